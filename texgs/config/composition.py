@@ -61,67 +61,53 @@ class Repository(ConfigRepository):
             raise ConfigError(problem) from error
 
 
-class Files:
-    """The files of some folders, each of which is read once, and the orders in which Hydra merges them."""
-
-    def __init__(self, places: Places) -> None:
-        self.repository = CachingConfigRepository(Repository(places))
-        self._values: dict[str, dict[str, Any]] = {}
-        self._listed: dict[tuple[str, Words], list[tuple[str, str]]] = {}
-
-    def is_choice(self, override: Override) -> bool:
-        """Return whether an override chooses a file of a group, rather than setting a key."""
-        return self.repository.group_exists(override.key_or_group) and not isinstance(override.value(), dict)
-
-    def chosen(self, choices: Words) -> list[tuple[str, str]]:
-        """Return names and packages of the files that some words choose, those that count most at the end.
-
-        What a recipe or an edit consists of does not depend on other choices, unless its files override them:
-        a run, which needs all combinations, finds each once.
-        """
-        alone: dict[str, list[tuple[str, str]]] = {}
-        for override in map(parsed, choices):
-            if override.key_or_group in ALONE and override.type is OverrideType.CHANGE:
-                files = self.listed(f"{override.key_or_group}/{override.value()}")
-                alone[override.key_or_group] = files
-        if any(package != group for group, files in alone.items() for _, package in files):
-            return self.listed("config", choices)
-        rest = tuple(word for word in choices if parsed(word).key_or_group not in alone)
-        files = self.listed("config", rest)
-        for group, own in alone.items():
-            at = next(index for index, (_, package) in enumerate(files) if package == group)
-            files = [*files[:at], *own, *(each for each in files[at:] if each[1] != group)]
-        return files
-
-    def listed(self, name: str, choices: Words = ()) -> list[tuple[str, str]]:
-        """Return the files of a configuration in the order that Hydra gives them."""
-        if (name, choices) not in self._listed:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # a recipe or an edit by itself needs no _self_
-                listed = create_defaults_list(
-                    self.repository, name, [*map(parsed, choices)], prepend_hydra=False, skip_missing=True
-                )
-            files = [(each.config_path or "", each.package or "") for each in listed.defaults]
-            self._listed[name, choices] = files
-        return self._listed[name, choices]
-
-    def values(self, name: str, package: str) -> dict[str, Any]:
-        """Return the values of a file, by the names of a package such as `fit`."""
-        if name not in self._values:
-            loaded = self.repository.load_config(name)
-            values: Any = OmegaConf.to_container(loaded.config) if loaded else {}
-            if not isinstance(values, dict):
-                raise mismatch(package or name, "keys with values", values)
-            for part in reversed(package.split(".") if package else ()):
-                values = {part: values}
-            self._values[name] = values
-        return self._values[name]
-
-
 @lru_cache(maxsize=16)
-def files_of(places: Places, _changed: tuple[int, ...]) -> Files:
+def files_of(places: Places, _changed: tuple[int, ...]) -> CachingConfigRepository:
     """Return the files of some folders as they are since their last change."""
-    return Files(places)
+    return CachingConfigRepository(Repository(places))
+
+
+@lru_cache(maxsize=4096)
+def listed(files: CachingConfigRepository, name: str, choices: Words = ()) -> list[tuple[str, str]]:
+    """Return names and packages of the files of a configuration, in the order that Hydra gives them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # a recipe or an edit by itself needs no _self_
+        own = create_defaults_list(
+            files, name, [*map(parsed, choices)], prepend_hydra=False, skip_missing=True
+        )
+    return [(each.config_path or "", each.package or "") for each in own.defaults]
+
+
+def chosen(files: CachingConfigRepository, choices: Words) -> list[tuple[str, str]]:
+    """Return names and packages of the files that some words choose, those that count most at the end.
+
+    What a recipe or an edit consists of does not depend on other choices, unless its files override them:
+    a run, which needs all combinations, finds each once.
+    """
+    alone: dict[str, list[tuple[str, str]]] = {}
+    for override in map(parsed, choices):
+        group = override.key_or_group
+        if group in ALONE and override.type is OverrideType.CHANGE:
+            alone[group] = listed(files, f"{group}/{override.value()}")
+    if any(package != group for group, own in alone.items() for _, package in own):
+        return listed(files, "config", choices)
+    together = listed(files, "config", tuple(x for x in choices if parsed(x).key_or_group not in alone))
+    for group, own in alone.items():
+        at = next(index for index, (_, package) in enumerate(together) if package == group)
+        together = [*together[:at], *own, *(each for each in together[at:] if each[1] != group)]
+    return together
+
+
+@lru_cache(maxsize=4096)
+def values_of(files: CachingConfigRepository, name: str, package: str) -> dict[str, Any]:
+    """Return the values of a file, by the names of a package such as `fit`."""
+    loaded = files.load_config(name)
+    values: Any = OmegaConf.to_container(loaded.config) if loaded else {}
+    if not isinstance(values, dict):
+        raise mismatch(package or name, "keys with values", values)
+    for part in reversed(package.split(".") if package else ()):
+        values = {part: values}
+    return values
 
 
 def composition(words: Words, places: Places) -> dict[str, Any]:
@@ -137,14 +123,17 @@ def composition(words: Words, places: Places) -> dict[str, Any]:
     """
     paths = (path for place in places for path in sorted(place.rglob("*.yaml")))
     files = files_of(places, tuple(path.stat().st_mtime_ns for path in paths if path.is_file()))
+    choices: Words = ()
     for word in words:
-        if parsed(word).is_sweep_override():
+        override = parsed(word)
+        if override.is_sweep_override():
             raise ConfigError(several_values(word))
-    choices = tuple(word for word in words if files.is_choice(parsed(word)))
+        if files.group_exists(override.key_or_group) and not isinstance(override.value(), dict):
+            choices = (*choices, word)
     values = asdict(Config())
     values["data_folder"] = os.environ.get("TEXGS_DATA", values["data_folder"])
-    for name, package in files.chosen(choices):
-        merge(values, files.values(name, package))
+    for name, package in chosen(files, choices):
+        merge(values, values_of(files, name, package))
     for word in words:
         if word not in choices:
             apply(values, parsed(word))

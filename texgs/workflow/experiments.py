@@ -37,8 +37,7 @@ class LeftOut:
 class Selection:
     """The configurations of a run."""
 
-    lacking: Callable[[Config], Sequence[str]]  # what is not here of what a configuration needs
-    skips: bool  # whether what lacks something is left out
+    lacking: Callable[[Config], Sequence[str]]  # sentences for which a configuration is left out
     by_sweep: dict[str, list[Config]] = field(default_factory=lambda: defaultdict(list))  # "": of none
     left_out: dict[LeftOut, dict[str, None]] = field(default_factory=dict)  # with the places of its jobs
 
@@ -49,7 +48,7 @@ class Selection:
 
     def takes(self, config: Config, what: str) -> bool:
         """Return whether a configuration is run; what is left out is noted."""
-        reasons = self.lacking(config) if self.skips else ()
+        reasons = self.lacking(config)
         for why in reasons:
             places = self.left_out.setdefault(LeftOut(what, why.removeprefix(f"{what}: ")), {})
             places.update(dict.fromkeys(stage.place for stage in STAGES.values() if stage.applies(config)))
@@ -103,8 +102,8 @@ def selected(words: Words, lacking: Callable[[Config], Sequence[str]]) -> Select
     """
     plain, aimed = apart(words)
     base = compose(plain)
-    is_asked_for = any(word.startswith("missing=") for word in plain)
-    selection = Selection(lacking, base.missing == "skip" and (is_asked_for or not named(plain)))
+    is_asked_for = any(word.startswith("missing=") for word in plain) or not named(plain)
+    selection = Selection(lacking if base.missing == "skip" and is_asked_for else lambda config: ())
     reached: set[str] = set()
     of_union = base.aimed if base.experiments else {}
     for part in parts(plain, base):

@@ -6,7 +6,7 @@ import csv
 import statistics
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -28,6 +28,7 @@ class Forecast:
     """A run before it is started."""
 
     selection: Selection
+    missing: Sequence[str]  # what it would stop at, a sentence each
     to_do: Mapping[str, int]  # jobs by stage
     done: int  # jobs whose results are there
     seconds: float  # of what is to be done, on the machine of speeds.csv
@@ -63,7 +64,7 @@ def forecast(words: tuple[str, ...]) -> Forecast:
             continue
         to_do[job.stage.name] += 1
         seconds += STEP_SECONDS + table[job.stage.name].seconds(*work_of(job, planned.configs[folder]))
-    return Forecast(selection, to_do, done, seconds + (START_SECONDS if to_do else 0))
+    return Forecast(selection, [*planned.missing], to_do, done, seconds + (START_SECONDS if to_do else 0))
 
 
 def work_of(job: Job, config: Config) -> tuple[float, int]:
@@ -112,16 +113,12 @@ def probe() -> float:
 def show(words: tuple[str, ...]) -> int:
     """Print a forecast, a line for each thing; return 1 if the run would not start."""
     expected = forecast(words)
-    selection = expected.selection
-    configs = selection.configs
-    for config in {config.dataset.name: config for config in configs[::-1]}.values():  # of its fits
-        if selection.skips or not selection.lacking(config):
-            print(f"ok       data set {config.dataset.name:16} {source(config)}")
-    for entry in selection.left_out:
+    for name, config in {each.dataset.name: each for each in expected.selection.configs[::-1]}.items():
+        if not any(line.startswith(f"data set {name}:") for line in expected.missing):
+            print(f"ok       data set {name:16} {source(config)}")
+    for entry in expected.selection.left_out:
         print(f"left out {entry.what}: {entry.why}")
-    needed = () if selection.skips else configs
-    stops = dict.fromkeys(line for config in needed for line in selection.lacking(config))
-    for line in stops:
+    for line in expected.missing:
         print(f"missing  {line}")
     kinds = ", ".join(f"{count} {stage}" for stage, count in expected.to_do.items())
     print(f"jobs     {sum(expected.to_do.values())} to do ({kinds or 'none'}), {expected.done} done")
@@ -130,7 +127,7 @@ def show(words: tuple[str, ...]) -> int:
         f"time     about {duration(expected.seconds * slower)}: an estimate, from speeds measured on other "
         f"scenes; just now this machine rasterizes {1 / slower:.1f} times as fast as theirs"
     )
-    return 1 if stops else 0
+    return 1 if expected.missing else 0
 
 
 def duration(seconds: float) -> str:
