@@ -5,18 +5,20 @@ import stat
 import pytest
 
 from texgs.core import io
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import LONGEST, ArgumentError, TexgsError, printable
+from texgs.core.image import read_rgba
+from texgs.core.io import read_json, write_bytes
 
 
 def test_json_round_trip_creates_folders(tmp_path):
     path = io.write_json(tmp_path / "a" / "b.json", {"z": 1, "a": [0.5, None]})
-    assert io.read_json(path) == {"z": 1, "a": [0.5, None]}
+    assert read_json(path) == {"z": 1, "a": [0.5, None]}
     assert path.read_text().startswith('{\n  "z": 1')
     assert path.read_text().endswith("}\n")
 
 
 def test_failed_write_leaves_the_old_file_and_no_other(tmp_path):
-    path = io.write_bytes(tmp_path / "file", b"old")
+    path = write_bytes(tmp_path / "file", b"old")
 
     def fail(file):
         file.write(b"half")
@@ -32,7 +34,7 @@ def test_failed_write_leaves_the_old_file_and_no_other(tmp_path):
 def test_mode_follows_the_umask(tmp_path):
     old = os.umask(0o027)
     try:
-        path = io.write_bytes(tmp_path / "file", b"")
+        path = write_bytes(tmp_path / "file", b"")
     finally:
         os.umask(old)
     assert stat.S_IMODE(path.stat().st_mode) == 0o640
@@ -42,12 +44,12 @@ def test_mistakes_are_named(tmp_path):
     with pytest.raises(ArgumentError, match="cannot be written as JSON"):
         io.write_json(tmp_path / "x.json", {"x": float("nan")})
     with pytest.raises(ArgumentError, match="no such file"):
-        io.read_json(tmp_path / "none.json")
-    io.write_bytes(tmp_path / "bad.json", b"{\n]")
+        read_json(tmp_path / "none.json")
+    write_bytes(tmp_path / "bad.json", b"{\n]")
     with pytest.raises(ArgumentError, match=r"expected JSON, got .*line 2"):
-        io.read_json(tmp_path / "bad.json")
+        read_json(tmp_path / "bad.json")
     with pytest.raises(ArgumentError, match="cannot write there"):
-        io.write_bytes(tmp_path / "bad.json" / "below", b"")
+        write_bytes(tmp_path / "bad.json" / "below", b"")
 
 
 def test_a_full_disk_is_one_sentence(tmp_path):
@@ -57,3 +59,48 @@ def test_a_full_disk_is_one_sentence(tmp_path):
     with pytest.raises(ArgumentError, match="no space left there"):
         io.write_atomic(tmp_path / "a", fill)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (ValueError("no\n  good"), r"f: expected a thing, got no good; is the file damaged"),
+        (KeyError("size"), r"expected a thing, got a header without 'size'"),
+        (RecursionError("maximum"), r"expected a thing, got what is nested too deeply"),
+        (AssertionError(), r"expected a thing, got AssertionError"),
+        (PermissionError(13, "Permission denied"), r"f: cannot be read \(Permission denied\)"),
+        (OSError("broken data stream"), r"expected a thing, got broken data stream"),
+    ],
+)
+def test_what_a_library_raises_is_one_sentence(tmp_path, error, message):
+    path = write_bytes(tmp_path / "f", b"")
+    with pytest.raises(ArgumentError, match=message), io.reading(path, "a thing"):
+        raise error
+
+
+@pytest.mark.skipif(os.name == "nt", reason="named pipes are POSIX")
+def test_a_named_pipe_a_folder_and_a_device_are_no_files(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    kinds = ((tmp_path / "pipe", "a named pipe"), (tmp_path, "a folder"), ("/dev/zero", "a device"))
+    for path, kind in kinds:
+        for read in (read_json, read_rgba):
+            with pytest.raises(ArgumentError, match=rf"expected .*, got {kind}"):
+                read(path)
+    with pytest.raises(ArgumentError, match="got a device or a named pipe"):
+        write_bytes(tmp_path / "pipe", b"")
+
+
+def test_deep_and_long_json(tmp_path):
+    with pytest.raises(ArgumentError, match="expected JSON, got what is nested too deeply"):
+        read_json(write_bytes(tmp_path / "deep.json", b"[" * 100_000))
+    with pytest.raises(ArgumentError, match="expected JSON, got Exceeds the limit"):
+        read_json(write_bytes(tmp_path / "long.json", b"9" * 5000))
+
+
+def test_a_message_is_one_line_of_bounded_length_that_a_terminal_can_show():
+    name = "a\x1b[2J\u202eb\n\udcff"
+    assert str(TexgsError(f"{name}: no")) == "a\\x1b[2J\\u202eb \\udcff: no"
+    assert len(str(TexgsError("x" * 10**6 + "; do this"))) <= LONGEST + 5 <= 605
+    assert str(TexgsError("x" * 10**6 + "; do this")).endswith("; do this")
+    assert printable("naïve 体积 ½") == "naïve 体积 ½"
+    assert str(TexgsError(name)).isprintable()

@@ -13,48 +13,13 @@ NUMBERS = (
 )
 # What is put in the middle of a text.
 WORDS = (
-    *(
-        b"../../../../etc/passwd",
-        b"\x1b[2J\x07",
-        b"\x00",
-        b"$x_{$",
-        b"${oc.env:HOME}",
-        b"\xff\xfe",
-        b"%d",
-        b"\n",
-    ),
-    *(
-        b"[" * 20000,
-        b'{"a":' * 20000,
-        b"<a>" * 2000,
-        b"'" * 3,
-        b"!!python/object:os.system",
-        b"*a",
-        b"&a [*a, *a]",
-    ),
-    *(
-        "\N{RIGHT-TO-LEFT OVERRIDE}\N{PILE OF POO}".encode(),
-        b"/dev/zero",
-        b"2001-99-99",
-        b"null",
-        b"A" * 5000,
-    ),
+    *(b"../../../../etc/passwd", b"\x1b[2J\x07", b"\x00", b"$x_{$", b"${oc.env:HOME}", b"\xff\xfe", b"%d"),
+    *(b"\n", b"[" * 20000, b'{"a":' * 20000, b"<a>" * 2000, b"'" * 3, b"!!python/object:os.system"),
+    *(b"*a", b"&a [*a, *a]", "\N{RIGHT-TO-LEFT OVERRIDE}\N{PILE OF POO}".encode(), b"/dev/zero"),
+    *(b"2001-99-99", b"null", b"A" * 5000),
 )
-SIZES = (
-    0,
-    1,
-    0x7F,
-    0x80,
-    0xFF,
-    0xFFFF,
-    0x7FFFFFFF,
-    0x80000000,
-    0xFFFFFFFF,
-    2**40,
-    2**63 - 1,
-    2**63,
-    2**64 - 1,
-)
+# What a binary number is replaced by.
+SIZES = (0, 1, 0x7F, 0x80, 0xFF, 0xFFFF, 2**31 - 1, 2**31, 2**32 - 1, 2**40, 2**63 - 1, 2**63, 2**64 - 1)
 
 
 def mutated(data: bytes, random: random.Random) -> bytes:

@@ -17,16 +17,8 @@ from tests.fuzz.readers import READERS
 from texgs.core.errors import LONGEST
 
 CASES = int(os.environ.get("TEXGS_FUZZ_CASES", "40"))
-IN_A_PROCESS_EACH = (
-    ".vti",
-    ".vtk",
-    ".slc",
-    ".mha",
-    ".mhd",
-    ".nrrd",
-    ".nhdr",
-    "samples",
-)  # a file takes a second
+# A file of these takes a second.
+IN_A_PROCESS_EACH = (".vti", ".vtk", ".slc", ".mha", ".mhd", ".nrrd", ".nhdr", "samples")
 SECONDS = 300.0  # for all files of a reader
 ROOT = Path(__file__).parents[2]
 

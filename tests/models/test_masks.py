@@ -151,18 +151,9 @@ def tiny_sam(tmp_path_factory):
     """A folder with a random SAM of transformers, of images of 64x64."""
     transformers = pytest.importorskip("transformers")
     torch.manual_seed(0)
-    vision = {
-        "hidden_size": 16,
-        "num_hidden_layers": 2,
-        "num_attention_heads": 2,
-        "image_size": 64,
-        "patch_size": 16,
-        "output_channels": 32,
-        "window_size": 2,
-        "global_attn_indexes": [1],
-        "mlp_dim": 32,
-        "num_pos_feats": 16,
-    }
+    vision = {"hidden_size": 16, "num_hidden_layers": 2, "num_attention_heads": 2, "image_size": 64}
+    vision |= {"patch_size": 16, "output_channels": 32, "window_size": 2, "global_attn_indexes": [1]}
+    vision |= {"mlp_dim": 32, "num_pos_feats": 16}
     prompt = {"hidden_size": 32, "image_size": 64, "patch_size": 16, "mask_input_channels": 4}
     decoder = {"hidden_size": 32, "mlp_dim": 32, "num_hidden_layers": 1, "num_attention_heads": 2}
     decoder |= {"iou_head_hidden_dim": 16}
@@ -197,19 +188,11 @@ def test_a_sam_folder_agrees_with_the_pipeline_of_transformers(tiny_sam):
     assert torch.equal(sam(image, points, torch.tensor([True, False])), logits > 0)
 
 
-def test_folders_that_hold_no_sam(tiny_sam, tmp_path):
+def test_folders_that_hold_no_sam(tmp_path):
     with pytest.raises(ArgumentError, match=r"config\.json: no such file"):
         sam_folder(tmp_path)
     (tmp_path / "config.json").write_text('{"model_type": "clip"}')
     with pytest.raises(ArgumentError, match="expected a model of type sam, got clip"):
-        sam_folder(tmp_path)
-    (tmp_path / "config.json").write_text((tiny_sam / "config.json").read_text())
-    with pytest.raises(
-        ArgumentError, match=r"expected a sam model of transformers, got .*; copy or download it again"
-    ):
-        sam_folder(tmp_path)
-    (tmp_path / "model.safetensors").write_bytes((tiny_sam / "model.safetensors").read_bytes()[:1000])
-    with pytest.raises(ArgumentError, match=r"got .*; copy or download it again"):
         sam_folder(tmp_path)
 
 
@@ -259,20 +242,3 @@ def test_mobile_sam_finds_the_disc_clicked_on():
     sam = published_sam("mobile_sam", path)
     for (x, y), mask in zip(((30, 30), (70, 40), (45, 74)), masks, strict=True):
         assert overlap(sam(image, *click((x, y))), mask) > 0.9
-
-
-def test_mobile_sam_gives_the_masks_of_kornia():
-    """kornia's own way from a click to masks, which counts from the centres of pixels."""
-    from kornia.contrib.visual_prompter import VisualPrompter
-    from kornia.models.sam import SamConfig
-
-    path = real_data("weights/mobile_sam.pt")
-    image, _ = picture((30, 30, 16, YELLOW), (60, 40, 12, BLUE), (45, 74, 14, RED))
-    image = image[:, :72].contiguous()
-    prompter = VisualPrompter(SamConfig("mobile_sam", checkpoint=str(path)))
-    prompter.set_image(image.permute(2, 0, 1))
-    ours = published_sam("mobile_sam", path, dtype=torch.float32)
-    for at in ((30.0, 30.0), (60.0, 40.0), (45.0, 74.0)):
-        theirs = prompter.predict(torch.tensor([[at]]) - 0.5, torch.ones(1, 1))
-        expected = theirs.binary_masks[0, theirs.scores[0].argmax()]
-        assert overlap(ours(image, *click(at)), expected) > 0.99

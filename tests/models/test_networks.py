@@ -1,7 +1,12 @@
+from pathlib import Path
+
 import pytest
 import torch
+from safetensors.torch import save_file
 
+from texgs.core.errors import ArgumentError
 from texgs.models import networks
+from texgs.models.networks import read_tensors
 
 
 @pytest.mark.parametrize(
@@ -23,3 +28,43 @@ def test_the_format_is_what_the_processor_says(tmp_path, monkeypatch, text, expe
     networks.has_bfloat16.cache_clear()
     assert networks.fast_dtype("cpu") == torch.float32
     networks.has_bfloat16.cache_clear()
+
+
+def test_only_the_tensors_asked_for_come_back(tmp_path):
+    tensors = {"a": torch.arange(3.0), "b": torch.ones(2, 2)}
+    save_file(tensors, tmp_path / "x.safetensors")
+    torch.save(tensors, tmp_path / "x.pth")
+    torch.save(tensors, tmp_path / "old.pth", _use_new_zipfile_serialization=False)
+    for name in ("x.safetensors", "x.pth", "old.pth"):
+        assert read_tensors(tmp_path / name).keys() == tensors.keys()
+        (item,) = read_tensors(tmp_path / name, ["b"]).items()
+        assert item[0] == "b"
+        assert torch.equal(item[1], tensors["b"])
+        with pytest.raises(ArgumentError, match=f"{name}: expected tensor c, got a, b"):
+            read_tensors(tmp_path / name, ["b", "c"])
+
+
+class Harmful:
+    def __reduce__(self):
+        return (Path.touch, (Path("harm"),))
+
+
+def test_a_damaged_file_and_one_that_holds_code_are_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    torch.save({"a": torch.ones(1000), "b": Harmful()}, tmp_path / "code.pth")
+    torch.save({"a": torch.ones(1000)}, tmp_path / "x.pth")
+    save_file({"a": torch.ones(1000)}, tmp_path / "x.safetensors")
+    for name in ("x.pth", "x.safetensors"):
+        whole = (tmp_path / name).read_bytes()
+        (tmp_path / f"cut_{name}").write_bytes(whole[: len(whole) // 2])
+        (tmp_path / f"text_{name}").write_bytes(b"<html>not found</html>")
+        (tmp_path / f"empty_{name}").touch()
+    bad = [path for path in tmp_path.iterdir() if path.name not in ("x.pth", "x.safetensors")]
+    assert len(bad) == 7
+    for path in bad:
+        with pytest.raises(ArgumentError, match=r"expected a file of weights, .* copy or download") as caught:
+            read_tensors(path)
+        assert "\n" not in str(caught.value)
+    assert not Path("harm").exists()
+    with pytest.raises(ArgumentError, match=r"gone\.pth: no such file"):
+        read_tensors(tmp_path / "gone.pth")

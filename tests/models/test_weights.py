@@ -1,10 +1,7 @@
 import hashlib
 from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
-import torch
-from safetensors.torch import save_file
 
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError, MissingDataError
@@ -58,9 +55,7 @@ def test_another_file_of_that_name_is_refused_also_after_it_was_whole(folder):
     assert available("tiny")
     put(path, b"half of")
     for look in (locate, available):
-        with pytest.raises(
-            ArgumentError, match=f"tiny.bin: expected the weights of tiny with checksum {CHECKSUM[:12]}"
-        ):
+        with pytest.raises(ArgumentError, match=f"tiny.bin: expected .* with checksum {CHECKSUM[:12]}"):
             look("tiny")
 
 
@@ -107,45 +102,3 @@ def test_the_catalogue_says_what_each_file_is():
 def test_real_weights_are_whole(name, monkeypatch):
     monkeypatch.setenv("TEXGS_WEIGHTS", str(real_data("weights")))
     assert len(read_tensors(locate(name))) > 4
-
-
-def test_only_the_tensors_asked_for_come_back(tmp_path):
-    tensors = {"a": torch.arange(3.0), "b": torch.ones(2, 2)}
-    save_file(tensors, tmp_path / "x.safetensors")
-    torch.save(tensors, tmp_path / "x.pth")
-    torch.save(tensors, tmp_path / "old.pth", _use_new_zipfile_serialization=False)
-    for name in ("x.safetensors", "x.pth", "old.pth"):
-        assert read_tensors(tmp_path / name).keys() == tensors.keys()
-        (item,) = read_tensors(tmp_path / name, ["b"]).items()
-        assert item[0] == "b"
-        assert torch.equal(item[1], tensors["b"])
-        with pytest.raises(ArgumentError, match=f"{name}: expected tensor c, got a, b"):
-            read_tensors(tmp_path / name, ["b", "c"])
-
-
-class Harmful:
-    def __reduce__(self):
-        return (Path.touch, (Path("harm"),))
-
-
-def test_a_damaged_file_and_one_that_holds_code_are_refused(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    torch.save({"a": torch.ones(1000), "b": Harmful()}, tmp_path / "code.pth")
-    torch.save({"a": torch.ones(1000)}, tmp_path / "x.pth")
-    save_file({"a": torch.ones(1000)}, tmp_path / "x.safetensors")
-    for name in ("x.pth", "x.safetensors"):
-        whole = (tmp_path / name).read_bytes()
-        (tmp_path / f"cut_{name}").write_bytes(whole[: len(whole) // 2])
-        (tmp_path / f"text_{name}").write_bytes(b"<html>not found</html>")
-        (tmp_path / f"empty_{name}").touch()
-    bad = [path for path in tmp_path.iterdir() if path.name not in ("x.pth", "x.safetensors")]
-    assert len(bad) == 7
-    for path in bad:
-        with pytest.raises(
-            ArgumentError, match=r"expected a file of weights, got .*; copy or download it again"
-        ) as caught:
-            read_tensors(path)
-        assert "\n" not in str(caught.value)
-    assert not Path("harm").exists()
-    with pytest.raises(ArgumentError, match=r"gone\.pth: no such file"):
-        read_tensors(tmp_path / "gone.pth")

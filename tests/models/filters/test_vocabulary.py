@@ -42,7 +42,7 @@ def test_usual_wordings(instruction, name):
         "not gold",
         "make it",
         "a painting",
-        "gold but darker",
+        "gold, darker",
         "#12",
     ],
 )
