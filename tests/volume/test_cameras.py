@@ -95,11 +95,6 @@ def test_cameras_are_spread_evenly_over_a_path():
     assert cameras.spread(path, 1) == path[:1]
 
 
-def test_mistakes_are_named():
-    for make, message in [
-        (lambda: cameras.icosphere(0, **LENS), "frequency: expected at least 1, got 0"),
-        (lambda: cameras.spiral(1, **LENS), "count: expected at least 2 cameras on a path from pole to pole"),
-        (lambda: cameras.orbit_path(0, 0, **LENS), "count: expected at least 1 camera, got 0"),
-    ]:
-        with pytest.raises(ArgumentError, match=message):
-            make()
+def test_a_spiral_has_two_ends():
+    with pytest.raises(ArgumentError, match="count: expected at least 2 cameras on a path from pole to pole"):
+        cameras.spiral(1, **LENS)

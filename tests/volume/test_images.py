@@ -78,7 +78,6 @@ def test_mistakes_are_named(tmp_path):
     view, _ = random_view(tmp_path, cameras(1, size=8)[0])
     large = replace(view, camera=replace(view.camera, width=1 << 20, height=1 << 20))
     for views, reduce, message in [
-        ([], 1, "views: expected at least one, got none"),
         ([view], 3, "reduce: expected a divisor of 8 x 8 pixels, got 3"),
         ([replace(view, path=tmp_path / "gone.png")], 1, r"gone\.png: no such file"),
         ([large], 1, "1 views of 1048576 x 1048576 pixels"),

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.volume import render
-from texgs.volume.render import Appearance, Times, directions, render_views
+from texgs.volume.render import Times, directions, render_views
 from texgs.volume.view_set import View
 
 
@@ -63,14 +62,6 @@ def test_an_interruption_before_an_image_is_written_loses_no_time(views, tmp_pat
     assert [entry["is_first"] for entry in after.values()] == [True, False, False, True, False, False]
     assert times.first == [entry["ms"] for entry in after.values() if entry["is_first"]]
     assert times.others == [entry["ms"] for entry in after.values() if not entry["is_first"]]
-
-
-@pytest.mark.parametrize("field", ["ambient", "diffuse", "specular", "shininess", "step", "opacity_unit"])
-@pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf")])
-def test_factors_and_lengths_are_checked(field, value):
-    least = "more than 0" if field in ("step", "opacity_unit") else "at least 0"
-    with pytest.raises(ArgumentError, match=f"{field}: expected {least}, got {value}"):
-        Appearance(**{field: value})
 
 
 def test_viewer_and_lights_are_distant():

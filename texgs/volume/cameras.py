@@ -30,12 +30,7 @@ def icosphere(frequency: int, radius: float, fov_y: float, width: int, height: i
         fov_y: vertical field of view, degrees.
         width: pixels.
         height: pixels.
-
-    Raises:
-        ArgumentError: if an argument is out of range.
     """
-    if frequency < 1:
-        raise ArgumentError(f"frequency: expected at least 1, got {frequency}")
     angles = [(degrees(asin(y)), degrees(atan2(-z, x))) for x, y, z in geodesic_vertices(frequency).tolist()]
     # Rounded, because heights that are equal by symmetry differ in the last bit.
     angles.sort(key=lambda pair: (round(pair[0], 9), pair[1]))
@@ -67,8 +62,6 @@ def orbit_path(
     They are `polar` degrees above the horizon, the first at the azimuth `start`: by default in front (+z, for
     polar 0). The lens is that of `icosphere`.
     """
-    if count < 1:
-        raise ArgumentError(f"count: expected at least 1 camera, got {count}")
     turn = [start + 360 * index / count for index in range(count)]
     return [orbit(azimuth, polar, radius, fov_y, width, height) for azimuth in turn]
 

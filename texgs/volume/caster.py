@@ -125,8 +125,6 @@ class Caster:
 
     def cast(self, tf: TransferFunction, camera: Camera, light: Light, outputs: Collection[str] = ()) -> Cast:
         """Cast a view, with what else is wanted of OUTPUTS, in one pass; without gradients and skew."""
-        if unknown := sorted(set(outputs) - set(OUTPUTS)):
-            raise ArgumentError(f"outputs: expected some of {', '.join(OUTPUTS)}, got {unknown[0]}")
         height, width = camera.height, camera.width
         require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
         self._check(camera)
@@ -151,8 +149,6 @@ class Caster:
 
     def _check(self, camera: Camera) -> None:
         """Refuse cameras and steps that the library would take for others."""
-        if camera.viewmat.requires_grad or camera.K.requires_grad:
-            raise ArgumentError("camera: not differentiable here, but it requires a gradient; detach it")
         pinhole(camera.viewmat.cpu(), camera.K.cpu())
         samples = self._diagonal / (self._appearance.step * self._voxel)
         if samples > MOST_SAMPLES:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from PIL import Image
 
-from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 
 COLUMNS = 6  # of a contact sheet, at most
@@ -18,7 +17,6 @@ MILLISECONDS = 80  # of a picture of an animation
 
 def write_contact_sheet(path: str | Path, pictures: Sequence[Image.Image]) -> Path:
     """Write a PNG with rows of pictures of any mode and size, in reading order, over white."""
-    _require_pictures(path, pictures)
     shown = [_thumbnail(_over_white(picture)) for picture in pictures]
     width, height = max(picture.width for picture in shown), max(picture.height for picture in shown)
     columns = min(COLUMNS, len(shown))
@@ -34,20 +32,9 @@ def write_contact_sheet(path: str | Path, pictures: Sequence[Image.Image]) -> Pa
 
 def write_animation(path: str | Path, pictures: Sequence[Image.Image]) -> Path:
     """Write an animated PNG of pictures of one size over white that repeats without end."""
-    _require_pictures(path, pictures)
-    if other := next((picture.size for picture in pictures if picture.size != pictures[0].size), None):
-        raise ArgumentError(
-            f"{path}: expected pictures of one size, got {pictures[0].size} and {other} pixels"
-        )
     first, *rest = [_over_white(picture) for picture in pictures]
     options = {"save_all": True, "append_images": rest, "duration": MILLISECONDS, "loop": 0}
     return write_atomic(path, lambda file: first.save(file, format="PNG", **options))
-
-
-def _require_pictures(path: str | Path, pictures: Sequence[Image.Image]) -> None:
-    """Require at least one picture."""
-    if not pictures:
-        raise ArgumentError(f"{path}: expected at least one picture, got none")
 
 
 def _over_white(picture: Image.Image) -> Image.Image:

@@ -111,19 +111,14 @@ def _ask(path: Path, series: str | None, is_header_only: bool) -> tuple[dict[str
 
 def _received(stream: IO[bytes], is_header_only: bool) -> tuple[dict[str, Any] | None, np.ndarray]:
     """Return what the process says about a volume, None if it died, and the samples where it sends some."""
-    said, values = json.loads(stream.readline(LONGEST_LINE) or "null"), np.empty(0)
+    said = json.loads(stream.readline(LONGEST_LINE) or "null")
     if said is None or "error" in said or is_header_only:
-        return said, values
+        return said, np.empty(0)
     dims, dtype = said["dims"], np.dtype(said["dtype"])
     require_room(dims, dtype)
-    values = np.empty(dims[::-1], dtype)
-    rest = memoryview(values.data).cast("B")
-    while len(rest):
-        count = stream.readinto(rest)  # type: ignore[attr-defined]
-        if not count:
-            return None, values
-        rest = rest[count:]
-    return said, values
+    samples = stream.read(byte_count(dims, dtype))
+    is_whole = len(samples) == byte_count(dims, dtype)
+    return (said, np.frombuffer(samples, dtype).reshape(dims[::-1])) if is_whole else (None, np.empty(0))
 
 
 def answer(path: Path, series: str | None, is_header_only: bool) -> None:
@@ -136,8 +131,10 @@ def answer(path: Path, series: str | None, is_header_only: bool) -> None:
         try:
             with reading_as(_kind(path)):
                 said, values = image_of(path, series, is_header_only)
-            printed.seek(0)
-            complain(printed.read())
+            printed.seek(0)  # what a library has printed instead of raising it
+            for line in printed:
+                if COMPLAINT.search(line) and "warning" not in line.lower():
+                    raise ArgumentError(f"the file is damaged or cut off, its reader says: {line.strip()}")
         except TexgsError as error:
             values, said = None, {"error": str(error), "is_memory": isinstance(error, OutOfMemoryError)}
         output.write(json.dumps(said).encode() + b"\n")
@@ -165,20 +162,9 @@ def image_of(
         from texgs.volume.vtk_image import read_vtk
 
         return read_vtk(path)
-    if path.is_dir():
-        from texgs.volume.dicom import read_dicom
+    from texgs.volume.itk_image import read_dicom, read_itk
 
-        return read_dicom(path, series)
-    from texgs.volume.itk_image import read_itk
-
-    return read_itk(path, is_header_only)
-
-
-def complain(printed: str) -> None:
-    """Raise what a library has printed instead of raising it."""
-    for line in printed.splitlines():
-        if COMPLAINT.search(line) and "warning" not in line.lower():
-            raise ArgumentError(f"the file is damaged or cut off, its reader says: {line.strip()}")
+    return read_dicom(path, series) if path.is_dir() else read_itk(path, is_header_only)
 
 
 if __name__ == "__main__":

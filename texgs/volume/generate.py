@@ -1,8 +1,7 @@
 """Volumes made here, for examples and tests: a sphere, an orbital, decaying turbulence, and jets.
 
-All are cubes of float32 in [0, 1] with spacing 1 and at least 16 samples along each side, and the same
-everywhere for the same arguments up to rounding. Turbulence and jets are one flow for each seed, whatever the
-size they are sampled at.
+All are cubes of float32 in [0, 1] with spacing 1, and the same everywhere for the same arguments up to
+rounding. Turbulence and jets are one flow for each seed, whatever the size they are sampled at.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import torch
 from scipy.special import eval_genlaguerre, lpmv
 from torch import Tensor
 
-from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Grid
 from texgs.volume.navier_stokes import (
     curl,
@@ -29,7 +27,6 @@ from texgs.volume.navier_stokes import (
 )
 
 Array = np.ndarray
-SMALLEST = 16  # samples along each side
 ORBITAL = (4, 3, 0)  # quantum numbers n, l and m: 4f z^3
 FADED = 0.05  # of the largest amplitude along the radius of an orbital: what is farther out is cut off
 STEPS = 4096  # along the radius and the polar angle, where the largest amplitude is looked for
@@ -45,7 +42,6 @@ def sphere(size: int) -> Grid:
     With a transfer function that is opaque at high values and faint at low ones it is the paper's synthetic
     sphere: an opaque centre in a low-opacity shell.
     """
-    _check_size(size)
     axis = torch.linspace(-1, 1, size)
     distance = (axis[:, None, None] ** 2 + axis[:, None] ** 2 + axis**2).sqrt()
     return _grid(0.5 + 0.5 * torch.cos(pi * distance.clamp_max(1)))
@@ -56,7 +52,6 @@ def orbital(size: int) -> Grid:
 
     Along +y are a lobe and a ring, both above it, and their mirror image, below it.
     """
-    _check_size(size)
     return _grid(torch.from_numpy(0.5 + 0.5 * orbital_cube(size, *ORBITAL)))
 
 
@@ -66,7 +61,6 @@ def turbulence(size: int, seed: int = 0) -> Grid:
     A direct numerical simulation from random solenoidal motion; see `navier_stokes.evolve`. Divided by the
     largest magnitude.
     """
-    _check_size(size)
     (velocity,) = evolve(random_flow(TURBULENCE_RESOLUTION, 1.5, 2.5, seed), VISCOSITY, [DURATION])
     vorticity = curl(velocity)
     place = _places(size)
@@ -83,7 +77,6 @@ def jets(size: int, seed: int = 0) -> Grid:
     A stand-in for the five jets data set, not the data. The jets are simulated as they develop in time,
     moving along with their shear layers; height stands for time (Taylor's hypothesis).
     """
-    _check_size(size)
     n_frames, speed = 48, 0.5  # snapshots; speed at which the shear layers rise
     frame_of_row = torch.linspace(0, n_frames - 1, size)
     times = [2 * pi / speed * index / (n_frames - 1) for index in range(n_frames)]
@@ -130,12 +123,6 @@ def _five_jets(n: int) -> Tensor:
 def _places(size: int) -> Tensor:
     """Return where the samples of a periodic box lie along one axis, [size]."""
     return 2 * pi / size * torch.arange(size)
-
-
-def _check_size(size: int) -> None:
-    """Require enough samples."""
-    if size < SMALLEST:
-        raise ArgumentError(f"size: expected at least {SMALLEST} samples along each side, got {size}")
 
 
 def _grid(values: Tensor) -> Grid:

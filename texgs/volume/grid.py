@@ -106,13 +106,6 @@ def require_room(dims: Dims, dtype: np.dtype, beside: int = 0) -> None:
     )
 
 
-def upright(up: str) -> AxisPermutation:
-    """Return the permutation that makes the volume's axis `up` the world's +y."""
-    if up not in UPRIGHT:
-        raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up!r}")
-    return UPRIGHT[up]
-
-
 def closest(directions: np.ndarray) -> AxisPermutation:
     """For each axis of space find the stored axis that runs along it most nearly, and its sign.
 

@@ -100,10 +100,8 @@ def load(views: Sequence[View], reduce: int = 1) -> Images:
     Every block of reduce x reduce pixels becomes one, the average of premultiplied colours.
 
     Raises:
-        ArgumentError: if there is no view, or the size cannot be divided.
+        ArgumentError: if the size cannot be divided.
     """
-    if not views:
-        raise ArgumentError("views: expected at least one, got none")
     height, width = views[0].camera.height, views[0].camera.width
     if height % reduce or width % reduce:
         raise ArgumentError(f"reduce: expected a divisor of {width} x {height} pixels, got {reduce}")

@@ -12,7 +12,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
-from texgs.volume.grid import AxisPermutation, Dims, Triple, permuted_lattice, permuted_values, upright
+from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
 from texgs.volume.nrrd_file import WORDS, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
 
@@ -42,7 +42,7 @@ class Summary:
 
 def prepare(
     source: Source,
-    target: str | Path,
+    target: Path,
     *,
     crop: tuple[int, int, int, int, int, int] | None = None,
     reduce: int = 1,
@@ -75,14 +75,9 @@ def prepare(
         ArgumentError: if an argument is out of range, samples are not finite or do not fit float32, the
             volume is constant, or fewer than two samples are left along an axis. Nothing is written then.
     """
-    target = Path(target)
-    if target.suffix != ".nrrd":
-        raise ArgumentError(f"{target}: expected a target with the suffix .nrrd, got {target.suffix!r}")
-    if method not in REDUCERS:
-        raise ArgumentError(f"method: expected one of {', '.join(REDUCERS)}, got {method!r}")
     if nan_value is not None and not abs(nan_value) <= np.finfo(np.float32).max:
         raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
-    bounds, axes = _bounds(source.dims, crop), upright(up)
+    bounds, axes = _bounds(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
     kept = "uint8" if source.dtype.kind == "b" else source.dtype.name
     dtype = np.dtype(kept if kept in KEPT_TYPES else "float32")
@@ -160,8 +155,6 @@ def _bounds(dims: Dims, crop: tuple[int, ...] | None) -> Bounds:
 
 def _reduced_lattice(source: Source, bounds: Bounds, reduce: int) -> tuple[Dims, Triple, Triple]:
     """Return dims, spacing and origin after crop and reduction."""
-    if reduce < 1:
-        raise ArgumentError(f"reduce: expected an integer of at least 1, got {reduce}")
     nx, ny, nz = (-(-(high - low) // reduce) for low, high in bounds)
     if min(nx, ny, nz) < 2:
         raise ArgumentError(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -14,7 +13,6 @@ import torch
 from numpy.typing import NDArray
 
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
 from texgs.core.io import read_json, write_json
 from texgs.core.light import Light
@@ -25,11 +23,7 @@ from texgs.volume.view_set import View
 
 @dataclass(frozen=True)
 class Appearance:
-    """How a volume looks besides its transfer function: Blinn-Phong factors, and sampling.
-
-    Raises:
-        ArgumentError: if a factor is negative, or a length is not above 0.
-    """
+    """How a volume looks besides its transfer function: Blinn-Phong factors, and sampling."""
 
     ambient: float = 0.3
     diffuse: float = 0.7
@@ -37,14 +31,6 @@ class Appearance:
     shininess: float = 20.0
     step: float = 0.25  # sample distance, voxels of the finest axis
     opacity_unit: float = 0.005  # length over which a transfer function's opacity applies, world units
-
-    def __post_init__(self) -> None:
-        for name in ("ambient", "diffuse", "specular", "shininess"):
-            if not 0 <= getattr(self, name) < inf:
-                raise ArgumentError(f"{name}: expected at least 0, got {getattr(self, name)}")
-        for name in ("step", "opacity_unit"):
-            if not 0 < getattr(self, name) < inf:
-                raise ArgumentError(f"{name}: expected more than 0, got {getattr(self, name)}")
 
 
 class VolumeRenderer(Protocol):

@@ -136,10 +136,6 @@ def _open_raw(
     if dims is None or dtype is None:
         missing = " and ".join(key for key, value in (("dims", dims), ("dtype", dtype)) if value is None)
         raise ArgumentError(f"plain samples have no header; set {missing}, and endian and skip where needed")
-    if endian not in ("little", "big"):
-        raise ArgumentError(f"endian: expected little or big, got {endian!r}")
-    if skip < 0:
-        raise ArgumentError(f"skip: expected at least 0 bytes, got {skip}")
     try:
         stored = np.dtype(dtype).newbyteorder("<" if endian == "little" else ">")
     except TypeError as error:

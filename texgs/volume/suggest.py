@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from texgs.core.errors import ArgumentError
 from texgs.volume.transfer import TransferFunction
 
 Array = NDArray[np.float64]
@@ -43,15 +42,13 @@ def suggest(
     of the bins they are taken for labels, the lowest for background. Higher values are more opaque.
 
     Args:
-        histogram: [n] counts of voxels in equal bins over [minimum, maximum], the range of the data.
+        histogram: [n] counts of voxels in equal bins over [minimum, maximum], the range of the data; two of
+            them at least are not 0.
         minimum: in data units.
         maximum: in data units.
         count: of functions, fewer where there are fewer values; by default what shows, at most 5.
-
-    Raises:
-        ArgumentError: if the histogram is no list of counts, holds one value only, or count is below 1.
     """
-    counts = _checked(histogram, minimum, maximum, count)
+    counts = np.asarray(histogram, dtype=np.float64)
     values = minimum + (np.arange(len(counts)) + 0.5) * (maximum - minimum) / len(counts)
     present = counts > 0
     if looks_like_labels(counts):
@@ -70,21 +67,6 @@ def suggest(
 def looks_like_labels(counts: Array) -> bool:
     """Return whether so few bins of a histogram hold voxels that the values are taken for labels."""
     return int(np.count_nonzero(counts)) <= FEW
-
-
-def _checked(histogram: ArrayLike, minimum: float, maximum: float, count: int | None) -> Array:
-    """Return the histogram as counts, once it is one."""
-    counts = np.asarray(histogram, dtype=np.float64)
-    if counts.ndim != 1 or not np.isfinite(counts).all() or (counts < 0).any() or not minimum < maximum:
-        raise ArgumentError(
-            f"histogram: expected [n] counts over minimum < maximum, got {list(counts.shape)} over "
-            f"[{minimum:g}, {maximum:g}]"
-        )
-    if (counts > 0).sum() < 2:
-        raise ArgumentError("histogram: expected at least two different values, got a constant volume")
-    if count is not None and count < 1:
-        raise ArgumentError(f"count: expected at least 1, got {count}")
-    return counts
 
 
 def _labels(counts: Array, count: int | None) -> list[Class]:

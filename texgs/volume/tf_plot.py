@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from texgs.core.errors import ArgumentError
 from texgs.core.figures import new_figure, words, write_figure
 from texgs.volume.transfer import TransferFunction
 
@@ -31,16 +30,8 @@ def plot(
     """Draw basic transfer functions over a volume's histogram [n] over [minimum, maximum], as PNG.
 
     Opacity is the height of each coloured area; the grey area is the number of voxels, on a log axis.
-
-    Raises:
-        ArgumentError: if the histogram is no list of counts, its range is empty, or the path is not writable.
     """
     counts = np.asarray(histogram, dtype=np.float64)
-    if counts.ndim != 1 or len(counts) == 0 or not minimum < maximum:
-        raise ArgumentError(
-            f"histogram: expected [n] counts over minimum < maximum, got {list(counts.shape)} over "
-            f"[{minimum:g}, {maximum:g}]"
-        )
     figure = new_figure(*SIZE, 100)
     opacity = figure.add_subplot()
     voxels = opacity.twinx()

@@ -70,37 +70,19 @@ def read_views(folder: str | Path) -> ViewSet:
 
 
 def write_transforms(
-    folder: str | Path, split: Literal["train", "test"], views: Sequence[View], metadata: Mapping[str, Any]
+    folder: Path, split: Literal["train", "test"], views: Sequence[View], metadata: Mapping[str, Any]
 ) -> Path:
-    """Write transforms_train.json or transforms_test.json for images in `folder`; they may come later.
+    """Write transforms_train.json or transforms_test.json for PNG files in `folder`; they may come later.
 
     All views have one size and lens; `metadata` are further keys, such as volume, tf, aabb and shading.
-
-    Raises:
-        ArgumentError: if views differ, an image is no PNG file in `folder`, or `metadata` has a key of the
-            layout.
     """
-    folder = Path(folder)
-    path = folder / f"transforms_{split}.json"
-    if not views:
-        raise ArgumentError(f"{path}: expected at least one view, got none")
-    if taken := [key for key in (*LENS_KEYS, "frames") if key in metadata]:
-        raise ArgumentError(
-            f"metadata: {', '.join(taken)} would overwrite what the views say; choose other keys"
-        )
-    lens = _lens_values(views[0].camera)
-    if other := next((view for view in views if _lens_values(view.camera) != lens), None):
-        raise ArgumentError(
-            f"{other.path}: expected the size and lens of {views[0].path}; other lenses need another folder"
-        )
     frames = [_frame(folder, view) for view in views]
-    return write_json(path, {**lens, **metadata, "frames": frames})
+    values = {**_lens_values(views[0].camera), **metadata, "frames": frames}
+    return write_json(folder / f"transforms_{split}.json", values)
 
 
 def _frame(folder: Path, view: View) -> dict[str, Any]:
     """Return one entry of the list of frames."""
-    if not view.path.is_relative_to(folder) or view.path.suffix != ".png":
-        raise ArgumentError(f"{view.path}: expected a .png file in {folder}")
     light: dict[str, Any] = {"kind": view.light.kind}
     if view.light.kind == "directional":
         light |= {"azimuth": view.light.azimuth, "polar": view.light.polar}
