@@ -6,10 +6,12 @@ import torch
 
 from texgs.core.camera import orbit
 from texgs.core.light import Light
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.loop import Fit
 from texgs.fit.seeds import surfels_at
 from texgs.fit.settings import Densify, Losses, Phase, Rates
+from texgs.metrics.quality import psnr
 from texgs.volume.images import Images
 
 SIZE = 32
@@ -50,6 +52,27 @@ def ball_images(count=6, **options):
     return images_of([ball_planes(camera) for camera in views], views)
 
 
+def blank_images(count=3, size=SIZE):
+    """Views of nothing."""
+    planes = torch.ones(4, size, size)
+    planes[3] = 0
+    return images_of([planes] * count, cameras(count, size))
+
+
+def quality(field, images):
+    """Mean PSNR over images."""
+    with torch.no_grad():
+        seen = [field.render(camera).color.clamp(0, 1) for camera in images.cameras]
+    return sum(psnr(color, images.target(i).color) for i, color in enumerate(seen)) / len(seen)
+
+
+def assert_same(tensors, expected):
+    """Both have the same names and bits."""
+    assert tensors.keys() == expected.keys()
+    for name, x in expected.items():
+        assert torch.equal(tensors[name], x), name
+
+
 def ball_seeds(count=80, seed=0, opacity=0.1):
     """Raw surfels with colours and one material at random points in a cube that holds the ball."""
     generator = torch.Generator().manual_seed(seed)
@@ -88,6 +111,11 @@ def run(fit, iterations=None):
         if done == iterations:
             break
     return fit
+
+
+def model_of(fit):
+    """The surfels of a fit as they are now."""
+    return Surfels({name: x.detach() for name, x in fit.parameters.items()}, fit.shading)
 
 
 def is_finite(parameters):

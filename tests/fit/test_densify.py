@@ -139,15 +139,6 @@ def test_surfels_may_all_be_removed():
     assert step(optimizer, []) == []
 
 
-def test_splits_depend_on_the_generator_only():
-    optimizers = [surfels([LARGE] * 2) for _ in range(3)]
-    for optimizer, seed in zip(optimizers, (0, 0, 1), strict=True):
-        step(optimizer, [1.0, 1.0], seed=seed)
-    first, same, other = (optimizer.parameters["means"] for optimizer in optimizers)
-    assert torch.equal(first, same)
-    assert not torch.equal(first, other)
-
-
 def test_one_material_stays_one_where_there_is_one_surfel():
     optimizer = surfels([LARGE])
     step(optimizer, [1e-3])

@@ -1,10 +1,11 @@
 import pytest
 import torch
+from scipy.spatial.transform import Rotation
 
 from texgs.core.errors import ArgumentError
-from texgs.core.image import write_png
 from texgs.fields.gaussians.model import Baked, Gaussians
 from texgs.fields.optimizer import Optimizer, Rate
+from texgs.fields.splats import screen_box
 from texgs.fit import checkpoint
 from texgs.fit.densify import SHRINK, DensityControl
 from texgs.fit.kinds import FitTask
@@ -12,11 +13,10 @@ from texgs.fit.kinds.gaussians import FIT, GaussianKeys
 from texgs.fit.loop import Fit
 from texgs.fit.seeds import seed_gaussians
 from texgs.fit.settings import CommonRates, Densify, Seeds
-from texgs.metrics.quality import evaluate, mean
 from texgs.raster.shading import Y00
-from texgs.volume.view_set import View, ViewSet
+from texgs.volume.view_set import ViewSet
 
-from .scenes import SIZE, ball_images, is_finite, run
+from .scenes import SIZE, assert_same, ball_images, is_finite, quality, run
 
 SEEDS = Seeds(kind="hull", count=80, opacity=0.1, half_size=0.4)
 DENSIFY = Densify(start=20, stop=120, every=20, cap=150)  # no resets, after which images are pale
@@ -31,21 +31,12 @@ def task_of(folder, **keys):
     return FitTask(GaussianKeys(**keys), views, ball_images(), folder, torch.device("cpu"), 0, "ball", {})
 
 
-def psnr_of(model, images, folder):
-    """Mean PSNR on the images that it was fitted to."""
-    views = []
-    for index, camera in enumerate(images.cameras):
-        path = write_png(folder / f"{index}.png", images.target(index).color)
-        views.append(View(camera, path, images.lights[index]))
-    return mean(evaluate(model, views))["psnr"]
-
-
 def test_it_fits_a_ball(tmp_path):
     task = task_of(tmp_path)
     fitted = FIT.fit(task)
     seeds = FIT.fit(task_of(tmp_path / "none", iterations=0)).field
-    assert psnr_of(seeds, task.images, tmp_path) < 19
-    assert psnr_of(fitted.field, task.images, tmp_path) > 24
+    assert quality(seeds, task.images) < 19
+    assert quality(fitted.field, task.images) > 24
     assert 80 < len(fitted.field) <= 150
     assert fitted.field.parameters["sh"].shape[1:] == (16, 3)
     assert (fitted.iterations, len(fitted.losses)) == (200, 2)
@@ -72,14 +63,11 @@ def test_an_interrupted_fit_goes_on_to_the_same_bits(tmp_path):
     checkpoint.save(task.output / checkpoint.FOLDER, half)
     fitted = FIT.fit(task)
     assert fitted.seconds > 1000
-    for name, x in whole.parameters.items():
-        assert torch.equal(fitted.field.parameters[name], x), name
+    assert_same(fitted.field.parameters, whole.parameters)
 
 
 def test_the_part_of_a_view_that_is_fitted_shows_all_gaussians(tmp_path):
     """The box of surfels is as good for Gaussians, whose filter is wider."""
-    from texgs.fields.splats import screen_box
-
     for seed in range(20):
         generator = torch.Generator().manual_seed(seed)
         p = seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), SEEDS, 0, seed)
@@ -130,12 +118,7 @@ def test_children_are_drawn_from_the_ellipsoid_of_their_parent():
     p = optimizer.parameters
     assert len(p["means"]) == 2 * n
     torch.testing.assert_close(p["scales"][0].exp(), deviations / SHRINK)
-    w, x, y, z = (quats / quats.norm()).double()
-    rotation = torch.stack([
-        torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)]),
-        torch.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)]),
-        torch.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]),
-    ])  # fmt: skip
+    rotation = torch.from_numpy(Rotation.from_quat(quats.double().numpy(), scalar_first=True).as_matrix())
     covariance = rotation @ torch.diag(deviations.double() ** 2) @ rotation.T
     # The error of a standard deviation from 8000 draws is 0.8 %, of a variance twice that.
     torch.testing.assert_close(p["means"].detach().double().T.cov(), covariance, atol=1.6e-3, rtol=0)

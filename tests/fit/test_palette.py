@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.fit.scenes import ball_images, ball_planes, cameras, images_of
+from tests.fit.scenes import assert_same, ball_images, ball_planes, blank_images, images_of, quality
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.palette.networks import base_color, density, palette_color
@@ -16,7 +16,6 @@ from texgs.fit.kinds.palette import HashKeys, PaletteKeys
 from texgs.fit.kinds.voxels import Decay, GridStage, VoxelKeys
 from texgs.fit.palette import PaletteFit, base_loss
 from texgs.fit.palette_colors import object_palette
-from texgs.metrics.quality import psnr
 
 VOXELS = VoxelKeys(
     stages=[GridStage(16, 30), GridStage(32, 30)],
@@ -53,14 +52,6 @@ def fit(images):
     return palette_fit
 
 
-def quality(field, images):
-    """Mean PSNR over views."""
-    values = [
-        psnr(field.render(camera).color, images.target(i).color) for i, camera in enumerate(images.cameras)
-    ]
-    return sum(values) / len(values)
-
-
 def test_the_ball_is_found(fit, images):
     assert fit.progress == list(range(1, STEPS + 1))
     field = fit.field({})
@@ -85,9 +76,8 @@ def test_the_palette_has_the_hue_of_the_ball(images):
 
 def test_the_same_seed_gives_the_same_field(fit, images):
     again = PaletteFit(images, SETTINGS)
-    for _ in again.run():
-        pass
-    assert all(torch.equal(x, fit.parameters[name]) for name, x in again.parameters.items())
+    list(again.run())
+    assert_same(again.parameters, fit.parameters)
 
 
 @pytest.mark.parametrize("stop", [20, 70, 140, STEPS])
@@ -100,9 +90,7 @@ def test_a_resumed_run_is_as_if_it_had_never_stopped(fit, images, tmp_path, stop
     resumed.colors = fit.colors
     run_to_end(resumed, tmp_path, "resumed")
     assert resumed.iteration == resumed.iterations == STEPS
-    assert resumed.parameters.keys() == fit.parameters.keys()
-    for name, x in fit.parameters.items():
-        assert torch.equal(resumed.parameters[name], x), name
+    assert_same(resumed.parameters, fit.parameters)
     assert torch.equal(resumed.geometry.grid.rows, fit.geometry.grid.rows)
 
 
@@ -134,8 +122,7 @@ def test_the_loss_of_the_base_has_the_gradient_of_a_plain_graph(fit, images):
 def test_shares_of_palette_colours_add_up_to_one():
     settings = replace(SETTINGS, colors=3, seed_steps=0, base_steps=5, palette_steps=5)
     fit = PaletteFit(ball_images(count=4), settings)
-    for _ in fit.run():
-        pass
+    list(fit.run())
     mixed = palette_color(torch.rand(50, 3), fit.parameters, fit.levels)
     torch.testing.assert_close(mixed.shares.sum(1), torch.ones(50))
     assert mixed.shares.shape == (50, 3)
@@ -149,9 +136,8 @@ def test_errors(images):
         PaletteFit(images, replace(SETTINGS, hash=HashKeys(entries=1000)))
     with pytest.raises(ArgumentError, match=r"fit.palette.hash.finest: expected at least coarsest"):
         PaletteFit(images, replace(SETTINGS, hash=HashKeys(coarsest=600)))
-    blank = images_of([torch.cat([torch.ones(3, 32, 32), torch.zeros(1, 32, 32)])] * 3, cameras(3))
     with pytest.raises(ArgumentError, match="expected something visible in one of them, found none"):
-        PaletteFit(blank, SETTINGS)
+        PaletteFit(blank_images(), SETTINGS)
     unseen = PaletteFit(images, replace(SETTINGS, voxels=replace(VOXELS, stages=[GridStage(16, 5)])))
     unseen.voxels.settings = replace(unseen.voxels.settings, prune_weight=1.0)
     with pytest.raises(FitError, match="expected some that show in the views, found none; lower prune_w"):

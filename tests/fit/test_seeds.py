@@ -7,14 +7,14 @@ from scipy.spatial.distance import cdist
 
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError
-from texgs.fit.hull import hull_points, mean_colors, project
+from texgs.fit.hull import hull_points, mean_colors
 from texgs.fit.seeds import box_of, read_points, seed_surfels, shrunk, surfels_at
 from texgs.fit.settings import Seeds
 from texgs.volume.grid import Grid
 from texgs.volume.images import load
 from texgs.volume.view_set import ViewSet, read_views
 
-from .scenes import RADIUS, ball_images, cameras, images_of
+from .scenes import RADIUS, assert_same, ball_images, blank_images, cameras, images_of, is_finite
 
 BOX = (torch.full((3,), -0.55), torch.full((3,), 0.55))
 
@@ -77,23 +77,14 @@ def test_points_outside_of_a_view_are_not_carved_by_it():
 
 
 def test_views_that_show_nothing_are_an_error():
-    views = cameras(3)
-    empty = images_of([torch.cat([torch.ones(3, 32, 32), torch.zeros(1, 32, 32)])] * 3, views)
+    empty = blank_images()
     with pytest.raises(ArgumentError, match=r"visual hull: .*found none.*do the views show anything"):
         hull_points(empty, BOX, 100, random_numbers())
     with pytest.raises(ArgumentError, match="visual hull"):
         seeds(images=empty)
     parameters, colors = seeds(images=empty, kind="random")
     assert torch.equal(colors, torch.zeros(300, 3))
-    assert all(torch.isfinite(x).all() for x in parameters.values())
-
-
-def test_projection_is_that_of_the_pinhole():
-    camera = cameras(1)[0]
-    target = torch.zeros(1, 3)
-    columns, rows, is_inside = project(camera, torch.cat([target, 2 * camera.position[None]]))
-    assert (columns[0], rows[0]) == (16, 16)
-    assert is_inside.tolist() == [True, False]
+    assert is_finite(parameters)
 
 
 def test_colours_are_means_without_the_background():
@@ -123,12 +114,8 @@ def test_scales_are_distances_of_the_three_nearest():
     assert torch.equal(surfels["means"], points)
 
 
-def test_equal_points_have_a_finite_scale():
-    surfels = surfels_at(torch.zeros(10, 3), 0.1, random_numbers())
-    assert torch.isfinite(surfels["scales"]).all()
-
-
-def test_three_points_are_too_few():
+def test_points_may_be_equal_but_not_too_few():
+    assert torch.isfinite(surfels_at(torch.zeros(10, 3), 0.1, random_numbers())["scales"]).all()
     with pytest.raises(ArgumentError, match="seeds: expected at least 4 points, got 3"):
         surfels_at(torch.zeros(3, 3), 0.1, random_numbers())
 
@@ -140,7 +127,7 @@ def test_the_same_seed_gives_the_same_surfels_and_another_one_others(kind):
     assert colors.shape == (300, 3)
     assert 0 <= colors.min() <= colors.max() <= 1
     assert torch.equal(colors, same_colors)
-    assert all(torch.equal(x, same[name]) for name, x in first.items())
+    assert_same(same, first)
     assert not torch.equal(first["means"], other["means"])
 
 
@@ -202,58 +189,57 @@ def test_colours_out_of_range_are_told(tmp_path, kind, values, message):
         read_points(tmp_path / "a.ply")
 
 
-def test_mistakes_in_points_are_named(tmp_path):
+@pytest.mark.parametrize(
+    ("columns", "end", "message"),
+    [
+        ({name: column for name, column in xyz().items() if name != "z"}, None, "a number z each, got x, y"),
+        ({**xyz(), "x": ("float", ["nan"] * 5)}, None, "expected finite x, y and z"),
+        (xyz(3), None, "at least 4 points, got 3"),
+        (xyz(), -12, "expected a whole PLY file"),
+        (xyz(), 2, "expected a whole PLY file"),
+    ],
+)
+def test_mistakes_in_points_are_named(tmp_path, columns, end, message):
     path = tmp_path / "points3d.ply"
-    with pytest.raises(ArgumentError, match=r"points3d\.ply: no such file; .*visible needs no points"):
+    with pytest.raises(ArgumentError, match=rf"{path}: no such file; .*visible needs no points"):
         seeds(tmp_path, kind="points")
-    path.write_bytes(b"no points at all")
-    with pytest.raises(ArgumentError, match=r"points3d\.ply: expected a whole PLY file"):
-        seeds(tmp_path)
-    write_ply(path, {name: column for name, column in xyz().items() if name != "z"})
-    with pytest.raises(ArgumentError, match="points3d.ply: expected vertices with a number z each, got x, y"):
-        seeds(tmp_path)
-    write_ply(path, {**xyz(), "x": ("float", ["nan"] * 5)})
-    with pytest.raises(ArgumentError, match="expected finite x, y and z"):
-        seeds(tmp_path)
-    write_ply(path, xyz(3))
-    with pytest.raises(ArgumentError, match="at least 4 points, got 3"):
-        seeds(tmp_path)
-    write_ply(path, xyz())
-    path.write_bytes(path.read_bytes()[:-12])
-    with pytest.raises(ArgumentError, match="expected a whole PLY file"):
+    write_ply(path, columns)
+    path.write_bytes(path.read_bytes()[:end])
+    with pytest.raises(ArgumentError, match=message):
         seeds(tmp_path)
 
 
 # --- the box ----------------------------------------------------------------
 
 
-def test_the_box_is_that_of_the_data_with_a_margin():
-    low, high = box_of(view_set(aabb=[[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]), None)
-    torch.testing.assert_close(low, torch.tensor([-0.52, -0.27, -0.02]))
-    torch.testing.assert_close(high, torch.tensor([0.52, 0.27, 0.12]))
-    low, high = box_of(view_set(), None)
-    assert torch.equal(high, torch.full((3,), 0.55))
+@pytest.mark.parametrize(
+    ("metadata", "half_size", "low", "high"),
+    [
+        ({"aabb": [[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]}, None, (-0.52, -0.27, -0.02), (0.52, 0.27, 0.12)),
+        # The release has random points within 1.3 of the middle of data from -1 to 1.
+        ({"aabb": [[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]}, 1.3, (-0.65, -0.65, -0.6), (0.65, 0.65, 0.7)),
+        ({}, None, (-0.55,) * 3, (0.55,) * 3),
+        ({}, 0.7, (-0.7,) * 3, (0.7,) * 3),
+    ],
+)
+def test_the_box_is_that_of_the_data_with_a_margin_or_a_cube(metadata, half_size, low, high):
+    torch.testing.assert_close(
+        torch.stack(box_of(view_set(**metadata), half_size)), torch.tensor([low, high])
+    )
 
 
-def test_a_cube_is_as_large_as_the_data_and_in_its_middle():
-    """The release has random points within 1.3 of the middle of data from -1 to 1."""
-    low, high = box_of(view_set(aabb=[[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]), 1.3)
-    torch.testing.assert_close(low, torch.tensor([-0.65, -0.65, -0.6]))
-    torch.testing.assert_close(high, torch.tensor([0.65, 0.65, 0.7]))
-    low, high = box_of(view_set(), 0.7)
-    assert torch.equal(low, torch.full((3,), -0.7))
-    assert torch.equal(high, torch.full((3,), 0.7))
+FORM, ORDER = "two corners of three numbers", "the lowest corner, then the highest"
 
 
-@pytest.mark.parametrize("aabb", [[1, 2], "box", [[0, 0, 0], [1, 1, "x"]], [[0, 0], [1, 1]], {}])
-def test_an_aabb_of_another_form_is_an_error(aabb):
-    with pytest.raises(ArgumentError, match="aabb: expected two corners of three numbers"):
-        box_of(view_set(aabb=aabb), 1.0)
-
-
-@pytest.mark.parametrize("aabb", [[[1, 0, 0], [0, 1, 1]], [[0, 0, float("nan")], [1, 1, 1]]])
-def test_an_aabb_the_wrong_way_round_is_an_error(aabb):
-    with pytest.raises(ArgumentError, match="aabb: expected the lowest corner, then the highest"):
+@pytest.mark.parametrize(
+    ("aabb", "message"),
+    [
+        *((aabb, FORM) for aabb in ([1, 2], "box", [[0, 0, 0], [1, 1, "x"]], [[0, 0], [1, 1]], {})),
+        *((aabb, ORDER) for aabb in ([[1, 0, 0], [0, 1, 1]], [[0, 0, float("nan")], [1, 1, 1]])),
+    ],
+)
+def test_an_aabb_that_is_no_box_is_an_error(aabb, message):
+    with pytest.raises(ArgumentError, match=f"aabb: expected {message}"):
         box_of(view_set(aabb=aabb), 1.0)
 
 

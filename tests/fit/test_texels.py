@@ -6,21 +6,22 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.fit.scenes import HEADLIGHT, ball_images, ball_seeds, cameras, images_of, new_fit, run
+from tests.fit.scenes import (
+    ball_images,
+    ball_seeds,
+    blank_images,
+    cameras,
+    images_of,
+    model_of,
+    new_fit,
+    run,
+)  # fmt: skip
 from texgs.core.errors import ArgumentError
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.fields.surfels.texels import offsets_of
 from texgs.fit.settings import TextureKeys
-from texgs.fit.texels import (
-    Sight,
-    look,
-    mean_color,
-    sizes_for_budget,
-    sizes_where_seen,
-    textured,
-    texturize,
-)
+from texgs.fit.texels import Sight, look, mean_color, sizes_for_budget, sizes_where_seen, textured, texturize
 from texgs.raster.arguments import check_texture
 from texgs.raster.types import Texture
 
@@ -32,16 +33,11 @@ def images():
 
 @pytest.fixture(scope="module")
 def ball(images):
-    fit = run(new_fit(images, iterations=60))
-    return Surfels({name: x.detach() for name, x in fit.parameters.items()}, fit.shading)
+    return model_of(run(new_fit(images, iterations=60)))
 
 
 def total(sizes):
     return int(sizes.long().prod(dim=1).sum())
-
-
-def color(model, view):
-    return model.render(view, HEADLIGHT).color
 
 
 def sight(largest, pixel):
@@ -104,9 +100,7 @@ def test_mean_color_counts_what_is_there_only():
 
 
 def test_mean_color_of_nothing_is_finite():
-    planes = torch.ones(4, 8, 8)
-    planes[3] = 0
-    assert mean_color(images_of([planes], cameras(1, 8))).tolist() == [0, 0, 0]
+    assert mean_color(blank_images()).tolist() == [0, 0, 0]
 
 
 def test_an_empty_texture_renders_as_before(ball, images):
@@ -115,7 +109,7 @@ def test_an_empty_texture_renders_as_before(ball, images):
     with_texels = texturize(plain, images, TextureKeys(sweeps=0))
     assert with_texels.stage == "texture"
     for view in cameras():
-        assert_close(color(with_texels, view), color(plain, view), atol=1e-6, rtol=0)
+        assert_close(with_texels.render(view).color, plain.render(view).color, atol=1e-6, rtol=0)
 
 
 def test_texels_can_take_the_colors_over(ball, images):
@@ -151,11 +145,9 @@ def test_a_model_of_another_stage_is_refused(ball, images):
         texturize(texturize(ball, images, TextureKeys(sweeps=0)), images, TextureKeys())
 
 
-def test_a_budget_of_nothing_is_refused(ball, images):
-    with pytest.raises(ArgumentError, match="texels: expected at least 1, got 0"):
-        texturize(ball, images, TextureKeys(0))
-
-
-def test_a_texture_too_large_for_the_rasterizer_is_refused():
-    with pytest.raises(ArgumentError, match=r"expected at most 2\^24 for one surfel, got"):
-        sizes_for_budget(torch.tensor([[1.0, 1.0]]), 2**25)
+@pytest.mark.parametrize(
+    ("texels", "message"), [(0, "at least 1, got 0"), (2**25, r"at most 2\^24 for one surfel, got")]
+)
+def test_budgets_that_cannot_be_had(texels, message):
+    with pytest.raises(ArgumentError, match=f"texels: expected {message}"):
+        sizes_for_budget(torch.tensor([[1.0, 1.0]]), texels)

@@ -5,20 +5,20 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.fit.scenes import RADIUS, ball_images, ball_planes, cameras, images_of
+from tests.fit.scenes import RADIUS, ball_images, ball_planes, blank_images, images_of, quality
 from tests.real_data import real_data
 from texgs.config.compose import compose
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
+from texgs.fields.voxels.model import Voxels
 from texgs.fields.voxels.rays import AROUND, curve, training_rays, widened
 from texgs.fit import checkpoint
 from texgs.fit.checkpoint import run_to_end
 from texgs.fit.hull import hull_box
 from texgs.fit.kinds.voxels import Decay, GridStage, VoxelKeys
 from texgs.fit.voxels import VoxelFit, grown, hull_grid, refined, seen_voxels
-from texgs.metrics.quality import psnr
 from texgs.raster.voxel_grid import interpolate_rows
-from texgs.raster.voxels import March, camera_rays, render_view
+from texgs.raster.voxels import March, camera_rays
 from texgs.volume.images import load
 from texgs.volume.view_set import read_views
 
@@ -43,22 +43,12 @@ def fit(images):
     return voxel_fit
 
 
-@torch.no_grad()
-def quality(fit, images):
-    """Mean PSNR over views."""
-    values = []
-    for index, camera in enumerate(images.cameras):
-        color = render_view(fit.grid, camera, fit.march).color
-        values.append(psnr(color, images.target(index).color))
-    return sum(values) / len(values)
-
-
 def test_the_ball_is_found(fit, images):
     assert fit.progress == list(range(1, 121))
     assert fit.losses[0] < 0.01
-    assert quality(fit, images) > 25
+    assert quality(Voxels(fit.grid, fit.march), images) > 25
     unseen = orbit(20, 10, 1.5, 50, 32, 32)
-    assert quality(fit, images_of([ball_planes(unseen)], [unseen])) > 20
+    assert quality(Voxels(fit.grid, fit.march), images_of([ball_planes(unseen)], [unseen])) > 20
 
 
 def test_published_views():
@@ -66,9 +56,8 @@ def test_published_views():
     fit = VoxelFit(
         load(views.train, reduce=4), VoxelKeys(stages=[GridStage(32, 60), GridStage(64, 120)], rays=2048)
     )
-    for _ in fit.run():
-        pass
-    assert quality(fit, load(views.test[::30], reduce=4)) > 27
+    list(fit.run())
+    assert quality(Voxels(fit.grid, fit.march), load(views.test[::30], reduce=4)) > 27
 
 
 def test_what_is_outside_of_the_ball_stays_empty(fit):
@@ -79,8 +68,7 @@ def test_what_is_outside_of_the_ball_stays_empty(fit):
 
 def test_the_same_seed_gives_the_same_grid(fit, images):
     again = VoxelFit(images, SETTINGS)
-    for _ in again.run():
-        pass
+    list(again.run())
     assert torch.equal(again.grid.rows, fit.grid.rows)
 
 
@@ -113,12 +101,10 @@ def test_a_run_that_stopped_after_its_last_step_ends_as_any_other(images, tmp_pa
 
 @pytest.mark.parametrize(("optimizer", "rate"), [("rmsprop", 40.0), ("adam", 5.0)])
 def test_optimisers_without_total_variation(images, optimizer, rate):
-    stages = [GridStage(16, 80, total_variation=False)]
-    density = Decay(rate, 1.0, 10)
-    fit = VoxelFit(images, replace(SETTINGS, stages=stages, optimizer=optimizer, density=density))
-    for _ in fit.run():
-        pass
-    assert quality(fit, images) > 18
+    keys = {"stages": [GridStage(16, 80, total_variation=False)], "density": Decay(rate, 1.0, 10)}
+    fit = VoxelFit(images, replace(SETTINGS, optimizer=optimizer, **keys))
+    list(fit.run())
+    assert quality(Voxels(fit.grid, fit.march), images) > 18
 
 
 def test_training_rays_pass_through_their_pixels(images):
@@ -173,11 +159,10 @@ def test_the_hull_holds_the_ball(images):
 
 
 def test_views_that_show_nothing():
-    blank = images_of([torch.cat([torch.ones(3, 32, 32), torch.zeros(1, 32, 32)])] * 3, cameras(3))
     with pytest.raises(ArgumentError, match="visual hull: expected points that every view shows"):
-        hull_box(blank, 0.6)
+        hull_box(blank_images(), 0.6)
     with pytest.raises(ArgumentError, match="expected something visible in one of them, found none"):
-        VoxelFit(blank, SETTINGS)
+        VoxelFit(blank_images(), SETTINGS)
 
 
 def test_refining_keeps_the_field(fit):

@@ -4,9 +4,8 @@ from torch.testing import assert_close
 
 from tests.fields.gaussians.samples import sample
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.errors import ArgumentError
 from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
-from texgs.fields.kinds import kinds
 from texgs.fields.part_edit import PartEdit
 
 CAMERA = orbit(30, 20, 3, 40, 48, 40)
@@ -16,15 +15,6 @@ OUTPUTS = ("depth", "median")
 def assert_same(rendered, expected):
     for name in ("color", "alpha", *OUTPUTS):
         assert torch.equal(getattr(rendered, name), getattr(expected, name)), name
-
-
-@pytest.mark.parametrize("edits", [None, [PartEdit()]])
-def test_one_model_unedited_is_the_model_bit_for_bit(edits):
-    model = sample(40)
-    assert_same(
-        JoinedGaussians([model]).render(CAMERA, edits=edits, outputs=OUTPUTS),
-        model.render(CAMERA, outputs=OUTPUTS),
-    )
 
 
 def test_a_scene_is_the_union_whatever_the_order():
@@ -55,43 +45,6 @@ def test_an_opacity_is_a_factor_and_at_most_one():
     assert_close(rendered.color, JoinedGaussians([faint, solid]).render(CAMERA).color, atol=2e-5, rtol=0)
 
 
-@pytest.mark.parametrize(
-    ("edit", "name"),
-    [
-        (PartEdit(palette=(1, 0, 0)), "palette"),
-        (PartEdit(ambient=0.5), "ambient"),
-        (PartEdit(diffuse=0.5), "diffuse"),
-        (PartEdit(specular=0.5), "specular"),
-        (PartEdit(shininess=2.0), "shininess"),
-    ],
-)
-def test_other_edits_are_refused(edit, name):
-    with pytest.raises(
-        ArgumentError, match=f"{name}: expected a model that can .* one of gaussians; fit surfels"
-    ):
-        JoinedGaussians([sample()]).render(CAMERA, edits=[edit])
-
-
-def test_looks_without_light_are_refused():
-    with pytest.raises(ArgumentError, match="look: expected shaded, got diffuse; gaussians have light"):
-        JoinedGaussians([sample()]).render(CAMERA, look="diffuse")
-
-
-def test_what_is_no_scene_is_refused():
-    with pytest.raises(ArgumentError, match="models: expected at least one, got none"):
-        JoinedGaussians([])
+def test_filters_that_differ_are_no_scene():
     with pytest.raises(ArgumentError, match="expected all with the antialiased filter or none, got both"):
         JoinedGaussians([sample(), sample(antialiased=True)])
-    with pytest.raises(ArgumentError, match="segments: expected none of gaussians"):
-        JoinedGaussians([sample()], [[torch.ones(7, dtype=torch.bool)]])
-    with pytest.raises(ArgumentError, match="edits: expected one for each of 1 models, got 2"):
-        JoinedGaussians([sample()]).render(CAMERA, edits=[PartEdit(), PartEdit()])
-
-
-def test_the_kind_composes_and_says_what_it_cannot_do():
-    from texgs.fields.kinds import require
-
-    kind = kinds()["gaussians"]
-    assert isinstance(kind.compose([sample()], [()]), JoinedGaussians)
-    with pytest.raises(ConfigError, match="expected a fit of surfels, got one of gaussians, which has no"):
-        require("gaussians", {"palette"}, "edit=crimson")

@@ -8,7 +8,7 @@ from safetensors.torch import load_file
 
 from tests.fields.gaussians.samples import sample
 from tests.fields.rewritten import description_of, rewritten
-from tests.fields.surfels.ply_files import columns_of, numbered, vertices, write_vertices
+from tests.fields.surfels.ply_files import numbered, vertices
 from tests.fields.surfels.samples import same
 from tests.fields.surfels.samples import sample as surfels
 from texgs.core.errors import ArgumentError, ShapeError
@@ -117,34 +117,11 @@ def test_fewer_harmonics_come_back_with_zeros(tmp_path):
     assert not harmonics[:, 4:].any()
 
 
-def test_files_of_other_programs_may_have_fewer_harmonics_and_more_properties(tmp_path):
-    path = write_ply(tmp_path / "m.ply", sample())
-    changes = {f"f_rest_{k}": None for k in range(45)} | {"segment": np.arange(7)}
-    restored = read_ply(write_vertices(tmp_path / "o.ply", columns_of(path, **changes), text=True))
-    assert torch.equal(restored.parameters["sh"], sample().parameters["sh"][:, :1])
-
-
 def test_surfels_written_for_viewers_of_gaussians_are_gaussians(tmp_path):
     model = surfels("surfels")
     restored = read_ply(write_surfels(tmp_path / "m.ply", model, "3dgs"))
     assert torch.equal(restored.parameters["scales"][:, :2], model.parameters["scales"])
     assert restored.parameters["scales"][:, 2].exp().max() < 1.1e-6
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"scale_2": None}, "expected vertices with a number scale_2 each, got x, y, z"),
-        ({"opacity": None}, "expected vertices with a number opacity each"),
-        ({"f_rest_44": None}, "expected 0, 9, 24 or 45 properties f_rest, got 44"),
-        ({"rot_3": np.full(7, np.nan)}, "quats: expected finite values, got 7 NaN"),
-    ],
-)
-def test_what_is_no_gaussian_is_named(tmp_path, changes, message):
-    path = write_ply(tmp_path / "m.ply", sample())
-    write_vertices(path, columns_of(path, **changes))
-    with pytest.raises(ArgumentError, match=f"^{path}: {message}"):
-        read_ply(path)
 
 
 def test_what_is_not_finite_is_not_written(tmp_path):

@@ -7,7 +7,6 @@ from torch.testing import assert_close
 from tests.fields.gaussians.samples import sample
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.core.light import Light
 from texgs.fields.gaussians.model import Gaussians
 from texgs.raster import Options
 from texgs.raster.reference.render import rasterize
@@ -57,15 +56,6 @@ def test_the_filter_matters():
     assert float(other.render(CAMERA).alpha.sum()) < 0.5 * float(thin.render(CAMERA).alpha.sum())
 
 
-def test_light_changes_nothing_and_the_background_is_white_unless_told():
-    model = sample(5)
-    rendered = model.render(CAMERA)
-    assert torch.equal(rendered.color, model.render(CAMERA, Light("directional", 100, 30)).color)
-    empty = rendered.alpha == 0
-    assert bool((rendered.color[empty] == 1).all())
-    assert bool((model.render(CAMERA, background=torch.zeros(3)).color[empty] == 0).all())
-
-
 def test_parameters_by_role():
     model = sample()
     assert set(model.tensors("geometry")) == {"means", "quats", "scales", "opacities"}
@@ -97,8 +87,3 @@ def test_what_is_no_model_is_refused(change, error, message):
     changed = {**sample().parameters, **change}
     with pytest.raises(error, match=message):
         Gaussians({name: x for name, x in changed.items() if x is not None})
-
-
-def test_there_are_no_normals():
-    with pytest.raises(ArgumentError, match=r"3D Gaussians .* have no normal"):
-        sample().render(CAMERA, outputs=("normal",))

@@ -8,7 +8,7 @@ from safetensors.torch import load_file
 
 from tests.fields.rewritten import description_of, rewritten
 from texgs.core.camera import orbit
-from texgs.core.errors import TexgsError
+from texgs.core.errors import DeviceError, TexgsError
 from texgs.fields.palette.file import FORMAT, read_palette, write_palette
 from texgs.fields.palette.model import PaletteField, PaletteScene
 from texgs.fields.palette.networks import new_networks
@@ -66,12 +66,6 @@ def test_density_doubles_where_boxes_overlap():
     torch.testing.assert_close(middle(shown.color), alpha * color + 1 - alpha, atol=0.01, rtol=0)
     assert scene.palettes == [(0.0, 0.0, 0.0)] * 2
     assert len(scene) == 2 * len(box()) == 4 * LEVELS.rows
-
-
-@pytest.mark.parametrize("free", [False, True])
-def test_a_scene_of_one_is_the_field(free):
-    field = box(scale=1.0, free=free)
-    assert torch.equal(PaletteScene([field]).render(CAMERA).color, field.render(CAMERA).color)
 
 
 def test_boxes_apart_are_seen_as_each_alone():
@@ -155,20 +149,6 @@ def test_clusters_are_of_hues_and_the_largest_comes_first():
     torch.testing.assert_close(cluster_colors(torch.full((9, 3), 0.5), 2), torch.full((2, 3), 0.5))
 
 
-@pytest.mark.parametrize(
-    ("render", "message"),
-    [
-        (lambda s: s.render(CAMERA, edits=[]), "edits: expected one for each of 1 models, got 0"),
-        (
-            lambda s: s.render(CAMERA, edits=[PartEdit(diffuse=2)]),
-            "diffuse: .* got one of palette; fit surfels for this",
-        ),
-        (lambda s: s.render(CAMERA, look="ambient"), "look: expected shaded, got ambient"),
-        (lambda s: s.render(CAMERA, outputs=("normal",)), "outputs: expected depth of palette fields, got"),
-        (lambda s: PaletteScene([]), "models: expected at least one"),
-        (lambda s: s.fields[0].to("cuda"), "device: expected cpu, got cuda; palette fields are rendered on"),
-    ],
-)
-def test_what_palette_fields_cannot_show(render, message):
-    with pytest.raises(TexgsError, match=message):
-        render(PaletteScene([box()]))
+def test_palette_fields_are_on_the_cpu():
+    with pytest.raises(DeviceError, match="device: expected cpu, got cuda; palette fields are rendered on"):
+        box().to("cuda")

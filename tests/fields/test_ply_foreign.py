@@ -1,0 +1,126 @@
+"""PLY files of other programs: what is read of them, and how they are refused."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from plyfile import PlyData, PlyElement
+
+from tests.fields.gaussians.samples import sample as gaussians
+from tests.fields.surfels.ply_files import columns_of, write_vertices
+from tests.fields.surfels.samples import STAGES, same
+from tests.fields.surfels.samples import sample as surfels
+from tests.real_data import real_data
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.fields.gaussians import files
+from texgs.fields.surfels import ply
+
+KINDS = {"surfels": (lambda: surfels("surfels"), ply), "gaussians": (gaussians, files)}
+
+
+@pytest.fixture(params=KINDS)
+def written(request, tmp_path):
+    """A model, its file, and what reads such files."""
+    make, module = KINDS[request.param]
+    return make(), module.write_ply(tmp_path / "m.ply", make()), module.read_ply
+
+
+def test_text_other_orders_and_doubles_are_read(written, tmp_path):
+    model, path, read_ply = written
+    columns = columns_of(path)
+    mixed = dict(sorted(columns.items(), reverse=True)) | {"label": np.arange(7)}
+    for kind in ({"text": True}, {"byte_order": ">"}):
+        assert same(read_ply(write_vertices(tmp_path / "o.ply", mixed, **kind)), model)
+    array = np.zeros(7, [(name, "f8") for name in columns])
+    for name, column in columns.items():
+        array[name] = column
+    PlyData([PlyElement.describe(array, "vertex")]).write(tmp_path / "d.ply")
+    assert same(read_ply(tmp_path / "d.ply"), model)
+
+
+def test_there_may_be_fewer_harmonics(written):
+    model, path, read_ply = written
+    write_vertices(path, columns_of(path, **{f"f_rest_{k}": None for k in range(45)}))
+    assert torch.equal(read_ply(path).parameters["sh"], model.parameters["sh"][:, :1])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        *(({name: None}, f"a number {name} each") for name in ("y", "opacity", "scale_1", "rot_3", "f_dc_1")),
+        ({"f_rest_44": None}, "expected 0, 9, 24 or 45 properties f_rest, got 44"),
+        ({"rot_3": np.full(7, np.nan)}, "quats: expected finite values, got 7 NaN"),
+    ],
+)
+def test_what_is_no_model_is_named(written, changes, message):
+    _, path, read_ply = written
+    write_vertices(path, columns_of(path, **changes))
+    with pytest.raises(ArgumentError, match=f"^{path}: .*{message}"):
+        read_ply(path)
+
+
+def test_files_that_are_no_ply_are_named(written, tmp_path):
+    _, path, read_ply = written
+    with pytest.raises(ArgumentError, match="none: no such file"):
+        read_ply(tmp_path / "none")
+    with pytest.raises(ArgumentError, match="got a folder"):
+        read_ply(tmp_path)
+    negative = b"ply\nformat ascii 1.0\nelement vertex -5\nproperty float x\nend_header\n"
+    for content in (b"hello", bytes(range(256)), negative):
+        path.write_bytes(content)
+        with pytest.raises(TexgsError, match="expected a whole PLY file"):
+            read_ply(path)
+    PlyData([PlyElement.describe(np.zeros(1, [("a", "i4")]), "face")]).write(path)
+    with pytest.raises(ArgumentError, match="expected vertices, got face"):
+        read_ply(path)
+    array = np.empty(1, [("x", object), ("scale_0", "f4"), ("scale_1", "f4"), ("scale_2", "f4")])
+    array[0] = (np.zeros(2, np.float32), 0, 0, -20)
+    PlyData([PlyElement.describe(array, "vertex")]).write(path)
+    with pytest.raises(ArgumentError, match="a number x each"):
+        read_ply(path)
+
+
+@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize("kept", [0, 0.05, 0.5, 0.999])
+def test_a_file_cut_anywhere_is_refused(tmp_path, stage, kept):
+    path = ply.write_ply(tmp_path / "m.ply", surfels(stage))
+    data = path.read_bytes()
+    path.write_bytes(data[: int(kept * len(data))])
+    with pytest.raises(ArgumentError, match="expected a whole PLY file"):
+        ply.read_ply(path)
+
+
+def test_the_release_clamps_colours_at_zero(tmp_path):
+    path = ply.write_ply(tmp_path / "m.ply", surfels("shading", material="paper"), "release")
+    dark = write_vertices(path, columns_of(path, f_dc_1=np.full(7, -3.0)))
+    assert not ply.read_ply(dark).parameters["colors"][:, 1].any()
+
+
+def test_what_a_flavour_cannot_express(tmp_path):
+    model = surfels("shading", shared=True)
+    sharp, bad = {"shininess": torch.tensor([3.0])}, {"means": torch.full((7, 3), math.nan)}
+    for changes, flavour, message in (
+        ({}, "4dgs", "flavour: expected 2dgs, 3dgs, release, got '4dgs'"),
+        (sharp, "release", r"shininess: expected less than 50.*got up to 95\.3"),
+        (bad, "2dgs", "means: expected finite values, got 21 NaN"),
+    ):
+        changed = replace(model, parameters={**model.parameters, **changes})
+        with pytest.raises(ArgumentError, match=message):
+            ply.write_ply(tmp_path / "m.ply", changed, flavour)
+    with pytest.raises(ArgumentError, match="release needs a model with shading, got stage surfels"):
+        ply.write_ply(tmp_path / "m.ply", surfels("surfels"), "release")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_volumes_of_3dgs_are_no_surfels(tmp_path):
+    path = ply.write_ply(tmp_path / "m.ply", surfels("surfels"), "3dgs")
+    write_vertices(path, columns_of(path, scale_2=np.r_[np.full(4, -4.0), np.full(3, -13.0)]))
+    with pytest.raises(ArgumentError, match="expected flat Gaussians, got 4 of 7 with a third axis"):
+        ply.read_ply(path)
+
+
+def test_a_point_cloud_of_the_papers_data_is_no_model():
+    with pytest.raises(ArgumentError, match="expected vertices with a number scale_0 each, got x, y, z, nx"):
+        ply.read_ply(real_data("vortex/TF01/points3d.ply"))
