@@ -101,14 +101,17 @@ def test_the_cap_takes_the_largest_gradients():
     assert sorted(step(surfels([LARGE] * 4), [4e-4, 9e-4, 3e-4, 8e-4], cap=5)) == [0, 1, 1, 2, 3]
 
 
-@pytest.mark.parametrize("cap", [1, 3, 4])
-def test_at_or_above_the_cap_nothing_is_added(cap):
-    assert step(surfels([SMALL, LARGE, SMALL, LARGE]), [1.0] * 4, cap=cap) == [0, 1, 2, 3]
-
-
-def test_what_is_removed_makes_room_under_the_cap():
-    optimizer = surfels([SMALL] * 4, [0.5, 0.001, 0.5, 0.5])
-    assert step(optimizer, [1e-3, 0.0, 2e-3, 3e-3], cap=4) == [0, 2, 3, 3]
+@pytest.mark.parametrize(
+    ("opacities", "cap", "left"),
+    [
+        (None, 1, [0, 1, 2, 3]),
+        (None, 3, [0, 1, 2, 3]),
+        (None, 4, [0, 1, 2, 3]),
+        ([0.5, 0.001, 0.5, 0.5], 4, [0, 2, 3, 3]),
+    ],
+)
+def test_only_what_is_removed_makes_room_at_or_above_the_cap(opacities, cap, left):
+    assert step(surfels([SMALL, LARGE, SMALL, SMALL], opacities), [1e-3, 0.5, 2e-3, 3e-3], cap=cap) == left
 
 
 @pytest.mark.parametrize(("iteration", "expected"), [(9, 2), (10, 2), (20, 3), (30, 3), (40, 2)])

@@ -125,15 +125,16 @@ def test_one_view_is_enough():
 
 
 @pytest.mark.parametrize(
-    ("color", "alpha"),
-    [([1.0, 1.0, 1.0], 0.0), ([1.0, 1.0, 1.0], 1.0), ([0.0, 0.0, 0.0], 1.0)],
-    ids=["empty", "white", "black"],
+    ("color", "alpha"), [(1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], ids=["empty", "white", "black"]
 )
-def test_images_of_one_colour_give_a_finite_model(color, alpha):
-    fit = run(new_fit(images=flat_images(color, alpha), iterations=120))
+@pytest.mark.parametrize("losses", [Losses(), Losses(normal=0.05), Losses(dssim=1.0), Losses(0.0, 1.0)])
+def test_images_of_one_colour_give_a_finite_model(color, alpha, losses):
+    iterations = 120 if losses == Losses() else 30
+    images = flat_images([color] * 3, alpha)
+    fit = run(new_fit(images=images, losses=losses, iterations=iterations))
     assert is_finite(fit.state())
-    if alpha == 0 or color[0] == 1:
-        assert quality(model_of(fit), fit.images) > 25
+    if color == 1 and iterations == 120:
+        assert quality(model_of(fit), images) > 25
 
 
 def test_a_model_without_surfels_goes_on_and_stays_empty():
@@ -172,13 +173,6 @@ def test_cameras_inside_of_the_object_fit(tmp_path):
     fit = run(new_fit(images=images, parameters=start, iterations=150, densify=DENSIFY))
     assert is_finite(fit.state())
     assert quality(model_of(fit), fit.images) > 12
-
-
-@pytest.mark.parametrize("weights", [Losses(normal=0.05), Losses(dssim=1.0), Losses(dssim=0.0, alpha=1.0)])
-@pytest.mark.parametrize("kind", ["ball", "empty"])
-def test_every_loss_stays_finite(weights, kind):
-    images = ball_images() if kind == "ball" else flat_images([1.0, 1.0, 1.0], 0.0)
-    assert is_finite(run(new_fit(images=images, losses=weights, iterations=30)).state())
 
 
 def test_a_material_for_each_surfel_stays_finite_and_smooth():

@@ -11,6 +11,7 @@ from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fit.losses import view_loss
 from texgs.fit.settings import Losses
 from texgs.raster.reference.losses import bilateral_smoothness, ssim
+from texgs.raster.shading import MATERIAL
 
 OPTICS = ShadingModel()
 ALL = Losses(alpha=0.1, normal=0.05, smoothness=0.01)
@@ -26,13 +27,7 @@ def per_surfel():
     generator = torch.Generator().manual_seed(3)
     p = ball_seeds(60, opacity=0.6)
     n = len(p["means"])
-    return {
-        **p,
-        **{
-            name: p[name] + torch.randn(n, generator=generator) for name in ("ambient", "diffuse", "specular")
-        },
-        "shininess": p["shininess"] + torch.randn(n, generator=generator),
-    }
+    return p | {name: p[name] + torch.randn(n, generator=generator) for name in MATERIAL}
 
 
 def photometric(image, target, weight):
@@ -117,10 +112,7 @@ def test_loss_and_gradients_of_the_visible_part_are_those_of_the_view():
     camera = cameras(1, size=96, distance=4)[0]
     p = random_surfels(7, 30, 0.05, 0.05)
     generator = torch.Generator().manual_seed(1)
-    p |= {
-        name: p[name] + torch.randn(30, generator=generator)
-        for name in ("ambient", "diffuse", "specular", "shininess")
-    }
+    p |= {name: p[name] + torch.randn(30, generator=generator) for name in MATERIAL}
     planes = torch.ones(4, 96, 96)
     planes[3] = 0
     planes[:, 40:52, 70:80] = 0.5

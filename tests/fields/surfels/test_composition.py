@@ -84,12 +84,13 @@ def test_hiding_is_removing_bit_for_bit():
         assert torch.equal(getattr(hidden, name), getattr(removed, name)), name
 
 
-def test_an_edit_is_the_model_with_other_numbers():
+@pytest.mark.parametrize("opacity", [0.4, 1000.0])
+def test_an_edit_is_the_model_with_other_numbers_and_at_most_opaque(opacity):
     model = ball(4)
-    edit = PartEdit(palette=(0.1, 0.7, 0.2), opacity=0.4, ambient=0.5, diffuse=1.5, specular=2, shininess=0.5)
+    edit = PartEdit(True, (0.1, 0.7, 0.2), opacity, ambient=0.5, diffuse=1.5, specular=2, shininess=0.5)
     p = model.parameters
     factors = {"ambient": 0.2, "diffuse": 0.75, "specular": 0.4, "shininess": 10.0}
-    opacities = torch.logit(0.4 * p["opacities"].sigmoid())
+    opacities = torch.logit((opacity * p["opacities"].sigmoid()).clamp_max(1 - 1e-7))
     changed = {
         "palette": torch.tensor(edit.palette),
         "opacities": opacities,
@@ -97,13 +98,6 @@ def test_an_edit_is_the_model_with_other_numbers():
     }
     expected = Surfels({**p, **changed}, model.shading).render(CAMERA, SIDE)
     assert_close(Composition([model]).render(CAMERA, SIDE, [edit]).color, expected.color, atol=2e-5, rtol=0)
-
-
-def test_an_opacity_above_one_is_one():
-    model = ball(5)
-    rendered = Composition([model]).render(CAMERA, SIDE, [PartEdit(opacity=1000.0)])
-    full = {**model.parameters, "opacities": torch.full((150,), 40.0)}
-    assert torch.equal(rendered.alpha, Surfels(full).render(CAMERA, SIDE).alpha)
 
 
 def test_edits_do_not_copy_texels():
@@ -121,19 +115,15 @@ def test_looks_of_the_material_are_its_factors():
     assert_close(rendered.color, 0.25 * rendered.alpha[..., None].expand(-1, -1, 3), atol=1e-5, rtol=0)
 
 
-def test_without_light_colours_are_those_of_palette_and_texels():
-    model = ball(1, n=3000)
-    flat = {**model.parameters, "texels": torch.zeros_like(model.parameters["texels"])}
-    flat["colors"] = torch.zeros_like(flat["colors"])
-    rendered = Composition([Surfels(flat)]).render(CAMERA, SIDE, look="unshaded", background=torch.zeros(3))
-    assert_close(rendered.color, rendered.alpha[..., None] * flat["palette"], atol=1e-5, rtol=0)
-
-
-def test_texels_alone_are_around_grey():
-    model = ball(1, n=3000)
-    even = {**model.parameters, "texels": torch.full_like(model.parameters["texels"], 0.125)}
-    rendered = Composition([Surfels(even)]).render(CAMERA, SIDE, look="texture", background=torch.zeros(3))
-    assert_close(rendered.color, 0.625 * rendered.alpha[..., None].expand(-1, -1, 3), atol=1e-5, rtol=0)
+@pytest.mark.parametrize(("look", "texels", "shown"), [("unshaded", 0.0, None), ("texture", 0.125, 0.625)])
+def test_without_light_colours_are_those_of_palette_and_texels_and_texels_alone_are_around_grey(
+    look, texels, shown
+):
+    p = ball(1, n=3000).parameters
+    flat = {**p, "texels": torch.full_like(p["texels"], texels), "colors": torch.zeros_like(p["colors"])}
+    rendered = Composition([Surfels(flat)]).render(CAMERA, SIDE, look=look, background=torch.zeros(3))
+    expected = p["palette"] if shown is None else torch.full((3,), shown)
+    assert_close(rendered.color, rendered.alpha[..., None] * expected, atol=1e-5, rtol=0)
 
 
 def test_discs_are_opaque_within_one_standard_deviation():
