@@ -13,11 +13,13 @@ def description_of(path, format):
 
 
 def rewritten(path, format, tensors=None, **description):
-    """The file with some tensors (None removes one) and entries of its description (as well) changed."""
-    header = {**description_of(path, format), **description}
+    """The file with some tensors and entries of its description changed; None removes one.
+
+    A tensor may be a function of the one that is there.
+    """
+    whole, header = load_file(path), {**description_of(path, format), **description}
+    changed = {name: x(whole[name]) if callable(x) else x for name, x in (tensors or {}).items()}
+    kept = {name: x.contiguous() for name, x in {**whole, **changed}.items() if x is not None}
     header = {name: value for name, value in header.items() if value is not None}
-    kept = {
-        name: x.contiguous() for name, x in {**load_file(path), **(tensors or {})}.items() if x is not None
-    }
     save_file(kept, path, {format: json.dumps(header)})
     return path

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import pytest
 import torch
@@ -12,7 +13,7 @@ from tests.fields.palette.test_palette import box
 from tests.fields.rewritten import rewritten
 from tests.fields.surfels.samples import sample as surfels
 from tests.fields.voxels.test_voxels import ball
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, TexgsError
 from texgs.fields.files import open_field
 from texgs.fields.gaussians.files import read_gaussians, write_gaussians
 from texgs.fields.palette.file import read_palette, write_palette
@@ -24,7 +25,7 @@ LOSSLESS = {
     "texgs-model": (surfels, write_model, read_model),
     "texgs-gaussians": (gaussians, write_gaussians, read_gaussians),
     "texgs-voxels": (ball, write_voxels, read_voxels),
-    "texgs-palette": (box, write_palette, read_palette),
+    "texgs-palette": (partial(box, scale=1.0, free=True), write_palette, read_palette),
 }
 FILES = {**LOSSLESS, "texgs-compact": (surfels, write_compact, read_compact)}
 
@@ -36,7 +37,9 @@ def test_files_are_known_by_their_header_and_the_same_field_gives_the_same_bytes
     field = open_field(path)
     assert (field.kind, field.metadata) == (make().kind, make().metadata)
     assert write(tmp_path / "b", make()).read_bytes() == path.read_bytes()
-    assert write(tmp_path / "c", field).read_bytes() == path.read_bytes(), "nor is anything rounded twice"
+    assert write(tmp_path / "c", field).read_bytes() == path.read_bytes(), (
+        "every bit comes back, and nothing is rounded twice"
+    )
     if format in LOSSLESS:
         assert path.stat().st_size == pytest.approx(field.sizes()["stored_total_mib"] * 2**20, abs=4000)
 
@@ -101,3 +104,80 @@ def test_what_could_not_be_read_back_is_not_written(tmp_path, format):
             write(path, replace(make(), parameters=broken))
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+SHORTER = {"density": lambda x: x[:-1]}
+SURFELS, GAUSSIANS = "stage, optics and metadata in the header", "filter and metadata in the header"
+VOXELS, PALETTE = "a grid and its lattice", "networks and a grid"
+NETWORKS = "expected the networks of a palette field"
+
+
+@pytest.mark.parametrize(
+    ("format", "changes", "message"),
+    [
+        ("model", {"stage": "cooked"}, "expected stage surfels, shading, texture, got 'cooked'"),
+        ("model", {"stage": []}, "expected stage surfels, shading, texture"),
+        ("model", {"optics": {"low_pass": 2.0, "lens": 1}}, f"expected {SURFELS}"),
+        ("model", {"optics": {"material": "wood"}}, "optics: expected values"),
+        ("model", {"optics": {"low_pass": -1}}, "optics: expected values"),
+        ("model", {"optics": {"low_pass": "thin"}}, f"expected {SURFELS}"),
+        ("model", {"metadata": 3}, f"expected {SURFELS}"),
+        ("model", {"tensors": {"means": None}}, "model: expected means, quats, scales, opacities"),
+        ("model", {"tensors": {"texels": None}}, "expected tensor texels at stage texture, got"),
+        ("model", {"tensors": {"ambient": None}}, "expected tensor ambient at stage texture"),
+        (
+            "model",
+            {"tensors": {"colors": None, "sh": torch.zeros(7, 1, 3)}},
+            "expected tensor colors at stage texture",
+        ),
+        ("model", {"tensors": {"mood": torch.zeros(3)}}, "expected tensors of a texgs model, got mood"),
+        ("model", {"tensors": {"quats": torch.zeros(6, 4)}}, r"quats: expected \[7, 4\], got \[6, 4\]"),
+        ("model", {"tensors": {"diffuse": torch.zeros(2)}}, r"diffuse: expected \[7\] or \[1\], got \[2\]"),
+        ("model", {"tensors": {"means": torch.Tensor.double}}, "means: expected torch.float32, got torch.fl"),
+        ("model", {"tensors": {"sizes": torch.Tensor.long}}, "sizes: expected torch.int32"),
+        ("model", {"tensors": {"scales": lambda x: x * torch.nan}}, "scales: expected finite .*, got 14 NaN"),
+        ("model", {"tensors": {"offsets": torch.arange(7) + 1000}}, ".* textures within the"),
+        ("model", {"tensors": {"offsets": torch.zeros(7).long()}}, ".* texels of its own for every surfel"),
+        ("gaussians", {"filter": {"antialiased": 1}}, f"expected {GAUSSIANS}"),
+        ("gaussians", {"filter": {"lens": 1}}, f"expected {GAUSSIANS}"),
+        ("gaussians", {"filter": []}, f"expected {GAUSSIANS}"),
+        ("gaussians", {"filter": None}, f"expected {GAUSSIANS}"),
+        ("gaussians", {"metadata": 3}, f"expected {GAUSSIANS}"),
+        (
+            "gaussians",
+            {"tensors": {"means": None}},
+            "model: expected means, .*, sh, got",
+        ),
+        ("gaussians", {"tensors": {"mood": torch.zeros(3)}}, "model: expected means, .*, got .*mood"),
+        ("gaussians", {"tensors": {"quats": torch.zeros(6, 4)}}, r"quats: expected \[7, 4\], got \[6, 4\]"),
+        ("gaussians", {"tensors": {"means": torch.Tensor.double}}, "means: expected torch.float32, got"),
+        ("gaussians", {"tensors": {"scales": lambda x: x * torch.nan}}, "scales: .* finite .*, got 21 NaN"),
+        ("voxels", {"tensors": {"sh": None}}, f"expected {VOXELS}"),
+        ("voxels", {"tensors": SHORTER}, "sh: expected .* got"),
+        ("voxels", {"tensors": {"masks": torch.zeros_like}}, "masks: expected the bits of"),
+        ("voxels", {"tensors": {"density": lambda x: x * torch.nan}}, "density: expected finite"),
+        ("voxels", {"tensors": {"sh": lambda x: x[:, :3]}}, "sh: expected 1, 4 or 9 coefficients"),
+        ("voxels", {"spacing": 0}, "spacing: expected a length above 0"),
+        ("voxels", {"lower": [0, 0]}, "lower: expected 3 finite numbers"),
+        ("voxels", {"step": None}, f"expected {VOXELS}"),
+        ("palette", {"tensors": {"light.1": None}}, f"light.1: {NETWORKS}"),
+        ("palette", {"tensors": {"extra": torch.ones(1)}}, f"extra: {NETWORKS}"),
+        ("palette", {"tensors": {"palette.colors": None}}, f"expected {PALETTE}"),
+        (
+            "palette",
+            {"tensors": {"light.1": lambda x: x[:5]}},
+            r"light.1: .* \[64, 64\], got \[5, 64\]",
+        ),
+        ("palette", {"tensors": {"light.1": torch.Tensor.double}}, "light.1: expected float32"),
+        ("palette", {"tensors": {"free.0": None}}, f"free.0: {NETWORKS}"),
+        ("palette", {"tensors": SHORTER}, "masks: expected the bits of"),
+        ("palette", {"tensors": {"trunk.0": lambda x: x * torch.inf}}, "trunk.0: expected finite"),
+        ("palette", {"hash": {"entries": 100}}, "entries: expected a power of two"),
+        ("palette", {"step": None}, f"expected {PALETTE}"),
+    ],
+)
+def test_what_cannot_be_used_is_named(tmp_path, format, changes, message):
+    make, write, read = FILES[f"texgs-{format}"]
+    path = rewritten(write(tmp_path / "m", make()), f"texgs-{format}", **changes)
+    with pytest.raises(TexgsError, match=f"^{path}: {message}"):
+        read(path)

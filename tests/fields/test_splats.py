@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import pytest
 import torch
 from hypothesis import given, settings
@@ -94,7 +92,3 @@ def test_the_part_keeps_the_light_and_moves_the_principal_point():
     target = images.target(0, around=Box(0, 0, 1, 1))
     assert target.share == 1
     assert torch.equal(target.camera.K, camera.K)
-    moved = camera.crop(5, 9, 20, 30)
-    assert (moved.width, moved.height) == (15, 21)
-    assert_close(moved.K[:2, 2], camera.K[:2, 2] - torch.tensor([5.0, 9.0]))
-    assert_close(replace(moved, K=camera.K).position, camera.position)

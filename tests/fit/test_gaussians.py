@@ -1,13 +1,10 @@
 import pytest
 import torch
-from scipy.spatial.transform import Rotation
 
 from texgs.core.errors import ArgumentError
 from texgs.fields.gaussians.model import Baked, Gaussians
-from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.splats import screen_box
 from texgs.fit import checkpoint
-from texgs.fit.densify import SHRINK, DensityControl
 from texgs.fit.kinds import FitTask
 from texgs.fit.kinds.gaussians import FIT, GaussianKeys
 from texgs.fit.loop import Fit
@@ -93,32 +90,3 @@ def test_seeds_are_grey_from_everywhere_and_as_thick_as_wide(tmp_path):
 def test_seeds_in_voxels_are_refused(tmp_path):
     with pytest.raises(ArgumentError, match=r"seeds\.kind=voxels needs a volume"):
         seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), Seeds(kind="voxels"), 3, 0)
-
-
-# --- densification ----------------------------------------------------------
-
-
-def test_children_are_drawn_from_the_ellipsoid_of_their_parent():
-    n = 4000
-    deviations = torch.tensor([0.1, 0.05, 0.2])
-    quats = torch.tensor([0.9, 0.1, -0.3, 0.2])
-    optimizer = Optimizer(
-        {
-            "means": torch.zeros(n, 3),
-            "quats": quats.repeat(n, 1),
-            "scales": deviations.log().repeat(n, 1),
-            "opacities": torch.zeros(n),
-            "sh": torch.zeros(n, 1, 3),
-        },
-        {"sh": Rate(1.0, 1.0)},
-    )
-    control = DensityControl(Densify(start=0, every=10, cap=2 * n), n, 5.0, torch.device("cpu"))
-    control.gradients, control.counts = torch.ones(n), torch.ones(n)
-    control.step(10, optimizer, torch.Generator().manual_seed(0))
-    p = optimizer.parameters
-    assert len(p["means"]) == 2 * n
-    torch.testing.assert_close(p["scales"][0].exp(), deviations / SHRINK)
-    rotation = torch.from_numpy(Rotation.from_quat(quats.double().numpy(), scalar_first=True).as_matrix())
-    covariance = rotation @ torch.diag(deviations.double() ** 2) @ rotation.T
-    # The error of a standard deviation from 8000 draws is 0.8 %, of a variance twice that.
-    torch.testing.assert_close(p["means"].detach().double().T.cov(), covariance, atol=1.6e-3, rtol=0)

@@ -47,6 +47,9 @@ def test_color_and_alpha(target):
     alpha = photometric(seen.alpha[..., None], target.alpha[..., None], 0.2)
     assert loss(parameters, target, alpha=0.0) == pytest.approx(float(color), rel=1e-4)
     assert loss(parameters, target, alpha=0.5) == pytest.approx(float(color + 0.5 * alpha), rel=1e-4)
+    term = loss(parameters, target, alpha=0.5, alpha_l1=False) - loss(parameters, target, alpha=0.0)
+    structure = 1 - ssim(seen.alpha[..., None].double(), target.alpha[..., None].double())
+    assert term == pytest.approx(float(0.5 * 0.2 * structure), rel=1e-3), "alone at the same weight"
 
 
 def test_smoothness_of_each_map_of_the_material(target):
@@ -83,14 +86,6 @@ def gradients(parameters, target, turns_normals=True, **weights):
     weights = Losses(**{"alpha": 0.0, **weights})
     view_loss(leaves, OPTICS, target, weights, None, 10, turns_normals).backward()
     return {name: x.grad for name, x in leaves.items()}
-
-
-def test_alpha_without_l1_is_its_dissimilarity_at_the_same_weight(target):
-    parameters = per_surfel()
-    alpha = Surfels(parameters, OPTICS).render(target.camera, target.light).alpha[..., None].double()
-    expected = 0.5 * 0.2 * (1 - ssim(alpha, target.alpha[..., None].double()))
-    term = loss(parameters, target, alpha=0.5, alpha_l1=False) - loss(parameters, target, alpha=0.0)
-    assert term == pytest.approx(float(expected), rel=1e-3)
 
 
 def test_shading_turns_normals_unless_told_not_to(target):

@@ -74,12 +74,6 @@ def test_the_palette_has_the_hue_of_the_ball(images):
     torch.testing.assert_close(color / color[0], torch.tensor([1.0, 0.5, 0.25]), atol=0.02, rtol=0)
 
 
-def test_the_same_seed_gives_the_same_field(fit, images):
-    again = PaletteFit(images, SETTINGS)
-    list(again.run())
-    assert_same(again.parameters, fit.parameters)
-
-
 @pytest.mark.parametrize("stop", [20, 70, 140, STEPS])
 def test_a_resumed_run_is_as_if_it_had_never_stopped(fit, images, tmp_path, stop):
     """Within the grid's fit and each part of that of networks, and between them."""

@@ -4,12 +4,9 @@ from math import exp, log
 
 import pytest
 import torch
-from safetensors.torch import load_file
 
-from tests.fields.rewritten import description_of, rewritten
 from texgs.core.camera import orbit
-from texgs.core.errors import DeviceError, TexgsError
-from texgs.fields.palette.file import FORMAT, read_palette, write_palette
+from texgs.core.errors import DeviceError
 from texgs.fields.palette.model import PaletteField, PaletteScene
 from texgs.fields.palette.networks import new_networks
 from texgs.fields.palette.rendering import Geometry, blending_weights
@@ -99,41 +96,6 @@ def test_blending_weights_are_those_of_a_plain_loop():
     gradients = [torch.autograd.grad((x.double() * values).sum(), depth)[0] for x in (weights, expected)]
     torch.testing.assert_close(*gradients, atol=1e-6, rtol=1e-5)
     assert len(blending_weights(depth[:0], ray[:0])) == 0
-
-
-@pytest.mark.parametrize("free", [False, True])
-def test_files_give_the_same_bits(tmp_path, free):
-    field = box(scale=1.0, free=free)
-    restored = read_palette(write_palette(tmp_path / "model.safetensors", field))
-    assert torch.equal(restored.render(CAMERA).color, field.render(CAMERA).color)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda t, h: t.pop("light.1"), "light.1: expected the networks of a palette field"),
-        (lambda t, h: t.update(extra=torch.ones(1)), "extra: expected the networks of a palette field"),
-        (lambda t, h: t.pop("palette.colors"), "expected networks and a grid"),
-        (
-            lambda t, h: t.update({"light.1": t["light.1"][:5]}),
-            r"light.1: expected \[64, 64\], got \[5, 64\]",
-        ),
-        (lambda t, h: t.update({"light.1": t["light.1"].double()}), "light.1: expected float32"),
-        (lambda t, h: t.update({"free.table": t["palette.table"].clone()}), "free.0: expected the networks"),
-        (lambda t, h: t.update(density=t["density"][:-1]), "masks: expected the bits of"),
-        (lambda t, h: t["trunk.0"].fill_(torch.inf), "trunk.0: expected finite"),
-        (lambda t, h: h["hash"].update(entries=100), "entries: expected a power of two"),
-        (lambda t, h: h.update(step=None), "expected networks and a grid"),
-    ],
-)
-def test_damaged_files_are_named(tmp_path, change, message):
-    path = write_palette(tmp_path / "m.safetensors", box())
-    tensors, header = load_file(path), description_of(path, FORMAT)
-    change(tensors, header)
-    rewritten(path, FORMAT, {name: tensors.get(name) for name in load_file(path)} | tensors, **header)
-    with pytest.raises(TexgsError, match=message) as caught:
-        read_palette(path)
-    assert str(path) in str(caught.value)
 
 
 def test_clusters_are_of_hues_and_the_largest_comes_first():

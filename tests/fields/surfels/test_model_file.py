@@ -4,11 +4,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.torch import load_file
 
-from tests.fields.rewritten import description_of, rewritten
+from tests.fields.rewritten import description_of
 from tests.fields.surfels.samples import STAGES, same, sample
-from texgs.core.errors import ArgumentError, ShapeError
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.model_file import FORMAT, read_model, write_model
+from texgs.fields.surfels.model_file import read_model, write_model
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -59,44 +58,3 @@ def test_other_programs_can_read_the_tensors(tmp_path):
         "optics": {"low_pass": 3.0, "material": "bounded", "local_viewer": True, "facing": True},
         "metadata": sample().metadata,
     }
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"stage": "cooked"}, "expected stage surfels, shading, texture, got 'cooked'"),
-        ({"stage": []}, "expected stage surfels, shading, texture"),
-        ({"optics": {"low_pass": 2.0, "lens": 1}}, "expected stage, optics and metadata in the header"),
-        ({"optics": {"material": "wood"}}, "optics: expected values"),
-        ({"optics": {"low_pass": -1}}, "optics: expected values"),
-        ({"optics": {"low_pass": "thin"}}, "expected stage, optics and metadata in the header"),
-        ({"metadata": 3}, "expected stage, optics and metadata in the header"),
-    ],
-)
-def test_a_header_that_cannot_be_used_is_named(tmp_path, change, message):
-    path = rewritten(write_model(tmp_path / "m", sample()), FORMAT, **change)
-    with pytest.raises(ArgumentError, match=f"^{path}: {message}"):
-        read_model(path)
-
-
-@pytest.mark.parametrize(
-    ("tensors", "message"),
-    [
-        ({"means": None}, "model: expected means, quats, scales, opacities"),
-        ({"texels": None}, "expected tensor texels at stage texture, got"),
-        ({"ambient": None}, "expected tensor ambient at stage texture"),
-        ({"colors": None, "sh": torch.zeros(7, 1, 3)}, "expected tensor colors at stage texture"),
-        ({"mood": torch.zeros(3)}, "expected tensors of a texgs model, got mood"),
-        ({"quats": torch.zeros(6, 4)}, r"quats: expected \[7, 4\], got \[6, 4\]"),
-        ({"diffuse": torch.zeros(2)}, r"diffuse: expected \[7\] or \[1\], got \[2\]"),
-        ({"means": torch.zeros(7, 3).double()}, r"means: expected torch.float32, got torch.float64"),
-        ({"sizes": torch.ones(7, 2).long()}, r"sizes: expected torch.int32"),
-        ({"scales": torch.full((7, 2), torch.nan)}, "scales: expected finite values, got 14 NaN"),
-        ({"offsets": torch.arange(7) + 1000}, ".* textures within the"),
-        ({"offsets": torch.zeros(7).long()}, ".* texels of its own for every surfel"),
-    ],
-)
-def test_a_tensor_that_cannot_be_used_is_named(tmp_path, tensors, message):
-    path = rewritten(write_model(tmp_path / "m", sample()), FORMAT, tensors)
-    with pytest.raises((ArgumentError, ShapeError), match=f"^{path}: {message}"):
-        read_model(path)

@@ -4,13 +4,9 @@ from dataclasses import replace
 
 import pytest
 import torch
-from safetensors.torch import load_file
 
-from tests.fields.rewritten import description_of, rewritten
 from texgs.core.camera import orbit
-from texgs.core.errors import TexgsError
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.voxels.file import FORMAT, read_voxels, write_voxels
 from texgs.fields.voxels.model import Voxels, VoxelScene, merged
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, unpack_rows, voxel_grid
 
@@ -30,41 +26,10 @@ def ball(center=(0.0, 0.0, 0.0), color=0.4, density=60.0, side=32, spacing=0.02,
     return Voxels(grid.with_rows(rows), metadata={"tf": "TF01"})
 
 
-def test_files_give_the_same_bits(tmp_path):
-    field = ball(degree=2)
-    restored = read_voxels(write_voxels(tmp_path / "model.safetensors", field))
-    assert torch.equal(restored.grid.rows, field.grid.rows)
-    assert torch.equal(restored.grid.masks, field.grid.masks)
-    assert torch.equal(restored.render(CAMERA).color, field.render(CAMERA).color)
-
-
 def test_sizes_are_those_that_the_paper_counts():
     field = ball(degree=2)
     sizes, n = field.sizes(), len(field)
     assert sizes["total_mib"] * 2**20 == 4 * 32**3 + n * (4 + 2 * 27)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda t, h: t.pop("sh"), "expected a grid and its lattice"),
-        (lambda t, h: t.update(density=t["density"][:-1]), "expected .* got"),
-        (lambda t, h: t.update(masks=torch.zeros_like(t["masks"])), "masks: expected the bits of"),
-        (lambda t, h: t.update(density=torch.full_like(t["density"], torch.nan)), "density: .*finite|NaN"),
-        (lambda t, h: t.update(sh=t["sh"][:, :3]), "sh: expected 1, 4 or 9 coefficients"),
-        (lambda t, h: h.update(spacing=0), "spacing: expected a length above 0"),
-        (lambda t, h: h.update(lower=[0, 0]), "lower: expected 3 finite numbers"),
-        (lambda t, h: h.update(step=None), "expected a grid and its lattice"),
-    ],
-)
-def test_damaged_files_are_named(tmp_path, change, message):
-    path = write_voxels(tmp_path / "m.safetensors", ball())
-    tensors, header = load_file(path), description_of(path, FORMAT)
-    change(tensors, header)
-    rewritten(path, FORMAT, {name: tensors.get(name) for name in load_file(path)} | tensors, **header)
-    with pytest.raises(TexgsError, match=message) as caught:
-        read_voxels(path)
-    assert str(path) in str(caught.value)
 
 
 def test_two_apart_are_seen_as_each_alone():
