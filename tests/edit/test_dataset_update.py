@@ -13,6 +13,7 @@ from tests.fit.scenes import HEADLIGHT, cameras
 from texgs.core.errors import ArgumentError, FitError
 from texgs.edit.dataset_update import PhotometricLoss, azimuth, field_views, update_field
 from texgs.edit.gaussians import GaussianLearner, radii
+from texgs.edit.methods.dge import DgeKeys
 from texgs.edit.methods.in2n import In2nKeys
 from texgs.edit.methods.updates import UpdateSchedule
 from texgs.edit.voxels import VoxelLearner, corner
@@ -38,20 +39,23 @@ def views_of(field, count=5, size=48):
     return Images(stack, views, [HEADLIGHT] * count)
 
 
-def splats(**options):
+def splats(**keys):
     model = gaussians(degree=1)
     images = views_of(model)
-    return GaussianLearner(model, images, RATES, PIXELS, 100, **options), images
+    return GaussianLearner(
+        DgeKeys(rates=RATES, **{"prune": False, **keys}), model, images, PIXELS, 100
+    ), images
 
 
 def grid(frozen=False):
     field = voxels(degree=1)
     keys = In2nKeys(frozen=frozen, sh=0.05, patches=4, side=16)
-    return VoxelLearner(field, keys, PATCHES), seen(field.grid, count=5)
+    images = seen(field.grid, count=5)
+    return VoxelLearner(keys, field, images, PATCHES, 100), images
 
 
 LEARNERS = {"gaussians": splats, "voxels": grid}
-FROZEN = {"gaussians": lambda: splats(is_frozen=True), "voxels": lambda: grid(frozen=True)}
+FROZEN = {"gaussians": lambda: splats(frozen=True), "voxels": lambda: grid(frozen=True)}
 
 
 def color_of(field):
@@ -164,17 +168,19 @@ def test_the_first_step_of_gaussians_goes_against_the_gradient_of_the_loss_writt
 
 
 def test_gaussians_that_are_faint_or_large_are_removed():
-    learner, images = splats(prunes=True)
+    learner, images = splats(prune=True)
     model = learner.original
     parameters = {name: x.clone() for name, x in model.parameters.items()}
     parameters["opacities"][:10] = -9.0
     parameters["scales"][10:30, 0] = 0.5
-    learner = GaussianLearner(replace(model, parameters=parameters), images, RATES, PIXELS, 200, prunes=True)
+    learner = GaussianLearner(
+        DgeKeys(rates=RATES), replace(model, parameters=parameters), images, PIXELS, 200
+    )
     learner.optimizer._rates = {name: Rate(0.0, 1.0) for name in learner.optimizer._rates}
     for _ in range(100):
         learner.step(images, [0], torch.Generator())
     assert len(learner.field) == len(model) - 30
-    assert len(splats(prunes=True, is_frozen=True)[0].field) == len(model)
+    assert len(splats(prune=True, frozen=True)[0].field) == len(model)
 
 
 def test_radii_are_those_of_a_sphere_on_the_axis():

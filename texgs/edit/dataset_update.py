@@ -131,16 +131,9 @@ def update_field(
 ) -> Updated:
     """Edit a field by editing its training views, which it learns from as they are then.
 
-    Args:
-        learner: with the field, and how it learns.
-        images: training views, which stay as they are.
-        guidance: edits views.
-        instruction: to the guidance.
-        schedule: of edits and iterations.
-        keeps_renders: edits stay close to views of the field as it was, as in DGE; or to the training views.
-        shown: views that are returned, at most.
-        seed: of all random numbers.
-        title: of the progress bar.
+    The images given stay as they are. Where renders are kept, edits stay close to views of the field as it
+    was, as in DGE; else to the training views. So many views as are to be shown are returned, at most. The
+    seed is of all random numbers.
     """
     generator = torch.Generator().manual_seed(seed)
     edits = _Edits(learner, images, guidance, require_instruction(instruction), keeps_renders, generator)

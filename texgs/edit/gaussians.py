@@ -10,6 +10,8 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.edit.dataset_update import PhotometricLoss
+from texgs.edit.methods.dge import DgeKeys
+from texgs.edit.methods.igs2gs import Igs2gsKeys
 from texgs.edit.objective import Objective
 from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import Losses, Painting, learn_style
@@ -18,7 +20,7 @@ from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.optimizer import Optimizer
 from texgs.fields.splats import GEOMETRY, join, split
 from texgs.fit.loop import extent, rates
-from texgs.fit.settings import CommonRates, Rates
+from texgs.fit.settings import Rates
 from texgs.models.vgg import Vgg
 from texgs.volume.images import Images
 
@@ -86,27 +88,24 @@ class GaussianPainting:
 class GaussianLearner:
     """Gaussians that learn from whole views by Adam, in so many iterations; the model given stays as it is.
 
-    Frozen, only harmonics learn. Else Gaussians that are faint, or large in the scene or on screen, can be
-    removed now and then, as DGE does.
+    Frozen, only harmonics learn. Else DGE can remove Gaussians now and then that are faint, or large in the
+    scene or on screen.
     """
 
     def __init__(
         self,
+        keys: Igs2gsKeys | DgeKeys,
         model: Gaussians,
         images: Images,
-        learning: CommonRates,
         loss: PhotometricLoss,
         iterations: int,
-        *,
-        is_frozen: bool = False,
-        prunes: bool = False,
     ) -> None:
         self.original, self.loss, self.iterations = model, loss, iterations
-        self.prunes = prunes and not is_frozen
+        self.prunes = isinstance(keys, DgeKeys) and keys.prune and not keys.frozen
         self.extent = extent(images.cameras, model.parameters["means"].cpu())
         raw = {**model.parameters, **split(model.parameters["sh"])}
-        chosen = rates(raw, Rates(**asdict(learning)), self.extent)
-        learned = {name: rate for name, rate in chosen.items() if not (is_frozen and name in GEOMETRY)}
+        chosen = rates(raw, Rates(**asdict(keys.rates)), self.extent)
+        learned = {name: rate for name, rate in chosen.items() if not (keys.frozen and name in GEOMETRY)}
         self.optimizer = Optimizer({name: x.contiguous() for name, x in raw.items()}, learned)
         self.iteration = 0
         self.radii = torch.zeros(len(model), device=model.device)  # largest on screen since the last pruning

@@ -163,7 +163,9 @@ class VoxelPainting:
 class VoxelLearner:
     """A grid that learns from patches of views by RMSProp; the field given stays as it is."""
 
-    def __init__(self, field: Voxels, keys: In2nKeys, loss: PhotometricLoss) -> None:
+    def __init__(
+        self, keys: In2nKeys, field: Voxels, images: Images, loss: PhotometricLoss, iterations: int
+    ) -> None:
         self.original, self.keys, self.loss = field, keys, loss
         self.density = 0.0 if keys.frozen else keys.density
         self.grid = field.grid.with_rows(field.grid.rows.clone())

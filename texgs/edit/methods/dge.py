@@ -12,10 +12,7 @@ from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, update_method
 from texgs.fit.settings import CommonRates
 
 if TYPE_CHECKING:
-    from texgs.edit.dataset_update import PhotometricLoss
     from texgs.edit.gaussians import GaussianLearner
-    from texgs.fields.gaussians.model import Gaussians
-    from texgs.volume.images import Images
 
 
 @dataclass(frozen=True)
@@ -45,14 +42,11 @@ def schedule(keys: DgeKeys, views: int) -> UpdateSchedule:
     return UpdateSchedule(keys.rounds, keys.every, keys.views, keys.views, "random", "round", levels)
 
 
-def learner(keys: DgeKeys, model: Gaussians, images: Images, loss: PhotometricLoss) -> GaussianLearner:
-    """Let the Gaussians learn from whole views."""
+def learner() -> type[GaussianLearner]:
+    """Return what learns from whole views."""
     from texgs.edit.gaussians import GaussianLearner
 
-    iterations = schedule(keys, len(images)).iterations
-    return GaussianLearner(
-        model, images, keys.rates, loss, iterations, is_frozen=keys.frozen, prunes=keys.prune
-    )
+    return GaussianLearner
 
 
 METHOD = update_method(

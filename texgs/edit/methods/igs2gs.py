@@ -10,10 +10,7 @@ from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, 
 from texgs.fit.settings import CommonRates
 
 if TYPE_CHECKING:
-    from texgs.edit.dataset_update import PhotometricLoss
     from texgs.edit.gaussians import GaussianLearner
-    from texgs.fields.gaussians.model import Gaussians
-    from texgs.volume.images import Images
 
 
 def rates(zeroth: float, means_final: float) -> CommonRates:
@@ -39,12 +36,11 @@ def schedule(keys: Igs2gsKeys, views: int) -> UpdateSchedule:
     return UpdateSchedule(keys.passes, keys.every, learned="newest", levels=levels)
 
 
-def learner(keys: Igs2gsKeys, model: Gaussians, images: Images, loss: PhotometricLoss) -> GaussianLearner:
-    """Let the Gaussians learn from whole views."""
+def learner() -> type[GaussianLearner]:
+    """Return what learns from whole views."""
     from texgs.edit.gaussians import GaussianLearner
 
-    iterations = schedule(keys, len(images)).iterations
-    return GaussianLearner(model, images, keys.rates, loss, iterations, is_frozen=keys.frozen)
+    return GaussianLearner
 
 
 METHOD = update_method(

@@ -9,10 +9,7 @@ from texgs.core.keys import key
 from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, update_method
 
 if TYPE_CHECKING:
-    from texgs.edit.dataset_update import PhotometricLoss
     from texgs.edit.voxels import VoxelLearner
-    from texgs.fields.voxels.model import Voxels
-    from texgs.volume.images import Images
 
 
 @dataclass(frozen=True)
@@ -37,11 +34,11 @@ def schedule(keys: In2nKeys, views: int) -> UpdateSchedule:
     return UpdateSchedule(rounds, keys.every, views=1, levels=noise_range("edit.in2n.noise", keys.noise))
 
 
-def learner(keys: In2nKeys, model: Voxels, images: Images, loss: PhotometricLoss) -> VoxelLearner:
-    """Let the grid learn from patches."""
+def learner() -> type[VoxelLearner]:
+    """Return what learns from patches."""
     from texgs.edit.voxels import VoxelLearner
 
-    return VoxelLearner(model, keys, loss)
+    return VoxelLearner
 
 
 METHOD = update_method(

@@ -77,21 +77,25 @@ def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float]
 Keys = TypeVar("Keys", bound=UpdateKeys)
 
 
+# What makes a learner, imported late: from the keys, a model, its views, the loss and a number of iterations.
+MakeLearner = Callable[[], "Callable[[Any, Any, Images, PhotometricLoss, int], Learner]"]
+
+
 def update_method(
     name: str,
     summary: str,
     settings: type[Keys],
     schedule: Callable[[Keys, int], UpdateSchedule],
-    learner: Callable[[Keys, Any, Images, PhotometricLoss], Learner],
+    learner: MakeLearner,
     kind: str,
     *,
     keeps_renders: bool = False,
 ) -> Method[Keys]:
     """Return the specification of a method that edits training views while a kind of field learns from them.
 
-    From its keys and a number of views follows the schedule, and from its keys, a model, the training views
-    and the loss on them what learns. Where renders are kept, edits stay close to views of the fitted model
-    and not to the training views.
+    From its keys and a number of views follows the schedule. What learns is made from the keys, a model, the
+    training views, the loss on them and a number of iterations. Where renders are kept, edits stay close to
+    views of the fitted model and not to the training views.
     """
     return Method(
         name,
@@ -108,7 +112,7 @@ def update_method(
 
 def _run(
     schedule: Callable[[Keys, int], UpdateSchedule],
-    learner: Callable[[Keys, Any, Images, PhotometricLoss], Learner],
+    learner: MakeLearner,
     keeps_renders: bool,
     task: Task[Keys],
 ) -> EditedScene:
@@ -124,11 +128,11 @@ def _run(
     notes: dict[str, Any] = {}
 
     def one(name: str, model: Field, views: Sequence[View]) -> Field:
-        images = load(views, task.reduce)
+        images, plan = load(views, task.reduce), schedule(keys, len(views))
         updated = update_field(
-            *(learner(keys, model, images, loss), images, guidance),
+            *(learner()(keys, model, images, loss, plan.iterations), images, guidance),
             task.settings_for(name).instruction,
-            schedule(keys, len(views)),
+            plan,
             keeps_renders=keeps_renders,
             shown=SHOWN,
             seed=task.edit.seed,
