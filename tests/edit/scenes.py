@@ -4,8 +4,10 @@ import torch
 from kornia.geometry.conversions import rotation_matrix_to_quaternion
 
 from tests.fit.scenes import HEADLIGHT, RADIUS, cameras
+from texgs.edit.style_picture import StylePicture
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
+from texgs.volume.images import Images
 
 
 def sphere_points(count):
@@ -41,6 +43,22 @@ def ball(count=400, side=5, opacity=4.0):
         },
         ShadingModel(),
     )
+
+
+def images_of(field, count=6, size=48):
+    """Images of a field over white, as training views would be."""
+    around, planes = cameras(count, size), []
+    with torch.no_grad():
+        for camera in around:
+            shown = field.render(camera)
+            planes.append(torch.cat([shown.color, shown.alpha[..., None]], dim=2).permute(2, 0, 1))
+    stack = torch.stack(planes).clamp(0, 1).mul(255).round().to(torch.uint8)
+    return Images(stack, around, [HEADLIGHT] * count)
+
+
+def plain_style(color):
+    """A style of one colour."""
+    return StylePicture.of(torch.tensor(color)[:, None, None].expand(3, 40, 40).contiguous())
 
 
 def views(count=6, size=64):

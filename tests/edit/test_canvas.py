@@ -92,7 +92,4 @@ def test_the_mean_alpha_is_the_weighted_mean_of_alpha_of_whole_views(opacity):
     ).double()
     expected = float(alphas.square().sum() / alphas.sum())
     assert mean_alpha(model, cameras) == pytest.approx(expected, rel=1e-5)
-
-
-def test_nothing_to_see_is_not_translucent():
-    assert mean_alpha(ball(opacity=-60.0), views(2)[0]) == 1
+    assert mean_alpha(ball(opacity=-60.0), cameras) == 1, "nothing to see is not translucent"

@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from tests.edit.guidances import Returns, Tint, Watching
+from tests.edit.scenes import images_of
 from tests.edit.test_gaussians import ball as gaussians
-from tests.edit.test_voxels import seen
 from tests.fields.voxels.test_voxels import ball as voxels
-from tests.fit.scenes import HEADLIGHT, cameras
+from tests.fit.scenes import cameras
 from texgs.core.errors import ArgumentError, FitError
 from texgs.edit.dataset_update import PhotometricLoss, azimuth, field_views, update_field
 from texgs.edit.gaussians import GaussianLearner, radii
@@ -20,7 +20,7 @@ from texgs.edit.voxels import VoxelLearner, corner
 from texgs.fields.optimizer import Rate
 from texgs.fit.settings import CommonRates
 from texgs.raster.losses import ssim
-from texgs.volume.images import Box, Images
+from texgs.volume.images import Box
 
 COLOR = (0.8, 0.3, 0.1)
 RATES = CommonRates(means=1e-4, sh=0.05, sh_rest=0.0025, means_final=1.0, final=1.0)
@@ -28,20 +28,9 @@ PIXELS = PhotometricLoss(0.8, 0.2)
 PATCHES = PhotometricLoss(1.0, 0.0)
 
 
-@torch.no_grad()
-def views_of(field, count=5, size=48):
-    planes = []
-    views = cameras(count, size)
-    for camera in views:
-        shown = field.render(camera)
-        planes.append(torch.cat([shown.color, shown.alpha[..., None]], dim=2).permute(2, 0, 1))
-    stack = torch.stack(planes).clamp(0, 1).mul(255).round().to(torch.uint8)
-    return Images(stack, views, [HEADLIGHT] * count)
-
-
 def splats(**keys):
     model = gaussians(degree=1)
-    images = views_of(model)
+    images = images_of(model, count=5)
     return GaussianLearner(
         DgeKeys(rates=RATES, **{"prune": False, **keys}), model, images, PIXELS, 100
     ), images
@@ -50,7 +39,7 @@ def splats(**keys):
 def grid(frozen=False):
     field = voxels(degree=1)
     keys = In2nKeys(frozen=frozen, sh=0.05, patches=4, side=16)
-    images = seen(field.grid, count=5)
+    images = images_of(field, count=5)
     return VoxelLearner(keys, field, images, PATCHES, 100), images
 
 

@@ -7,24 +7,14 @@ import torch
 
 from tests.edit.scenes import RADIUS, sphere_points
 from tests.fit.scenes import cameras
-from texgs.core.errors import ArgumentError
 from texgs.edit.gaussians import HIGHER, stylize_gaussians
+from texgs.edit.methods.stylesplat import StyleSplatKeys
 from texgs.edit.objective import Objective
 from texgs.edit.pictures import picture
-from texgs.edit.recipe import Recipe
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.gaussians.model import Gaussians
 
-RECIPE = Recipe(
-    iterations=4,
-    rate=0.01,
-    features=0.0,
-    distribution=0.0,
-    patches=1.0,
-    behind="white",
-    cropped=False,
-    reduce=1,
-)
+RECIPE = StyleSplatKeys(nnfm=0.0, patches=1.0).recipe(4, 0, reduce=1, rate=0.01)
 STYLE = StylePicture.of(picture("dots", 96))
 
 
@@ -77,8 +67,3 @@ def test_the_loss_falls():
         _, losses = stylize_gaussians(ball(), cameras(4, 48), STYLE, recipe)
         ends.append(sum(losses["patches"][-8:]))
     assert ends[1] < 0.7 * ends[0]
-
-
-def test_features_need_a_network():
-    with pytest.raises(ArgumentError, match="vgg: expected a VGG for this recipe, got none"):
-        stylize_gaussians(ball(), cameras(1, 48), STYLE, replace(RECIPE, features=1.0))

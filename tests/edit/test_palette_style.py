@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from tests.edit.scenes import plain_style
 from tests.fit.scenes import ball_images, cameras
 from tests.fit.test_palette import SETTINGS
 from texgs.core.errors import ArgumentError
@@ -13,7 +14,6 @@ from texgs.edit.methods.stylerf import StyleRfKeys
 from texgs.edit.objective import Objective
 from texgs.edit.palette_style import PalettePainting, stylize_palette
 from texgs.edit.pictures import picture
-from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.palette.networks import free_color, palette_color
@@ -21,17 +21,8 @@ from texgs.fields.palette.rendering import points_on, shown
 from texgs.fit.palette import PaletteFit
 from texgs.raster.voxels import camera_rays
 
-RECIPE = Recipe(
-    iterations=6,
-    rate=0.01,
-    features=0.0,
-    distribution=0.0,
-    patches=50.0,
-    behind="white",
-    cropped=False,
-    reduce=2,
-)
-WEIGHTS = StyleRfKeys(variation=0.1, distillation=60)
+WEIGHTS = StyleRfKeys(nnfm=0.0, patches=50.0, variation=0.1, distillation=60)
+RECIPE = WEIGHTS.recipe(6, 0, reduce=2, rate=0.01)
 STYLE = StylePicture.of(picture("dots", 96))
 
 
@@ -47,11 +38,6 @@ def field(images):
     for _ in fit.run():
         pass
     return fit.field({})
-
-
-def plain(color):
-    """A style of one colour."""
-    return StylePicture.of(torch.tensor(color)[:, None, None].expand(3, 40, 40).contiguous())
 
 
 def one_colored(field):
@@ -132,7 +118,7 @@ def test_only_colours_change(field, images, vgg, features):
 
 
 def test_a_plain_style_becomes_the_colour_of_the_ball(field, images):
-    field, style = one_colored(field), plain([0.2, 0.6, 0.3])
+    field, style = one_colored(field), plain_style([0.2, 0.6, 0.3])
     edited, *_ = stylize_palette(
         field, images, [style], replace(RECIPE, iterations=60), replace(WEIGHTS, variation=0.0)
     )
@@ -155,8 +141,6 @@ def test_layers_of_palette_colours_are_apart_and_together_everything(field, imag
         torch.testing.assert_close(alpha, 1 - torch.exp(-depth), atol=0.02, rtol=0)  # small weights are left
 
 
-def test_errors(field, images):
+def test_each_palette_colour_has_a_style(field, images):
     with pytest.raises(ArgumentError, match="styles: expected one for each of 2 palette colours, got 1"):
         stylize_palette(field, images, [STYLE], RECIPE, WEIGHTS)
-    with pytest.raises(ArgumentError, match="vgg: expected a VGG for this recipe, got none"):
-        stylize_palette(field, images, [STYLE] * 2, replace(RECIPE, features=1.0), WEIGHTS)

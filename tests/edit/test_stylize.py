@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.edit.scenes import ball, views
+from tests.edit.scenes import ball, plain_style, views
 from tests.models.networks import random_weights
 from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.pictures import picture
@@ -61,7 +61,7 @@ def test_only_texels_and_offsets_change_and_base_colours_are_colours(name, vgg, 
 def test_a_plain_style_becomes_the_colour_of_the_surface():
     """Its projection is that colour, whatever light: c_ind * gain + highlight is what Blinn-Phong says."""
     color = torch.tensor([0.2, 0.6, 0.3])
-    style = StylePicture.of(color[:, None, None].expand(3, 40, 40).contiguous())
+    style = plain_style(color.tolist())
     model = ball()
     plain = {**model.parameters, "palette": color, "colors": torch.zeros_like(model.parameters["colors"])}
     cameras, lights = views()

@@ -183,15 +183,6 @@ def test_hidden_surfels_take_the_colour_of_the_nearest_seen_one(glimpse):
     assert_close(filled, torch.tensor([0.2] * 5 + [0.7] * 5), atol=0.08, rtol=0)
 
 
-def test_one_seen_surfel_gives_all_others_its_colour():
-    model = shell(count=10, texels=2)
-    place, surfel = owners(model.parameters)
-    colors, weights = torch.ones(40, 3), torch.zeros(40)
-    weights[place[surfel == 4]] = 1.0
-    colors[place[surfel == 4]] = 0.3
-    assert_close(fill_unseen(colors, weights, model), torch.full((40, 3), 0.3), atol=0.01, rtol=0)
-
-
 def test_nothing_seen_nothing_changes():
     model = shell(count=4, texels=2)
     filled = fill_unseen(torch.zeros(16, 3), torch.zeros(16), model)  # as back_project has it

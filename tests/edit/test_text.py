@@ -16,7 +16,6 @@ from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
 from texgs.edit.observations import render_views
 from texgs.edit.text import RECIPES, TextRecipe, edit_by_text
-from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.texels import bare_colors, owners, recolored, untextured
 from texgs.models.filters import ProceduralFilters
@@ -94,17 +93,6 @@ def test_only_chosen_surfels_change(model):
     kept = place[~upper[surfel]]
     assert torch.equal(p["texels"][kept], q["texels"][kept])
     assert (bare_colors(done)[place[upper[surfel]]] - torch.tensor(BLUE)).abs().mean() < 0.02
-
-
-def test_the_palette_still_recolours(model):
-    done = edited(model, Tint((0.5, 0.5, 0.5)))
-    shift = torch.tensor([0.2, -0.1, 0.1])
-    edit = PartEdit(palette=tuple((model.parameters["palette"] + shift).tolist()))
-    scene, camera = Composition([done]), around(3)[0]
-    plain = scene.render(camera, look="unshaded")
-    moved = scene.render(camera, edits=[edit], look="unshaded")
-    solid = plain.alpha > 0.95
-    assert_close((moved.color - plain.color)[solid].mean(dim=0), shift, atol=0.01, rtol=0)
 
 
 def test_highlights_keep_their_colour():
@@ -186,12 +174,6 @@ def test_training_views_nearest_to_the_axes_as_they_are_but_for_their_size(model
         shown, expected = model.render(camera).color, model.render(original).color
         mean = expected.unflatten(0, (32, 2)).unflatten(2, (32, 2)).mean((1, 3))
         assert (shown - mean).abs().mean() < 0.01
-
-
-def test_the_papers_recipe():
-    paper = RECIPES["paper"]
-    assert (paper.views, paper.iterations, paper.rate, paper.final) == ("nearest", 1500, 0.025, 1.0)
-    assert (paper.opacities[0], paper.opacities[-1]) == (2.0, 0.5)
 
 
 def test_without_texture_some_surfels_have_one_colour_and_others_stay(model):

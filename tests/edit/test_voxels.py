@@ -5,53 +5,33 @@ from dataclasses import replace
 import pytest
 import torch
 
+from tests.edit.scenes import images_of, plain_style
 from tests.fields.voxels.test_voxels import ball
-from tests.fit.scenes import HEADLIGHT, cameras
-from texgs.core.errors import ArgumentError
+from tests.fit.scenes import cameras
 from texgs.edit.methods.arf import ArfKeys
 from texgs.edit.objective import Objective
 from texgs.edit.pictures import picture
-from texgs.edit.recipe import Recipe
-from texgs.edit.style_loop import image_variation, learn_style
+from texgs.edit.style_loop import learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.voxels import VoxelPainting, moved, object_colors, recolored_images, stylize_voxels
 from texgs.raster.voxel_grid import drop_sh, unpack_rows
 from texgs.raster.voxels import render_view
-from texgs.volume.images import Images
 
-RECIPE = Recipe(
-    iterations=8, features=0.0, distribution=0.0, patches=50.0, behind="white", cropped=False, reduce=2
-)
-WEIGHTS = ArfKeys(content=0.0, variation=0.1)
+WEIGHTS = ArfKeys(nnfm=0.0, patches=50.0, content=0.0, variation=0.1)
+RECIPE = WEIGHTS.recipe(8, 0, reduce=2)
 STYLE = StylePicture.of(picture("dots", 96))
 A = torch.tensor([[0.6, 0.2, 0.0], [0.1, 0.5, 0.1], [0.0, 0.1, 0.7]])
 B = torch.tensor([0.1, 0.05, 0.15])
 
 
-@torch.no_grad()
-def seen(grid, count=6, size=48):
-    """Views of a grid over white, as training views would be."""
-    views = cameras(count, size)
-    planes = []
-    for camera in views:
-        shown = render_view(grid, camera)
-        planes.append(torch.cat([shown.color, shown.alpha[..., None]], dim=2).permute(2, 0, 1))
-    stack = torch.stack(planes).clamp(0, 1).mul(255).round().to(torch.uint8)
-    return Images(stack, views, [HEADLIGHT] * count)
-
-
-def plain(color):
-    """A style of one colour."""
-    return StylePicture.of(torch.tensor(color)[:, None, None].expand(3, 40, 40).contiguous())
-
-
 def test_views_are_recoloured_as_the_grid_is():
-    grid = drop_sh(ball(degree=2).grid)
-    recolored = seen(moved(grid, A, B, is_exact=True))
-    images = recolored_images(seen(grid), A, B, foreground=True)
+    field = ball(degree=2)
+    field = replace(field, grid=drop_sh(field.grid))
+    recolored = images_of(replace(field, grid=moved(field.grid, A, B, is_exact=True)))
+    images = recolored_images(images_of(field), A, B, foreground=True)
     assert torch.equal(images.planes[:, 3], recolored.planes[:, 3])
     assert int((images.planes.int() - recolored.planes.int()).abs().max()) <= 2, "rounding of both"
-    everywhere = recolored_images(seen(grid), A, B, foreground=False)
+    everywhere = recolored_images(images_of(field), A, B, foreground=False)
     corner = everywhere.planes[0, :3, 0, 0].float() / 255
     torch.testing.assert_close(corner, A.sum(1) + B, atol=1 / 255, rtol=0)
 
@@ -78,7 +58,7 @@ def test_colours_count_by_their_alpha():
 
 def test_the_step_has_the_gradient_of_autograd(vgg, monkeypatch):
     field = ball(degree=0)
-    images, recipe = seen(field.grid, count=1), replace(RECIPE, iterations=1, features=1.0)
+    images, recipe = images_of(field, count=1), replace(RECIPE, iterations=1, features=1.0)
     weights = ArfKeys(content=0.3, variation=0.7)
     run = VoxelPainting(field.grid, field, weights, torch.Generator())
     gradients = []
@@ -109,7 +89,7 @@ def test_only_colours_change(vgg, features):
     field = ball(degree=2)
     rows = field.grid.rows.clone()
     recipe = replace(RECIPE, features=features, iterations=3)
-    edited, losses = stylize_voxels(field, seen(field.grid), STYLE, recipe, ArfKeys(), vgg)
+    edited, losses = stylize_voxels(field, images_of(field), STYLE, recipe, ArfKeys(), vgg)
     assert torch.equal(field.grid.rows, rows), "the field given is left alone"
     assert torch.equal(edited.grid.masks, field.grid.masks)
     assert torch.equal(edited.grid.rows[:, 3], field.grid.rows[:, 3]), "densities"
@@ -119,8 +99,8 @@ def test_only_colours_change(vgg, features):
 
 
 def test_a_plain_style_becomes_the_colour_of_the_ball():
-    field, style = ball(degree=1), plain([0.2, 0.6, 0.3])
-    edited, _ = stylize_voxels(field, seen(field.grid), style, RECIPE, WEIGHTS)
+    field, style = ball(degree=1), plain_style([0.2, 0.6, 0.3])
+    edited, _ = stylize_voxels(field, images_of(field), style, RECIPE, WEIGHTS)
     shown = render_view(edited.grid, cameras(1, 48)[0])
     color = (shown.color - 1 + shown.alpha[..., None])[shown.alpha > 0.99]
     torch.testing.assert_close(color, style.mean.expand_as(color), atol=0.01, rtol=0)
@@ -131,7 +111,7 @@ def test_in_the_end_colours_have_the_mean_and_covariance_of_the_style():
     field = ball(degree=0)
     soft = STYLE.image * 0.3 + 0.35
     style = StylePicture.of(soft)
-    images = seen(field.grid)
+    images = images_of(field)
     noise = torch.rand(images.planes[:, :3].shape, generator=torch.Generator().manual_seed(1))
     images.planes[:, :3] = (images.planes[:, :3].float() * (0.7 + 0.3 * noise)).to(torch.uint8)
     wanted = torch.cat([style.mean, style.pixels.T.cov().flatten()])
@@ -144,16 +124,3 @@ def test_in_the_end_colours_have_the_mean_and_covariance_of_the_style():
         misses[is_exact] = float((torch.cat([colors.mean(0), colors.T.cov().flatten()]) - wanted).abs().max())
     assert misses[True] < 0.02
     assert misses[False] > 5 * misses[True]
-
-
-def test_variation_is_the_mean_squared_difference_of_neighbours():
-    image = torch.rand(3, 5, 7)
-    down = sum((image[:, y + 1] - image[:, y]).square().sum() for y in range(4)) / (3 * 4 * 7)
-    right = sum((image[..., x + 1] - image[..., x]).square().sum() for x in range(6)) / (3 * 5 * 6)
-    torch.testing.assert_close(image_variation(image), (down + right) / 2)
-
-
-def test_features_need_a_network():
-    field = ball(degree=0)
-    with pytest.raises(ArgumentError, match="vgg: expected a VGG for this recipe, got none"):
-        stylize_voxels(field, seen(field.grid, 1), STYLE, replace(RECIPE, features=1.0), WEIGHTS)
