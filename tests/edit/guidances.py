@@ -16,30 +16,22 @@ class Identity:
 
 
 class Tint(Identity):
-    """Every view in one colour, where it shows anything."""
+    """Every view in one colour, where it shows anything; keeps the views it was given.
+
+    With a sigma, every view of every call goes half way to a colour that is off by chance.
+    """
 
     name = "tint"
 
-    def __init__(self, color, lit=False):
+    def __init__(self, color, lit=False, sigma=0.0):
         super().__init__(lit)
-        self.color = torch.tensor(color)
+        self.color, self.sigma, self.seen = torch.tensor(color), sigma, []
 
     def __call__(self, views, instruction, generator):
+        self.seen.append(views)
         alpha = views.alphas[..., None]
-        return self.color * alpha + 1 - alpha
-
-
-class NoisyTint(Tint):
-    """As `Tint`, but every view of every call goes half way to a colour that is off by chance."""
-
-    name = "noisy tint"
-
-    def __init__(self, color, sigma):
-        super().__init__(color)
-        self.sigma = sigma
-
-    def __call__(self, views, instruction, generator):
-        alpha = views.alphas[..., None]
+        if not self.sigma:
+            return self.color * alpha + 1 - alpha
         color = self.color + self.sigma * torch.randn(len(views), 1, 1, 3, generator=generator)
         return 0.5 * views.images + 0.5 * (color.clamp(0, 1) * alpha + 1 - alpha)
 
@@ -55,15 +47,3 @@ class Returns(Identity):
 
     def __call__(self, views, instruction, generator):
         return self.found(views) if callable(self.found) else self.found
-
-
-class Watching(Tint):
-    """As `Tint`; keeps the views it was given."""
-
-    def __init__(self, color, lit=False):
-        super().__init__(color, lit)
-        self.seen = []
-
-    def __call__(self, views, instruction, generator):
-        self.seen.append(views)
-        return super().__call__(views, instruction, generator)

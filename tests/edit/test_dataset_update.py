@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.edit.guidances import Returns, Tint, Watching
+from tests.edit.guidances import Returns, Tint
 from tests.edit.scenes import images_of
 from tests.edit.test_gaussians import ball as gaussians
 from tests.fields.voxels.test_voxels import ball as voxels
 from tests.fit.scenes import cameras
-from texgs.core.errors import ArgumentError, FitError
+from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.dataset_update import PhotometricLoss, azimuth, field_views, update_field
 from texgs.edit.gaussians import GaussianLearner, radii
 from texgs.edit.methods.dge import DgeKeys
@@ -99,7 +99,7 @@ def test_edits_stay_close_to_training_views_or_to_the_field_as_it_was():
     for keeps, expected in ((False, 0.2), (True, None)):
         learner, images = splats()
         images.planes[:, :3] = round(0.2 * 255)
-        guidance = Watching(COLOR)
+        guidance = Tint(COLOR)
         schedule = UpdateSchedule(3, 4, views=5, group=5)
         update_field(learner, images, guidance, "anything", schedule, keeps_renders=keeps)
         first, *_, last = guidance.seen
@@ -113,7 +113,7 @@ def test_edits_stay_close_to_training_views_or_to_the_field_as_it_was():
 
 def test_the_guidance_is_told_how_much_noise_to_use():
     learner, images = splats()
-    guidance = Watching(COLOR)
+    guidance = Tint(COLOR)
     schedule = UpdateSchedule(2, 2, views=1, levels=((0.9, 0.9), (0.3, 0.3)))
     update_field(learner, images, guidance, "anything", schedule)
     assert [views.level for views in guidance.seen] == [0.9, 0.3]
@@ -121,7 +121,7 @@ def test_the_guidance_is_told_how_much_noise_to_use():
 
 def test_views_that_are_edited_together_go_around_the_object():
     learner, images = splats()
-    guidance = Watching(COLOR)
+    guidance = Tint(COLOR)
     update_field(learner, images, guidance, "anything", UpdateSchedule(1, 1, group=5))
     (views,) = guidance.seen
     angles = [azimuth(camera) for camera in views.cameras]
@@ -138,6 +138,8 @@ def test_views_of_a_field_say_where_its_pixels_are():
     assert float(facing.median()) > 0.9, "normals of a ball point away from its middle"
     assert float(away.norm(dim=1).std()) < 0.1
     assert (views.normals[views.alphas == 0] == 0).all()
+    with pytest.raises(ShapeError, match="conditions: expected"):
+        field_views(field, cameras(3, 64), torch.zeros(3, 5, 5, 3))
 
 
 def test_the_first_step_of_gaussians_goes_against_the_gradient_of_the_loss_written_out():

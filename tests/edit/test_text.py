@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.edit.guidances import Identity, NoisyTint, Returns, Tint, Watching
+from tests.edit.guidances import Identity, Returns, Tint
 from tests.edit.textured import around, shell
 from tests.fields.surfels.samples import sample
 from tests.raster.requirements import require_same_bits
@@ -17,7 +17,7 @@ from texgs.core.light import HEADLIGHT, Light
 from texgs.edit.observations import render_views
 from texgs.edit.text import RECIPES, TextRecipe, edit_by_text
 from texgs.fields.surfels.composition import Composition
-from texgs.fields.surfels.texels import bare_colors, owners, recolored, untextured
+from texgs.fields.surfels.texels import bare_colors, owners, recolored
 from texgs.models.filters import ProceduralFilters
 from texgs.volume.cameras import icosphere
 
@@ -107,7 +107,7 @@ def test_highlights_keep_their_colour():
 
 
 def test_refinement_sees_the_first_result(model):
-    guidance = Watching(RED)
+    guidance = Tint(RED)
     second = edited(edited(model, Tint(BLUE)), guidance)
     (views,) = guidance.seen
     assert missed(views, BLUE) < 0.02
@@ -132,7 +132,7 @@ def test_refinement_keeps_some_of_the_first_style(model, monkeypatch):
 
 def test_same_seed_same_model(model):
     one, two, other = (
-        edited(model, NoisyTint(BLUE, 0.2), seed=seed).parameters["texels"] for seed in (1, 1, 2)
+        edited(model, Tint(BLUE, sigma=0.2), seed=seed).parameters["texels"] for seed in (1, 1, 2)
     )
     assert torch.equal(one, two)
     assert not torch.equal(one, other)
@@ -151,7 +151,7 @@ def test_unseen_sides_have_the_new_colour(model):
 
 
 def test_six_views_of_the_size_asked_for_in_the_aspect_of_the_first(model):
-    guidance = Watching((0.1, 0.2, 0.3))
+    guidance = Tint((0.1, 0.2, 0.3))
     wide = [type(c)(c.viewmat, c.K, 48, 24) for c in around(2)]
     edit_by_text(model, wide, guidance, "x", size=40)
     (views,) = guidance.seen
@@ -163,7 +163,7 @@ def test_six_views_of_the_size_asked_for_in_the_aspect_of_the_first(model):
 
 
 def test_training_views_nearest_to_the_axes_as_they_are_but_for_their_size(model):
-    guidance = Watching((0.1, 0.2, 0.3))
+    guidance = Tint((0.1, 0.2, 0.3))
     cameras = icosphere(4, *Lens(3.0, 30.0, 64, 64))
     edit_by_text(model, cameras, guidance, "x", TextRecipe("nearest"), size=32)
     (views,) = guidance.seen
@@ -174,16 +174,6 @@ def test_training_views_nearest_to_the_axes_as_they_are_but_for_their_size(model
         shown, expected = model.render(camera).color, model.render(original).color
         mean = expected.unflatten(0, (32, 2)).unflatten(2, (32, 2)).mean((1, 3))
         assert (shown - mean).abs().mean() < 0.01
-
-
-def test_without_texture_some_surfels_have_one_colour_and_others_stay(model):
-    half = torch.arange(len(model)) % 2 == 0
-    plain = untextured(model, half)
-    p, offsets = plain.parameters, model.parameters["offsets"].tolist()
-    for n, count in enumerate(model.parameters["sizes"].prod(1).tolist()):
-        own, now = (q["texels"][offsets[n] : offsets[n] + count] for q in (model.parameters, p))
-        assert torch.equal(now, now[:1].expand_as(now) if half[n] else own)
-    assert (untextured(model).parameters["texels"] != model.parameters["texels"]).any()
 
 
 def broken(views):

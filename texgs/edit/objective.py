@@ -77,13 +77,10 @@ class Objective:
         distributions: dict[int, FeatureDistribution] = {}
         if recipe.needs_vgg and vgg is not None:
             maps, regions = style_maps(style.scaled(max(style.region.shape) / reduce), recipe, vgg)
-            features = StyleFeatures.of(
-                maps[STRIDE], regions[STRIDE], recipe.positions, recipe.dimensions, recipe.seed
-            )
-            if recipe.distribution > 0:
-                distributions = {
-                    s: FeatureDistribution.of(x, regions[s], recipe.seed) for s, x in maps.items()
-                }
+            drawn = recipe.positions, recipe.dimensions, recipe.seed
+            features = StyleFeatures.of(maps[STRIDE], regions[STRIDE], *drawn)
+            for stride, x in maps.items() if recipe.distribution > 0 else ():
+                distributions[stride] = FeatureDistribution.of(x, regions[stride], recipe.seed)
         if recipe.patches > 0 and recipe.iterations > 0:
             patches = PatchStatistics.of(style.image, style.region, recipe.seed)
         return cls(recipe, reduce, vgg, features, distributions, patches, clip)
@@ -125,16 +122,14 @@ class Objective:
         weight = recipe.features * recipe.lambda_s
         terms = {"nnfm": weight * nnfm(maps[STRIDE], self.style, on[STRIDE], recipe.queries, iteration)}
         if self.distributions:
-            distances = [
-                each.distance(maps[s], on[s], iteration, iteration) for s, each in self.distributions.items()
-            ]
+            each = self.distributions.items()
+            distances = [style.distance(maps[s], on[s], iteration, iteration) for s, style in each]
             terms["distribution"] = weight * recipe.distribution * torch.stack(distances).mean()
         return terms
 
     def content(self, image: Tensor, target: Tensor) -> Tensor:
         """Return the mean squared distance [] of features of an image and a target, both [3, h, w] (ARF)."""
-        if self.vgg is None:
-            raise ArgumentError("vgg: expected a VGG for the distance of contents, got none; load it")
+        assert self.vgg is not None
         features = self.vgg.features(self.small(image))
         with torch.no_grad():
             wanted = self.vgg.features(self.small(target))

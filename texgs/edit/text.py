@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import atan, degrees
 from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor
 
-from texgs.core.camera import Camera
+from texgs.core.camera import Camera, orbit, orbit_direction
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.memory import require_memory
-from texgs.edit.axis_views import axis_cameras, nearest_to_axes
 from texgs.edit.canvas import require_editable
 from texgs.edit.observations import LinearObservation, observe, render_views
 from texgs.edit.texel_solver import back_project, fill_unseen, learn, seen_texels, solve
@@ -26,6 +26,11 @@ from texgs.models.instruction import require_instruction
 SIZE = 512  # pixels along the longer side of the views: what InstructPix2Pix was trained on
 PIXEL = 112  # bytes of memory for a pixel of a view: what the guidance sees, returns, and texels follow
 SURFEL = 28  # and for a surfel in a view at one opacity
+# Azimuth and polar angle of cameras at the front (+z), back, left, right, top and bottom, degrees.
+AXES = ((-90, 0), (90, 0), (180, 0), (0, 0), (-90, 90), (-90, -90))
+ANY_FOV = 45.0  # degrees, of cameras that only their directions are needed of
+BORDER = 1.06  # of the field of view against what holds the scene, for surfels have an extent
+NEAREST = 0.05  # distance to the nearest point against that to the middle
 
 
 @dataclass(frozen=True)
@@ -114,8 +119,68 @@ def edited_cameras(
     if recipe.views == "all":
         return cameras
     if recipe.views == "nearest":
-        return [camera.resized(size) for camera in nearest_to_axes(cameras, means).values()]
-    return list(axis_cameras(cameras[0].resized(size), means).values())
+        return [camera.resized(size) for camera in nearest_to_axes(cameras, means)]
+    return axis_cameras(cameras[0].resized(size), means)
+
+
+def axis_cameras(like: Camera, points: Tensor) -> list[Camera]:
+    """Return new cameras exactly along the six axes of a scene of points [N, 3], which it fills.
+
+    They look at the middle of the scene from as far as another camera does, with the narrowest field of view
+    that shows all of it in all six: a guidance works best on a large object, and pixels become texels.
+    """
+    center = _center(points)
+    radius = float((like.position.cpu().double() - center).norm())
+    tangent = _widest(points.detach().cpu().double() - center, radius, like.width / like.height)
+    fov = degrees(2 * atan(BORDER * tangent))
+    cameras = []
+    for azimuth, polar in AXES:
+        camera = orbit(azimuth, polar, radius, fov, like.width, like.height)
+        viewmat = camera.viewmat.clone()
+        viewmat[:3, 3] -= viewmat[:3, :3] @ center.to(viewmat)
+        cameras.append(replace(camera, viewmat=viewmat).to(like.viewmat.device))
+    return cameras
+
+
+def nearest_to_axes(cameras: Sequence[Camera], points: Tensor) -> list[Camera]:
+    """Choose the six different cameras whose directions from a scene of points [N, 3] are nearest to its axes.
+
+    The sum of the cosines of the angles between cameras and axes is largest.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    if len(cameras) < len(AXES):
+        raise ArgumentError(
+            f"cameras: expected {len(AXES)} at least to choose those nearest to the axes from, got "
+            f"{len(cameras)}; edit new views along the axes instead (edit.text.views=axes)"
+        )
+    directions = torch.stack([camera.position.cpu().double() for camera in cameras]) - _center(points)
+    axes = torch.stack([orbit_direction(*angles) for angles in AXES])  # [6, 3]
+    cosines = axes @ torch.nn.functional.normalize(directions, dim=1).T  # [6, V]
+    _, chosen = linear_sum_assignment(cosines.numpy(), maximize=True)
+    return [cameras[index] for index in chosen.tolist()]
+
+
+def _center(points: Tensor) -> Tensor:
+    """Return the middle of the box around points [N, 3], float64 on the CPU."""
+    points = points.detach().cpu().double()
+    return 0.5 * (points.amin(dim=0) + points.amax(dim=0))
+
+
+def _widest(points: Tensor, radius: float, aspect: float) -> float:
+    """Return the tangent of half the vertical field of view that holds points [N, 3] around the origin."""
+    widest = 1e-3
+    for azimuth, polar in AXES:
+        R_cw = orbit(azimuth, polar, radius, ANY_FOV, 2, 2).viewmat[:3, :3].to(points)
+        x, y, z = (points @ R_cw.T).unbind(dim=1)
+        if float(z.min()) + radius < NEAREST * radius:
+            raise ArgumentError(
+                f"like: expected a camera well outside of the scene, got one {radius:.3g} from its middle, "
+                "which is too near; pass one farther away"
+            )
+        high, wide = (float((sides.abs() / (z + radius)).max()) for sides in (y, x))
+        widest = max(widest, high, wide / aspect)
+    return widest
 
 
 def _follow(
