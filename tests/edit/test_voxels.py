@@ -60,10 +60,10 @@ def test_the_step_has_the_gradient_of_autograd(vgg, monkeypatch):
     field = ball(degree=0)
     images, recipe = images_of(field, count=1), replace(RECIPE, iterations=1, features=1.0)
     weights = ArfKeys(content=0.3, variation=0.7)
-    run = VoxelPainting(field.grid, field, weights, torch.Generator())
+    objective = Objective.of_views(recipe, STYLE, images.size, vgg)
+    run = VoxelPainting(field.grid, field, images, objective, weights, torch.Generator())
     gradients = []
     monkeypatch.setattr(run, "step", lambda step: gradients.append(run.optimizer.gradient.rows.clone()))
-    run.follow(images, Objective.of_views(recipe, STYLE, images.size, vgg))
     losses = learn_style(run, 1, recipe, "test")
 
     rows = field.grid.rows.clone().requires_grad_()
@@ -119,7 +119,7 @@ def test_in_the_end_colours_have_the_mean_and_covariance_of_the_style():
     for is_exact in (True, False):
         weights = replace(WEIGHTS, exact=is_exact)
         edited, _ = stylize_voxels(field, images, style, RECIPE, weights)
-        run = VoxelPainting(edited.grid, edited, weights, torch.Generator().manual_seed(3))
+        run = VoxelPainting(edited.grid, edited, images, None, weights, torch.Generator().manual_seed(3))
         colors = run.rendered_colors(images.cameras, True, 1)
         misses[is_exact] = float((torch.cat([colors.mean(0), colors.T.cov().flatten()]) - wanted).abs().max())
     assert misses[True] < 0.02

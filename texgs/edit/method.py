@@ -26,36 +26,28 @@ class Method(Generic[Settings]):
     """One way to edit a scene. Its module imports nothing heavy before one of these functions is called."""
 
     name: str
-    summary: str
-    """What it does, in `texgs --help`."""
-    settings: type[Settings]
-    """Dataclass of its keys, `edit.NAME` in the configuration."""
-    run: Callable[[Any], Any]
-    """Edits a scene: from a `Task[Settings]` of texgs/edit/task.py to an `EditedScene`."""
+    summary: str  # what it does, in `texgs --help`
+    settings: type[Settings]  # dataclass of its keys, `edit.NAME` in the configuration
+    run: Callable[[Any], Any]  # from a `Task[Settings]` of texgs/edit/task.py to an `EditedScene`
     check: Callable[[Settings], None]
     """Raises an ArgumentError for what is wrong with its settings, without scene and weights."""
     weights: Callable[[Settings], Mapping[str, str]]
     """Names of the weights that it needs, each with the word of its settings that does without; or ""."""
-    needs: frozenset[str] = frozenset()
-    """What fields have to be capable of, of `texgs.fields.kinds.Capability`."""
-    fields: frozenset[str] = frozenset()
-    """Kinds of field that it is made for; empty: all that can what it needs."""
+    needs: frozenset[str] = frozenset()  # what fields have to be capable of, see `Capability`
+    fields: frozenset[str] = frozenset()  # kinds that it is made for; empty: all that can what it needs
     check_fit: Callable[[Settings, Any], None] = lambda settings, fit: None
     """Raises an ArgumentError where its settings do not go with those of the fit, the node `fit`."""
-    files: Callable[[Settings], Mapping[str, Path]] = lambda settings: {}
-    """Files that it reads besides the scene and its views."""
+    files: Callable[[Settings], Mapping[str, Path]] = lambda settings: {}  # read besides scene and views
     adds: Callable[[Settings, Sequence[str]], Sequence[str]] = lambda settings, models: ()
     """Parts that the scene has afterwards in addition, from the names of its models."""
     style: Callable[[Settings], Any] | None = None
     """The `StylePicture` that it follows, which the result is compared with; None where there are several."""
-    follows: str = ""
-    """Which of its keys, "style" or "instruction", looks of a data set have an own value of."""
+    follows: str = ""  # which of its keys, "style" or "instruction", looks of a data set have a value of
     followed: Callable[[Settings], str] = lambda settings: ""
     """What it follows, in tables: the name of a picture, or words."""
     numbers: Callable[[Settings], Mapping[str, Any]] = lambda settings: {}
     """Numbers of the recipe that its settings name, with what they change about it."""
-    is_look: bool = True
-    """Whether the scene looks different afterwards."""
+    is_look: bool = True  # whether the scene looks different afterwards
 
     @property
     def stage(self) -> str:
@@ -74,9 +66,7 @@ class Method(Generic[Settings]):
     def of(self, edit: Any, look: str | None = None) -> Settings:
         """Return its settings among those of an edit: the schema's `Edit`, or its node in a configuration.
 
-        Args:
-            edit: to do.
-            look: what it follows, where that is not what its settings say.
+        A look is what it follows, where that is not what its settings say.
         """
         values = getattr(edit, self.name)
         settings: Any = values if isinstance(values, self.settings) else typed(self.settings, values)

@@ -26,11 +26,7 @@ Find = Callable[[Tensor], Tensor]
 
 @dataclass(frozen=True, eq=False)
 class StylePicture:
-    """A style and the part of its picture that counts.
-
-    Raises:
-        ShapeError, ArgumentError: if shapes do not fit, or the part is empty.
-    """
+    """A style and the part of its picture that counts."""
 
     image: Tensor  # [3, h, w] in [0, 1]; beyond the region its nearest colours
     region: Tensor  # [h, w] bool
@@ -45,7 +41,7 @@ class StylePicture:
 
     @classmethod
     def of(cls, image: Tensor, region: Tensor | None = None) -> StylePicture:
-        """A style from an image [3, h, w], cut to the box around the region [h, w]; by default all of it."""
+        """Return the style of an image [3, h, w], cut to the box around the region [h, w]; by default all."""
         size = check.shape("image", image, "3 h w")
         if min(size["h"], size["w"]) < SMALLEST:
             raise ArgumentError(
@@ -62,20 +58,16 @@ class StylePicture:
 
     @property
     def mean(self) -> Tensor:
-        """Mean colour [3] of the region."""
+        """Return the mean colour [3] of the region."""
         return self.pixels.mean(0)
 
     @property
     def pixels(self) -> Tensor:
-        """Colours [n, 3] of the region."""
+        """Return the colours [n, 3] of the region."""
         return self.image.permute(1, 2, 0)[self.region]
 
     def scaled(self, long_side: float) -> StylePicture:
-        """The style with its longer side at so many pixels, its aspect kept; smaller ones by averaging.
-
-        Raises:
-            OutOfMemoryError: if it does not fit into memory.
-        """
+        """Return the style with its longer side at so many pixels, its aspect kept; smaller by averaging."""
         height, width = self.region.shape
         factor = long_side / max(height, width)
         size = [max(SMALLEST // 2, round(factor * x)) for x in (height, width)]
@@ -88,12 +80,12 @@ class StylePicture:
         return StylePicture(image, region if bool(region.any()) else torch.ones_like(region))
 
     def vivid(self, gain: float) -> StylePicture:
-        """The style with the differences of its colours from grey times a gain, as far as they can be."""
+        """Return the style with its colours' differences from grey times a gain, as far as they can be."""
         grey = self.image.mean(0)
         return replace(self, image=(grey + gain * (self.image - grey)).clamp(0, 1))
 
     def to(self, device: torch.device | str) -> StylePicture:
-        """The same on another device."""
+        """Return the same on another device."""
         return StylePicture(self.image.to(device), self.region.to(device))
 
 
@@ -134,7 +126,7 @@ def read_style(path: str | Path, find: Find | None = None) -> StylePicture:
 
 
 def reduced(picture: Image.Image) -> Image.Image:
-    """A picture, upright, as red, green, blue and alpha with 2,048 pixels along its longer side at most.
+    """Return a picture upright, as RGBA, with 2,048 pixels along its longer side at most.
 
     One so narrow that its shorter side would hold no pattern then keeps more.
     """
@@ -153,7 +145,7 @@ def reduced(picture: Image.Image) -> Image.Image:
 
 
 def filled(image: Tensor, region: Tensor) -> Tensor:
-    """The image [3, h, w] with pixels outside the region [h, w] in the colour of the nearest one in it."""
+    """Return the image [3, h, w]; pixels outside the region [h, w] have the colour of the nearest in it."""
     from scipy.ndimage import distance_transform_edt
 
     nearest = distance_transform_edt(~region.cpu().numpy(), return_distances=False, return_indices=True)
@@ -162,15 +154,10 @@ def filled(image: Tensor, region: Tensor) -> Tensor:
 
 
 def mirrored_crop(image: Tensor, top: int, left: int, height: int, width: int) -> Tensor:
-    """[3, height, width] of the plane that an image, mirrored at its edges again and again, covers."""
-    rows, columns = (
-        mirrored(start, count, size, image.device)
-        for start, count, size in ((top, height, image.shape[1]), (left, width, image.shape[2]))
-    )
-    return image[:, rows][:, :, columns]
+    """Return [3, height, width] of the plane that an image, mirrored at its edges again and again, covers."""
 
+    def indices(start: int, count: int, size: int) -> Tensor:
+        at = (start + torch.arange(count, device=image.device)) % (2 * size)
+        return torch.where(at < size, at, 2 * size - 1 - at)
 
-def mirrored(start: int, count: int, size: int, device: torch.device) -> Tensor:
-    """Indices [count] into a side of `size` pixels."""
-    at = (start + torch.arange(count, device=device)) % (2 * size)
-    return torch.where(at < size, at, 2 * size - 1 - at)
+    return image[:, indices(top, height, image.shape[1])][:, :, indices(left, width, image.shape[2])]

@@ -143,7 +143,7 @@ def axis_cameras(like: Camera, points: Tensor) -> list[Camera]:
 
 
 def nearest_to_axes(cameras: Sequence[Camera], points: Tensor) -> list[Camera]:
-    """Choose the six different cameras whose directions from a scene of points [N, 3] are nearest to its axes.
+    """Choose the six different cameras whose directions from points [N, 3] are nearest to the axes.
 
     The sum of the cosines of the angles between cameras and axes is largest.
     """

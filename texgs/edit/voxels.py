@@ -57,9 +57,10 @@ def stylize_voxels(
     colors = object_colors(planes[:3].T, planes[3], generator, recipe.foreground)
     matrix, offset = (x.float() for x in color_map(colors, style.pixels))
     images = recolored_images(images, matrix, offset, recipe.foreground)
-    run = VoxelPainting(moved(drop_sh(field.grid), matrix, offset, keys.exact), field, keys, generator)
-    run.learn_rays(images, title)
-    run.follow(images, Objective.of_views(recipe, style, images.size, vgg))
+    grid = moved(drop_sh(field.grid), matrix, offset, keys.exact)
+    objective = Objective.of_views(recipe, style, images.size, vgg)
+    run = VoxelPainting(grid, field, images, objective, keys, generator)
+    run.learn_rays(title)
     losses = learn_style(run, len(images), recipe, title)
     colors = run.rendered_colors(images.cameras, recipe.foreground, stride)
     matrix, offset = (x.float() for x in color_map(colors, style.pixels))
@@ -103,13 +104,21 @@ def sampled(grid: VoxelGrid, field: Voxels, rays: Tensor) -> tuple[Samples, Rays
 class VoxelPainting:
     """A grid of degree 0 on its way to a style; rays and blocks are drawn at random."""
 
-    def __init__(self, grid: VoxelGrid, field: Voxels, keys: ArfKeys, generator: torch.Generator) -> None:
-        self.grid, self.original, self.keys, self.generator = grid, field, keys, generator
-        self.optimizer = VoxelOptimizer(grid)
+    def __init__(
+        self,
+        grid: VoxelGrid,
+        field: Voxels,
+        images: Images,
+        objective: Objective,
+        keys: ArfKeys,
+        generator: torch.Generator,
+    ) -> None:
+        self.grid, self.original, self.images, self.objective = grid, field, images, objective
+        self.keys, self.generator, self.optimizer = keys, generator, VoxelOptimizer(grid)
 
-    def learn_rays(self, images: Images, title: str) -> None:
+    def learn_rays(self, title: str) -> None:
         """Follow the colours of rays through the pixels of views."""
-        rays = training_rays(images)
+        rays = training_rays(self.images)
         steps = range(round(self.keys.ray_epochs * len(rays) / RAYS))
         for step in progress(steps, title=f"{title}, recoloured views", unit="step"):
             drawn, target = rays.draw(RAYS, RUN, self.generator)
@@ -117,10 +126,6 @@ class VoxelPainting:
             error = out.color - target
             samples.add_gradient(error * (2 / error.numel()), None, self.optimizer.gradient)
             self.step(step)
-
-    def follow(self, images: Images, objective: Objective) -> None:
-        """Learn from whole views from now on, by their distance to a style."""
-        self.images, self.objective = images, objective
 
     def render(self, view: int) -> list[Painting]:
         """Show a view over white."""

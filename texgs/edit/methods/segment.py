@@ -97,7 +97,7 @@ def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
     return [camera.to(task.device) for camera in cameras]
 
 
-def places_of(settings: SegmentKeys) -> list[list[float]]:
+def normalized(settings: SegmentKeys) -> list[list[float]]:
     """Return the clicks, those beside the part last, as shares of the sides of the view."""
     places = normalized_clicks("edit.segment.points", [*settings.points, *settings.others])
     if not settings.points:
@@ -114,7 +114,7 @@ def clicks_of(settings: SegmentKeys, lens: Lens, device: torch.device) -> Clicks
     from texgs.core.camera import orbit
     from texgs.edit.clicks import Clicks
 
-    places, (azimuth, polar) = places_of(settings), settings.view
+    places, (azimuth, polar) = normalized(settings), settings.view
     camera = orbit(azimuth, polar, *lens).to(device)
     points = lens.width * torch.tensor(places, dtype=torch.float32, device=device)
     positive = torch.arange(len(points), device=device) < len(settings.points)
@@ -149,7 +149,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
 def check(settings: SegmentKeys) -> None:
     """Require a name, clicks, and a number of views that an icosphere has."""
     require_name(settings.name, "edit.segment.name")
-    places_of(settings)
+    normalized(settings)
     frequency_of(settings.views, "edit.segment.views")
 
 

@@ -21,12 +21,7 @@ SIZE = 512  # pixels of each side of a file
 
 
 def picture(name: str, size: int = SIZE) -> Tensor:
-    """Read one of the pictures, square: [3, size, size] in [0, 1].
-
-    Args:
-        name: of PICTURES.
-        size: pixels of each side, reduced or enlarged if it is not that of the file.
-    """
+    """Read one of `PICTURES`, square and resized: [3, size, size] in [0, 1]."""
     import torch  # not at the top: a plan of edits asks for the names only
 
     if name not in PICTURES:
