@@ -1,3 +1,5 @@
+"""The edits of an experiment: what each starts from, which stages it goes through, and what it reads."""
+
 import pytest
 
 from texgs.config.compose import compose
@@ -7,12 +9,8 @@ from texgs.workflow.edits import edits
 from texgs.workflow.stage_table import STAGES
 
 
-def names(*words):
-    return [compose(each).edit.name for each in edits(words)]
-
-
-def test_without_an_edit_there_is_none():
-    assert edits(("dataset=engine",)) == []
+def edits_of(*words):
+    return [compose(each).edit for each in edits(words)]
 
 
 def test_every_edit_of_conf_composes_and_is_named_after_its_file():
@@ -23,21 +21,24 @@ def test_every_edit_of_conf_composes_and_is_named_after_its_file():
         assert edit.base is None or edit.base in members("edit")
 
 
-def test_what_an_edit_starts_from_comes_before_it():
-    assert names("edit=crimson") == ["lobe", "crimson"]
-    assert names("edits=[glass, crimson, lobe]") == ["glass", "lobe", "crimson"]
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (("dataset=engine",), []),
+        (("edit=crimson",), ["lobe", "crimson"]),  # what an edit starts from comes before it
+        (("edits=[glass, crimson, lobe]",), ["glass", "lobe", "crimson"]),
+    ],
+)
+def test_edits_of_a_run(words, names):
+    assert [edit.name for edit in edits_of(*words)] == names
 
 
-def test_a_base_and_parts_can_be_given_as_words():
+def test_words_hold_for_the_edit_and_its_base_and_parts_can_be_given():
     words = ("edit=glass", "edit.base=lobe", "edit.parts=[TF02/lobe]", "edit.name=part")
-    lobe, part = (compose(each).edit for each in edits(words))
+    lobe, part = edits_of(*words, "edit.image.iterations=7")
     assert (lobe.name, lobe.method, lobe.base, list(lobe.parts)) == ("lobe", "segment", None, [])
     assert (part.name, part.method, part.base, list(part.parts)) == ("part", "image", "lobe", ["TF02/lobe"])
-
-
-def test_a_changed_value_holds_for_the_edit():
-    (words,) = edits(("edit=glass", "edit.image.iterations=7"))
-    assert compose(words).edit.image.iterations == 7
+    assert part.image.iterations == 7
 
 
 @pytest.mark.parametrize(
@@ -57,17 +58,20 @@ def test_a_changed_value_holds_for_the_edit():
 )
 def test_a_mistake_is_one_sentence(words, message):
     with pytest.raises(ConfigError, match=message):
-        [compose(each) for each in edits(words)]
+        edits_of(*words)
 
 
-def test_each_method_has_its_stage_and_the_models_are_those_of_another_configuration():
-    for name, stages in (
+@pytest.mark.parametrize(
+    ("name", "stages"),
+    [
         ("glass", {"edit_image", "edit_metrics", "page"}),
         ("gold", {"edit_text", "edit_metrics", "page"}),
         ("lobe", {"edit_segment"}),
-    ):
-        config = compose(("dataset=engine", f"edit={name}"))
-        assert {stage.name for stage in STAGES.values() if stage.applies(config)} == stages
+    ],
+)
+def test_each_method_has_its_stage(name, stages):
+    config = compose(("dataset=engine", f"edit={name}"))
+    assert {stage.name for stage in STAGES.values() if stage.applies(config)} == stages
 
 
 def test_an_edit_reads_the_scene_of_its_base():

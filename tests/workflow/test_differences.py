@@ -10,7 +10,9 @@ from texgs.config.compose import compose
 from texgs.config.describe import keys, value_at
 from texgs.core.errors import ConfigError
 from texgs.edit.method import methods
-from texgs.workflow.differences import ALL, compared, differences, published, text
+from texgs.workflow.differences import ALL, differences, published, text
+
+STYLES = "style, style_untextured"
 
 
 def cells(table):
@@ -40,12 +42,6 @@ def test_keys_are_there_and_can_have_the_papers_values(claim):
     assert claim.of is None or claim.of in {other.key for other in published().keys}
 
 
-def test_the_papers_recipes_differ_in_what_is_known():
-    """c_ind starts from the zeroth harmonic and keeps the rate that it has in 2DGS, as in the release."""
-    assert told(["paper"]) == [("fit.shading.rates.colors", "0.01", "0.0007", "paper")]
-    assert told([], ["style_paper", "text_paper", "lobe_paper"]) == []
-
-
 def test_values_of_the_paper_make_no_rows_and_others_do(tmp_path, monkeypatch):
     config = compose(("fit=quick", *(override(c) for c in published().keys if c.key.startswith("fit."))))
     folder = tmp_path / "conf" / "fit"
@@ -59,32 +55,41 @@ def test_values_of_the_paper_make_no_rows_and_others_do(tmp_path, monkeypatch):
     assert told(["mine", "other"]) == [("fit.texture.rate", "0.025", "0.5", "other")]
 
 
-def test_recipes_with_the_same_difference_share_a_row():
-    entries = told(["quick", "default"])
-    assert ("fit.materials", "surfel", "shared", "quick, default") in entries
-    assert ("fit.shading.iterations", "20000", "2000", "quick") in entries
-    assert ("fit.shading.iterations", "20000", "8000", "default") in entries
-    assert not {"fit.surfels.rates.sh", "fit.texture.rate"} & {row[0] for row in entries}, (
-        "of what is not run"
-    )
+@pytest.mark.parametrize(
+    ("recipes", "edits", "expected"),
+    [
+        # c_ind starts from the zeroth harmonic and keeps the rate that it has in 2DGS, as in the release.
+        (["paper"], [], {("fit.shading.rates.colors", "0.01", "0.0007", "paper")}),
+        ([], ["style_paper", "text_paper", "lobe_paper"], set()),
+        (["gaussians", "quick-variant"], ["none", "arf", "of-the-user"], set()),  # nothing to compare
+    ],
+)
+def test_rows_are_what_differs(recipes, edits, expected):
+    assert set(told(recipes, edits)) == expected
+
+
+@pytest.mark.parametrize(
+    ("recipes", "edits", "row"),
+    [
+        (["quick", "default"], [], ("fit.materials", "surfel", "shared", "quick, default")),  # they share it
+        (["quick", "default"], [], ("fit.shading.iterations", "20000", "2000", "quick")),
+        (["quick", "default"], [], ("fit.shading.iterations", "20000", "8000", "default")),
+        ([], ["style", "style_untextured"], ("edit.image.recipe.iterations", "3000", "100", STYLES)),
+        ([], ["style", "style_untextured"], ("edit.image.recipe.lambda_s", "0.9", "1", STYLES)),
+        ([], ["text_quick"], ("edit.text.recipe.views", "nearest", "axes", "text_quick")),
+        ([], ["text_quick"], ("edit.text.guidance", "instruct_pix2pix", "filters", "text_quick")),
+    ],
+)
+def test_a_row_tells_the_numbers_that_recipes_and_edits_run_with(recipes, edits, row):
+    entries = told(recipes, edits)
+    assert row in entries
+    of_what_is_not_run = {"fit.surfels.rates.sh", "fit.texture.rate"}
+    assert not of_what_is_not_run & {entry[0] for entry in entries}
 
 
 def test_other_numbers_of_views_make_rows_with_their_data_sets():
     views = {"training views": {162: ["wood"], 92: ["bonsai", "engine"]}, "test views": {181: ["wood"]}}
     assert told([], views=views) == [("training views", "162", "92", "bonsai, engine")]
-
-
-def test_numbers_of_an_edits_recipe_are_those_it_runs_with():
-    entries = told([], ["style", "text_quick", "style_untextured"])
-    assert ("edit.image.recipe.iterations", "3000", "100", "style, style_untextured") in entries
-    assert ("edit.image.recipe.lambda_s", "0.9", "1", "style, style_untextured") in entries
-    assert ("edit.text.recipe.views", "nearest", "axes", "text_quick") in entries
-    assert ("edit.text.guidance", "instruct_pix2pix", "filters", "text_quick") in entries
-
-
-def test_what_has_nothing_to_compare_is_left_out():
-    assert told(["gaussians", "quick-variant"], ["none", "arf", "of-the-user"]) == []
-    assert list(compared("fit", "gaussians")) == []
 
 
 def test_what_no_key_expresses_is_always_told():
