@@ -110,7 +110,7 @@ def test_a_resumed_job_may_have_only_empty_views_left(folder, monkeypatch):
 
 def test_a_job_of_the_workflow(folder, capsys):
     from texgs.config.compose import compose
-    from texgs.workflow.settings_files import settings_file
+    from texgs.workflow.job import settings_file
     from texgs.workflow.stage_table import STAGES
 
     settings = settings_file(STAGES["volume"].settings(compose(tuple(TINY))), "results")

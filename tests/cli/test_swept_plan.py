@@ -10,8 +10,8 @@ import pytest
 from texgs.core.errors import ConfigError
 from texgs.workflow import plan
 from texgs.workflow.graph import Graph
+from texgs.workflow.notes import note_results
 from texgs.workflow.plan import make, words_of
-from texgs.workflow.settings_files import note_results
 from texgs.workflow.tracked import WHOLE, owner
 
 FITS = {"dataset": "sphere", "fit": "demo", "tracking": "none"}

@@ -7,8 +7,8 @@ from texgs.config.compose import compose
 from texgs.core.checksum import Checksums
 from texgs.core.errors import MissingDataError
 from texgs.models import weights
+from texgs.workflow.job import settings_digest
 from texgs.workflow.missing import missing_weights, require_same, weights_of
-from texgs.workflow.settings_files import settings_digest
 from texgs.workflow.stage_table import STAGES
 
 CLIP = "clip-vit-base-patch32"

@@ -7,8 +7,8 @@ from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
 from texgs.core.keys import typed
+from texgs.workflow.job import settings_digest, settings_file
 from texgs.workflow.locate import source_file, tf_names, views_folder
-from texgs.workflow.settings_files import settings_digest, settings_file
 from texgs.workflow.stage import plain
 from texgs.workflow.stage_table import STAGES
 

@@ -14,10 +14,9 @@ from texgs.core.io import read_json
 from texgs.report.metrics_files import below
 from texgs.workflow.checks import check_basic_tfs, check_edit, check_fit
 from texgs.workflow.experiments import LeftOut, Selection, selected
-from texgs.workflow.job import Job
+from texgs.workflow.job import Job, settings_digest
 from texgs.workflow.missing import lacking, missing_weights
 from texgs.workflow.result import METRICS, fingerprint, is_complete, stamped
-from texgs.workflow.settings_files import settings_digest
 from texgs.workflow.stage_table import STAGES, SWEPT
 from texgs.workflow.stage_table import jobs as jobs_of
 

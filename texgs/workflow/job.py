@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from texgs.config.schema import Config
-from texgs.core.checksum import Checksums
+from texgs.core.checksum import Checksums, digest
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_json
+from texgs.core.io import write_bytes, write_json
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.progress import curve_logger
 from texgs.report.results import plain
@@ -19,7 +21,6 @@ from texgs.workflow import result, tracked
 from texgs.workflow.missing import require_same, weights_of
 from texgs.workflow.provenance import record
 from texgs.workflow.runs import run
-from texgs.workflow.settings_files import settings_digest
 from texgs.workflow.stage import Outcome, Stage
 
 
@@ -126,3 +127,21 @@ def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
         write_json(work / result.METRICS, metrics)
         result.publish(job.output)
         tracked.log_result(recorded, job, metrics)
+
+
+def settings_file(settings: dict[str, Any], results: str) -> str:
+    """Write a job's settings to `RESULTS/.conf/STAGE-DIGEST.yaml`, unless that is there; return its path."""
+    text = _yaml(settings)
+    path = Path(results) / ".conf" / f"{settings['stage']}-{digest(text)}.yaml"
+    if not path.exists():
+        write_bytes(path, text.encode())
+    return path.as_posix()
+
+
+def settings_digest(settings: dict[str, Any]) -> str:
+    """Return the digest of a job's settings: the one in the name of its file."""
+    return digest(_yaml(settings))
+
+
+def _yaml(settings: dict[str, Any]) -> str:
+    return yaml.dump(settings, Dumper=yaml.CSafeDumper, allow_unicode=True)

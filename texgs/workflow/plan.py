@@ -131,7 +131,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     from texgs.core.checksum import Checksums
     from texgs.workflow.experiments import apart
     from texgs.workflow.graph import drawn, earlier
-    from texgs.workflow.settings_files import note_results, note_tables
+    from texgs.workflow.notes import note_results, note_tables
 
     checksums = Checksums.load()
     selection, planned = drawn(words, checksums)
@@ -162,7 +162,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
 
 def plain(job: Job, results: str) -> dict[str, Any]:
     """Return a job in plain values; its settings file is written."""
-    from texgs.workflow.settings_files import settings_file
+    from texgs.workflow.job import settings_file
 
     return {
         "stage": job.stage.name,

@@ -16,7 +16,7 @@ from texgs.report.tables import specs
 from texgs.workflow import tracked
 from texgs.workflow.code import code_digest
 from texgs.workflow.plan import planned, words_of
-from texgs.workflow.settings_files import note_written
+from texgs.workflow.notes import note_written
 from texgs.workflow.stage_table import RULES
 
 collect_rarely()

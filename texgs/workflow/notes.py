@@ -1,4 +1,4 @@
-"""Files in RESULTS/.conf: the settings of jobs, and notes on results that are not as they should be.
+"""Notes on results that are not as they should be, in files of RESULTS/.conf that their jobs read.
 
 Snakemake knows of inputs and parameters. That a result is damaged, or that a job failed and left the result
 before it in place, it learns by a note: it takes an input for changed where its contents are.
@@ -10,12 +10,10 @@ import os
 from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import yaml
+from typing import TYPE_CHECKING
 
 from texgs.core.cache import keep, recall
-from texgs.core.checksum import Checksums, digest, sha256
+from texgs.core.checksum import Checksums, sha256
 from texgs.core.io import write_bytes
 from texgs.workflow.result import METRICS
 
@@ -23,24 +21,6 @@ if TYPE_CHECKING:
     from texgs.workflow.job import Job
 
 LONG_AGO = 946684800  # the year 2000, in seconds
-
-
-def settings_file(settings: dict[str, Any], results: str) -> str:
-    """Write a job's settings to `RESULTS/.conf/STAGE-DIGEST.yaml`, unless that is there; return its path."""
-    text = _yaml(settings)
-    path = Path(results) / ".conf" / f"{settings['stage']}-{digest(text)}.yaml"
-    if not path.exists():
-        write_bytes(path, text.encode())
-    return path.as_posix()
-
-
-def settings_digest(settings: dict[str, Any]) -> str:
-    """Return the digest of a job's settings: the one in the name of its file."""
-    return digest(_yaml(settings))
-
-
-def _yaml(settings: dict[str, Any]) -> str:
-    return yaml.dump(settings, Dumper=yaml.CSafeDumper, allow_unicode=True)
 
 
 def write_note(file: str, note: str) -> None:
