@@ -1,14 +1,7 @@
 from dataclasses import replace
 
 from tests.report.written import lines, metrics, records, rows, sources
-from texgs.report.results import (
-    Comparison,
-    PseResult,
-    SheetResult,
-    TimingResult,
-    ViewsResult,
-    VolumeResult,
-)
+from texgs.report.results import Comparison, PseResult, SheetResult, TimingResult, ViewsResult, VolumeResult
 from texgs.report.scene_tables import datasets, edits, rendering
 from texgs.report.table import UNLIKE
 
@@ -66,12 +59,8 @@ def test_data_sets_are_in_the_papers_order_and_stand_ins_below(tmp_path):
         metrics(tmp_path, "views", views, name, "TF01")
     metrics(tmp_path, "views", views, "jets", "TF01", stand_in="five jets")
     entries = rows(datasets(records(tmp_path)))
-    assert [row["data set"] for row in entries] == [
-        names[0],
-        "jets, stand-in for five jets",
-        *names[1:],
-        "another",
-    ]
+    expected = [names[0], "jets, stand-in for five jets", *names[1:], "another"]
+    assert [row["data set"] for row in entries] == expected
     assert [entries[1][c] for c in ("samples (paper)", "MiB (paper)", "ms / frame (paper)")] == [None] * 3
 
 

@@ -23,7 +23,7 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment
 from texgs.viewer.messages import Orbit
-from texgs.viewer.segments import LENS, alone
+from texgs.viewer.segments import LENS, isolated
 from texgs.volume.cameras import icosphere_of
 
 FRONT = Orbit((0.0, 0.0, 0.0), -90, 0, 4.0, 22.0, 120, 120)  # on +z
@@ -184,6 +184,6 @@ async def test_a_segment_is_cancelled_and_only_one_is_made_at_a_time(browser, sc
 def test_a_model_alone_has_no_edits(scene_file):
     scene = read_scene(scene_file)
     models = {**scene.models, "other": SceneModel(scene.models["balls"].file, PartEdit(opacity=0.2))}
-    shown = alone(Scene(models), "other")
+    shown = isolated(Scene(models), "other")
     assert shown.models["other"].edit == PartEdit()
     assert not shown.models["balls"].edit.visible

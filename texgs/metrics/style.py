@@ -40,16 +40,9 @@ def style_similarity(
     region: Tensor | None = None,
     title: str = "style",
 ) -> StyleSimilarity:
-    """Compare views over white, not trained on, with a style.
+    """Compare views over white, not trained on and with a light each, with a style.
 
-    Args:
-        model: any stage.
-        cameras: of the views.
-        lights: one for each camera.
-        style: [3, h, w] in [0, 1], its longer side that of the views.
-        vgg: whose features are compared.
-        region: [h, w] bool, what of the style counts; by default all.
-        title: of the progress bar.
+    The style is [3, h, w] in [0, 1], its longer side that of the views; of it counts the region [h, w] bool.
     """
     device = model.device
     style = style.to(device)

@@ -119,8 +119,8 @@ def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
     for run in runs_of(in_order([each for each in own if each.variant])):
         first, end = next(iter(run.values())), end_of(run)
         number = int(first.variant) if first.variant.isdigit() else 0
-        meant = {"views": number} if sweep == "views" else {"pixels": number}
-        row = cells(first, **measures_of(run), alike=end is not None and is_alike(end, **meant))
+        expected = {"views": number} if sweep == "views" else {"pixels": number}
+        row = cells(first, **measures_of(run), alike=end is not None and is_alike(end, **expected))
         row |= {LABEL: first.recipe, variant: first.variant, SOURCES: [part.path for part in run.values()]}
         rows.append(row)
     rows.sort(key=lambda row: (len(row[variant]), row[variant]))  # numbers, as words

@@ -52,7 +52,7 @@ def images(dataset: str) -> int | None:
     return int(volumes()[dataset]["image_px"]) if dataset in volumes() else None
 
 
-def meant(record: Record[Any]) -> str:
+def intended_dataset(record: Record[Any]) -> str:
     """Return the data set of a job, or the one that it stands in for."""
     return record.stand_in.replace(" ", "_") or record.dataset
 
@@ -64,7 +64,7 @@ def in_order(records: Iterable[R]) -> list[R]:
 
 def rank(record: Record[Any]) -> tuple[int, int, str]:
     """Return where a data set stands: in the paper's order, stand-ins below the real ones, others last."""
-    place, _, _ = rank_in_paper(meant(record))
+    place, _, _ = rank_in_paper(intended_dataset(record))
     return place, 2 if record.stand_in else 0, record.dataset
 
 

@@ -15,9 +15,9 @@ from texgs.report.published import (
     cells,
     images,
     in_order,
+    intended_dataset,
     mean,
     mean_rows,
-    meant,
     paper,
     volumes,
 )
@@ -116,7 +116,7 @@ def rendering(records: Iterable[Record[Any]]) -> Table:
     rows = [timing_row(record) for record in timings]
     titles = [column.title for column in RENDERING[5:]]
     means = mean_rows(rows, (LABEL, "pixels", "device", "threads"), titles)
-    if any(meant(record) in volumes() for record in timings):
+    if any(intended_dataset(record) in volumes() for record in timings):
         means += [published_time("image", "800x800"), published_time("text", "512x512")]
     return Table("", RENDERING, [*rows, *means])
 

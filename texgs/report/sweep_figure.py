@@ -31,7 +31,7 @@ def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
     Variants that are numbers make an axis, with the standard deviation over seeds; others have bars.
     """
     runs = sweep_runs(records, name)
-    titles, pictures = different(runs), looks(runs)
+    titles, pictures = different(runs), scene_pictures(runs)
     series = dict(list(variants(runs).groupby("series", sort=False)))
     names = sorted(set(runs["variant"]), key=natural)
     is_axis = all(number(variant) is not None for variant in names)
@@ -122,7 +122,7 @@ def draw_bars(
     axes.locator_params(axis="x", nbins=4)
 
 
-def looks(runs: DataFrame) -> dict[str, dict[str, np.ndarray]]:
+def scene_pictures(runs: DataFrame) -> dict[str, dict[str, np.ndarray]]:
     """Render pictures [H, W, 3] of the edited scenes by series and by variant, of the first seed each."""
     by_series: dict[str, dict[str, np.ndarray]] = {}
     for run in runs[runs["edit"] != ""].to_dict("records"):

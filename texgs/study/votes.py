@@ -15,13 +15,13 @@ from PIL import Image
 from texgs.core.figures import new_figure, words, write_figure
 from texgs.report.edit_tables import words_of
 from texgs.report.metrics_files import Record, of
-from texgs.report.published import meant, paper, volumes
+from texgs.report.published import intended_dataset, paper, volumes
 from texgs.report.results import EditResult
 from texgs.report.sections import Figure, data_uri
 from texgs.report.table import UNPUBLISHED, Column, Table
 from texgs.study.ballots import Votes
 from texgs.study.questions import KINDS, Compared, rank_name
-from texgs.study.rankings import CONFIDENCE, Rankings, firsts, friedman, interval, together
+from texgs.study.rankings import CONFIDENCE, Rankings, firsts, friedman, interval, pooled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +56,7 @@ class Panel:
 
 def study_table(records: Sequence[Record[Any]], votes: Votes | None) -> Table:
     """Return the table of a study; without votes the paper's, where some jobs edit data sets of it."""
-    is_shown = votes or any(meant(edit) in volumes() for edit in of(EditResult, records))
+    is_shown = votes or any(intended_dataset(edit) in volumes() for edit in of(EditResult, records))
     table = user_study(votes)
     return table if is_shown else replace(table, rows=[])
 
@@ -120,8 +120,8 @@ def alike(panels: Iterable[Panel]) -> list[list[Panel]]:
 
 
 def total(panels: Iterable[Panel]) -> Rankings:
-    """Return the votes on questions that compare the same methods."""
-    return together([panel.votes for panel in panels])
+    """Return all votes on questions that compare the same methods."""
+    return pooled([panel.votes for panel in panels])
 
 
 def rows_of(kind: str, panels: Sequence[Panel]) -> list[dict[str, Any]]:

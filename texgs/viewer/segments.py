@@ -89,7 +89,7 @@ class Segmenter:
         return self._masks
 
 
-def alone(scene: Scene, name: str) -> Scene:
+def isolated(scene: Scene, name: str) -> Scene:
     """Return the scene with one of its models, as it is clicked on: with its textures and no other edit."""
     entry_of(scene, name)
     models = {}

@@ -17,7 +17,7 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.session import SCENE_KEYS, Session, state_of
 from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
-from texgs.viewer.segments import alone
+from texgs.viewer.segments import isolated
 
 SCENE = "scene.yaml"  # as jobs write it
 OF_JOBS = "metrics.json"  # beside what a job wrote, and would write again
@@ -102,7 +102,7 @@ class SharedEdits:
         The scene as it is now has the textures of a trial, as far as it has such parts.
         """
         if view.only:
-            return alone(self.scene, view.only)
+            return isolated(self.scene, view.only)
         if view.before:
             return self.original
         names, textures = part_names(self.scene), trial or {}
