@@ -21,13 +21,9 @@ TASKS = {  # what was asked for, by what methods follow
 
 
 def ballot_page(study: str, questions: Sequence[Question], films: Sequence[bytes], size: int) -> str:
-    """Return the page as HTML.
+    """Return the page as HTML; ballots carry the digest of the study.
 
-    Args:
-        study: its digest, which ballots carry.
-        questions: at least one.
-        films: MP4 of each question: the scene before the edits and the options, in cells.
-        size: of a cell, pixels.
+    The film of a question is an MP4 with the scene before the edits and the options, in cells of a size.
     """
     from jinja2 import Environment
 
@@ -36,10 +32,7 @@ def ballot_page(study: str, questions: Sequence[Question], films: Sequence[bytes
     return environment.from_string(text_of("ballot.html.j2")).render(
         study=study,
         size=size,
-        questions=[
-            entry(number, question, film)
-            for number, (question, film) in enumerate(zip(questions, films, strict=True), start=1)
-        ],
+        questions=list(map(entry, range(1, len(questions) + 1), questions, films)),
         style=style,
         script=script,
         hashes={"style": policy_hash(style), "script": policy_hash(script)},

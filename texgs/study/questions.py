@@ -118,11 +118,8 @@ def question_of(
     ]
     order.shuffle(options)
     original = original_of(first.dataset, {fit_of(record) for record in looks}, records)
-    pictures = [
-        first.path.with_name(name).as_posix()
-        for name in first.facts.get("pictures", {})
-        if name.startswith("style")
-    ]
+    names = [name for name in first.facts.get("pictures", {}) if name.startswith("style")]
+    pictures = [first.path.with_name(name).as_posix() for name in names]
     followed = dict(first.result.followed)
     return Question(first.dataset, first.result.follows, followed, original.as_posix(), pictures, options)
 

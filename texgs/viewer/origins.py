@@ -65,12 +65,7 @@ class Origin:
 
 
 class Origins:
-    """Views and transfer functions of the models of a scene, as far as they are there.
-
-    Args:
-        scene: as it was opened.
-        session: renders.
-    """
+    """Views and transfer functions of the models of a scene, as far as they are there."""
 
     def __init__(self, scene: Scene, session: Session) -> None:
         self._session = session
@@ -116,9 +111,8 @@ class Origins:
         functions = [tf for each in self._origins.values() if (tf := each.transfer)]
         summary = summary_of(self._volume) if self._volume else {}
         low, high, counts = (summary.get(key) for key in ("minimum", "maximum", "histogram"))
-        if not functions or not isinstance(counts, list) or not counts:
-            return None
-        if not all(map(is_number, (low, high, *counts))):
+        is_known = isinstance(counts, list) and counts and all(map(is_number, (low, high, *counts)))
+        if not functions or not is_known:
             return None
         merged = [int(part.sum()) for part in np.array_split(counts, min(BINS, len(counts)))]
         return {"minimum": low, "maximum": high, "histogram": merged, "functions": functions}
@@ -166,11 +160,9 @@ def fitted(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
     scale = min(width / pixels.shape[1], height / pixels.shape[0])
     size = [max(1, round(scale * side)) for side in pixels.shape[1::-1]]
     small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
-    framed = np.empty((height, width, 3), np.uint8)
-    framed[:] = pixels[0, 0]
     left, top = (width - size[0]) // 2, (height - size[1]) // 2
-    framed[top : top + size[1], left : left + size[0]] = small
-    return framed
+    sides = (top, height - size[1] - top, left, width - size[0] - left)
+    return cv2.copyMakeBorder(small, *sides, cv2.BORDER_CONSTANT, value=pixels[0, 0].tolist())
 
 
 def orbit_of(camera: Camera) -> dict[str, Any] | None:

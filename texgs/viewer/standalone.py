@@ -52,9 +52,7 @@ def write_page(path: Path, scene: Scene, name: str) -> WrittenPage:
     """
     composed = scene.open()
     if not isinstance(composed, Composition):
-        raise ArgumentError(
-            f"{path}: expected a scene of surfels, got one of another kind; fit surfels for this"
-        )
+        raise ArgumentError(f"{path}: expected a scene of surfels, got another kind; fit surfels for this")
     surfels = pack(path, composed)
     if len(surfels) > LARGEST:
         raise ArgumentError(
@@ -77,10 +75,9 @@ def page_of(description: dict[str, Any], surfels: str, picture: bytes) -> str:
 
     script = f"\n{joined_modules('standalone.js')}"
     style = f"\n{web_file('style.css')}{web_file('standalone.css')}"
-    template = files("texgs.viewer").joinpath("web", "standalone.html.j2").read_text(encoding="utf-8")
     return (
         Environment(autoescape=True)
-        .from_string(template)
+        .from_string(web_file("standalone.html.j2"))
         .render(
             name=description["name"],
             version=__version__,
