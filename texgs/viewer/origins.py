@@ -111,8 +111,9 @@ class Origins:
         functions = [tf for each in self._origins.values() if (tf := each.transfer)]
         summary = summary_of(self._volume) if self._volume else {}
         low, high, counts = (summary.get(key) for key in ("minimum", "maximum", "histogram"))
-        is_known = isinstance(counts, list) and counts and all(map(is_number, (low, high, *counts)))
-        if not functions or not is_known:
+        if not functions or not isinstance(counts, list) or not counts:
+            return None
+        if not all(map(is_number, (low, high, *counts))):
             return None
         merged = [int(part.sum()) for part in np.array_split(counts, min(BINS, len(counts)))]
         return {"minimum": low, "maximum": high, "histogram": merged, "functions": functions}
