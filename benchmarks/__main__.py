@@ -8,8 +8,7 @@ from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 
-from benchmarks import machine, table
-from benchmarks.load import Load
+from benchmarks import machine, report
 from benchmarks.settings import SECTIONS, Settings, parse
 from texgs.core.errors import TexgsError
 
@@ -20,12 +19,12 @@ def main() -> int:
     """Run the sections in turn; what is measured so far is on disk after each."""
     try:
         settings = parse()
-        report = {"machine": machine.describe(settings.device), "settings": _plain(settings), "sections": {}}
-        path = settings.json or RESULTS / f"{report['machine']['date'][:10]}-{settings.device.type}.json"
+        results = {"machine": machine.describe(settings.device), "settings": _plain(settings), "sections": {}}
+        path = settings.json or RESULTS / f"{results['machine']['date'][:10]}-{settings.device.type}.json"
         for name in SECTIONS:
-            report["sections"][name] = _measure(name, settings)
+            results["sections"][name] = _measure(name, settings)
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+            path.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     except TexgsError as error:
         print(error, file=sys.stderr)
         return 1
@@ -37,9 +36,9 @@ def _measure(name: str, settings: Settings) -> dict:
     """One section as JSON, shown on the screen as well."""
     if name not in settings.sections:
         return {"measurements": [], "skipped": [{"name": name, "reason": "not in --sections"}]}
-    with Load() as load:
+    with machine.Load() as load:
         section = import_module(f"benchmarks.{name}").run(settings)
-    table.show(name, section)
+    report.show(name, section)
     print(f"{name}: {load}")
     return {"load": asdict(load)} | asdict(section)
 

@@ -30,12 +30,8 @@ def run(settings: Settings) -> Section:
         networks[name] = random_vgg(settings.device, dtype, is_torch=True)
     for size in settings.sizes:
         cases = [pair(network, {"size": size, "by": name}) for name, network in networks.items()]
-        times = measure(cases, settings.rounds, settings.device, "convolution")
-        section.measurements += times
-        own = section.find("features", size=size, by="texgs")
-        for case in cases[1:]:
-            other = section.find("features", size=size, by=case.parameters["by"])
-            section.measurements.append(other.over(own, "time / texgs"))
+        section.measurements += measure(cases, settings.rounds, settings.device, "convolution")
+    section.add_ratios("by", "texgs", ["features"], "time")
     return section
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 import torch
+from torch import Tensor
 from torch.profiler import ProfilerActivity, profile
 
 from benchmarks import scenes
@@ -19,6 +20,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.loop import Fit
 from texgs.fit.settings import Densify, Losses, Phase, Rates
+from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 
 SURFELS = {400: 15_000, 800: 40_000}  # by image size; for other sizes those of the settings
@@ -55,19 +57,20 @@ def run(settings: Settings) -> Section:
 
 def training(size: int, n: int, device: torch.device) -> Fit:
     """The shading phase of the paper on views of a generated scene that was slightly moved."""
-    made = {name: x.to(device) for name, x in scenes.surfels("opaque", n).items()}
-    shared = raw_material(0.3, 0.7, 0.3, 20.0, "bounded")
-    raw = {
-        "means": made["means"],
-        "quats": made["quats"],
-        "scales": made["scales"].log(),
-        "opacities": made["opacities"].logit(),
-        "colors": made["features"],
-        **{name: x.to(device).repeat(n) for name, x in shared.items()},
-    }
+    raw = raw_surfels(n, device)
+    raw |= {name: raw[name].repeat(n) for name in MATERIAL}
     phase = Phase(10**9, losses=LOSSES, rates=RATES, densify=Densify(start=10**9, stop=10**9))
     moved = raw | {"means": raw["means"] + 0.003}
     return Fit(moved, ShadingModel(), views(Surfels(raw), size), phase, seed=0)
+
+
+def raw_surfels(n: int, device: torch.device, seed: int = 0) -> dict[str, Tensor]:
+    """Return a generated scene as parameters of a model, with one material for all."""
+    made = scenes.surfels("opaque", n, seed)
+    shape = {"means": made["means"], "quats": made["quats"], "scales": made["scales"].log()}
+    colors = {"opacities": made["opacities"].logit(), "colors": made["features"]}
+    raw = shape | colors | raw_material(0.3, 0.7, 0.3, 20.0, "bounded")
+    return {name: x.to(device) for name, x in raw.items()}
 
 
 @torch.no_grad()

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from types import SimpleNamespace
-from unittest.mock import patch
-
 import torch
 from torch import Tensor
-from torch.nn.functional import pad
 
 from benchmarks import workload
 from benchmarks.report import Measurement, Section
@@ -29,21 +24,11 @@ class Peer(workload.Workload):
 
     def forward(self) -> None:
         """Project and blend, for colour and normals."""
-        a = self.arguments
+        from tests.raster import gsplat_torch
+
         for tensor in self.learned:
             tensor.grad = None
-        self.render = SimpleNamespace()
-        centres, homographies, normals = project(self.gsplat, a)[:3]
-        blending = SimpleNamespace(
-            render_weight_from_alpha=weights_by_ray, accumulate_along_rays=self.sum_by_ray
-        )
-        surfels, pixels = self.fragments
-        images = torch.zeros_like(pixels)
-        size = (a["width"], a["height"])
-        tensors = (centres, homographies, a["opacities"][None], a["features"][None], normals)
-        with patch.dict(sys.modules, nerfacc=blending):
-            color, _, normal = self.gsplat.accumulate_2dgs(*tensors, surfels, pixels, images, *size)
-        self.render.color, self.render.normal = color[0], normal[0] @ a["viewmat"][:3, :3]
+        self.render = gsplat_torch.rasterize(**self.arguments, listed=self.fragments)
 
 
 def compare(settings: Settings, section: Section) -> None:
@@ -53,7 +38,7 @@ def compare(settings: Settings, section: Section) -> None:
     from tests.raster import gsplat_torch
 
     try:
-        gsplat = gsplat_torch.load()
+        gsplat_torch.load()
     except pytest.skip.Exception as reason:
         section.skip(PEER, str(reason))
         return
@@ -61,8 +46,7 @@ def compare(settings: Settings, section: Section) -> None:
     for scene, size in dict.fromkeys((scene, min(size, settings.size)) for scene, size in SCENES):
         ours = workload.plain(scene, size, n, settings.device, outputs=("normal",), options=LIKE_GSPLAT)
         theirs = Peer(ours.arguments, ours.learned, workload.interleaved(ours.cotangents))
-        theirs.gsplat, theirs.sum_by_ray = gsplat, gsplat_torch.sum_by_ray
-        theirs.fragments = fragments(gsplat, ours.arguments)
+        theirs.fragments = fragments(ours.arguments)
         where = {"scene": scene, "size": size, "surfels": n}
         section.measurements += _time(ours, theirs, where, settings)
 
@@ -82,20 +66,13 @@ def _time(ours: workload.Workload, theirs: Peer, where: dict, settings: Settings
     return [*timed.measurements, ratio, Measurement.of(name, where | {"peer": PEER}, "1", [difference])]
 
 
-def project(gsplat, a: dict) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Centres, homographies, normals and depths by gsplat, with a leading axis of one image."""
-    camera = (a["viewmat"][None], a["K"][None], a["width"], a["height"], a["options"].near)
-    scales = pad(a["scales"], (0, 1), value=1.0)
-    _, centres, depths, homographies, normals = gsplat._fully_fused_projection_2dgs(
-        a["means"], a["quats"], scales, *camera
-    )
-    return centres, homographies, normals, depths
-
-
 @torch.no_grad()
-def fragments(gsplat, a: dict) -> tuple[Tensor, Tensor]:
+def fragments(a: dict) -> tuple[Tensor, Tensor]:
     """Surfel and pixel [F] of the fragments that we blend, pixel by pixel and front to back."""
-    centres, homographies, _, depths = (x[0] for x in project(gsplat, a))
+    from tests.raster import gsplat_torch
+
+    names = ("means", "quats", "scales", "viewmat", "K", "width", "height", "options")
+    centres, depths, homographies, _ = (x[0] for x in gsplat_torch.project(*(a[name] for name in names)))
     radii = rasterize(**a | {"outputs": ("statistics",)}).statistics.radii
     reach = radii.ceil().mul(1.1).add(2).long()  # the box's middle is not quite the centre
     seen = (radii > 0).nonzero().squeeze(1)
@@ -108,7 +85,7 @@ def fragments(gsplat, a: dict) -> tuple[Tensor, Tensor]:
     )
     order = torch.argsort(pixels * len(depths) + rank[surfels])
     surfels, pixels, alphas = surfels[order], pixels[order], alphas[order]
-    light = weights_by_ray(alphas, pixels, a["width"] * a["height"])[1]
+    light = gsplat_torch.weights_by_ray(alphas, pixels, a["width"] * a["height"])[1]
     kept = light * (1 - alphas) >= a["options"].transmittance_min
     return surfels[kept], pixels[kept]
 
@@ -130,12 +107,3 @@ def _candidates(
     alphas = a["opacities"][surfels] * torch.exp(-torch.minimum(rho, filtered) / 2)
     strong = alphas >= a["options"].alpha_min
     return surfels[strong], (at[:, 1] * a["width"] + at[:, 0])[strong], alphas[strong]
-
-
-def weights_by_ray(alphas: Tensor, ray_indices: Tensor, n_rays: int) -> tuple[Tensor, Tensor]:
-    """Blending weight and light [F] of fragments sorted by ray; one sum over all, so in double precision."""
-    logs = torch.log1p(-alphas.double())
-    before = torch.cumsum(logs, 0) - logs
-    first = torch.searchsorted(ray_indices, torch.arange(n_rays)).clamp(max=max(len(alphas) - 1, 0))
-    light = torch.exp(before - before[first][ray_indices]).to(alphas.dtype)
-    return alphas * light, light

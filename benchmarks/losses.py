@@ -38,9 +38,7 @@ def run(settings: Settings) -> Section:
             where = settings.where(function=compared.name, by=writer)
             cases.append(Case(NAME, where, {NAME: differentiated(function, compared)}))
     section.measurements = measure(cases, settings.rounds, settings.device, "losses")
-    for m in [m for m in section.measurements if m.parameters["by"] != "texgs"]:
-        ours = section.find(NAME, function=m.parameters["function"], by="texgs")
-        section.measurements.append(m.over(ours, "time / texgs"))
+    section.add_ratios("by", "texgs", [NAME], "time")
     return section
 
 

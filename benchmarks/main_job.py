@@ -21,7 +21,6 @@ import torch
 
 from benchmarks import machine
 from benchmarks.command import call
-from benchmarks.load import Load
 from texgs.report.metrics_files import COPIES, read
 
 WORDS = ("fit=quick", "views.width=400", "views.height=400")
@@ -39,7 +38,7 @@ def main(output: str, names: str, *overrides: str) -> None:
 def seconds_of(*words: str) -> dict[str, Any]:
     """Run a fresh project to its report."""
     with tempfile.TemporaryDirectory() as folder:
-        with Load() as load:  # before the run, whose jobs are no children of this process
+        with machine.Load() as load:  # before the run, whose jobs are no children of this process
             sleep(5)
         start = perf_counter()
         program = Path(sys.executable).with_name("texgs")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import json
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -17,8 +16,6 @@ from benchmarks.settings import Settings
 from texgs.core.camera import Camera
 from texgs.raster import native
 
-ROOT = Path(__file__).parents[1]
-CHILD = "from benchmarks.memory import child; child()"
 LARGE = {"surfels": 1_000_000, "width": 1920, "height": 1080}
 STATUS = Path("/proc/self/status")
 
@@ -33,15 +30,13 @@ def run(settings: Settings) -> Section:
         views.append(LARGE)
     for view in views:
         where = {"scene": settings.scene, **view}
-        command = [sys.executable, "-c", CHILD, json.dumps(where | {"device": settings.device.type})]
-        done = subprocess.run(
-            command, cwd=ROOT, capture_output=True, text=True, check=False, preexec_fn=machine.unbind
-        )
-        if done.returncode:
-            reason = (done.stderr.strip().splitlines() or ["it died"])[-1]
-            section.skip(f"{view['surfels']} surfels at {view['width']} x {view['height']}", reason)
+        process = machine.child("memory.child", json.dumps(where | {"device": settings.device.type}))
+        said, complaint = process.communicate()
+        if process.returncode:
+            name = f"{view['surfels']} surfels at {view['width']} x {view['height']}"
+            section.skip(name, machine.last_line(complaint))
             continue
-        peaks = json.loads(done.stdout.splitlines()[-1])
+        peaks = json.loads(machine.last_line(said))
         section.measurements += [Measurement.of(name, where, "MB", [1e-6 * x]) for name, x in peaks.items()]
     if settings.device.type == "cpu" and not STATUS.exists():
         section.skip("resident", "this system does not report the peak of a process's resident memory")

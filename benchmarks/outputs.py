@@ -27,26 +27,16 @@ def run(settings: Settings) -> Section:
     cases = []
     for variant, (outputs, channels) in VARIANTS.items():
         made = workload.plain(*where, outputs=outputs, channels=channels)
-        cases += _cases(made, settings.where(variant=variant))
+        cases += made.cases(settings.where(variant=variant))
     features = workload.plain(*where, learned=("features",))
-    cases += _cases(features, settings.where(variant="features learn, geometry frozen"))
+    cases += features.cases(settings.where(variant="features learn, geometry frozen"))
     for variant, texels in TEXELS.items():
         made = workload.textured(*where, texels)
-        cases += _cases(made, settings.where(variant=f"{variant}, texels learn"))
+        cases += made.cases(settings.where(variant=f"{variant}, texels learn"))
     cases.append(_splat(features, settings.where(variant="splat 3 channels")))
     section = Section(measure(cases, settings.rounds, settings.device, "outputs"))
-    reference = {name: section.find(name, variant="plain") for name in RATIOS}
-    section.measurements += [
-        m.over(reference[m.name], f"{m.name} / plain") for m in section.measurements if m.name in RATIOS
-    ]
+    section.add_ratios("variant", "plain", RATIOS)
     return section
-
-
-def _cases(made: Workload, where: dict) -> list[Case]:
-    return [
-        Case("forward", where, {"forward": made.image}),
-        Case("forward+backward", where, made.forward_backward),
-    ]
 
 
 def _splat(made: Workload, where: dict) -> Case:

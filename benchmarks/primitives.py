@@ -8,7 +8,7 @@ from itertools import product
 from benchmarks import scenes, workload
 from benchmarks.report import Measurement, Section
 from benchmarks.settings import Settings
-from benchmarks.timing import Case, measure
+from benchmarks.timing import measure
 from benchmarks.workload import Workload
 from texgs.raster import rasterize
 
@@ -18,7 +18,6 @@ MAKERS = {
     "flat gaussians": partial(scenes.gaussians, thickness=1e-3),  # the same ellipses, but for the filters
     "gaussians": scenes.gaussians,
 }
-PASSES = ("forward", "forward+backward")
 
 
 def run(settings: Settings) -> Section:
@@ -32,13 +31,10 @@ def run(settings: Settings) -> Section:
     for place, (primitive, make) in product(places, MAKERS.items()):
         made = workload.plain(*place.values(), settings.device, make=make)
         where = place | {"primitive": primitive}
-        cases.append(Case("forward", where, {"forward": made.image}))
-        cases.append(Case("forward+backward", where, made.forward_backward))
+        cases += made.cases(where)
         fragments.append(Measurement.of("fragments", where, "1", [blended(made)]))
     section = Section(measure(cases, settings.rounds, settings.device, "primitives") + fragments)
-    for place, name in product(places, (*PASSES, "fragments")):
-        surfels, *others = (section.find(name, **place, primitive=primitive) for primitive in MAKERS)
-        section.measurements += [other.over(surfels, f"{name} / surfels") for other in others]
+    section.add_ratios("primitive", "surfels", ("forward", "forward+backward", "fragments"))
     return section
 
 

@@ -1,4 +1,4 @@
-"""What the sections return: measurements, their ratios, and what could not be measured."""
+"""What the sections return: measurements, their ratios, what could not be measured; and tables of these."""
 
 from __future__ import annotations
 
@@ -21,20 +21,14 @@ class Measurement:
 
     @classmethod
     def of(cls, name: str, parameters: dict[str, Any], unit: str, values: Iterable[float]) -> Measurement:
-        """Median and minimum of the values."""
+        """Return the median and minimum of the values."""
         samples = list(values)
         return cls(name, parameters, unit, median(samples), min(samples), len(samples))
 
     def over(self, other: Measurement, name: str, **more: Any) -> Measurement:
-        """How many times as much as another one; medians by medians, minima by minima."""
-        return Measurement(
-            name,
-            self.parameters | more,
-            "ratio",
-            self.median / other.median,
-            self.min / other.min,
-            min(self.n, other.n),
-        )
+        """Return how many times as much it is as another one; medians by medians, minima by minima."""
+        ratios = self.median / other.median, self.min / other.min
+        return Measurement(name, self.parameters | more, "ratio", *ratios, min(self.n, other.n))
 
 
 @dataclass
@@ -49,8 +43,55 @@ class Section:
         self.skipped.append({"name": name, "reason": reason})
 
     def find(self, name: str, **parameters: Any) -> Measurement:
-        """The measurement of that name whose parameters include these."""
+        """Return the measurement of that name whose parameters include these."""
         (measurement,) = (
             m for m in self.measurements if m.name == name and parameters.items() <= m.parameters.items()
         )
         return measurement
+
+    def add_ratios(self, key: str, reference: str, names: Iterable[str], label: str = "{}") -> None:
+        """Add what the others take over the one whose parameter `key` is the reference."""
+        others = [m for m in self.measurements if m.name in names and m.parameters[key] != reference]
+        for m in others:
+            other = self.find(m.name, **m.parameters | {key: reference})
+            self.measurements.append(m.over(other, f"{label.format(m.name)} / {reference}"))
+
+
+def show(title: str, section: Section) -> None:
+    """Print a section: times, passes, ratios and the like apart, then what was skipped."""
+    groups: dict[tuple, list[Measurement]] = {}
+    for m in section.measurements:
+        kind = "ms, passes" if m.name.startswith("pass ") else m.unit
+        groups.setdefault((kind, tuple(m.parameters)), []).append(m)
+    for (kind, _), measurements in groups.items():
+        print(f"\n{title} [{kind}]: median (minimum)")
+        print_table(measurements)
+    for skipped in section.skipped:
+        print(f"\n{title}: {skipped['name']} skipped: {skipped['reason']}")
+
+
+def print_table(measurements: list[Measurement]) -> None:
+    """Print a row for each set of parameters, a column for each quantity."""
+    names = list(dict.fromkeys(m.name for m in measurements))
+    rows: dict[tuple, dict[str, str]] = {}
+    for m in measurements:
+        rows.setdefault(tuple(m.parameters.values()), {})[m.name] = cell(m)
+    header = [*measurements[0].parameters, *(name.removeprefix("pass ") for name in names)]
+    lines = [header]
+    lines += [[*map(str, row), *(cells.get(name, "") for name in names)] for row, cells in rows.items()]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
+        print("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)))
+
+
+def cell(m: Measurement) -> str:
+    """Return the median and, if there is more than one value, the minimum; four digits at most."""
+    return number(m.median) if m.n == 1 else f"{number(m.median)} ({number(m.min)})"
+
+
+def number(value: float) -> str:
+    """Return three significant digits without an exponent, unless the value is tiny."""
+    if value and abs(value) < 1e-3:
+        return f"{value:.1e}"
+    digits = 0 if abs(value) >= 100 else 1 if abs(value) >= 10 else 2
+    return f"{value:.{digits}f}"

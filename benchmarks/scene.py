@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from benchmarks import scenes
-from benchmarks.fit import DISTANCE
+from benchmarks.fit import DISTANCE, raw_surfels
 from benchmarks.report import Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
@@ -14,7 +13,7 @@ from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.shading import ShadingModel, raw_material
+from texgs.fields.surfels.shading import ShadingModel
 
 MODELS, SURFELS, SIDE = 4, 30_000, 4  # models, surfels in each, texels along each side of a texture
 EDITS = [
@@ -42,22 +41,14 @@ def run(settings: Settings) -> Section:
 
 def model(seed: int, device: torch.device) -> Surfels:
     """A textured model of the generated scenes."""
-    made = {name: x.to(device) for name, x in scenes.surfels("opaque", SURFELS, seed).items()}
+    raw = raw_surfels(SURFELS, device, seed)
     generator = torch.Generator().manual_seed(seed)
     count = SIDE * SIDE
-    material = raw_material(0.3, 0.7, 0.3, 20.0, "bounded")
-    return Surfels(
-        {
-            "means": made["means"],
-            "quats": made["quats"],
-            "scales": made["scales"].log(),
-            "opacities": made["opacities"].logit(),
-            "colors": made["features"] - 0.5,
-            **{name: x.to(device) for name, x in material.items()},
-            "palette": torch.full((3,), 0.5, device=device),
-            "texels": 0.1 * torch.randn(SURFELS * count, 3, generator=generator).to(device),
-            "sizes": torch.full((SURFELS, 2), SIDE, dtype=torch.int32, device=device),
-            "offsets": count * torch.arange(SURFELS, device=device),
-        },
-        ShadingModel(),
-    )
+    texture = {
+        "colors": raw["colors"] - 0.5,
+        "palette": torch.full((3,), 0.5, device=device),
+        "texels": 0.1 * torch.randn(SURFELS * count, 3, generator=generator).to(device),
+        "sizes": torch.full((SURFELS, 2), SIDE, dtype=torch.int32, device=device),
+        "offsets": count * torch.arange(SURFELS, device=device),
+    }
+    return Surfels(raw | texture, ShadingModel())

@@ -1,7 +1,7 @@
 """Generated scenes that load a rasterizer like fitted ones: three nested, closed shells of surfels.
 
-Measured at 60 000 surfels (tests/raster/test_benchmark_scenes.py): 53 % of the pixels of a 400 x 400 image and
-52 % of 800 x 800 are covered, and the blended fragments per covered pixel are
+Measured at 60 000 surfels: 53 % of the pixels of a 400 x 400 image and 52 % of 800 x 800 are covered, and the
+blended fragments per covered pixel are
 
 | scene       | 400 x 400 | 800 x 800 |
 |-------------|-----------|-----------|

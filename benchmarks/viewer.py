@@ -33,7 +33,7 @@ def main(source: str, output: str) -> None:
         assert process.stdout is not None
         try:
             address = process.stdout.readline().strip()
-            rounds = [turned(address, SIZE, SECONDS) for _ in range(ROUNDS)]
+            rounds = [asyncio.run(turned(address, SIZE, SECONDS)) for _ in range(ROUNDS)]
         finally:
             process.terminate()
     facts = {"machine": machine.describe(torch.device("cpu")), "primitives": len(read_scene(source).open())}
@@ -41,18 +41,8 @@ def main(source: str, output: str) -> None:
     print({key: round(median(each[key] for each in rounds), 1) for key in rounds[0]})
 
 
-def turned(address: str, size: int, seconds: float) -> dict[str, float]:
-    """Return frames a second, milliseconds from asking to the frame, and the sides of what came.
-
-    Args:
-        address: what the viewer printed.
-        size: pixels of either side of the picture.
-        seconds: how long to turn.
-    """
-    return asyncio.run(_turned(address, size, seconds))
-
-
-async def _turned(address: str, size: int, seconds: float) -> dict[str, float]:
+async def turned(address: str, size: int, seconds: float) -> dict[str, float]:
+    """Return frames a second, milliseconds from asking to the frame, and the sides of what came."""
     parts = urlsplit(address)
     headers = {"Origin": f"{parts.scheme}://{parts.netloc}"}
     waits: list[float] = []
@@ -82,15 +72,8 @@ async def _turned(address: str, size: int, seconds: float) -> dict[str, float]:
 
 def _view(number: int, size: int) -> dict[str, object]:
     """A view from a bit further on the way around the scene."""
-    camera = {
-        "azimuth": (2 * number) % 360 - 180,
-        "polar": 20,
-        "distance": 4,
-        "fov_y": 30,
-        "target": [0, 0, 0],
-        "width": size,
-        "height": size,
-    }
+    direction = {"azimuth": (2 * number) % 360 - 180, "polar": 20, "distance": 4, "target": [0, 0, 0]}
+    camera = direction | {"fov_y": 30, "width": size, "height": size}
     return {"type": "view", "id": number, "camera": camera, "mode": "shaded", "moving": True}
 
 

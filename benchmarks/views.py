@@ -60,8 +60,7 @@ def _run(settings: Settings) -> Section:
     ]
     cases.append(view_set(grid, look, shots, where | {"views": n_views}))
     section.measurements = measure(cases, settings.rounds, settings.device, "views")
-    own = section.find("frame", by="texgs")
-    section.measurements.append(section.find("frame", by="VTK").over(own, "time / texgs"))
+    section.add_ratios("by", "texgs", ["frame"], "time")
     return section
 
 

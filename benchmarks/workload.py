@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from benchmarks import scenes
+from benchmarks.timing import Case
 from texgs.core.camera import Camera
 from texgs.raster import Options, Render, Texture, rasterize
 
@@ -56,6 +57,11 @@ class Workload:
     def forward_backward(self) -> dict[str, Callable[[], None]]:
         """The phases of a pass with gradients."""
         return {"forward with gradients": self.forward, "backward": self.backward}
+
+    def cases(self, where: dict) -> list[Case]:
+        """Return what is timed: a pass without gradients, and one with them."""
+        with_gradients = Case("forward+backward", where, self.forward_backward)
+        return [Case("forward", where, {"forward": self.image}), with_gradients]
 
 
 def plain(

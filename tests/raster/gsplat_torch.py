@@ -32,37 +32,47 @@ def load(module="_torch_impl_2dgs"):
         return import_module(f"gsplat.cuda.{module}")
 
 
+def project(means, quats, scales, viewmat, K, width, height, options):
+    """Return centres, depths, homographies and normals of surfels, with a leading axis of one image."""
+    thick = torch.cat([scales, torch.ones_like(scales[:, :1])], 1)
+    camera = (viewmat[None], K[None], width, height, options.near)
+    return load()._fully_fused_projection_2dgs(means, quats, thick, *camera)[1:]
+
+
 def rasterize(
-    means, quats, scales, opacities, viewmat, K, width, height, *, features, background=None, options, **_
+    means,
+    quats,
+    scales,
+    opacities,
+    viewmat,
+    K,
+    width,
+    height,
+    *,
+    features,
+    options,
+    background=None,
+    listed=None,
+    **_,
 ):
-    """Render surfels with gsplat: colour, alpha and normal; `options` with the filter that gsplat has."""
+    """Render surfels with gsplat: colour, alpha and normal; `options` with the filter that gsplat has.
+
+    `listed` holds surfel and pixel of each fragment; without, they are searched for.
+    """
     gsplat = load()
     assert options.low_pass == 2.0
     assert options.filter_sigma == 1.0
-    thickness = torch.ones_like(scales[:, :1])
-    _, centres, depths, homographies, normals = gsplat._fully_fused_projection_2dgs(
-        means, quats, torch.cat([scales, thickness], 1), viewmat[None], K[None], width, height, options.near
-    )
-    rho = squared_distances(centres[0], homographies[0], (width, height))
-    surfels, pixels = fragments(rho, depths[0], opacities, options)
+    camera = (viewmat, K, width, height)
+    centres, depths, homographies, normals = project(means, quats, scales, *camera, options)
+    if listed is None:
+        rho = squared_distances(centres[0], homographies[0], (width, height))
+        listed = fragments(rho, depths[0], opacities, options)
+    surfels, pixels = listed
     with patch.dict(sys.modules, nerfacc=BLENDING):
-        color, alpha, normal = gsplat.accumulate_2dgs(
-            centres,
-            homographies,
-            opacities[None],
-            features[None],
-            normals,
-            surfels,
-            pixels,
-            torch.zeros_like(pixels),
-            width,
-            height,
-        )
-    color, alpha, normal = (
-        color[0],
-        alpha[0],
-        normal[0] @ viewmat[:3, :3],
-    )  # normals from camera to world axes
+        tensors = (centres, homographies, opacities[None], features[None], normals, surfels, pixels)
+        images = torch.zeros_like(pixels)
+        color, alpha, normal = gsplat.accumulate_2dgs(*tensors, images, width, height)
+    color, alpha, normal = color[0], alpha[0], normal[0] @ viewmat[:3, :3]  # normals in world axes
     if background is not None:
         color = color + (1 - alpha) * background
     return Render(color=color, alpha=alpha[..., 0], normal=normal)
@@ -135,11 +145,11 @@ def fragments(rho, depths, opacities, options):
 
 
 def weights_by_ray(alphas, ray_indices, n_rays):
-    """Blending weight and light [F] of fragments sorted by ray."""
-    logs = torch.log1p(-alphas)
+    """Blending weight and light [F] of fragments sorted by ray; one sum over all, so in double precision."""
+    logs = torch.log1p(-alphas.double())
     before = torch.cumsum(logs, 0) - logs
     first = torch.searchsorted(ray_indices, torch.arange(n_rays)).clamp(max=max(len(alphas) - 1, 0))
-    light = torch.exp(before - before[first][ray_indices])
+    light = torch.exp(before - before[first][ray_indices]).to(alphas.dtype)
     return alphas * light, light
 
 
