@@ -116,14 +116,9 @@ def test_no_imports_in_circles_between_packages():
 @pytest.mark.parametrize(
     "line",
     [
-        "from texgs.cli import main",
-        "def f():\n    import texgs.cli.main",
-        "import_module('texgs.cli.main')",
-        "NAME = 'texgs.cli.main:parse'",
-        "f'texgs.cli.{name}'",
-        "'texgs.cli'",
-        "from ..cli import main",
-        "from texgs import cli",
+        *("from texgs.cli import main", "from ..cli import main", "from texgs import cli"),
+        *("def f():\n    import texgs.cli.main", "import_module('texgs.cli.main')"),
+        *("NAME = 'texgs.cli.main:parse'", "f'texgs.cli.{name}'", "'texgs.cli'"),
     ],
 )
 def test_arrows_are_found(line):

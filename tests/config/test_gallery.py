@@ -121,52 +121,43 @@ def test_models_of_a_comparison_are_those_of_the_last_phases_of_all_recipes():
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("rows", "words", "message"),
     [
-        ((), "edits: expected some to show"),
+        ("[{edit: glas}]", "edits=[glass]", r"\.edit: expected one of none, glass, got glas, did"),
+        ("[{edit: glass}]", "", r"\.edit: expected one of none, got glass"),
         (
-            (grid("[{edit: glas}]"), "edits=[glass]"),
-            r"pictures\.edit: expected one of none, glass, got glas, did",
+            "[{edit: stylesplat}]",
+            "edits=[stylesplat]",
+            r"\.edit: stylesplat works on none of quick; add a",
         ),
-        ((grid("[{edit: glass}]"),), r"pictures\.edit: expected one of none, got glass"),
+        ("[{fit: demos}]", "fits=[quick,demo]", r"\.fit: expected one of quick, demo, got demos"),
         (
-            (grid("[{fit: demos}]"), "fits=[quick,demo]"),
-            r"pictures\.fit: expected one of quick, demo, got demos",
+            *("[{edit: glass, fit: plenoxels}]", "fits=[quick,plenoxels] edits=[glass]"),
+            r"\.fit: glass does not work on plenoxels",
         ),
-        (
-            (grid("[{edit: glass, fit: plenoxels}]"), "fits=[quick,plenoxels]", "edits=[glass]"),
-            r"pictures\.fit: glass does not work on plenoxels",
-        ),
-        (
-            (grid("[{edit: stylesplat}]"), "edits=[stylesplat]"),
-            r"pictures\.edit: stylesplat works on none of quick; add a recipe",
-        ),
-        ((grid("[{variant: a}]"),), r"pictures\.variant: expected none without a sweep, got a"),
-        (
-            (grid("[{}]"), "sweep=resolution", "variant=400"),
-            "variant: expected one of 400, 800, 1200, got none",
-        ),
-        ((grid("[{light: [3]}]"),), r"pictures\.light: expected azimuth and polar angle, got \[3"),
-        ((grid("[{box: [0.5, 0.5, 0.6]}]"),), r"pictures\.box: expected left, top and side, from 0 to 1"),
-        ((grid("[{fov_y: 180}]"),), r"fov_y: expected less than 180, got 180"),
-        (
-            (grid("[{show: volum}]"),),
-            "show: expected one of scene, volume, error, got volum, did you mean volume",
-        ),
-        ((grid("[{changes: ['TF03.opacity=1']}]"),), r"changes: expected PART.KEY=VALUE with one of TF01"),
-        ((grid("[{changes: [opaque]}]"),), r"changes: expected PART.KEY=VALUE with one of"),
-        ((grid("[{edit: gold, changes: ['TF02/lobe.opacity=1']}]"), "edits=[gold,lobe]"), "TF02, got TF02/"),
-        ((grid("[{title: a}, {title: a}]"),), "expected rows with different titles, got 'a' twice"),
-        ((grid("[]"),), "expected a picture in a row and a column, got none"),
-        (("gallery.grids=[{name: a/b}]",), "expected different names of files, got 'a/b'"),
-        (("gallery.grids=[{},{}]",), "expected different names of files, got 'pictures'"),
-        (("gallery.name=sheet",), "gallery.name: sheet is a folder of texgs"),
-        (("gallery.name=a/b",), "gallery.name: expected a letter and then letters"),
+        ("[{variant: a}]", "", r"\.variant: expected none without a sweep, got a"),
+        ("[{}]", "sweep=resolution variant=400", "variant: expected one of 400, 800, 1200, got none"),
+        ("[{light: [3]}]", "", r"\.light: expected azimuth and polar angle, got \[3"),
+        ("[{box: [0.5, 0.5, 0.6]}]", "", r"\.box: expected left, top and side, from 0 to 1"),
+        ("[{box: [0.5, 0.5]}]", "", r"\.box: expected left, top and side, from 0 to 1, got \[0.5, 0.5\]"),
+        ("[{fov_y: 180}]", "", "fov_y: expected less than 180, got 180"),
+        ("[{show: volum}]", "", "show: expected one of scene, volume, error, got volum, did you mean volume"),
+        ("[{changes: ['TF03.opacity=1']}]", "", "changes: expected PART.KEY=VALUE with one of TF01"),
+        ("[{changes: [opaque]}]", "", "changes: expected PART.KEY=VALUE with one of"),
+        ("[{edit: gold, changes: ['TF02/lobe.opacity=1']}]", "edits=[gold,lobe]", "TF02, got TF02/"),
+        ("[{title: a}, {title: a}]", "", "expected rows with different titles, got 'a' twice"),
+        ("[]", "", "expected a picture in a row and a column, got none"),
+        ("", "", "edits: expected some to show"),
+        ("", "gallery.grids=[{name: a/b}]", "expected different names of files, got 'a/b'"),
+        ("", "gallery.grids=[{},{}]", "expected different names of files, got 'pictures'"),
+        ("", "gallery.name=sheet", "gallery.name: sheet is a folder of texgs"),
+        ("", "gallery.name=a/b", "gallery.name: expected a letter and then letters"),
     ],
 )
-def test_a_mistake_is_one_sentence(words, message):
+def test_a_mistake_is_one_sentence(rows, words, message):
+    given = (words,) if "{" in words else words.split()
     with pytest.raises(ConfigError, match=message):
-        GALLERY.inputs(compose((*ENGINE, *words)))
+        GALLERY.inputs(compose((*ENGINE, *given, *([grid(rows)] if rows else ()))))
 
 
 def test_parts_that_an_edit_adds_can_be_changed():

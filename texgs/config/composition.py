@@ -111,16 +111,7 @@ def values_of(files: CachingConfigRepository, name: str, package: str) -> dict[s
 
 
 def composition(words: Words, places: Places) -> dict[str, Any]:
-    """Return the values of all keys, references to others resolved.
-
-    Args:
-        words: overrides in Hydra's syntax.
-        places: folders with configurations; of files with the same name, that of the first folder counts.
-
-    Raises:
-        HydraException: for a file that is not there, or a word that is no override.
-        ConfigError: for a file that cannot be read, or a word that cannot be done.
-    """
+    """Return the values of all keys; of files with the same name, that of the first place counts."""
     paths = (path for place in places for path in sorted(place.rglob("*.yaml")))
     files = files_of(places, tuple(path.stat().st_mtime_ns for path in paths if path.is_file()))
     choices: Words = ()

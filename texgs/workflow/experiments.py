@@ -57,9 +57,7 @@ class Selection:
     def add(self, words: Words, several: bool) -> None:
         """Add one data set with one recipe: its fits and its edits, or those of each variant of its sweep.
 
-        Args:
-            words: of the data set and the recipe.
-            several: whether it is one of several recipes, of which not each can be edited in every way.
+        Of several recipes not each can be edited in every way.
         """
         config = compose((*words, "edit=none"))
         if not self.takes(config, f"data set {config.dataset.name}"):
@@ -91,14 +89,7 @@ def selected(words: Words, lacking: Callable[[Config], Sequence[str]]) -> Select
 
     Words of the form dataset.NAME.KEY=VALUE hold for one data set of the run. A data set that the words name
     wins over the list of the experiment, and is not left out where it lacks something, unless they say so.
-
-    Args:
-        words: overrides of the configuration.
-        lacking: sentences that tell what is not on this machine of what a configuration needs.
-
-    Raises:
-        ConfigError: for a name twice in a list, a data set that the run has not, or an experiment of
-            experiments that sets more than these.
+    What a configuration is lacking on this machine is told in sentences.
     """
     plain, aimed = apart(words)
     base = compose(plain)

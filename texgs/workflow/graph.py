@@ -75,12 +75,7 @@ class Graph:
         return {}
 
     def add(self, config: Config, checksums: Checksums) -> list[str]:
-        """Add the jobs of a configuration, and return their folders.
-
-        Raises:
-            ConfigError, ArgumentError: for basic TFs, a fit or an edit with mistakes, and two variants of one
-                folder.
-        """
+        """Add the jobs of a configuration, which is checked before, and return their folders."""
         check_basic_tfs(config.dataset)
         check_fit(config)
         check_edit(config)
@@ -126,9 +121,8 @@ def earlier(
 ) -> tuple[dict[str, str], dict[LeftOut, list[str]]]:
     """Return the whole results of earlier runs, which tables and the report show beside those of a run.
 
-    Returns:
-        Their metrics files with digests of the contents, but for results made from others that have been
-        replaced since, or will be by this run; and these results, with their places.
+    These are metrics files with digests of their contents, and with their places the results that come from
+    others which have been replaced since, or will be by this run.
     """
     digests: dict[str, str] = {}
     outdated: dict[LeftOut, list[str]] = {}

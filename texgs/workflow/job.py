@@ -37,12 +37,7 @@ class Job:
 
     @classmethod
     def of(cls, stage: Stage, config: Config, checksums: Checksums) -> Job:
-        """Return the job that a configuration describes; its settings name the weights that it works with.
-
-        Raises:
-            ConfigError: if the configuration does not fit the stage.
-            MissingDataError: if a file from elsewhere is not there.
-        """
+        """Return the job that a configuration describes; its settings name the weights that it works with."""
         from texgs.workflow.sweep import swept  # not at the top: jobs go without Hydra
 
         settings, weights = stage.settings(config), weights_of(stage, config, checksums)
@@ -69,17 +64,10 @@ class Job:
 
 
 def execute(job: Job, tracking: tracked.Tracking, *, force: bool = False) -> bool:
-    """Run a job, unless its result is there; an interrupted run of the same job goes on.
+    """Run a job, unless its result is there, and return whether there was something to do.
 
-    The result before it stays until this one is complete.
-
-    Args:
-        job: what to run.
-        tracking: where its run is recorded.
-        force: whether to begin from nothing in any case.
-
-    Returns:
-        Whether there was something to do.
+    An interrupted run of the same job goes on, unless it is forced to begin from nothing. The result before
+    it stays until this one is complete.
     """
     with result.alone(job.output):
         result.recover(job.output)

@@ -50,11 +50,7 @@ def note_results(jobs: Iterable[Job], settings: Iterable[str]) -> None:
 
 
 def note_tables(results: str, checksums: Checksums) -> dict[str, str]:
-    """Note in files for tables and the report what of them has been changed since they were made.
-
-    Returns:
-        These files by the names of the rules.
-    """
+    """Note what of tables and the report has been changed since; return files of notes by rule."""
     made = recall(_written(results), "") or {}
     changed = [path for path, sha in made.items() if Path(path).exists() and checksums.of(Path(path)) != sha]
     files = {}

@@ -110,9 +110,7 @@ def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
 def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
     """Return the plan of a run, and a sentence for each thing that is missing for some of its jobs.
 
-    Args:
-        words: overrides of the configuration.
-        is_job: whether this is a job of a run that has left its plan.
+    A job on a cluster has that of the run that submitted it.
     """
     path = Path(".snakemake", "texgs", f"plan-{digest(repr(words))}.json")
     data = os.environ.get("TEXGS_DATA", "")
@@ -188,11 +186,7 @@ def wildcards(configs: Sequence[Config]) -> dict[str, list[str]]:
 
 
 def left_out(entries: Mapping[LeftOut, Iterable[str]], results: str) -> str:
-    """Write what a run goes on without, with the places of its jobs, to a file named after its contents.
-
-    Returns:
-        The path of the file: JSON, a list of objects with `what`, `why` and `places`.
-    """
+    """Write what a run goes on without, with the places of its jobs, as JSON; return the path of the file."""
     text = json.dumps([{**asdict(each), "places": [*places]} for each, places in entries.items()], indent=1)
     path = Path(results) / ".conf" / f"left-out-{digest(text)}.json"
     if not path.exists():

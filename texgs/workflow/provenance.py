@@ -28,13 +28,9 @@ PACKAGES = (  # whose code decides results
 def record(
     settings: Mapping[str, Any], identity: Mapping[str, Any], made_from: Mapping[str, str], seconds: float
 ) -> dict[str, Any]:
-    """Return where and how the result of a job came about.
+    """Return where and how the result of a job came about, from its settings and identity.
 
-    Args:
-        settings: of the job.
-        identity: digests of its settings and code, checksums of its inputs.
-        made_from: its inputs that are files of other results, by name.
-        seconds: that its work took.
+    `made_from` names its inputs that are files of other results.
     """
     return {
         **facts(settings),

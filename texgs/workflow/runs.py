@@ -103,14 +103,9 @@ def begin(
 ) -> Run:
     """Begin a run of an experiment, which `Run.end` ends; the first one ends those of killed processes.
 
-    Args:
-        uri: `sqlite:///PATH` for a local file, made where there is none, with the files of runs in
-            `mlartifacts` beside it; the http address of an MLflow server; or None to switch tracking off.
-        experiment: name of the experiment, made where there is none.
-        name: name of the run.
-        tags: tags of the run; the tag `PARENT` says which run it is inside of.
-        params: parameters; nested mappings become dotted names, lists JSON.
-        key: where there is a run with the same one, that goes on.
+    The store is `sqlite:///PATH`, with the files of runs in `mlartifacts` beside it, the http address of an
+    MLflow server, or None to switch tracking off. The tag `PARENT` says which run it is inside of. Where
+    there is a run with the same key, that goes on.
     """
     if uri is None:
         return Run()

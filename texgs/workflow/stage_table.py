@@ -36,11 +36,7 @@ RULES: dict[str, Rule] = {stage.rule.name: stage.rule for stage in STAGES.values
 
 
 def jobs(config: Config) -> list[tuple[Stage, Config]]:
-    """Return the stages that a configuration goes through, each with its own configuration of one job.
-
-    Raises:
-        MissingDataError: if basic TFs are folders of views that are not there.
-    """
+    """Return the stages that a configuration goes through, each with its own configuration of one job."""
     names = tf_names(config)
     by_tf = [replace(config, tf=name) for name in names] if is_fit(config) else []
     return [

@@ -76,9 +76,6 @@ def as_sweep(words: Words) -> Words:
     """Return the words, with those that give a key several values as a sweep, named after the keys.
 
     Each combination of values is a variant. Seeds make none: they are what means are over.
-
-    Raises:
-        ConfigError: if values cannot be listed, or the words choose another sweep.
     """
     several = [word for word in words if has_several(word)]
     rest = tuple(word for word in words if word not in several)
