@@ -78,10 +78,8 @@ def test_noise_of_views_is_measured():
     step = 3 * 2.0 / float(intrinsics(40, SIZE, SIZE)[0, 0])
     generator = torch.Generator().manual_seed(0)
     frames = [plane(camera(step * i)) for i in range(4)]
-    noisy = [
-        replace(frame, image=frame.image + 0.05 * torch.randn(SIZE, SIZE, 3, generator=generator))
-        for frame in frames
-    ]
+    noises = 0.05 * torch.randn(4, SIZE, SIZE, 3, generator=generator)
+    noisy = [replace(frame, image=frame.image + noise) for frame, noise in zip(frames, noises, strict=True)]
     assert consistency(frames)[1].rmse < 1e-5
     assert consistency(noisy)[1].rmse == pytest.approx(0.05 * sqrt(2), rel=0.02)
 

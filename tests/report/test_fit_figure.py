@@ -15,6 +15,7 @@ from texgs.core.image import write_png
 from texgs.fields.splats import GEOMETRY
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
+from texgs.raster.shading import MATERIAL
 from texgs.report import fit_figure
 from texgs.report.fit_figure import (
     compare,
@@ -34,9 +35,7 @@ def shading(kind="shared"):
     parameters = ball_seeds(opacity=0.9)
     if kind == "surfel":
         spread = torch.linspace(-1, 1, len(parameters["means"]))
-        parameters |= {
-            name: parameters[name] + spread for name in ("ambient", "diffuse", "specular", "shininess")
-        }
+        parameters |= {name: parameters[name] + spread for name in MATERIAL}
     return Surfels(parameters)
 
 

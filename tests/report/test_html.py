@@ -143,9 +143,8 @@ def test_rows_lead_to_their_jobs(tmp_path, paths):
     document = page(tmp_path, paths)
     timing = sorted(paths).index(paths[1]) + 1
     assert document.values("href").count(f"#job-{timing}") == 1
-    assert [key for key in document.values("id") if key.startswith("job-")] == [
-        f"job-{n}" for n in range(1, 10)
-    ]
+    jobs = [key for key in document.values("id") if key.startswith("job-")]
+    assert jobs == [f"job-{number}" for number in range(1, 10)]
 
 
 def test_what_was_left_out_stands_on_top(tmp_path, paths):

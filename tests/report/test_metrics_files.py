@@ -19,10 +19,9 @@ def test_what_is_left_out_stands_below_tables_that_would_read_it(tmp_path):
     assert read_left_out(path) == read_left_out(None) == [], "without a file nothing is missing"
     path.write_text(json.dumps([WOOD, {"what": "edit dge", "why": "no weights", "places": ["edit"]}]))
     entries = read_left_out(path)
-    assert note(entries, ("phase",)) == "Left out: data set wood: its file is not there."
-    assert note(entries, ("edit", "views")) == (
-        "Left out: data set wood: its file is not there. edit dge: no weights."
-    )
+    wood = "Left out: data set wood: its file is not there."
+    assert note(entries, ("phase",)) == wood
+    assert note(entries, ("edit", "views")) == f"{wood} edit dge: no weights."
     assert note(entries, ("timing",)) == ""
 
 
@@ -52,9 +51,8 @@ def test_files_of_other_versions_are_left_out_as_long_as_one_is_good(tmp_path):
         read([old, good])
     records, (entry,) = read_known([old, good])
     assert [record.path for record in records] == [good]
-    assert str(entry) == (
-        f"1 metrics file: of another version of texgs, {old} first; run its job again to have it back."
-    )
+    why = f"of another version of texgs, {old} first; run its job again to have it back."
+    assert str(entry) == f"1 metrics file: {why}"
     assert read_known([good]) == (records, [])
     (tmp_path / "list.json").write_text("[]")
     with pytest.raises(ArgumentError, match="expected the metrics of a job"):
@@ -73,9 +71,8 @@ def test_copies_of_tracked_runs_and_jobs_at_work_are_no_results(tmp_path, monkey
         path.parent.mkdir(parents=True)
         path.write_text("{}")
     monkeypatch.chdir(tmp_path / "results" / "fuel" / ".views.work")
-    assert len(below("../../../results")) == len(below(tmp_path / "results")) == 1, (
-        "the folder's own name is free"
-    )
+    found = below("../../../results"), below(tmp_path / "results")
+    assert list(map(len, found)) == [1, 1], "the folder's own name is free"
     monkeypatch.chdir(tmp_path)
     assert [path.as_posix() for path in below("results")] == ["results/fuel/volume/metrics.json"]
 

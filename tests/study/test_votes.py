@@ -92,9 +92,8 @@ def test_the_papers_file_holds_ten_votes_in_each_row_and_column():
         by_dataset.setdefault(line["dataset"], []).append(list(line.values())[2:])
     assert len(by_dataset) == 8
     for counts in by_dataset.values():
-        assert (
-            [sum(row) for row in counts] == [sum(column) for column in zip(*counts, strict=True)] == [10] * 4
-        )
+        for lists in (counts, zip(*counts, strict=True)):
+            assert list(map(sum, lists)) == [10] * 4
 
 
 def test_bars_are_as_long_as_there_are_votes_from_the_best_rank_on():

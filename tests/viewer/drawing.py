@@ -41,12 +41,8 @@ def open_renderer(page, packed, description):
 def drawn(page, camera, description, mode="shaded"):
     """What the renderer draws [H, W, 3], uint8."""
     fov_y = 2 * np.degrees(np.arctan(0.5 * camera.height / float(camera.K[1, 1])))
-    seen = {
-        "viewmat": camera.viewmat[:3].tolist(),
-        "fov_y": fov_y,
-        "width": camera.width,
-        "height": camera.height,
-    }
+    size = {"width": camera.width, "height": camera.height}
+    seen = {"viewmat": camera.viewmat[:3].tolist(), "fov_y": fov_y, **size}
     text = page.evaluate("([camera, scene, mode]) => shoot(camera, scene, mode)", [seen, description, mode])
     return np.frombuffer(b64decode(text), np.uint8).reshape(camera.height, camera.width, 4)[..., :3]
 

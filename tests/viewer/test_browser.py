@@ -31,16 +31,8 @@ JPEG = 1.5  # levels of 255: what quality 95 costs on average
 @contextmanager
 def served(scene_file, port=0, **environment):
     """A server in a process of its own, and its address."""
-    words = [
-        sys.executable,
-        "-m",
-        "texgs.cli.main",
-        "view",
-        str(scene_file),
-        "--no-browser",
-        "--port",
-        str(port),
-    ]
+    words = [sys.executable, "-m", "texgs.cli.main", "view", str(scene_file)]
+    words += ["--no-browser", "--port", str(port)]
     env = {**os.environ, "TEXGS_CACHE": str(scene_file.parent / "cache"), **environment}
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env)
     try:
@@ -229,9 +221,8 @@ def test_a_model_gets_the_style_of_a_picture(chromium, scene_file):
     with served(scene_file, **weights) as (_, address), opened(chromium, address) as page:
         first = still(page)
         page.get_by_role("button", name="New look of TF01").click()
-        make, preview = (
-            page.get_by_role("button", name=name, exact=True) for name in ("Make look", "Preview")
-        )
+        make = page.get_by_role("button", name="Make look", exact=True)
+        preview = page.get_by_role("button", name="Preview", exact=True)
         expect(make).to_be_disabled()
         page.get_by_role("radio", name="dots").check(force=True)  # its picture is what one clicks on
         before = shown(page)
@@ -297,11 +288,7 @@ def test_an_export_is_saved(chromium, scene_file):
 
 
 def test_pages_share_their_edits(chromium, scene_file):
-    with (
-        served(scene_file) as (_, address),
-        opened(chromium, address) as one,
-        opened(chromium, address) as other,
-    ):
+    with served(scene_file) as (_, at), opened(chromium, at) as one, opened(chromium, at) as other:
         one.get_by_role("checkbox", name="Headlight").uncheck()
         expect(other.get_by_role("checkbox", name="Headlight")).not_to_be_checked()
         other.get_by_role("button", name="Undo").click()
@@ -332,9 +319,8 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
         with opened(chromium, address) as page:
             page.get_by_role("checkbox", name="Headlight").uncheck()
             page.get_by_role("checkbox", name="TF02").uncheck()
-            expect(page.get_by_role("listitem")).to_have_text(
-                ["light azimuth 40°, polar 10°", "TF02 visible off"]
-            )
+            steps = ["light azimuth 40°, polar 10°", "TF02 visible off"]
+            expect(page.get_by_role("listitem")).to_have_text(steps)
             process.kill()
             lost = page.get_by_text("No connection to texgs view")
             expect(lost).to_be_visible(timeout=WAIT)
@@ -342,7 +328,5 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
                 assert again == address
                 expect(lost).to_be_hidden(timeout=WAIT)
                 page.get_by_role("button", name="Make the other edits again").click()
-                expect(page.get_by_role("listitem")).to_have_text(
-                    ["light azimuth 40°, polar 10°", "TF02 visible off"]
-                )
+                expect(page.get_by_role("listitem")).to_have_text(steps)
                 expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked()

@@ -58,10 +58,8 @@ def test_what_is_missing_is_told(tmp_path):
 
 
 def described(tmp_path, *models, **values):
-    entries = {
-        f"TF{i}": SceneModel(write_model(tmp_path / f"{i}.safetensors", model))
-        for i, model in enumerate(models)
-    }
+    files = [write_model(tmp_path / f"{i}.safetensors", model) for i, model in enumerate(models)]
+    entries = {f"TF{i}": SceneModel(file) for i, file in enumerate(files)}
     session = Session(Scene(entries, **values))
     return session, describe("name", session.scene, session.composition)
 

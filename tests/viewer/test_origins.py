@@ -26,11 +26,8 @@ from texgs.volume.view_set import write_transforms
 LIGHT = Light("directional", 10, 40)
 PLACES = [(0, 0), (90, 20), (-120, -40)]  # azimuth and polar angle
 SIZE = 48
-TF = {
-    "name": "TF01",
-    "opacity": [[1.0, 0.0], [3.0, 0.5]],
-    "color": [[1.0, 1.0, 0.0, 0.0], [3.0, 0.0, 0.0, 1.0]],
-}
+COLOR = [[1.0, 1.0, 0.0, 0.0], [3.0, 0.0, 0.0, 1.0]]
+TF = {"name": "TF01", "opacity": [[1.0, 0.0], [3.0, 0.5]], "color": COLOR}
 
 
 def camera_at(azimuth, polar):

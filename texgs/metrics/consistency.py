@@ -82,9 +82,8 @@ def consistency(
         For each of `apart`, but those at which no pair sees the same.
     """
     if min(apart) < 1 or len(frames) <= max(apart):
-        raise ArgumentError(
-            f"frames: expected more than {max(apart)} for pairs so far apart, got {len(frames)}"
-        )
+        most = max(apart)
+        raise ArgumentError(f"frames: expected more than {most} for pairs so far apart, got {len(frames)}")
     pairs: dict[int, list[Difference]] = {each: [] for each in apart}
     for place, first in enumerate(frames[: len(frames) - max(apart)]):
         distance = perceptual(first.image) if perceptual else None

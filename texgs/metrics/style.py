@@ -53,9 +53,8 @@ def style_similarity(
     features = StyleFeatures.of(maps, part)
     target = gram(maps if part is None else maps[:, part])
     distances, grams, colors = [], [], []
-    for camera, light in progress(
-        list(zip(cameras, lights, strict=True)), len(cameras), title=title, unit="view"
-    ):
+    pairs = list(zip(cameras, lights, strict=True))
+    for camera, light in progress(pairs, len(pairs), title=title, unit="view"):
         shown = model.render(camera.to(device), light)
         image = shown.color.clamp(0, 1)
         colors.append(image[shown.alpha > OPAQUE])

@@ -192,10 +192,8 @@ def _check_values(path: Path, values: Mapping[str, Any]) -> None:
         if key not in words | measures:
             raise KeyError(key)
         if not isinstance(value, str if key in words else int | float):
-            expected = "words" if key in words else "a number"
-            raise ArgumentError(
-                f"{path}: numbers.{key}: expected {expected}, got {value!r:.60}; run the job again"
-            )
+            got = f"expected {'words' if key in words else 'a number'}, got {value!r:.60}"
+            raise ArgumentError(f"{path}: numbers.{key}: {got}; run the job again")
 
 
 def label(facts: Mapping[str, Any]) -> str:

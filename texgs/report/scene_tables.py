@@ -50,14 +50,7 @@ RENDERING = (
     Column("volume / scene", 1),
     Column("volume, ms (paper)", 1, UNPUBLISHED),
 )
-EDITS = (
-    Column(DATA),
-    Column(LABEL),
-    Column("edit"),
-    Column("views", 0),
-    Column("PSNR", 2),
-    Column("SSIM", 4),
-)
+EDITS = (*map(Column, (DATA, LABEL, "edit")), Column("views", 0), Column("PSNR", 2), Column("SSIM", 4))
 
 
 def datasets(records: Iterable[Record[Any]]) -> Table:
@@ -93,10 +86,8 @@ def dataset_row(
         SOURCES: [each.path for each in (volume, *views) if each],
     }
     if volume:
-        row |= {
-            "volume, samples": "x".join(map(str, volume.result.dims)),
-            "volume MiB": volume.result.volume_mib,
-        }
+        row["volume, samples"] = "x".join(map(str, volume.result.dims))
+        row["volume MiB"] = volume.result.volume_mib
     if (line := None if first.stand_in else volumes().get(first.dataset)) is not None:
         row["samples (paper)"] = "x".join(f"{line[f'volume_{axis}']:.0f}" for axis in "xyz")
         row["basic scenes (paper)"], row["MiB (paper)"] = line["basic_scenes"], line["volume_mib"]

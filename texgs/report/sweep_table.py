@@ -69,13 +69,8 @@ def fit_run(run: Run) -> dict[str, Any]:
     material = run["shading"].result.material if "shading" in run and values else {}
     factors = {title: material.get(factor) for title, factor in MATERIAL.items()}
     sources = [phase.path for phase in run.values()]
-    return {
-        **_names(first, str(first.tf), ""),
-        "is_done": bool(values),
-        SOURCES: sources,
-        **values,
-        **factors,
-    }
+    names = _names(first, str(first.tf), "")
+    return {**names, "is_done": bool(values), SOURCES: sources, **values, **factors}
 
 
 def edit_runs(records: Sequence[Record[Any]]) -> list[dict[str, Any]]:

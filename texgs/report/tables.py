@@ -182,7 +182,5 @@ def tables_of(
     given: Mapping[str, Table] | None = None,
 ) -> dict[str, Table]:
     """Return all tables of some jobs by their names, also empty ones; `given` need more than records."""
-    given = given or {}
-    return {
-        spec.name: spec.table(records, left_out, given.get(spec.name)) for spec in specs(sweeps_of(records))
-    }
+    own, listed = given or {}, specs(sweeps_of(records))
+    return {spec.name: spec.table(records, left_out, own.get(spec.name)) for spec in listed}

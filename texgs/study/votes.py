@@ -161,9 +161,8 @@ def method_rows(votes: Rankings) -> list[dict[str, Any]]:
 
 def caption(votes: Votes | None) -> str:
     """Return what the columns are, and whose votes these are."""
-    whose = (
-        f"Study {votes.study.study}, {len(votes.ballots)} ballots." if votes else "No votes but the paper's."
-    )
+    ours = f"Study {votes.study.study}, {len(votes.ballots)} ballots." if votes else ""
+    whose = ours or "No votes but the paper's."
     return (
         f"{whose} Votes for each rank; rank 1 is the best. "
         f"`first` is the share of first ranks, with its exact {CONFIDENCE:.0%} interval and the two-sided "
