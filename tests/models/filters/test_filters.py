@@ -11,8 +11,15 @@ from tests.models.views_of import random_views
 from texgs.core.camera import orbit
 from texgs.models.filters import FILTERS, ProceduralFilters
 from texgs.models.filters.material import GOLD, tint
-from texgs.models.filters.noise import cell_hash, fractal_noise, neighbours, tangential, value_noise
-from texgs.models.filters.surface import Surface, surface_of
+from texgs.models.filters.surface import (
+    Surface,
+    cell_hash,
+    fractal_noise,
+    neighbours,
+    surface_of,
+    tangential,
+    value_noise,
+)
 from texgs.models.guidance import EditViews
 from texgs.models.instruction import WORDS
 

@@ -8,7 +8,7 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from texgs.models.filters import ink, material, paint
+from texgs.models.filters import material, painting
 from texgs.models.filters.surface import Surface, surface_of
 from texgs.models.guidance import EditViews
 from texgs.models.instruction import understand
@@ -16,12 +16,12 @@ from texgs.models.instruction import understand
 Filter = Callable[[Surface], Tensor]
 
 FILTERS: dict[str, Filter] = {  # by the names of the vocabulary
-    "stipple drawing": ink.stipple,
-    "pencil hatching": ink.hatching,
-    "woodcut": ink.woodcut,
-    "watercolour": paint.watercolour,
-    "oil painting": paint.oil,
-    "cartoon": paint.cartoon,
+    "stipple drawing": painting.stipple,
+    "pencil hatching": painting.hatching,
+    "woodcut": painting.woodcut,
+    "watercolour": painting.watercolour,
+    "oil painting": painting.oil,
+    "cartoon": painting.cartoon,
     "marble": material.marble,
     "wood": material.wood,
     "mosaic": material.mosaic,

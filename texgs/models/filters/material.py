@@ -8,8 +8,15 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from texgs.models.filters.noise import cell_hash, fractal_noise, neighbours, tangential, value_noise
-from texgs.models.filters.surface import Surface, luminance
+from texgs.models.filters.surface import (
+    Surface,
+    cell_hash,
+    fractal_noise,
+    luminance,
+    neighbours,
+    tangential,
+    value_noise,
+)
 
 GOLD = ((0.30, 0.16, 0.03), (0.93, 0.66, 0.20), (1.00, 0.92, 0.60))  # dark, middle, light
 SILVER = ((0.22, 0.23, 0.26), (0.70, 0.72, 0.75), (0.97, 0.98, 1.00))
