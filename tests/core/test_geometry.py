@@ -35,15 +35,6 @@ def test_product_of_matrices_is_hamilton_product():
     torch.testing.assert_close(quats_to_matrices(product), quats_to_matrices(p) @ quats_to_matrices(q))
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_half_turns(axis):
-    quat = torch.zeros(4, dtype=torch.float64)
-    quat[1 + axis] = 1
-    expected = -torch.ones(3, dtype=torch.float64)
-    expected[axis] = 1
-    torch.testing.assert_close(quats_to_matrices(quat), torch.diag(expected))
-
-
 def test_gradients():
     assert torch.autograd.gradcheck(quats_to_matrices, random_quats(20).requires_grad_())
 

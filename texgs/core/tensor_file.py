@@ -94,24 +94,13 @@ def read_tensor_file(path: Path, format: str, version: int) -> tuple[dict[str, A
         format: entry of its header.
         version: the newest that can be read.
     """
-    from safetensors import SafetensorError, safe_open
+    from safetensors import safe_open
 
-    with reading(path, f"a {format} file", "write it again"):
-        try:
-            with safe_open(path, framework="pt") as file:
-                description = _description(path, format, version, file.metadata() or {})
-                # A copy is aligned in memory and does not depend on the file any more.
-                return description, {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
-        except SafetensorError as error:
-            raise ArgumentError(
-                f"{path}: expected a {format} file, got one cut short or damaged, or of another format; "
-                "check the path, or copy or write it again"
-            ) from error
-
-
-def short(value: object) -> str:
-    """Return enough of a value to recognise it in a message."""
-    return text if len(text := repr(value)) < 120 else f"{text[:120]} ..."
+    advice = "it is cut short or damaged, or of another format: check the path, or copy or write it again"
+    with reading(path, f"a {format} file", advice), safe_open(path, framework="pt") as file:
+        description = _description(path, format, version, file.metadata() or {})
+        # A copy is aligned in memory and does not depend on the file any more.
+        return description, {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
 
 
 def _description(path: Path, format: str, newest: int, header: dict[str, str]) -> dict[str, Any]:
@@ -123,7 +112,7 @@ def _description(path: Path, format: str, newest: int, header: dict[str, str]) -
         version = int(str(description["version"]))
     except (KeyError, RecursionError, TypeError, ValueError) as error:
         raise ArgumentError(
-            f"{path}: expected JSON with a version in the header, got {short(header[format])}; "
+            f"{path}: expected JSON with a version in the header, got {header[format]!r:.120}; "
             "write the file again"
         ) from error
     if version > newest:
