@@ -6,6 +6,7 @@ import gzip
 import lzma
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -57,12 +58,9 @@ class Reader:
     pack: Pack | None = None
 
 
-def volume(name: str) -> Callable[[Path], Path]:
-    def make(folder: Path) -> Path:
-        WRITERS[name](folder / name, sample_values())
-        return folder / name
-
-    return make
+def volume(name: str, folder: Path) -> Path:
+    WRITERS[name](folder / name, sample_values())
+    return folder / name
 
 
 def read_volume(path: Path) -> None:
@@ -70,17 +68,14 @@ def read_volume(path: Path) -> None:
     prepare(open_source(path), path.parent / "out.nrrd", nan_value=0.0)
 
 
-def slc(compression: int) -> Callable[[Path], Path]:
-    def make(folder: Path) -> Path:
-        values = sample_values("uint8")
-        text = f"11111 13 12 11 8 1.0 1.0 2.0 1 0 0 {compression} 2 2 X".encode() + bytes(12)
-        for plane in values:
-            runs = b"".join(bytes([0x80 | len(row)]) + row.tobytes() for row in plane) + b"\x00"
-            text += f"{len(runs)} X".encode() + runs if compression else plane.tobytes()
-        (folder / "v.slc").write_bytes(text)
-        return folder / "v.slc"
-
-    return make
+def slc(compression: int, folder: Path) -> Path:
+    values = sample_values("uint8")
+    text = f"11111 13 12 11 8 1.0 1.0 2.0 1 0 0 {compression} 2 2 X".encode() + bytes(12)
+    for plane in values:
+        runs = b"".join(bytes([0x80 | len(row)]) + row.tobytes() for row in plane) + b"\x00"
+        text += f"{len(runs)} X".encode() + runs if compression else plane.tobytes()
+    (folder / "v.slc").write_bytes(text)
+    return folder / "v.slc"
 
 
 def slices(folder: Path) -> Path:
@@ -144,17 +139,14 @@ def packed_compact(data: bytes) -> bytes:
     return line + b"\n" + lzma.compress(stored)
 
 
-def ply(flavour: str, text: bool = False) -> Callable[[Path], Path]:
-    def make(folder: Path) -> Path:
-        from plyfile import PlyData
+def ply(flavour: str, text: bool, folder: Path) -> Path:
+    from plyfile import PlyData
 
-        path = write_ply(folder / "m.ply", sample("shading", material="paper"), flavour)
-        if not text:
-            return path
-        PlyData(PlyData.read(path).elements, text=True).write(folder / "text.ply")
-        return folder / "text.ply"
-
-    return make
+    path = write_ply(folder / "m.ply", sample("shading", material="paper"), flavour)
+    if not text:
+        return path
+    PlyData(PlyData.read(path).elements, text=True).write(folder / "text.ply")
+    return folder / "text.ply"
 
 
 def scene(folder: Path) -> Path:
@@ -171,13 +163,10 @@ def read_whole_scene(path: Path) -> None:
     write_scene(path.with_name("again.yaml"), opened)
 
 
-def weights(old: bool) -> Callable[[Path], Path]:
-    def make(folder: Path) -> Path:
-        tensors = {"a.weight": torch.rand(4, 3), "b.bias": torch.arange(5)}
-        torch.save(tensors, folder / "w.pth", _use_new_zipfile_serialization=not old)
-        return folder / "w.pth"
-
-    return make
+def weights(old: bool, folder: Path) -> Path:
+    tensors = {"a.weight": torch.rand(4, 3), "b.bias": torch.arange(5)}
+    torch.save(tensors, folder / "w.pth", _use_new_zipfile_serialization=not old)
+    return folder / "w.pth"
 
 
 def release(folder: Path) -> Path:
@@ -197,13 +186,10 @@ def release(folder: Path) -> Path:
     return folder / "point_cloud.ply"
 
 
-def picture(name: str, **options: Any) -> Callable[[Path], Path]:
-    def make(folder: Path) -> Path:
-        pixels = np.random.default_rng(0).integers(0, 255, (48, 40, 3), np.uint8)
-        Image.fromarray(pixels).save(folder / name, **options)
-        return folder / name
-
-    return make
+def picture(name: str, folder: Path, **options: Any) -> Path:
+    pixels = np.random.default_rng(0).integers(0, 255, (48, 40, 3), np.uint8)
+    Image.fromarray(pixels).save(folder / name, **options)
+    return folder / name
 
 
 def checkpoint(folder: Path) -> Path:
@@ -235,11 +221,17 @@ def read_texture_file(path: Path) -> None:
 
 
 READERS: dict[str, Reader] = {
-    **{name: Reader(volume(name), read_volume) for name in WRITERS if not name.endswith((".vti", ".vtk"))},
-    "plain.mhd samples": Reader(volume("compressed.mhd"), read_volume, "compressed.zraw"),
-    "nii.gz inside": Reader(volume("packed.nii.gz"), read_volume, None, gzip.decompress, gzip.compress),
-    "plain.slc": Reader(slc(0), read_volume),
-    "packed.slc": Reader(slc(1), read_volume),
+    **{
+        name: Reader(partial(volume, name), read_volume)
+        for name in WRITERS
+        if not name.endswith((".vti", ".vtk"))
+    },
+    "plain.mhd samples": Reader(partial(volume, "compressed.mhd"), read_volume, "compressed.zraw"),
+    "nii.gz inside": Reader(
+        partial(volume, "packed.nii.gz"), read_volume, None, gzip.decompress, gzip.compress
+    ),
+    "plain.slc": Reader(partial(slc, 0), read_volume),
+    "packed.slc": Reader(partial(slc, 1), read_volume),
     "slices": Reader(slices, read_volume, "slices/0.tif"),
     "tf ours": Reader(tf_ours, read_function),
     "tf ParaView": Reader(tf_paraview, read_function),
@@ -258,24 +250,24 @@ READERS: dict[str, Reader] = {
         lambda folder: write_segment(folder / "s", sample(), torch.arange(7) < 3), read_segment_file
     ),
     "scene": Reader(scene, read_whole_scene),
-    "2dgs.ply": Reader(ply("2dgs"), read_ply),
-    "3dgs.ply text": Reader(ply("3dgs", text=True), read_ply),
-    "release.ply": Reader(ply("release"), read_ply),
+    "2dgs.ply": Reader(partial(ply, "2dgs", False), read_ply),
+    "3dgs.ply text": Reader(partial(ply, "3dgs", True), read_ply),
+    "release.ply": Reader(partial(ply, "release", False), read_ply),
     "release texture": Reader(release, read_ply, "texture.npz"),
     "release palette": Reader(release, read_ply, "palette_colors_chkpnt.pth"),
-    "weights": Reader(weights(old=False), read_tensors),
-    "weights old": Reader(weights(old=True), read_tensors),
-    "style.png": Reader(picture("s.png"), read_style),
-    "style.jpg": Reader(picture("s.jpg"), read_style),
-    "style.gif": Reader(picture("s.gif"), read_style),
-    "style.webp": Reader(picture("s.webp"), read_style),
-    "style.tif": Reader(picture("s.tif", compression="tiff_lzw"), read_style),
+    "weights": Reader(partial(weights, False), read_tensors),
+    "weights old": Reader(partial(weights, True), read_tensors),
+    "style.png": Reader(partial(picture, "s.png"), read_style),
+    "style.jpg": Reader(partial(picture, "s.jpg"), read_style),
+    "style.gif": Reader(partial(picture, "s.gif"), read_style),
+    "style.webp": Reader(partial(picture, "s.webp"), read_style),
+    "style.tif": Reader(partial(picture, "s.tif", compression="tiff_lzw"), read_style),
     "checkpoint": Reader(checkpoint, latest, "checkpoint.safetensors"),
     "json": Reader(metrics, read_json),
     "ballot": Reader(ballot, lambda path: read_ballot(STUDY, path)),
     "study key": Reader(lambda folder: write_key(folder / "key.json", STUDY), read_key),
-    "packed.vti": Reader(volume("packed.vti"), read_volume),
-    "plain.vti": Reader(volume("plain.vti"), read_volume),
-    "text.vtk": Reader(volume("text.vtk"), read_volume),
-    "binary.vtk": Reader(volume("binary.vtk"), read_volume),
+    "packed.vti": Reader(partial(volume, "packed.vti"), read_volume),
+    "plain.vti": Reader(partial(volume, "plain.vti"), read_volume),
+    "text.vtk": Reader(partial(volume, "text.vtk"), read_volume),
+    "binary.vtk": Reader(partial(volume, "binary.vtk"), read_volume),
 }
