@@ -15,7 +15,7 @@ import tifffile
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 
 from tests.real_data import real_data
-from tests.volume.volume_files import WRITERS, sample_values, whole
+from tests.volume.volume_files import WRITERS, assert_holds, sample_values, whole
 from texgs.core.errors import ArgumentError, OutOfMemoryError, ShapeError
 from texgs.volume.sources import open_source
 
@@ -109,7 +109,7 @@ def test_vtk_in_a_process_of_its_own_runs_nothing_of_the_folder(tmp_path, monkey
     WRITERS["text.vtk"](tmp_path / "text.vtk", sample_values())
     (tmp_path / "numpy.py").write_text("raise SystemExit('was run')")
     monkeypatch.chdir(tmp_path)
-    np.testing.assert_array_equal(whole("text.vtk"), sample_values())
+    assert_holds("text.vtk", sample_values())
 
 
 @pytest.mark.parametrize("encoding", ["gzip", "bzip2"])
@@ -157,11 +157,11 @@ def test_text_and_bytes_to_skip_are_read_as_before(tmp_path):
     values = np.arange(24, dtype=np.uint8).reshape(2, 3, 4)
     text = " ".join(map(str, values.ravel())).encode()
     path = nrrd(tmp_path / "v.nrrd", encoding="ascii", more="line skip: 1\n", data=b"x\n" + text)
-    np.testing.assert_array_equal(whole(path), values)
+    assert_holds(path, values)
     for skip, extra in (("3", b"abc"), ("-1", b"abcd")):  # NRRD counts bytes after decompression
         packed = gzip.compress(extra + values.tobytes())
         path = nrrd(tmp_path / "g.nrrd", encoding="gzip", more=f"byte skip: {skip}\n", data=packed)
-        np.testing.assert_array_equal(whole(path), values)
+        assert_holds(path, values)
 
 
 @pytest.mark.parametrize(("encoding", "pack"), [("gzip", gzip.compress), ("bzip2", bz2.compress)])
@@ -170,7 +170,7 @@ def test_streams_behind_each_other_are_one(tmp_path, encoding, pack, behind):
     """As programs write them that pack on several cores; what else is behind them is none."""
     values = np.arange(24, dtype=np.uint8).reshape(2, 3, 4)
     packed = pack(values.tobytes()[:7]) + pack(values.tobytes()[7:]) + behind
-    np.testing.assert_array_equal(whole(nrrd(tmp_path / "v.nrrd", encoding=encoding, data=packed)), values)
+    assert_holds(nrrd(tmp_path / "v.nrrd", encoding=encoding, data=packed), values)
 
 
 def test_pages_of_a_tiff_that_do_not_fit_into_memory(tmp_path):

@@ -5,7 +5,7 @@ import pydicom
 import pytest
 from pydicom.uid import CTImageStorage, ExplicitVRLittleEndian, JPEG2000Lossless, RLELossless, generate_uid
 
-from tests.volume.volume_files import sample_values, whole
+from tests.volume.volume_files import assert_holds, sample_values, whole
 from texgs.core.errors import ArgumentError
 from texgs.volume.sources import open_source
 
@@ -48,7 +48,7 @@ def test_slices_are_sorted_by_place_and_have_their_lattice(tmp_path):
 def test_slope_and_intercept_are_applied(tmp_path):
     write_series(tmp_path, sample_values(), RescaleSlope=2, RescaleIntercept=-1024)
     expected = 2.0 * sample_values() - 1024
-    np.testing.assert_array_equal(whole(tmp_path), expected)
+    assert_holds(tmp_path, expected)
 
 
 def test_slopes_that_differ_from_slice_to_slice(tmp_path):
@@ -57,7 +57,7 @@ def test_slopes_that_differ_from_slice_to_slice(tmp_path):
     places = [10 + 2.5 * z * np.array([0, 0, 1]) for z in (1, 2, 3)]
     write_series(tmp_path, sample_values()[1:4], places, number=4, RescaleSlope=0.25, RescaleIntercept=0)
     expected = sample_values()[:4] * np.array([1, 0.25, 0.25, 0.25])[:, None, None]
-    np.testing.assert_array_equal(whole(tmp_path), expected)
+    assert_holds(tmp_path, expected)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_compressed_slices_are_read(tmp_path):
         data = pydicom.dcmread(path)
         data.compress(RLELossless)
         data.save_as(path)
-    np.testing.assert_array_equal(whole(tmp_path), sample_values())
+    assert_holds(tmp_path, sample_values())
 
 
 def test_slices_that_cannot_be_decoded_are_refused(tmp_path, capfd):

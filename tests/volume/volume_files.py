@@ -29,6 +29,13 @@ def whole(path: Path, **arguments) -> np.ndarray:
     return source.slices(0, source.dims[2])
 
 
+def assert_holds(path: Path, values: np.ndarray, spacing=None, origin=None, **arguments) -> None:
+    """Compare samples with values, and spacing and origin where they are given."""
+    source = open_source(path, **arguments)
+    np.testing.assert_array_equal(source.slices(0, source.dims[2]), values)
+    assert (source.spacing, source.origin) == (spacing or source.spacing, origin or source.origin)
+
+
 def image_data(values: np.ndarray) -> pyvista.ImageData:
     """VTK image with one point array."""
     image = pyvista.ImageData(dimensions=values.shape[2::-1], spacing=SPACING)
@@ -59,8 +66,14 @@ def by_tifffile(**options) -> Writer:
     return lambda path, values: tifffile.imwrite(path, values, **options)
 
 
-def by_nibabel(path: Path, values: np.ndarray) -> None:
-    nibabel.save(nibabel.Nifti1Image(values.T, np.diag([*SPACING, 1.0])), path)
+def by_nibabel(kind=nibabel.Nifti1Image) -> Writer:
+    return lambda path, values: nibabel.save(kind(values.T, np.diag([*SPACING, 1.0])), path)
+
+
+def page_by_page(path: Path, values: np.ndarray) -> None:
+    with tifffile.TiffWriter(path) as writer:
+        for page in values:
+            writer.write(page, compression="zlib", contiguous=False)
 
 
 WRITERS: dict[str, Writer] = {
@@ -75,11 +88,13 @@ WRITERS: dict[str, Writer] = {
     **{f"{encoding}.nrrd": by_nrrd(encoding) for encoding in ("raw", "gzip", "bzip2", "ascii")},
     "raw.nhdr": by_nrrd("raw"),
     "gzip.nhdr": by_nrrd("gzip"),
-    "plain.nii": by_nibabel,
-    "packed.nii.gz": by_nibabel,
+    "plain.nii": by_nibabel(),
+    "second.nii": by_nibabel(nibabel.Nifti2Image),
+    "packed.nii.gz": by_nibabel(),
     "little.tif": by_tifffile(),
     "big.tiff": by_tifffile(byteorder=">"),
     "packed.tif": by_tifffile(compression="zlib"),
+    "pages.tif": page_by_page,
     "rows.npy": np.save,
     "columns.npy": lambda path, values: np.save(path, np.asfortranarray(values)),
 }

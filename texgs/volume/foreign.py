@@ -50,17 +50,17 @@ def open_foreign(
         if suffix == ".vti":
             _check_end(path)
         stored = stored_samples(path) if suffix in (*NRRD, *METAIMAGE) else None
-        said, values = _ask(path, series, is_header_only=stored is not None)
-        nx, ny, nz = said["dims"]
-        dims, axes = (nx, ny, nz), closest(np.array(said["directions"]))
-        dx, dy, dz = spacing or (said["spacing"][axis] for axis, _ in axes)
+        reply, values = _ask(path, series, is_header_only=stored is not None)
+        nx, ny, nz = reply["dims"]
+        dims, axes = (nx, ny, nz), closest(np.array(reply["directions"]))
+        dx, dy, dz = spacing or (reply["spacing"][axis] for axis, _ in axes)
         lengths = [(dims[axis] - 1) * step for (axis, _), step in zip(axes, (dx, dy, dz), strict=True)]
         x, y, z = origin or (
             place - (0.0 if sign > 0 else length)
-            for place, (_, sign), length in zip(said["origin"], axes, lengths, strict=True)
+            for place, (_, sign), length in zip(reply["origin"], axes, lengths, strict=True)
         )
         if stored is not None:
-            dtype = np.dtype(said["dtype"]).newbyteorder(">" if stored.is_big_endian else "<")
+            dtype = np.dtype(reply["dtype"]).newbyteorder(">" if stored.is_big_endian else "<")
             if stored.encoding != "raw":
                 values = unpacked(stored, dims, dtype)
             else:
@@ -95,30 +95,30 @@ def _ask(path: Path, series: str | None, is_header_only: bool) -> tuple[dict[str
         watchdog = Timer(SECONDS + size / RATE, child.kill)
         watchdog.start()
         try:
-            said, values = _received(child.stdout, is_header_only)
+            reply, values = _received(child.stdout, is_header_only)
         finally:
             watchdog.cancel()
             child.kill()
-    if said is None:
+    if reply is None:
         raise ArgumentError(
             f"expected {_kind(path)}, but its reader broke off; it is damaged, or claims more memory than "
             "there is"
         )
-    if "error" in said:
-        raise (OutOfMemoryError if said["is_memory"] else ArgumentError)(said["error"])
-    return said, values
+    if "error" in reply:
+        raise (OutOfMemoryError if reply["is_memory"] else ArgumentError)(reply["error"])
+    return reply, values
 
 
 def _received(stream: IO[bytes], is_header_only: bool) -> tuple[dict[str, Any] | None, np.ndarray]:
     """Return what the process says about a volume, None if it died, and the samples where it sends some."""
-    said = json.loads(stream.readline(LONGEST_LINE) or "null")
-    if said is None or "error" in said or is_header_only:
-        return said, np.empty(0)
-    dims, dtype = said["dims"], np.dtype(said["dtype"])
+    reply = json.loads(stream.readline(LONGEST_LINE) or "null")
+    if reply is None or "error" in reply or is_header_only:
+        return reply, np.empty(0)
+    dims, dtype = reply["dims"], np.dtype(reply["dtype"])
     require_room(dims, dtype)
     samples = stream.read(byte_count(dims, dtype))
     is_whole = len(samples) == byte_count(dims, dtype)
-    return (said, np.frombuffer(samples, dtype).reshape(dims[::-1])) if is_whole else (None, np.empty(0))
+    return (reply, np.frombuffer(samples, dtype).reshape(dims[::-1])) if is_whole else (None, np.empty(0))
 
 
 def answer(path: Path, series: str | None, is_header_only: bool) -> None:
@@ -130,14 +130,14 @@ def answer(path: Path, series: str | None, is_header_only: bool) -> None:
         values = None
         try:
             with reading_as(_kind(path)):
-                said, values = image_of(path, series, is_header_only)
+                reply, values = image_of(path, series, is_header_only)
             printed.seek(0)  # what a library has printed instead of raising it
             for line in printed:
                 if COMPLAINT.search(line) and "warning" not in line.lower():
                     raise ArgumentError(f"the file is damaged or cut off, its reader says: {line.strip()}")
         except TexgsError as error:
-            values, said = None, {"error": str(error), "is_memory": isinstance(error, OutOfMemoryError)}
-        output.write(json.dumps(said).encode() + b"\n")
+            values, reply = None, {"error": str(error), "is_memory": isinstance(error, OutOfMemoryError)}
+        output.write(json.dumps(reply).encode() + b"\n")
         if values is not None:
             output.write(memoryview(np.ascontiguousarray(values).data).cast("B"))
 

@@ -107,7 +107,7 @@ def require_room(dims: Dims, dtype: np.dtype, beside: int = 0) -> None:
 
 
 def closest(directions: np.ndarray) -> AxisPermutation:
-    """For each axis of space find the stored axis that runs along it most nearly, and its sign.
+    """Find for each axis of space the stored axis that runs along it most nearly, and its sign.
 
     Args:
         directions: [3, 3], rows of unit length. Where something is not finite, axes stay as they are stored.

@@ -43,7 +43,7 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
         dims, dtype = require_volume(sizes, reader.GetPixelIDValue(), reader.GetNumberOfComponents())
         fields = read_fields(path)[0] if path.suffix.lower() in NRRD else {}
         signs = np.array(NRRD_SPACES.get(fields.get("space", "").lower(), (1.0, 1.0, 1.0)))
-        said: dict[str, Any] = {
+        lattice: dict[str, Any] = {
             "dims": dims,
             "dtype": dtype.name,
             "spacing": reader.GetSpacing(),
@@ -51,13 +51,13 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
             "directions": (np.reshape(reader.GetDirection(), (3, 3)).T * signs).tolist(),
         }
         if {"axismins", "axismaxs"} <= fields.keys() and "spacedirections" not in fields:
-            said["origin"] = np.nan_to_num(np.array(fields["axismins"].split(), float)).tolist()
+            lattice["origin"] = np.nan_to_num(np.array(fields["axismins"].split(), float)).tolist()
             if "spacings" not in fields:
-                said["spacing"] = _steps(fields, dims)
+                lattice["spacing"] = _steps(fields, dims)
         if is_header_only:
-            return said, None
+            return lattice, None
         require_room(dims, dtype)
-        return said, sitk.GetArrayFromImage(reader.Execute())
+        return lattice, sitk.GetArrayFromImage(reader.Execute())
     except RuntimeError as error:
         raise ArgumentError(sentence(error)) from error
 
@@ -124,14 +124,14 @@ def read_dicom(folder: Path, series: str | None) -> tuple[dict[str, Any], np.nda
         values = sitk.GetArrayFromImage(reader.Execute())
     except RuntimeError as error:
         raise ArgumentError(sentence(error)) from error
-    said = {
+    lattice = {
         "dims": dims,
         "dtype": values.dtype.name,
         "spacing": (*first.spacing[:2], step),
         "origin": first.place.tolist(),
         "directions": first.directions.tolist(),
     }
-    return said, values
+    return lattice, values
 
 
 def chosen_files(folder: Path, series: str | None) -> list[str]:

@@ -67,7 +67,6 @@ class TransferFunction:
 
     def scaled(self, low: float, high: float) -> "TransferFunction":
         """Map a function given on fractions of the data range to data values: 0 -> low, 1 -> high."""
-        check_range("range", (low, high))
         for name, points in (("opacity", self.opacity), ("color", self.color)):
             for i, (fraction, *_) in enumerate(points):
                 if not 0 <= fraction <= 1:
@@ -117,13 +116,6 @@ class TransferFunction:
             keys = ", ".join(map(str, data)) if isinstance(data, Mapping) else type(data).__name__
             raise ArgumentError(f"transfer function: expected the keys opacity, color, got {keys or 'none'}")
         return TransferFunction(data["opacity"], data["color"])
-
-
-def check_range(name: str, range_: tuple[float, float]) -> None:
-    """Require a range that is not empty, with finite ends."""
-    low, high = range_
-    if not (-MAXIMUM <= low < high <= MAXIMUM):
-        raise ArgumentError(f"{name}: expected low < high, both finite, got {row_text(range_)}")
 
 
 def right_limit(points: Sequence[tuple[float, ...]], values: Array) -> Array:

@@ -43,14 +43,14 @@ def read_vtk(path: Path) -> tuple[dict[str, Any], np.ndarray]:
         )
     first = [0.0, 0.0, 0.0]
     image.TransformIndexToPhysicalPoint(list(image.extent[::2]), first)
-    said = {
+    lattice = {
         "dims": dims_of(shape),
         "dtype": values.dtype.name,
         "spacing": image.spacing,
         "origin": first,
         "directions": image.direction_matrix.T.tolist(),
     }
-    return said, np.asarray(values).reshape(shape)
+    return lattice, np.asarray(values).reshape(shape)
 
 
 def check_claim(reader: Any) -> None:
