@@ -146,6 +146,13 @@ def test_a_model_without_surfels_goes_on_and_stays_empty():
     assert is_finite(fit.state())
 
 
+def seeded(images, view_set, count):
+    """A fit of surfels that start where views say."""
+    parameters, colors = seed_surfels(images, view_set, Seeds(count=count, half_size=0.55), 0)
+    start = {**parameters, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
+    return run(new_fit(images=images, parameters=start, iterations=150, densify=DENSIFY))
+
+
 def test_views_without_alpha_fit_from_files(tmp_path):
     views = []
     for index, camera in enumerate(cameras(4)):
@@ -153,10 +160,7 @@ def test_views_without_alpha_fit_from_files(tmp_path):
         views.append(View(camera, path, HEADLIGHT))
     write_transforms(tmp_path, "train", views, {"aabb": [[-0.4] * 3, [0.4] * 3]})
     view_set = read_views(tmp_path)
-    images = load(view_set.train)
-    parameters, colors = seed_surfels(images, view_set, Seeds(count=80, half_size=0.55), 0)
-    start = {**parameters, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
-    fit = run(new_fit(images=images, parameters=start, iterations=150, densify=DENSIFY))
+    fit = seeded(load(view_set.train), view_set, 80)
     assert is_finite(fit.state())
     assert quality(model_of(fit), fit.images) > 18
 
@@ -165,12 +169,7 @@ def test_cameras_inside_of_the_object_fit(tmp_path):
     K = torch.tensor([[20.0, 0, 16], [0, 20, 16], [0, 0, 1]])
     targets = torch.tensor([[1.0, 0, 0], [0, 0, 1.0], [-1.0, 0, 0.1], [0.1, 0, -1.0]])
     views = [Camera(look_at(0.02 * t, t), K, SIZE, SIZE) for t in targets]
-    images = flat_images([0.2, 0.5, 0.9], 1.0, views=views)
-    parameters, colors = seed_surfels(
-        images, ViewSet(tmp_path, [], [], {}), Seeds(count=150, half_size=0.55), 0
-    )
-    start = {**parameters, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
-    fit = run(new_fit(images=images, parameters=start, iterations=150, densify=DENSIFY))
+    fit = seeded(flat_images([0.2, 0.5, 0.9], 1.0, views=views), ViewSet(tmp_path, [], [], {}), 150)
     assert is_finite(fit.state())
     assert quality(model_of(fit), fit.images) > 12
 

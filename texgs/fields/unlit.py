@@ -43,12 +43,7 @@ class UnlitField(ABC):
 class UnlitScene(ABC, Generic[F]):
     """Fields of one kind that are drawn together.
 
-    Args:
-        fields: at least one, all on one device.
-        segments: of each field; there may be none.
-
-    Raises:
-        ArgumentError: if there is no field, or there is a segment.
+    There is at least one, all are on one device, and none has segments.
     """
 
     def __init__(self, fields: Sequence[F], segments: Sequence[Sequence[Tensor]] = ()) -> None:

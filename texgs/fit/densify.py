@@ -16,7 +16,7 @@ RESET_OPACITY = 0.01
 
 
 def is_shared(name: str, values: Tensor) -> bool:
-    """Whether a parameter is one material for all surfels, also where there is but one surfel."""
+    """Return whether a parameter is one material for all surfels, also where there is but one surfel."""
     return name in MATERIAL and len(values) == 1
 
 
@@ -69,7 +69,7 @@ class DensityControl:
         self._clear(len(optimizer.parameters["means"]), largest.device)
 
     def _chosen(self, alive: Tensor) -> Tensor:
-        """Surfels [N] bool with the largest mean gradients above the threshold, as many as the cap allows."""
+        """Choose surfels [N] bool with the largest mean gradients above the threshold, up to the cap."""
         mean = self.gradients / self.counts.clamp_min(1)
         mean = torch.where(alive & (mean > self.settings.threshold), mean, 0.0)
         room = max(0, self.settings.cap - int(alive.sum()))
@@ -79,7 +79,7 @@ class DensityControl:
         return chosen
 
     def _children(self, parents: dict[str, Tensor], generator: torch.Generator) -> dict[str, Tensor]:
-        """Two smaller ones for each, drawn from its Gaussian."""
+        """Make two smaller ones for each, drawn from its Gaussian."""
         rows = {name: x.repeat(CHILDREN, *[1] * (x.ndim - 1)) for name, x in parents.items()}
         noise = torch.randn(rows["scales"].shape, generator=generator).to(rows["scales"])
         along = quats_to_matrices(rows["quats"])[..., : rows["scales"].shape[1]]  # [n, 3, 2 or 3]

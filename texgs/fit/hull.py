@@ -20,10 +20,7 @@ Box = tuple[Tensor, Tensor]  # lowest and highest corner [3]
 
 
 def hull_points(images: Images, box: Box, count: int, generator: torch.Generator) -> Tensor:
-    """Draw random points [count, 3] of the box that project onto something visible in every view.
-
-    There are fewer where the hull is but a tiny part of the box.
-    """
+    """Draw random points of the box that every view shows, [count, 3], or fewer where the hull is tiny."""
     inside: list[Tensor] = []
     for _ in range(ROUNDS):
         points = random_points(box, TRIED, generator)

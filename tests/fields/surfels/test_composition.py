@@ -10,6 +10,8 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
+from texgs.fields.surfels.texels import offsets_of
+from texgs.raster.shading import MATERIAL
 
 CAMERA = orbit(30, 20, 3, 40, 64, 48)
 SIDE = Light("directional", 100, 30)
@@ -26,31 +28,24 @@ def ball(seed, n=150, stage="texture", shared=True, middle=0.0):
         "scales": torch.log(0.08 + 0.05 * torch.rand(n, 2, generator=g)),
         "opacities": torch.randn(n, generator=g),
         "colors": 0.2 * torch.rand(n, 3, generator=g),
-        **{k: x.repeat(1 if shared else n) for k, x in raw_material(0.4, 0.5, 0.2, 20.0, "bounded").items()},
     }
+    factors = raw_material(0.4, 0.5, 0.2, 20.0, "bounded")
+    p |= {name: x.repeat(1 if shared else n) for name, x in factors.items()}
     if stage == "texture":
         sizes = torch.randint(1, 5, (n, 2), generator=g, dtype=torch.int32)
-        counts = sizes.long().prod(1)
-        p |= {
-            "palette": torch.rand(3, generator=g) * 0.6,
-            "texels": 0.2 * torch.rand(int(counts.sum()), 3, generator=g),
-            "sizes": sizes,
-            "offsets": counts.cumsum(0) - counts,
-        }
+        p |= {"palette": torch.rand(3, generator=g) * 0.6}
+        p |= {"texels": 0.2 * torch.rand(int(sizes.prod(1).sum()), 3, generator=g)}
+        p |= {"sizes": sizes, "offsets": offsets_of(sizes)}
     return Surfels(p, ShadingModel())
 
 
 def union(*models):
     """One model with the surfels of all, whose material is per surfel and palette part of the offsets."""
-    p, count = {}, 0
-    parts = []
+    parts, count = [], 0
     for model in models:
         q = dict(model.parameters)
-        n = len(model)
-        q["colors"] = q["colors"] + q.pop("palette")
-        for name in ("ambient", "diffuse", "specular", "shininess"):
-            q[name] = q[name].expand(n)
-        q["offsets"] = q["offsets"] + count
+        q |= {"colors": q["colors"] + q.pop("palette"), "offsets": q["offsets"] + count}
+        q |= {name: q[name].expand(len(model)) for name in MATERIAL}
         count += len(q["texels"])
         parts.append(q)
     p = {name: torch.cat([q[name] for q in parts]) for name in parts[0]}
@@ -149,17 +144,9 @@ def test_discs_are_opaque_within_one_standard_deviation():
     [
         ([], None, "models: expected at least one, got none"),
         ([sample("surfels")], None, "expected stage shading or texture, got surfels"),
-        (
-            [ball(1), Surfels(ball(2).parameters, ShadingModel(2.0))],
-            None,
-            r"expected one low_pass, got 2.0 and 6.0",
-        ),
+        ([ball(1), Surfels(ball(2).parameters, ShadingModel(2.0))], None, "one low_pass, got 2.0 and 6.0"),
         ([ball(1)], [PartEdit(), PartEdit()], "edits: expected one for each of 1 models, got 2"),
-        (
-            [ball(1, stage="shading")],
-            [PartEdit(palette=(0, 0, 0))],
-            "palette: expected a model with a texture",
-        ),
+        ([ball(1, stage="shading")], [PartEdit(palette=(0, 0, 0))], "palette: expected a model with a te"),
     ],
 )
 def test_what_cannot_be_composed(models, edits, message):
