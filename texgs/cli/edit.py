@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.cli.render import add_lens, lens_of
+from texgs.cli.options import add_device, add_lens, lens_of, option
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.core.names import SCENES, new_part_file, require_name
@@ -55,28 +55,17 @@ def add_segment_arguments(parser: argparse.ArgumentParser) -> None:
     add_clicks(parser)
     parser.add_argument("--output", type=Path, help="the new scene.yaml; the segment's file is put beside it")
     parser.add_argument("--preview", type=Path, metavar="PNG", help="write the view with the mask, no scene")
-    parser.add_argument(
-        "--masks",
-        default="mobile_sam",
-        help="mobile_sam, sam_vit_h, a folder with a SAM of transformers, or grabcut, which needs no weights "
-        "(%(default)s)",
-    )
-    parser.add_argument(
-        "--vote", choices=("contribution", "centre"), default="contribution", help="(%(default)s)"
-    )
+    masks = "mobile_sam, sam_vit_h, a folder with a SAM of transformers, or grabcut, which needs no weights"
+    option(parser, "--masks", "mobile_sam", masks)
+    option(parser, "--vote", "contribution", "", choices=("contribution", "centre"))
     parser.add_argument("--threshold", type=float, help="of votes; default 0.5, of vote centre 0.7")
     parser.add_argument(
         "--connected", action="store_true", help="keep only the connected pieces that hold a point"
     )
-    parser.add_argument(
-        "--views",
-        type=int,
-        default=42,
-        help="number of views that vote, 10 f^2 + 2: 12, 42, 92, 162, ... (%(default)s)",
-    )
-    parser.add_argument("--size", type=int, default=512, help="of these views, pixels (%(default)s)")
-    add_lens(parser, "of the view clicked on (%(default)s)", "default the width")
-    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
+    option(parser, "--views", 42, "number of views that vote, 10 f^2 + 2: 12, 42, 92, 162, ...")
+    option(parser, "--size", 512, "of these views, pixels")
+    add_lens(parser, "of the view clicked on", "default the width")
+    add_device(parser)
 
 
 def add_clicks(parser: argparse.ArgumentParser) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from texgs.cli.options import add_device, option
 from texgs.core.errors import ArgumentError
 from texgs.core.names import SCENES
 
@@ -35,20 +36,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="one model of a scene, with the textures that it has there; other edits of it only in html",
     )
-    parser.add_argument(
-        "--opacity", type=float, default=0.5, help="points: leave out surfels with less opacity (%(default)s)"
-    )
-    parser.add_argument(
-        "--voxel", type=float, default=1 / 256, help="edge of a cell of a mesh, world units (%(default)s)"
-    )
-    parser.add_argument(
-        "--views", type=int, default=92, help="number of views that a mesh is made from (%(default)s)"
-    )
-    parser.add_argument("--size", type=int, default=512, help="of these views, pixels (%(default)s)")
+    option(parser, "--opacity", 0.5, "points: leave out surfels with less opacity")
+    option(parser, "--voxel", 1 / 256, "edge of a cell of a mesh, world units")
+    option(parser, "--views", 92, "number of views that a mesh is made from")
+    option(parser, "--size", 512, "of these views, pixels")
     parser.add_argument(
         "--drop-unseen", action="store_true", help="compact: no texture for surfels that none of --views sees"
     )
-    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
+    add_device(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

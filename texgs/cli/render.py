@@ -7,14 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from texgs.cli.options import add_device, add_lens, lens_of, option
 from texgs.core.errors import ArgumentError
-from texgs.core.lens import Lens
 
 if TYPE_CHECKING:
     from texgs.core.camera import Camera
     from texgs.core.light import Light
 
-LENS = Lens()
 MOST_FRAMES = 100_000  # an hour of film
 PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61}  # frames by default
 
@@ -27,44 +26,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help=".png, .gif, .mp4 or a folder; default SCENE.png here, or .mp4 for several frames",
     )
-    parser.add_argument(
-        "--mode",
-        default="shaded",
-        help="shaded, unshaded, normal, depth, alpha, texture, discs, or a factor of the material: ambient, "
-        "diffuse, specular or shininess (%(default)s)",
+    modes = (
+        "shaded, unshaded, normal, depth, alpha, texture, discs, or a factor of the material: ambient, "
+        "diffuse, specular or shininess"
     )
-    parser.add_argument("--path", choices=PATHS, default="view", help="camera or light path (%(default)s)")
+    option(parser, "--mode", "shaded", modes)
+    option(parser, "--path", "view", "camera or light path", choices=PATHS)
     parser.add_argument("--frames", type=int, help="default test 181, orbit 72, light 61")
-    add_lens(parser, "pixels (%(default)s)", "pixels; default the width")
-    parser.add_argument(
-        "--azimuth",
-        type=float,
-        default=30.0,
-        help="azimuth of the camera, on an orbit of the first frame, degrees (%(default)s); not for test",
-    )
-    parser.add_argument(
-        "--polar",
-        type=float,
-        default=20.0,
-        help="angle above the horizon, degrees (%(default)s); not for path test",
-    )
-    parser.add_argument("--fps", type=float, default=25.0, help="frames per second (%(default)s)")
-    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
-
-
-def add_lens(parser: argparse.ArgumentParser, width: str, height: str) -> None:
-    """Add the size of pictures, whose help is given, and the distance and field of view of the camera."""
-    parser.add_argument("--width", type=int, default=LENS.width, help=width)
-    parser.add_argument("--height", type=int, help=height)
-    distance, fov = "distance, world units (%(default)s)", "vertical field of view, degrees (%(default)s)"
-    parser.add_argument("--radius", type=float, default=LENS.radius, help=distance)
-    parser.add_argument("--fov", type=float, default=LENS.fov_y, help=fov)
-
-
-def lens_of(arguments: argparse.Namespace) -> Lens:
-    """Return what `add_lens` has added; pictures are square by default."""
-    height = arguments.width if arguments.height is None else arguments.height
-    return Lens(arguments.radius, arguments.fov, arguments.width, height)
+    add_lens(parser, "pixels", "pixels; default the width")
+    azimuth = "azimuth of the camera, not for path test, on an orbit of the first frame, degrees"
+    option(parser, "--azimuth", 30.0, azimuth)
+    option(parser, "--polar", 20.0, "angle above the horizon, not for path test, degrees")
+    option(parser, "--fps", 25.0, "frames per second")
+    add_device(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -27,7 +27,7 @@ WORD = re.compile(r"(\+{0,2}[A-Za-z_][\w.@-]*=.*|~[A-Za-z_][\w.@-]*(=.*)?)", re.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Whatever snakemake takes."""
+    """Add whatever snakemake takes."""
     parser.add_argument(
         "words",
         nargs="*",
@@ -113,7 +113,7 @@ def require_pairs(words: Sequence[str]) -> None:
 
 
 def defaults(given: argparse.Namespace) -> list[str]:
-    """Options that hold where the user says nothing else: the Snakefile of texgs and the local profile."""
+    """Return options that hold where the user says nothing else: the Snakefile of texgs, the local profile."""
     from texgs.config.project import PROFILES, SNAKEFILE
 
     options = ["--snakefile", str(SNAKEFILE)]
@@ -123,7 +123,7 @@ def defaults(given: argparse.Namespace) -> list[str]:
 
 
 def located(words: Sequence[str]) -> list[str]:
-    """The words, with the path of a profile of texgs where only its name is given."""
+    """Return the words, with the path of a profile of texgs where only its name is given."""
     from texgs.config.project import PROFILES
 
     return [
@@ -135,7 +135,7 @@ def located(words: Sequence[str]) -> list[str]:
 
 
 def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
-    """The words as one entry of snakemake's `--config`, which reads values as YAML."""
+    """Return the words as one entry of snakemake's `--config`, which reads values as YAML."""
     import yaml
 
     if not words:

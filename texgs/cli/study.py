@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from texgs.cli.options import add_device, option
 from texgs.core.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -26,15 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--edits", nargs="+", default=[], metavar="EDIT", help="edits to compare; default all with a new look"
     )
-    parser.add_argument("--output", type=Path, default=Path("results/study"), help="folder (%(default)s)")
-    parser.add_argument(
-        "--seed", type=int, default=0, help="random seed for the order of clips (%(default)s)"
-    )
-    parser.add_argument(
-        "--size", type=int, default=384, help="width and height of a clip, pixels (%(default)s)"
-    )
-    parser.add_argument("--frames", type=int, default=150, help="frames of a turn, 25 a second (%(default)s)")
-    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
+    option(parser, "--output", Path("results/study"), "folder")
+    option(parser, "--seed", 0, "random seed for the order of clips")
+    option(parser, "--size", 384, "width and height of a clip, pixels")
+    option(parser, "--frames", 150, "frames of a turn, 25 a second")
+    add_device(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -92,10 +89,8 @@ def add_votes_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "ballots", nargs="*", type=Path, help="files that voters have sent (all in votes/ beside the key)"
     )
-    parser.add_argument(
-        "--key", type=Path, default=Path("results/study/key.json"), help="of the study (%(default)s)"
-    )
-    parser.add_argument("--output", type=Path, default=Path("results/tables"), help="folder (%(default)s)")
+    option(parser, "--key", Path("results/study/key.json"), "of the study")
+    option(parser, "--output", Path("results/tables"), "folder")
 
 
 def run_votes(arguments: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from texgs.cli.options import option
 from texgs.core.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -19,13 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser, output: str = "results/tables
     """Add where the numbers are, and where the tables or the report go."""
     parser.add_argument("metrics", nargs="*", type=Path, help="metrics.json files (all below results/)")
     parser.add_argument("--missing", type=Path, help="JSON file of what was left out, with reasons")
-    parser.add_argument(
-        "--study",
-        type=Path,
-        default=Path("results/study/key.json"),
-        help="key of a user study, with ballots in votes/ beside it (%(default)s)",
-    )
-    parser.add_argument("--output", type=Path, default=Path(output), help="(%(default)s)")
+    study = "key of a user study, with ballots in votes/ beside it"
+    option(parser, "--study", Path("results/study/key.json"), study)
+    option(parser, "--output", Path(output), "")
 
 
 def run(arguments: argparse.Namespace) -> int:

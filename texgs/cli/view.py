@@ -10,6 +10,7 @@ import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from texgs.cli.options import add_device
 from texgs.core.errors import ArgumentError, TexgsError
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="to listen on (%(default)s: this machine only); 0.0.0.0 lets others in who know the address",
     )
     parser.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
-    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
+    add_device(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

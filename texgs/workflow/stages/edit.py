@@ -53,7 +53,7 @@ def captions(config: Config) -> dict[str, str]:
 
 
 def looks_of(config: Config) -> dict[str, str]:
-    """What each model of a scene follows; empty where all follow what the edit itself says."""
+    """Return what each model of a scene follows; empty where all follow what the edit itself says."""
     edit, dataset, table = config.edit, config.dataset.name, config.dataset.looks
     if not edit.looks:
         return {}
