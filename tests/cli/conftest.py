@@ -37,8 +37,7 @@ def at(tmp_path_factory):
     def run(folder, *verbs):
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(folder)
-            for name in ("TEXGS_WEIGHTS", "TORCH_HOME", "HF_HOME", "XDG_CACHE_HOME"):
-                patch.setenv(name, str(folder / "none"))
+            hide_weights(patch, folder)
             patch.setattr("texgs.report.before_after.TURN", 4)  # frames of palette fields take long
             for words in verbs:
                 assert main(words) == 0
@@ -69,6 +68,12 @@ def gaussians(at, sphere, tmp_path_factory):
 def scene_of_two(at, tmp_path_factory):
     """Results with a scene of two models of turbulence."""
     return at(tmp_path_factory.mktemp("turbulence"), ["compose", *TURBULENCE])
+
+
+def hide_weights(patch, folder):
+    """Let no pretrained weights be found."""
+    for name in ("TEXGS_WEIGHTS", "TORCH_HOME", "HF_HOME", "XDG_CACHE_HOME"):
+        patch.setenv(name, str(folder / "none"))
 
 
 def copied(results, folder):

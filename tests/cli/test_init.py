@@ -46,16 +46,6 @@ def project(tmp_path, monkeypatch):
     return tmp_path / "conf"
 
 
-def test_files_of_the_project_come_before_those_of_texgs(project):
-    (project / "dataset" / "engine.yaml").write_text("name: engine\nvolume: {file: mine.nrrd}\n")
-    (project / "views").mkdir()
-    (project / "views" / "huge.yaml").write_text("width: 4000\nheight: 4000\n")
-    config = compose(("dataset=engine", "views=huge"))
-    assert (config.dataset.volume.file, config.views.width) == ("mine.nrrd", 4000)
-    assert config.fit.name == "default"
-    assert {"huge", "small"} <= set(members("views"))
-
-
 def test_the_project_may_have_defaults_of_its_own(project):
     from texgs.config.project import ROOT
 

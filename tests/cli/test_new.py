@@ -55,17 +55,13 @@ def write_tf(path, tf):
     path.write_text(json.dumps({"format": "texgs-tf", "version": 1, **tf.to_dict()}))
 
 
-def test_tfs_from_files(conf, scan, tmp_path):
-    tf = TransferFunction(((100, 0), (120, 0.5), (140, 0)), ((100, 1, 0, 0),))
-    write_tf(tmp_path / "tf.json", tf)
-    assert main(["new", str(scan), "--name", "mine", "--tf", str(tmp_path / "tf.json")]) == 0
-    (read,) = compose(("dataset=mine",)).dataset.basic_tfs.values()
-    assert [list(point) for point in read.opacity] == [[100, 0], [120, 0.5], [140, 0]]
-
-
-def test_a_data_set_is_not_overwritten(conf, scan, capsys):
+def test_a_data_set_is_only_replaced_where_that_is_asked_for_and_that_of_texgs_never(conf, scan, capsys):
+    shipped = (ROOT / "conf" / "dataset" / "engine.yaml").read_bytes()
     assert main(["new", str(scan), "--name", "engine"]) == 2
     assert "is there already; choose another --name" in capsys.readouterr().err
+    assert main(["new", str(scan), "--name", "engine", "--force"]) == 0
+    assert (ROOT / "conf" / "dataset" / "engine.yaml").read_bytes() == shipped
+    assert compose(("dataset=engine",)).dataset.volume.file == str(scan)
 
 
 @pytest.mark.parametrize(
@@ -82,13 +78,6 @@ def test_mistakes_write_nothing(conf, scan, capsys, words, message):
     assert main(["new", *(word.format(scan=scan) for word in words)]) == 2
     assert message in capsys.readouterr().err.splitlines()[-1]
     assert not conf.exists()
-
-
-def test_the_data_set_of_texgs_that_it_replaces_is_left_as_it_is(conf, scan):
-    shipped = (ROOT / "conf" / "dataset" / "engine.yaml").read_bytes()
-    assert main(["new", str(scan), "--name", "engine", "--force"]) == 0
-    assert (ROOT / "conf" / "dataset" / "engine.yaml").read_bytes() == shipped
-    assert compose(("dataset=engine",)).dataset.volume.file == str(scan)
 
 
 @pytest.mark.parametrize("name", ["no", "on", "null", "true", "Off", "nan", "inf", "1e3", "a" * 300])
@@ -133,11 +122,11 @@ def test_tfs_of_a_narrow_range_far_from_zero_keep_their_digits(conf, tmp_path):
 
 
 def test_tfs_from_files_keep_every_digit(conf, scan, tmp_path):
-    value = 100.12345678901234
-    write_tf(tmp_path / "tf.json", TransferFunction(((value, 0), (140, 0.5)), ((100, 1, 0, 0),)))
+    tf = TransferFunction(((100.12345678901234, 0), (120, 0.5), (140, 0)), ((100, 1, 0, 0),))
+    write_tf(tmp_path / "tf.json", tf)
     assert main(["new", str(scan), "--name", "mine", "--tf", "tf.json"]) == 0
     (read,) = compose(("dataset=mine",)).dataset.basic_tfs.values()
-    assert read.opacity[0][0] == value
+    assert [tuple(point) for point in read.opacity] == list(tf.opacity)
 
 
 def test_a_document_that_is_read_as_something_else_is_not_written(conf, scan, capsys, monkeypatch):

@@ -154,6 +154,10 @@ def test_a_folder_of_others_or_a_link_is_refused(output, tmp_path):
     link.symlink_to(output)
     with pytest.raises(ArgumentError, match="expected a folder, got a link"):
         result.claim(link, MINE)
+    (file := output.with_name("file")).write_text("mine")
+    result.recover(file)
+    with pytest.raises(ArgumentError, match="expected a folder, got a link or a file"):
+        result.claim(file, MINE)
 
 
 def test_fingerprints_know_contents_and_makers_but_no_times(output, tmp_path):
@@ -184,20 +188,21 @@ def is_told(path, other, text):
     return result.fingerprint(path, Checksums()) != before
 
 
-def test_fingerprints_of_views_from_elsewhere_know_all_that_fits_read(tmp_path):
+def test_fingerprints_of_views_from_elsewhere_and_of_slices_know_all_that_jobs_read(tmp_path, output):
     (tmp_path / "train").mkdir()
     (views := tmp_path / "transforms_train.json").write_text("{}")
     assert is_told(views, tmp_path / "train" / "r_0.png", "one")
     assert is_told(views, tmp_path / "train" / "r_0.png", "two")
     assert is_told(views, tmp_path / "points3d.ply", "where surfels start")
     assert not is_told(views, tmp_path / "notes.txt", "mine")
-
-
-def test_fingerprints_of_slices_know_nothing_else_of_their_folder(tmp_path):
-    (tmp_path / "z1.tif").write_text("one")
-    assert is_told(tmp_path, tmp_path / "z1.tif", "two")
-    assert is_told(tmp_path, tmp_path / "z2.TIFF", "more")
-    assert not is_told(tmp_path, tmp_path / ".DS_Store", "of the system")
+    (slices := tmp_path / "slices").mkdir()
+    (slices / "z1.tif").write_text("one")
+    assert is_told(slices, slices / "z1.tif", "two")
+    assert is_told(slices, slices / "z2.TIFF", "more")
+    assert not is_told(slices, slices / ".DS_Store", "of the system")
+    make(output)
+    (output / "mine.yaml").write_text("one")
+    assert is_told(output / "mine.yaml", output / "mine.yaml", "two"), "a file beside a result is its own"
 
 
 @pytest.mark.parametrize(
@@ -211,20 +216,6 @@ def test_fingerprints_of_headers_know_their_samples(tmp_path, name, header):
     (tmp_path / name).unlink()
     with pytest.raises(ArgumentError, match="a\\."):
         result.fingerprint(tmp_path / name, Checksums())
-
-
-def test_fingerprints_of_files_beside_a_result_are_their_own(output):
-    make(output)
-    (output / "mine.yaml").write_text("one")
-    assert is_told(output / "mine.yaml", output / "mine.yaml", "two")
-
-
-def test_a_file_in_the_place_of_a_result_is_told(output):
-    output.parent.mkdir(parents=True, exist_ok=True)
-    output.write_text("mine")
-    result.recover(output)
-    with pytest.raises(ArgumentError, match="expected a folder, got a link or a file"):
-        result.claim(output, MINE)
 
 
 def test_a_damaged_input_names_its_maker_and_is_looked_at_anew(output, monkeypatch, tmp_path):

@@ -19,29 +19,17 @@ from texgs.core.errors import ArgumentError
 TEXGS = [sys.executable, "-m", "texgs.cli.main"]
 
 
-@pytest.mark.parametrize(
-    "word", ["dataset=engine", "views.width=4", "+a.b=1", "++a=1", "~a.b", "edits=[x,y]"]
-)
-def test_words_of_the_configuration(word):
-    assert WORD.fullmatch(word)
-
-
-@pytest.mark.parametrize("word", ["volumes", "results/report.html", "results/a=b/c.png", "/tmp/x=y", "2=3"])
-def test_targets(word):
-    assert not WORD.fullmatch(word)
+def test_words_of_the_configuration_and_targets():
+    assert all(
+        map(WORD.fullmatch, ["dataset=engine", "views.width=4", "+a.b=1", "++a=1", "~a.b", "edits=[x,y]"])
+    )
+    targets = "volumes results/report.html results/a=b/c.png /tmp/x=y 2=3"
+    assert not any(map(WORD.fullmatch, targets.split()))
 
 
 def test_any_value_reaches_the_snakefile():
-    words = [
-        "a=$HOME `x` $(y)",
-        "b=[1, {c: 'd'}]",
-        'c="quoted"',
-        "d='",
-        'e="',
-        "f=#: -",
-        "g=é \U0001f600",
-        "h=\n\\",
-    ]
+    words = ["a=$HOME `x` $(y)", "b=[1, {c: 'd'}]", 'c="quoted"', "d='", 'e="', "f=#: -", "g=é \U0001f600"]
+    words += ["h=\n\\"]
     (entry,) = overrides(words, ())
     assert shlex.split(parse_config([entry])["overrides"]) == words
     assert overrides([], ()) == []

@@ -85,28 +85,6 @@ def test_a_second_segment_gets_what_the_first_left(scene, tmp_path, capsys):
     assert list(model.segments) == ["red", "blue"]
 
 
-def test_a_segment_made_again_leaves_that_of_other_scenes(scene, tmp_path):
-    assert segment(scene, "--point", LEFT, "--not", RIGHT) == 0
-    edited = tmp_path / "edited.yaml"
-    assert main(["edit", str(tmp_path / "new.yaml"), "balls/red.opacity=0.5", "--output", str(edited)]) == 0
-    before = read_scene(edited).models["balls"].segments["red"].file.read_bytes()
-    assert segment(scene, "--point", RIGHT, "--not", LEFT) == 0
-    other = read_scene(tmp_path / "new.yaml").models["balls"].segments["red"].file
-    assert other.name == "new-balls-red-2.safetensors"
-    kept = read_scene(edited).models["balls"].segments["red"].file
-    assert kept.read_bytes() == before != other.read_bytes()
-
-
-def test_a_new_segment_starts_as_the_model_is(scene, tmp_path):
-    half = tmp_path / "half.yaml"
-    assert main(["edit", str(scene), "balls.opacity=0.8", "--output", str(half)]) == 0
-    before = colors(half, tmp_path / "0.png")[2]
-    assert segment(half, "--point", LEFT, "--not", RIGHT) == 0
-    new = read_scene(tmp_path / "new.yaml").models["balls"]
-    assert new.segments["red"].edit == new.edit
-    assert np.array_equal(colors(tmp_path / "new.yaml", tmp_path / "1.png")[2], before)
-
-
 def test_what_is_clicked_on_has_the_textures_of_the_scene(tmp_path):
     fitted = two_balls()[0]
     sizes = torch.full((len(fitted), 2), 2, dtype=torch.int32)
@@ -120,12 +98,6 @@ def test_what_is_clicked_on_has_the_textures_of_the_scene(tmp_path):
     rendered = colors(scene, tmp_path / "rendered.png")[2]
     right = np.s_[:, SIZE - 30 :]  # part of the right ball, beside the mask and the clicks
     assert np.abs(shown[right] - rendered[right]).max() <= 1, "a step of 8 bits"
-
-
-def test_a_preview_writes_no_scene(scene, tmp_path):
-    picture = tmp_path / "preview.png"
-    assert segment(scene, "--point", LEFT, "--not", RIGHT, "--preview", str(picture)) == 0
-    assert Image.open(picture).size == (SIZE, SIZE)
     assert not (tmp_path / "new.yaml").exists()
 
 
@@ -133,7 +105,6 @@ def test_a_preview_writes_no_scene(scene, tmp_path):
     ("words", "message"),
     [
         ([], "--point: expected one at least, got none"),
-        (["--point", "500,2"], "point (500.5, 2.5): expected a place in the view of 120 x 120 pixels"),
         (["--point", LEFT, "--model", "TF01"], "--model: expected one of balls, got TF01"),
         (
             ["--point", LEFT, "--masks", "none"],

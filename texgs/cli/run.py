@@ -113,7 +113,7 @@ def require_pairs(words: Sequence[str]) -> None:
 
 
 def defaults(given: argparse.Namespace) -> list[str]:
-    """Return options that hold where the user says nothing else: the Snakefile of texgs, the local profile."""
+    """Return options that hold where the user says nothing else: Snakefile of texgs, local profile."""
     from texgs.config.project import PROFILES, SNAKEFILE
 
     options = ["--snakefile", str(SNAKEFILE)]
