@@ -1,4 +1,4 @@
-"""A small project that several files start from: views of a sphere, and a scene of turbulence."""
+"""A small project that several files start from: views of a sphere, and a scene of an orbital."""
 
 import shutil
 
@@ -20,7 +20,7 @@ VIEWS = [
 DEMO = ["fit=demo", "fit.seeds.count=400", "fit.shading.densify.stop=0"]
 SPHERE = ["dataset=sphere", *VIEWS]
 TINY = [*SPHERE, *DEMO, "fit.shading.iterations=150"]
-TURBULENCE = ["dataset=turbulence", *VIEWS, *DEMO, "fit.shading.iterations=60"]
+ORBITAL = ["dataset=orbital", "dataset.stand_in=vortex", *VIEWS, *DEMO, "fit.shading.iterations=60"]
 GAUSSIANS = [
     "fit=gaussians_quick",
     "fit.gaussians.seeds={kind: hull, count: 400}",
@@ -66,8 +66,8 @@ def gaussians(at, sphere, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def scene_of_two(at, tmp_path_factory):
-    """Results with a scene of two models of turbulence."""
-    return at(tmp_path_factory.mktemp("turbulence"), ["compose", *TURBULENCE])
+    """Results with a scene of two models of an orbital."""
+    return at(tmp_path_factory.mktemp("orbital"), ["compose", *ORBITAL])
 
 
 def hide_weights(patch, folder):

@@ -8,7 +8,7 @@ import pytest
 import torch
 from PIL import Image
 
-from tests.cli.conftest import TURBULENCE as WORDS
+from tests.cli.conftest import ORBITAL as WORDS
 from tests.cli.conftest import hide_weights
 from tests.models.clips import write_clip
 from texgs.cli.main import main
@@ -36,7 +36,7 @@ def results(at, scene_of_two):
         ("edit_metrics", "edit=glass"),
     )
     at(scene_of_two.parent, *([verb, *WORDS, *FEW, *words] for verb, *words in verbs))
-    return scene_of_two / "turbulence" / "scene" / "demo"
+    return scene_of_two / "orbital" / "scene" / "demo"
 
 
 @pytest.fixture(autouse=True)

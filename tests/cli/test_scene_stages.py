@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.conftest import TURBULENCE
+from tests.cli.conftest import ORBITAL
 from texgs.cli.main import main
 from texgs.scene.scene_file import read_scene
 
@@ -14,8 +14,8 @@ from texgs.scene.scene_file import read_scene
 @pytest.fixture(scope="module")
 def results(at, scene_of_two):
     """The scene, edited by numbers and timed."""
-    at(scene_of_two.parent, ["pse", *TURBULENCE], ["timing", *TURBULENCE])
-    return scene_of_two / "turbulence" / "scene" / "demo"
+    at(scene_of_two.parent, ["pse", *ORBITAL], ["timing", *ORBITAL])
+    return scene_of_two / "orbital" / "scene" / "demo"
 
 
 def numbers(results, stage):
