@@ -1,4 +1,4 @@
-"""`texgs new`: from a volume file to a data set that composes."""
+"""`texgs init` and `texgs new`: a project whose files compose, and data sets from volume files."""
 
 import json
 
@@ -9,7 +9,7 @@ import yaml
 from texgs.cli import new
 from texgs.cli.main import main
 from texgs.config.compose import compose
-from texgs.config.project import ROOT
+from texgs.config.project import ROOT, groups, members
 from texgs.volume.transfer import TransferFunction
 
 DOCUMENT = "name: mine\ntitle: another\nvolume: {file: scan.npy}\n"
@@ -134,3 +134,42 @@ def test_a_document_that_is_read_as_something_else_is_not_written(conf, scan, ca
     assert main(["new", str(scan), "--name", "mine"]) == 2
     assert "mine: expected to read" in capsys.readouterr().err
     assert not conf.exists()
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def test_what_it_writes_composes(tmp_path, monkeypatch, capsys):
+    assert main(["init", str(tmp_path / "mine")]) == 0
+    assert "README.md" in capsys.readouterr().out
+    monkeypatch.chdir(tmp_path / "mine")
+    assert "example" in members("experiment")
+    assert "engine" in members("dataset")
+    assert "README" not in groups()
+    assert compose(("experiment=example",)).fit.name == "demo"
+
+
+def test_a_project_is_left_as_it_is(tmp_path, capsys):
+    assert main(["init", str(tmp_path)]) == 0
+    (tmp_path / "README.md").write_text("mine")
+    before = contents(tmp_path)
+    assert main(["init", str(tmp_path)]) == 0
+    assert "is a project already" in capsys.readouterr().out
+    assert contents(tmp_path) == before
+
+
+def test_a_folder_of_something_else_is_refused(tmp_path, capsys):
+    (tmp_path / "thesis.tex").write_text("mine")
+    assert main(["init", str(tmp_path)]) == 2
+    assert "got one with thesis.tex; choose another" in capsys.readouterr().err
+    assert main(["init", str(tmp_path / "thesis.tex")]) == 2
+    assert "got a file" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_the_project_may_have_defaults_of_its_own(conf):
+    text = (ROOT / "conf" / "config.yaml").read_text().replace("dataset: turbulence", "dataset: jets")
+    (conf / "dataset").mkdir(parents=True)
+    (conf / "config.yaml").write_text(text)
+    assert compose().dataset.name == "jets"
