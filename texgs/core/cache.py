@@ -11,11 +11,7 @@ from texgs.core.io import write_bytes
 
 
 def cache_folder() -> Path:
-    """Return the folder for downloads and results worth keeping: TEXGS_CACHE, else texgs in the user's cache.
-
-    Raises:
-        ArgumentError: if there is neither, because this user has no home folder.
-    """
+    """Return the folder for what is worth keeping: TEXGS_CACHE, else texgs in the user's cache."""
     try:
         if chosen := os.environ.get("TEXGS_CACHE"):
             return Path(chosen).expanduser()

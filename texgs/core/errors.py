@@ -1,5 +1,6 @@
 """Errors a user can do something about. Each message is one sentence: what, where, got, what to do."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -63,16 +64,8 @@ def printable(text: str) -> str:
     """
     if len(text) > LONGEST:
         text = f"{text[: LONGEST - END]} ... {text[-END:]}"
-    if text.isprintable():
-        return text
-    return "".join(
-        letter
-        if letter.isprintable()
-        else " "
-        if letter.isspace()
-        else letter.encode("unicode_escape").decode()
-        for letter in text
-    )
+    letters = re.sub(r"\s", " ", text)
+    return "".join(x if x.isprintable() else x.encode("unicode_escape").decode() for x in letters)
 
 
 def first_line(error: Exception) -> str:

@@ -94,13 +94,13 @@ class Row:
 
     @property
     def head(self) -> float:
-        """Inches above the cells."""
+        """Return the inches above the cells."""
         lines = max(cell.title.count("\n") + 1 if cell.title else 0 for cell in self.cells)
         return HEAD + LINE * (lines - 1) if lines else 0.0
 
     @property
     def foot(self) -> float:
-        """Inches below the cells."""
+        """Return the inches below the cells."""
         has_words = any(cell.scale or (cell.words and cell.pixels is not None) for cell in self.cells)
         return FOOT if has_words else GAP
 
@@ -149,13 +149,7 @@ def draw(path: str | Path, rows: Sequence[Row], title: str = "", columns: int = 
 
 
 def lay_out(rows: Sequence[Row], title: str = "", columns: int = COLUMNS) -> Figure:
-    """Return a figure of rows, whose pictures are of one size.
-
-    Args:
-        rows: at least one, with a picture in one of them.
-        title: line at the top.
-        columns: the page is as wide as a row of so many cells at most.
-    """
+    """Return a figure of rows, whose pictures are of one size, as wide as so many columns at most."""
     height, width = next(x.pixels.shape[:2] for row in rows for x in row.cells if x.pixels is not None)
     columns = min(columns, max(len(row.cells) for row in rows))
     across = columns * (CELL + GAP)

@@ -21,12 +21,7 @@ SCRATCH = re.compile(r"\..+\.[0-9a-z_]{8}")  # files beside a target, until they
 def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
     """Create or replace a file in one step and return its path; folders on the way are created.
 
-    Args:
-        path: target file.
-        write: gets a binary file opened for writing. If it raises, the target is left as it was.
-
-    Raises:
-        ArgumentError: if the folder cannot be created or written to, or the disk is full.
+    `write` gets a binary file opened for writing. If it raises, the target is left as it was.
     """
     path = Path(path)
     if is_there(path) and not path.is_file() and not path.is_dir():  # it would be replaced by a file
@@ -71,11 +66,7 @@ def write_bytes(path: str | Path, data: bytes) -> Path:
 
 
 def write_json(path: str | Path, value: Any) -> Path:
-    """Create or replace a JSON file in one step: indented, keys in the order given, newline at the end.
-
-    Raises:
-        ArgumentError: if `value` holds something JSON has no word for, NaN and infinity included.
-    """
+    """Create or replace a JSON file in one step: indented, keys in the order given, without NaN."""
     try:
         text = json.dumps(value, indent=2, allow_nan=False)
     except (TypeError, ValueError) as error:
@@ -118,14 +109,8 @@ def is_there(path: str | Path) -> bool:
 def reading(path: str | Path, what: str, advice: str = ADVICE) -> Iterator[Path]:
     """Require a regular file, and report whatever a reader raises over it as one sentence.
 
-    Args:
-        path: of the file.
-        what: it should be, such as "a PLY file".
-        advice: what to do about a file that is something else.
-
-    Raises:
-        ArgumentError: in place of the reader's error; this project's own errors pass.
-        OutOfMemoryError: in place of a MemoryError.
+    This says what the file should be, such as "a PLY file", and what to do about one that is something else.
+    It is an ArgumentError, or an OutOfMemoryError; errors of this project pass.
     """
     path = require_file(path, what)
     with reading_as(what, advice, f"{path}: "):

@@ -72,14 +72,9 @@ def container_limits() -> Iterator[int]:
 
 
 def require_memory(n_bytes: int, what: str, advice: str) -> None:
-    """Require that so many bytes can be had, before they are asked for.
+    """Require that so many bytes can be had, before they are asked for; else advise what to do without.
 
     Linux hands out more memory than there is, and ends a process that uses it.
-
-    Args:
-        n_bytes: that the work needs.
-        what: the work or the thing, for the message.
-        advice: what to do without so much memory.
     """
     if n_bytes <= SMALL:
         return

@@ -64,10 +64,12 @@ def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25
 
 
 def _write_png(path: Path, frame: np.ndarray) -> None:
+    """Write one frame."""
     write_atomic(path, lambda file: Image.fromarray(frame).save(file, format="PNG"))
 
 
 def _write_gif(file: IO[bytes], first: np.ndarray, left: Iterator[np.ndarray], fps: float) -> None:
+    """Write frames whose times are rounded so that errors do not add up."""
     kept, n_bytes = [], 0
     for frame in chain([first], left):
         n_bytes += frame.nbytes

@@ -24,13 +24,8 @@ SEPARATORS = frozenset("/\\")  # of folders, on one system or another
 
 
 def label(where: str, name: object) -> str:
-    """Return a name of something in a scene or a data set: short, and of letters that a terminal can show.
-
-    Args:
-        where: the name comes from, for the message.
-        name: text, or a number that YAML has read in its place.
-    """
-    text = str(name)
+    """Return a name of something in a scene or a data set: short, and of letters that a terminal can show."""
+    text = str(name)  # YAML reads some names as numbers
     if not text.strip() or len(text) > LONGEST or not text.isprintable():
         raise ArgumentError(
             f"{where}: expected a name of 1 to {LONGEST} printable letters, got {text[: LONGEST + 1]!r}"
@@ -71,14 +66,7 @@ def new_part_file(where: str, folder: Path, *names: str) -> Path:
 
 
 def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> Path:
-    """Return the file that another file names, in its folder or elsewhere; it is only read.
-
-    Args:
-        where: the path comes from, for the message.
-        folder: that the path is relative to.
-        path: text, not too long and without control characters.
-        kind: of file, such as "a model".
-    """
+    """Return the file that another file in a folder names, there or elsewhere; it is only read."""
     is_path = isinstance(path, str) and 0 < len(path) <= LONGEST_PATH
     if not is_path or not all(each.isprintable() or category(each) == SPACES for each in str(path)):
         raise ArgumentError(f"{where}: expected the path of {kind}, got {path!r:.100}")

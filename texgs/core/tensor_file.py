@@ -42,13 +42,9 @@ OLD_PICKLES = 5  # one after the other at the start of a file of torch before 1.
 def write_tensor_file(
     path: str | Path, format: str, description: Mapping[str, Any], tensors: Mapping[str, Tensor]
 ) -> Path:
-    """Create or replace a file in one step; the same contents give the same bytes.
+    """Create or replace a file of a format in one step; the same contents give the same bytes.
 
-    Args:
-        path: target.
-        format: entry of the header, such as "texgs-model".
-        description: JSON with a `version`, and `metadata` of the caller's.
-        tensors: by name, on any device.
+    The description is JSON with a `version`, and `metadata` of the caller's.
     """
     require_json(path, description)
     return write_tensors(path, tensors, {format: json.dumps(description)})
@@ -87,12 +83,7 @@ def require_json(path: str | Path, description: Mapping[str, Any]) -> None:
 def read_tensor_file(path: Path, format: str, version: int) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Return the description and tensors, bit for bit, on the CPU. Nothing in the file is executed.
 
-    The description is judged before any tensor is looked at.
-
-    Args:
-        path: of the file.
-        format: entry of its header.
-        version: the newest that can be read.
+    The description is judged before any tensor is looked at; the version is the newest that can be read.
     """
     from safetensors import safe_open
 

@@ -36,12 +36,7 @@ def has_bfloat16() -> bool:
 
 
 def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[str, Tensor]:
-    """Return the tensors of a file of weights by name: of safetensors, or of torch's own format.
-
-    Args:
-        path: with the ending .safetensors, or any other for torch's; nothing in it is executed.
-        names: of the tensors wanted; by default all. Others are not read.
-    """
+    """Return the tensors of a file by name, all or those wanted: .safetensors, else of torch's own format."""
     from safetensors import safe_open
 
     with reading(path, "a file of weights", "copy or download it again") as path:
@@ -74,12 +69,7 @@ def _chosen(path: Path, stored: Iterable[str], names: Iterable[str] | None) -> l
 def read_folder(folder: str | Path, kind: str, names: tuple[str, ...]) -> list[Any]:
     """Return what classes of transformers read from a folder; networks come frozen and in float32.
 
-    Nothing is downloaded.
-
-    Args:
-        folder: with config.json, and weights as safetensors.
-        kind: the model_type of config.json, such as "clip".
-        names: of classes of transformers that can be read from a folder.
+    Nothing is downloaded. The kind is the model_type of config.json, such as "clip".
     """
     try:
         import transformers

@@ -35,14 +35,10 @@ class StyleFeatures:
         dimensions: int | None = None,
         seed: int = 0,
     ) -> StyleFeatures:
-        """Gather the features of a picture.
+        """Gather the features [C, h, w] of a picture, or of its region [h, w] bool.
 
-        Args:
-            features: [C, h, w].
-            region: [h, w] bool, what of the picture counts; by default all.
-            positions: that are kept, drawn at random where there are more; by default all.
-            dimensions: of the search, by principal components; by default all, which is exact.
-            seed: of the draw.
+        Of more positions so many are kept, drawn at random. The search is in so many principal directions of
+        the features; by default in all, which is exact.
         """
         size = check.shape("features", features, "C h w")
         rows = drawn(features.detach(), region, positions, torch.Generator().manual_seed(seed))
@@ -90,15 +86,8 @@ def nnfm(
 ) -> Tensor:
     """Return the mean cosine distance [] in [0, 2] of features to their nearest neighbours in the style.
 
-    Differentiable in the features; which neighbour is nearest is constant for the gradient. 0 where no
-    position counts.
-
-    Args:
-        features: [C, h, w] of an image.
-        style: of the style picture, from the same layers.
-        where: [h, w] bool, positions that count; by default all.
-        most: positions of them that are looked at, drawn at random where there are more; by default all.
-        seed: of the draw.
+    Differentiable in the features [C, h, w]; which neighbour is nearest is constant for the gradient. Only
+    positions `where` [h, w] count, of more than `most` some that are drawn at random; 0 where none does.
     """
     check.shape("features", features, "C h w", C=style.unit.shape[1])
     queries = drawn(features, where, most, torch.Generator().manual_seed(seed))

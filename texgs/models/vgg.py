@@ -38,13 +38,9 @@ class Vgg:
         layers: Sequence[str] = STYLE_LAYERS,
         dtype: torch.dtype | None = None,
     ) -> Vgg:
-        """Read the weights; only those that the layers need.
+        """Read the weights that the layers need, `relu1_1` to `relu5_3` in order.
 
-        Args:
-            path: of a file with torchvision's names, `features.N.weight`; by default where it is found.
-            device: that computes.
-            layers: whose output is wanted, `relu1_1` to `relu5_3`, in order.
-            dtype: that it computes in; by default `fast_dtype`.
+        They have torchvision's names, `features.N.weight`. The dtype to compute in is by default the fastest.
         """
         path = locate("vgg16") if path is None else path
         names = [f"relu{b + 1}_{c + 1}" for b, count in enumerate(BLOCKS) for c in range(count)]
