@@ -16,7 +16,7 @@ class Volume:
         None, "name of a built-in field", choices=("sphere", "orbital", "turbulence", "jets")
     )
     size: int = key(128, "samples along each side of a generated field", least=16)
-    seed: int = key(0, "random numbers of a generated field")
+    seed: int = key(0, "seed of a generated field")
     file: str | None = key(None, "file, or folder of TIFF or DICOM slices; relative to data_folder")
     series: str | None = key(
         None, "number or UID of the series to read, where a folder of DICOM slices has several"
@@ -50,19 +50,19 @@ class BasicTF:
 class LookKeys:
     """What the edits of a whole experiment make of a basic scene."""
 
-    style: str = key("strokes", "picture that texgs paints, or a picture file, of edits by a picture")
-    instruction: str = key("make it gold", "of edits by an instruction")
+    style: str = key("strokes", "style of edits by a picture: one that texgs paints, or a picture file")
+    instruction: str = key("make it gold", "instruction of edits by an instruction")
     caption: str = key("a rendering of a volume", "the basic scene in words, for CLIP's metrics")
-    styled: str = key("a painting with brush strokes", "the same after an edit by the picture")
-    instructed: str = key("a sculpture of gold", "the same after an edit by the instruction")
+    styled: str = key("a painting with brush strokes", "the scene after an edit by the picture, in words")
+    instructed: str = key("a sculpture of gold", "the scene after an edit by the instruction, in words")
 
 
 @dataclass(frozen=True)
 class Dataset:
     """A volume with its basic transfer functions, or a folder of views."""
 
-    name: str = key(REQUIRED, "name, also of the folder under results/")
-    title: str = key("${.name}", "name in tables")
+    name: str = key(REQUIRED, "name of the data set, and of its folder below results/")
+    title: str = key("${.name}", "name of the data set in tables")
     source: str = key("", "who made the data, and its licence")
     stand_in: str = key("", "what the data stand in for, where the real ones are not public")
     image: int = key(800, "width and height of views", "pixels", least=1)
@@ -78,7 +78,8 @@ class Dataset:
         metadata={"help": "basic transfer functions by name; their ranges must not overlap"},
     )
     looks: dict[str, LookKeys] = field(
-        default_factory=dict, metadata={"help": "by basic TF, what edits with edit.looks make of it"}
+        default_factory=dict,
+        metadata={"help": "what edits with edit.looks make of each basic TF"},
     )
 
 

@@ -15,10 +15,10 @@ class ShotKeys:
     Changes of both are made, those of the row first.
     """
 
-    title: str = key("", "beside the row, or above the column")
+    title: str = key("", "title beside the row, or above the column")
     edit: str | None = key(None, f"edit whose scene is shown; {AS_FITTED} or null: the scene as fitted")
     fit: str | None = key(None, "recipe of the scene; default the first of `fits` that the edit works on")
-    variant: str | None = key(None, "of the sweep, whose fits are shown")
+    variant: str | None = key(None, "variant of the sweep whose fits are shown")
     show: str | None = key(
         None,
         "the scene; its volume with the same changes and light; or what is wrong with the scene. A place "
@@ -40,26 +40,30 @@ class ShotKeys:
         least=16,
     )
     light: list[float] = key([], "azimuth and polar angle of the light; default the scene's light", "degrees")
-    changes: list[str] = key([], "of the scene, in the words of texgs edit, such as TF01.opacity=0.4")
+    changes: list[str] = key([], "changes of the scene, in the words of texgs edit, such as TF01.opacity=0.4")
 
 
 @dataclass(frozen=True)
 class GridKeys:
     """One picture file: rows and columns of pictures."""
 
-    name: str = key("pictures", "of the file")
+    name: str = key("pictures", "name of the file")
     caption: str = key("", "words below it in the report")
-    rows: list[ShotKeys] = field(default_factory=list, metadata={"help": "from above"})
-    columns: list[ShotKeys] = field(default_factory=list, metadata={"help": "from the left"})
+    rows: list[ShotKeys] = field(default_factory=list, metadata={"help": "rows, from above"})
+    columns: list[ShotKeys] = field(default_factory=list, metadata={"help": "columns, from the left"})
 
 
 @dataclass(frozen=True)
 class GalleryKeys:
     """What a data set's scenes are shown in; by default all new looks of the experiment."""
 
-    name: str = key("looks", "of its folder, and that of fits side by side; as its file in conf/experiment")
-    section: str = key("more", "of the report in which it stands", choices=SECTIONS)
+    name: str = key(
+        "looks",
+        "name of its folder, and that of fits side by side; as its file in conf/experiment",
+    )
+    section: str = key("more", "section of the report in which it stands", choices=SECTIONS)
     size: int = key(400, "width and height of each picture", "pixels", least=16)
     grids: list[GridKeys] = field(
-        default_factory=list, metadata={"help": "default one with a column for each look"}
+        default_factory=list,
+        metadata={"help": "pictures; default one with a column for each look"},
     )

@@ -20,15 +20,17 @@ NO_SWEEP = "none"  # name of the sweep without variants
 class Tracking:
     """Where runs are recorded."""
 
-    uri: str | None = key(None, "sqlite:/// and a file, the address of an MLflow server, or null: not at all")
-    experiment: str = key("texgs", "MLflow experiment")
+    uri: str | None = key(
+        None, "store: sqlite:/// and a file, the address of an MLflow server, or null for none"
+    )
+    experiment: str = key("texgs", "name of the MLflow experiment")
 
 
 @dataclass(frozen=True)
 class Device:
     """What the work runs on."""
 
-    name: str = key("cpu", "device of tensors", choices=("cpu", "cuda"))
+    name: str = key("cpu", "device that the work runs on", choices=("cpu", "cuda"))
     mapper: str = key(
         "cpu",
         "what renders volumes: the caster, on the CPU or a GPU; or VTK",
@@ -45,7 +47,7 @@ class Metric:
         "backbone of CLIP's metrics, where its weights are on this machine; losses have their own",
         choices=CLIP_BACKBONES,
     )
-    views: int = key(12, "of the test path, for style distance, consistency and LPIPS", least=2)
+    views: int = key(12, "views of the test path that measure style distance, consistency and LPIPS", least=2)
 
 
 @dataclass(frozen=True)
@@ -60,16 +62,17 @@ class PageKeys:
 class Sweep:
     """Variants of an experiment, each with its own overrides, side by side in one table."""
 
-    name: str = key(NO_SWEEP, "of the table")
-    seeds: list[int] = key([0], "random numbers of fits; each variant is fitted once with each")
-    edit_seeds: list[int] = key([0], "random numbers of edits; each edit is made once with each")
+    name: str = key(NO_SWEEP, "name of the sweep and of its table")
+    seeds: list[int] = key([0], "seeds of fits; each variant is fitted once with each")
+    edit_seeds: list[int] = key([0], "seeds of edits; each edit is made once with each")
     variants: dict[str, list[str]] = field(
         default_factory=dict, metadata={"help": "overrides by the name of the variant"}
     )
     over: list[str] = key(
-        [], "instead: keys with several values, such as fit.low_pass=2,6; each combination is a variant"
+        [],
+        "keys with several values, such as fit.low_pass=2,6; each combination is a variant",
     )
-    edits: list[str] = key([], "that are made of each variant; default those of the experiment")
+    edits: list[str] = key([], "edits that are made of each variant; default those of the experiment")
 
 
 @dataclass(frozen=True)
