@@ -19,16 +19,14 @@ def scene():
     return Surfels({**p, "texels": texels, "means": p["means"] + torch.tensor([0.0, 0.1, 0.15])})
 
 
-def pasted(canvas, full):
-    """Places of a full view [H, W, 3] over black at which it shows what a canvas does."""
-    height, width = canvas.alpha.shape
+def pasted(color, full):
+    """Places of a full view [H, W, 3] over black at which it shows these colours."""
+    height, width = color.shape[1:]
     places = [
         (top, left)
         for top in range(full.shape[0] - height + 1)
         for left in range(full.shape[1] - width + 1)
-        if torch.allclose(
-            full[top : top + height, left : left + width], canvas.color.permute(1, 2, 0), atol=2e-5
-        )
+        if torch.allclose(full[top : top + height, left : left + width], color.permute(1, 2, 0), atol=2e-5)
     ]
     return places
 
@@ -42,23 +40,23 @@ def test_a_part_is_what_the_scene_renders_there(scene, is_lit, look, opacity):
         cameras[0], lights[0], [PartEdit(opacity=opacity)], look=look, background=torch.zeros(3)
     )
     recipe = Recipe(opacity=opacity, is_lit=is_lit)
-    canvas = paint(scene, scene.parameters["texels"], cameras[0], lights[0], recipe)
-    assert canvas.alpha.numel() < full.alpha.numel()
-    assert len(pasted(canvas, full.color)) == 1
-    torch.testing.assert_close(canvas.alpha.sum(), full.alpha.sum())
+    color, alpha, _ = paint(scene, scene.parameters["texels"], cameras[0], lights[0], recipe)
+    assert alpha.numel() < full.alpha.numel()
+    assert len(pasted(color, full.color)) == 1
+    torch.testing.assert_close(alpha.sum(), full.alpha.sum())
     recipe = replace(recipe, cropped=False)
-    whole = paint(scene, scene.parameters["texels"], cameras[0], lights[0], recipe)
-    torch.testing.assert_close(whole.color.permute(1, 2, 0), full.color, atol=1e-5, rtol=0)
+    whole, *_ = paint(scene, scene.parameters["texels"], cameras[0], lights[0], recipe)
+    torch.testing.assert_close(whole.permute(1, 2, 0), full.color, atol=1e-5, rtol=0)
 
 
 def test_the_share_of_chosen_surfels_and_of_the_others_make_up_alpha(scene):
     cameras, lights = views()
     chosen = scene.parameters["means"][:, 1] > 0.1
     shares = [
-        paint(scene, scene.parameters["texels"], cameras[0], lights[0], Recipe(), mask).share
+        paint(scene, scene.parameters["texels"], cameras[0], lights[0], Recipe(), mask)[2]
         for mask in (chosen, ~chosen)
     ]
-    alpha = paint(scene, scene.parameters["texels"], cameras[0], lights[0], Recipe()).alpha
+    alpha = paint(scene, scene.parameters["texels"], cameras[0], lights[0], Recipe())[1]
     torch.testing.assert_close(shares[0] + shares[1], alpha, atol=1e-5, rtol=0)
     assert min(share.max() for share in shares) > 0.9
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -47,20 +47,15 @@ def rasterized(model: Surfels, camera: Camera, opacity: float = 1.0, **options: 
     )
 
 
-class Canvas(NamedTuple):
-    """A view, or the part of it that shows the model."""
-
-    color: Tensor  # [3, h, w] premultiplied, over black
-    alpha: Tensor  # [h, w]
-    share: Tensor  # [h, w] of alpha that is of the surfels to be changed
-
-
 def paint(
     model: Surfels, texels: Tensor, camera: Camera, light: Light, recipe: Recipe, chosen: Tensor | None = None
-) -> Canvas:
+) -> tuple[Tensor, Tensor, Tensor]:
     """Render a view, or the part of it that shows the model, as a recipe says; differentiable in the texels.
 
-    Texels [T, 3] are in place of the model's own. Of chosen surfels [N] bool the share in alpha is wanted.
+    Texels [T, 3] are in place of the model's own. Surfels are chosen by [N] bool, by default all.
+
+    Returns:
+        Premultiplied colours [3, h, w] over black, alpha [h, w], and the share of chosen surfels in it.
     """
     p = {**model.parameters, "texels": texels}
     part = around(model, camera) if recipe.cropped else camera
@@ -74,7 +69,7 @@ def paint(
     planes, alpha = render.color.permute(2, 0, 1), render.alpha
     rows, columns = visible_part(alpha) if recipe.cropped else (slice(None), slice(None))
     planes, alpha = planes[:, rows, columns], alpha[rows, columns]
-    return Canvas(planes[:3], alpha, alpha if chosen is None else planes[3].detach())
+    return planes[:3], alpha, alpha if chosen is None else planes[3].detach()
 
 
 def around(model: Surfels, camera: Camera) -> Camera:

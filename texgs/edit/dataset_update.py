@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import atan2, ceil, isfinite
 from typing import NamedTuple, Protocol
 
@@ -136,7 +136,10 @@ def update_field(
     seed is of all random numbers.
     """
     generator = torch.Generator().manual_seed(seed)
-    edits = _Edits(learner, images, guidance, require_instruction(instruction), keeps_renders, generator)
+    edits = _Edits(
+        *(learner, images, replace(images, planes=images.planes.clone()), guidance),
+        *(require_instruction(instruction), keeps_renders, generator),
+    )
     losses: list[float] = []
     steps = update_steps(schedule, len(images), generator)
     for iteration, step in enumerate(progress(steps, schedule.iterations, title=title, unit="step")):
@@ -150,33 +153,29 @@ def update_field(
     return Updated(learner.field, edits.some(shown), losses, edits.count, edits.seconds)
 
 
+@dataclass(eq=False)
 class _Edits:
     """The views that are learned from, as they are edited."""
 
-    def __init__(
-        self,
-        learner: Learner,
-        images: Images,
-        guidance: Guidance,
-        instruction: str,
-        keeps_renders: bool,
-        generator: torch.Generator,
-    ) -> None:
-        self.learner, self.guidance, self.instruction = learner, guidance, instruction
-        self.generator = generator
-        self.before, self.images = images, replace(images, planes=images.planes.clone())
-        self.original = learner.original if keeps_renders else None
-        self.edited: set[int] = set()
-        self.count, self.seconds = 0, 0.0
+    learner: Learner
+    before: Images
+    images: Images
+    guidance: Guidance
+    instruction: str
+    keeps_renders: bool
+    generator: torch.Generator
+    edited: set[int] = field(default_factory=set)
+    count: int = 0
+    seconds: float = 0.0
 
     @torch.no_grad()
     def make(self, ids: Sequence[int], level: float) -> None:
         """Edit some views together, as the field shows them now."""
-        start, field = time.monotonic(), self.learner.field
+        start, shown = time.monotonic(), self.learner.field
         ids = sorted(ids, key=lambda view: azimuth(self.images.cameras[view]))  # those that follow are alike
-        cameras = [self.images.cameras[view].to(field.device) for view in ids]
-        conditions = torch.stack([self._condition(view) for view in ids]).to(field.device)
-        views = field_views(field, cameras, conditions, level)
+        cameras = [self.images.cameras[view].to(shown.device) for view in ids]
+        conditions = torch.stack([self._condition(view) for view in ids]).to(shown.device)
+        views = field_views(shown, cameras, conditions, level)
         guided = self.guidance(views, self.instruction, self.generator)
         for view, image in zip(ids, require_edited(guided, views, self.guidance.name), strict=True):
             self.images.planes[view, :3] = image.permute(2, 0, 1).mul(255).round().to(torch.uint8)
@@ -185,10 +184,10 @@ class _Edits:
 
     def _condition(self, view: int) -> Tensor:
         """Return what edits of a view stay close to [H, W, 3]: how it was before the first of them."""
-        if self.original is None:
+        if not self.keeps_renders:
             return self.before.target(view).color
-        camera = self.before.cameras[view].to(self.original.device)
-        return self.original.render(camera).color.clamp(0, 1).cpu()
+        original = self.learner.original
+        return original.render(self.before.cameras[view].to(original.device)).color.clamp(0, 1).cpu()
 
     @torch.no_grad()
     def some(self, count: int) -> list[tuple[Tensor, Tensor]]:

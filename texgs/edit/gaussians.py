@@ -39,7 +39,8 @@ def stylize_gaussians(
     title: str = "style",
 ) -> tuple[Gaussians, Losses]:
     """Give Gaussians the style of a picture by training views; only their spherical harmonics change."""
-    run = GaussianPainting(model, cameras, style, recipe, vgg)
+    size = cameras[0].width, cameras[0].height
+    run = GaussianPainting(model, cameras, Objective.of_views(recipe, style.to(model.device), size, vgg))
     losses = learn_style(run, len(cameras), recipe, title)
     harmonics = {name: x.detach() for name, x in run.harmonics.items()}
     return replace(model, parameters=join({**run.geometry, **harmonics})), losses
@@ -48,23 +49,15 @@ def stylize_gaussians(
 class GaussianPainting:
     """Gaussians whose harmonics are on their way to a style."""
 
-    def __init__(
-        self,
-        model: Gaussians,
-        cameras: Sequence[Camera],
-        style: StylePicture,
-        recipe: Recipe,
-        vgg: Vgg | None,
-    ) -> None:
-        self.model, self.cameras = model, cameras
-        size = cameras[0].width, cameras[0].height
-        self.objective = Objective.of_views(recipe, style.to(model.device), size, vgg)
+    def __init__(self, model: Gaussians, cameras: Sequence[Camera], objective: Objective) -> None:
+        self.model, self.cameras, self.objective = model, cameras, objective
         self.geometry = model.tensors("geometry")
         self.harmonics = {
             name: x.clone(memory_format=torch.contiguous_format).requires_grad_()
             for name, x in split(model.parameters["sh"]).items()
         }
-        rates = {"sh": recipe.rate, "sh_rest": HIGHER * recipe.rate}
+        rate = objective.recipe.rate
+        rates = {"sh": rate, "sh_rest": HIGHER * rate}
         groups = [{"params": [x], "lr": rates[name]} for name, x in self.harmonics.items()]
         self.adam = torch.optim.Adam(groups, eps=1e-15, fused=True)
 

@@ -121,7 +121,9 @@ def solve(
     not seen keep their colours of the start.
     The order is random in each sweep over all of them. The curvature [T] is that of `back_project`.
     """
-    scale = _inverse(curvature)[:, None]
+    seen = curvature > 0
+    ridge = RIDGE * curvature[seen].median() if bool(seen.any()) else 0.0
+    scale = torch.where(seen, 1 / (curvature + ridge), 0.0)[:, None]
     colors = start.clone().requires_grad_()
     count = len(observations)
     order = [i for _ in range(sweeps) for i in torch.randperm(count, generator=generator).tolist()]
@@ -132,14 +134,6 @@ def solve(
         with torch.no_grad():
             colors.addcmul_(gradient, scale, value=-rate).clamp_(0, 1)
     return colors.detach()
-
-
-def _inverse(curvature: Tensor) -> Tensor:
-    """Return 1 / (curvature + ridge) [T]; 0 where nothing is seen."""
-    seen = curvature[curvature > 0]
-    if not len(seen):
-        return torch.zeros_like(curvature)
-    return torch.where(curvature > 0, 1 / (curvature + RIDGE * seen.median()), 0.0)
 
 
 def learn(
