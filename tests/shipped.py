@@ -6,36 +6,12 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-DATASETS = (
-    "beetle",
-    "bonsai",
-    "chameleon",
-    "combustion",
-    "engine",
-    "five_jets",
-    "flame",
-    "fly",
-    "frog",
-    "fuel",
-    "heptane",
-    "hydrogen",
-    "iguana",
-    "ionization",
-    "ironprot",
-    "isosurface",
-    "jets",
-    "mantle",
-    "mni152",
-    "neghip",
-    "orbital",
-    "rotstrat",
-    "sphere",
-    "supernova",
-    "tooth",
-    "turbulence",
-    "vortex",
-    "wood",
-)
+NAMES = """
+beetle bonsai chameleon combustion engine five_jets flame fly frog fuel heptane hydrogen iguana ionization
+ironprot isosurface jets mantle mni152 neghip orbital rotstrat sphere supernova tooth turbulence vortex
+wood
+"""
+DATASETS = tuple(NAMES.split())
 
 
 def tracked(folder: str) -> list[str]:

@@ -31,15 +31,10 @@ def everything(tmp_path_factory):
     file = tmp_path_factory.mktemp("bench") / "new" / "results.json"
     done = run(*TINY, "--json", str(file))
     assert done.returncode == 0, done.stderr
-    return done.stdout, json.loads(file.read_text())
-
-
-@pytest.mark.packaging
-def test_the_machine_is_described(everything):
-    machine = everything[1]["machine"]
-    wanted = {"date", "processor", "processors", "instruction_set", "torch", "texgs", "revision", "threads"}
-    assert wanted <= machine.keys()
-    assert all(machine[name] for name in wanted)
+    report = json.loads(file.read_text())
+    told = ("date", "processor", "processors", "instruction_set", "torch", "texgs", "revision", "threads")
+    assert all(report["machine"][name] for name in told)
+    return done.stdout, report
 
 
 @pytest.mark.packaging
@@ -60,28 +55,16 @@ def test_section(everything, name):
 
 
 @pytest.mark.packaging
-def test_what_is_measured_of_rasterize(everything):
-    names = {m["name"] for m in everything[1]["sections"]["rasterize"]["measurements"]}
-    passes = {"project", "sort", "bin", "forward", "backward", "reduce"}
-    steps = {"step forward", "step backward", "step Adam"}
-    assert names == {"forward", "step"} | steps | {f"pass {name}" for name in passes}
-
-
-@pytest.mark.packaging
-def test_every_peer_is_measured_or_skipped(everything):
-    section = everything[1]["sections"]["peers"]
-    peers = [m["parameters"]["peer"] for m in section["measurements"]] + [
-        s["name"] for s in section["skipped"]
-    ]
+def test_passes_and_peers(everything):
+    sections = everything[1]["sections"]
+    names = {m["name"] for m in sections["rasterize"]["measurements"]}
+    passes = {f"pass {name}" for name in ("project", "sort", "bin", "forward", "backward", "reduce")}
+    assert names == {"forward", "step", "step forward", "step backward", "step Adam"} | passes
+    measured, skipped = sections["peers"]["measurements"], sections["peers"]["skipped"]
+    peers = [m["parameters"]["peer"] for m in measured] + [each["name"] for each in skipped]
     for peer in ("gsplat's torch functions", "avx512", "avx2", "portable"):
         assert any(peer in name for name in peers), peer
-
-
-@pytest.mark.packaging
-def test_peers_render_the_same(everything):
-    measurements = everything[1]["sections"]["peers"]["measurements"]
-    differences = [m["median"] for m in measurements if m["name"] == "mean difference of images"]
-    assert all(difference < 1e-5 for difference in differences)
+    assert all(m["median"] < 1e-5 for m in measured if m["name"] == "mean difference of images")
 
 
 @pytest.mark.packaging
@@ -90,10 +73,8 @@ def test_sections_can_be_left_out(tmp_path):
     assert run(*TINY, "--sections", "rasterize", "--json", str(file)).returncode == 0
     sections = json.loads(file.read_text())["sections"]
     assert sections["rasterize"]["measurements"]
-    assert sections["losses"] == {
-        "measurements": [],
-        "skipped": [{"name": "losses", "reason": "not in --sections"}],
-    }
+    skipped = [{"name": "losses", "reason": "not in --sections"}]
+    assert sections["losses"] == {"measurements": [], "skipped": skipped}
 
 
 @pytest.mark.packaging
@@ -111,15 +92,12 @@ def test_defaults_are_those_of_the_targets():
     assert (settings.scene, settings.size, settings.n_surfels) == ("opaque", 800, 60_000)
 
 
-def test_cases_take_turns():
+def test_cases_take_turns_and_phases_add_up():
     order = []
     cases = [Case(name, {"case": name}, {name: lambda name=name: order.append(name)}) for name in "ab"]
     measurements = measure(cases, rounds=2, device=torch.device("cpu"), title="turns")
     assert "".join(order) == 2 * (5 * "a" + 5 * "b")
     assert [(m.name, m.n) for m in measurements] == [("a", 6), ("b", 6)]
-
-
-def test_phases_add_up():
     phases = {"first": lambda: None, "second": lambda: None}
     total, first, second = measure([Case("total", {}, phases)], 1, torch.device("cpu"), "sum")
     assert total.min >= first.min + second.min - 1e-9
@@ -127,9 +105,11 @@ def test_phases_add_up():
 
 def test_ratios():
     a, b = (Measurement.of("time", {"by": by}, "ms", values) for by, values in (("a", [8, 6]), ("b", [2, 1])))
-    ratio = a.over(b, "a / b")
+    section = Section([a, b])
+    section.add_ratios("by", "b", ["time"])
+    ratio = section.find("time / b", by="a")
     assert (ratio.unit, ratio.median, ratio.min) == ("ratio", pytest.approx(7 / 1.5), 6)
-    assert Section([a, b]).find("time", by="b") is b
+    assert section.find("time", by="b") is b
 
 
 def test_speeds_are_scaled_to_what_jobs_took():

@@ -75,9 +75,8 @@ class Slurm:
     def jobs(self, *states: str) -> dict[str, str]:
         """Comments of jobs by their numbers: the plugin writes rule and wildcards there."""
         lines = self.call("squeue", "--noheader", f"--states={','.join(states) or 'all'}", "--format=%A %k")
-        return {
-            number: comment for number, _, comment in (each.partition(" ") for each in lines.splitlines())
-        }
+        pairs = (each.partition(" ") for each in lines.splitlines())
+        return {number: comment for number, _, comment in pairs}
 
 
 def missing() -> list[str]:
@@ -94,10 +93,7 @@ def which(name: str) -> str | None:
 def running(folder: Path, cores: int = 32, memory: int = 64000) -> Iterator[Slurm]:
     """The cluster as long as the context lasts; afterwards neither a daemon nor a job is left.
 
-    Args:
-        folder: for all of its files.
-        cores: that the node says it has.
-        memory: that the node says it has, in MB.
+    The node says that it has so many cores, and so many MB of memory.
     """
     slurm = Slurm(folder)
     write_configuration(slurm, cores, memory)
@@ -121,17 +117,9 @@ def write_configuration(slurm: Slurm, cores: int, memory: int) -> None:
     for each in (folder / "state", folder / "spool", slurm.programs):
         each.mkdir(parents=True)
     host = socket.gethostname().partition(".")[0]
-    controller_port, node_port = free_ports(2)
-    values = {
-        "host": host,
-        "controller_port": controller_port,
-        "node_port": node_port,
-        "user": getpass.getuser(),
-        "folder": folder,
-        "cores": cores,
-        "memory": memory,
-    }
-    (folder / "slurm.conf").write_text(CONFIGURATION.format(**values))
+    ports = dict(zip(("controller_port", "node_port"), free_ports(2), strict=True))
+    values = {"host": host, "user": getpass.getuser(), "folder": folder, "cores": cores, "memory": memory}
+    (folder / "slurm.conf").write_text(CONFIGURATION.format(**values, **ports))
     (folder / "gres.conf").write_text(GPU.format(host=host))
     srun = slurm.programs / "srun"
     srun.write_text(SRUN.format(conf=folder / "slurm.conf", srun=which("srun")))
