@@ -11,11 +11,31 @@ from functools import lru_cache, wraps
 
 import torch
 
+from texgs.raster.api import rasterize
 from texgs.raster.reference import render as reference
 from texgs.raster.reference.fragments import ALPHA_MAX
 from texgs.raster.reference.render import TEXTURE_SIGMA, composite, kind_of, pixel_centres
 from texgs.raster.types import DEFAULT_OPTIONS
 
+# Absolute tolerances. Colours and alpha are sums of numbers below 1 in float32, whose exponents carry the
+# rounding of the intersection; depths are around 3; the distortion is at most 0.003 in these scenes.
+TOLERANCE = {"color": 3e-5, "alpha": 3e-5, "depth": 3e-5, "median": 3e-5, "normal": 5e-5, "distortion": 1e-7}
+TEXEL = 2e-6  # more for each texel that the textures span, as their random colours change from texel to texel
+UNDECIDED = 0.15  # largest share of pixels that may sit on a threshold (or, textured, on a texel centre)
+# Relative L2 of gradients, by tensor. Colours enter linearly and only carry the rounding of the weights.
+# Geometry is a sum of terms that cancel, led by few tilted surfels whose intersections lose digits; the
+# definition itself, in float32, has errors up to 1e-4 (means) and 2e-4 (quats) on such scenes.
+GRADIENT_TOLERANCE = {
+    "means": 5e-4,
+    "quats": 1e-3,
+    "scales": 2e-4,
+    "opacities": 1e-4,
+    "shift": 2e-4,
+    "features": 5e-5,
+    "base": 5e-5,
+    "gain": 1e-4,
+    "texels": 2e-4,
+}
 MARGIN = 1e-3
 IMAGES = ("color", "alpha", "depth", "median", "normal", "distortion")
 
@@ -134,3 +154,50 @@ def random_cotangents(scene, names, mask=None, seed=0):
         keep = torch.ones(shape[:2], dtype=torch.bool) if mask is None else mask
         cotangents[name] = cotangent * keep.reshape(*shape[:2], *[1] * (len(shape) - 2))
     return cotangents
+
+
+def check_images(scene, device, options=DEFAULT_OPTIONS, tolerance=TOLERANCE, least_alike=0.9):
+    """Compare the images of a scene that have a tolerance, pixel by pixel where the definition is sure."""
+    outputs = [name for name in scene.outputs if name != "statistics"]
+    rendered = images(scene.to(device).render(rasterize, outputs, options))
+    expected = true_images(scene, outputs, options)
+    sure = decided(scene, options)
+    assert 1 - sure.double().mean() < UNDECIDED
+    assert rendered["alpha"].max() <= 1
+    texels = 0 if scene.texture is None else int(scene.texture.sizes.max())
+    for name in names_of(scene):
+        assert rendered[name].shape == expected[name].shape
+        assert rendered[name].dtype == torch.float32
+        assert rendered[name].isfinite().all()
+        if name in tolerance:
+            error = (rendered[name].cpu() - expected[name]).abs()
+            assert float(error[sure].max()) < tolerance[name] + TEXEL * texels * (name == "color"), name
+            alike = (error[~sure] < 0.02).double().mean()  # a weak fragment more or less
+            assert sure.all() or alike > least_alike, name
+
+
+def check_gradients(
+    scene,
+    device,
+    names=("color",),
+    options=DEFAULT_OPTIONS,
+    wanted=None,
+    tolerance=GRADIENT_TOLERANCE,
+    least=1e-9,
+):
+    """Compare the gradients of random combinations of the images `names` in pixels off all thresholds.
+
+    Those of a length below `least` are rounding, as of the scales on the median depth.
+    """
+    names = [name for name in names if name in names_of(scene)]
+    if not names:
+        return  # Gaussians have no normal
+    cotangents = random_cotangents(scene, names, decided(scene, options))
+    derivatives = gradients(rasterize, scene.to(device), cotangents, options, wanted)
+    for name, gradient in true_gradients(scene, cotangents, options, wanted).items():
+        assert derivatives[name].shape == gradient.shape
+        assert derivatives[name].isfinite().all()
+        if gradient.norm() < least:
+            assert derivatives[name].norm() < max(1e-2 * (least < 1e-6), 1e-3), name
+        else:
+            assert relative(derivatives[name], gradient) < tolerance[name], name

@@ -5,17 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.raster.agreement import (
-    IMAGES,
-    decided,
-    gradients,
-    images,
-    names_of,
-    random_cotangents,
-    relative,
-    true_gradients,
-    true_images,
-)
+from tests.raster.agreement import IMAGES, check_gradients, check_images
 from tests.raster.scenes import (
     GAUSSIAN_OPTIONS,
     OTHER_OPTIONS,
@@ -28,61 +18,7 @@ from tests.raster.scenes import (
     textured_with_features,
 )
 from texgs.raster.api import rasterize
-from texgs.raster.types import DEFAULT_OPTIONS, Options
-
-# Absolute tolerances. Colours and alpha are sums of numbers below 1 in float32, whose exponents carry the
-# rounding of the intersection; depths are around 3; the distortion is at most 0.003 in these scenes.
-TOLERANCE = {"color": 3e-5, "alpha": 3e-5, "depth": 3e-5, "median": 3e-5, "normal": 5e-5, "distortion": 1e-7}
-TEXEL = 2e-6  # more for each texel that the textures span, as their random colours change from texel to texel
-UNDECIDED = 0.15  # largest share of pixels that may sit on a threshold (or, textured, on a texel centre)
-# Relative L2 of gradients, by tensor. Colours enter linearly and only carry the rounding of the weights.
-# Geometry is a sum of terms that cancel, led by few tilted surfels whose intersections lose digits; the
-# definition itself, in float32, has errors up to 1e-4 (means) and 2e-4 (quats) on such scenes.
-GRADIENT_TOLERANCE = {
-    "means": 5e-4,
-    "quats": 1e-3,
-    "scales": 2e-4,
-    "opacities": 1e-4,
-    "shift": 2e-4,
-    "features": 5e-5,
-    "base": 5e-5,
-    "gain": 1e-4,
-    "texels": 2e-4,
-}
-
-
-def check_images(scene, device, options=DEFAULT_OPTIONS):
-    """Compare all images of a scene, pixel by pixel where the definition is sure."""
-    outputs = [name for name in scene.outputs if name != "statistics"]
-    rendered = images(scene.to(device).render(rasterize, outputs, options))
-    expected = true_images(scene, outputs, options)
-    sure = decided(scene, options)
-    assert 1 - sure.double().mean() < UNDECIDED
-    texels = 0 if scene.texture is None else int(scene.texture.sizes.max())
-    for name in names_of(scene):
-        assert rendered[name].shape == expected[name].shape
-        assert rendered[name].dtype == torch.float32
-        error = (rendered[name].cpu() - expected[name]).abs()
-        tolerance = TOLERANCE[name] + (TEXEL * texels if name == "color" else 0)
-        assert float(error[sure].max()) < tolerance, name
-        assert sure.all() or (error[~sure] < 0.02).double().mean() > 0.9, name  # a weak fragment more or less
-
-
-def check_gradients(scene, device, names=("color",), options=DEFAULT_OPTIONS, wanted=None):
-    """Compare the gradients of random combinations of the images `names` in pixels off all thresholds."""
-    names = [name for name in names if name in names_of(scene)]
-    if not names:
-        return  # Gaussians have no normal
-    cotangents = random_cotangents(scene, names, decided(scene, options))
-    derivatives = gradients(rasterize, scene.to(device), cotangents, options, wanted)
-    expected = true_gradients(scene, cotangents, options, wanted)
-    for name, gradient in expected.items():
-        assert derivatives[name].shape == gradient.shape
-        assert derivatives[name].isfinite().all()
-        if gradient.norm() < 1e-9:  # no influence but for rounding, as of the scales on the median depth
-            assert derivatives[name].norm() < 1e-2, name
-        else:
-            assert relative(derivatives[name], gradient) < GRADIENT_TOLERANCE[name], name
+from texgs.raster.types import Options
 
 
 def shifted(scene, length):

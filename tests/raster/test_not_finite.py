@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from tests.raster.agreement import gradients, names_of, random_cotangents
-from tests.raster.scenes import random_scene, textured
+from tests.raster.requirements import refuses
+from tests.raster.scenes import PRIMITIVES, random_scene, textured
 from texgs.core.errors import ArgumentError
 from texgs.raster.api import rasterize, splat
 from texgs.raster.types import Options
@@ -47,42 +48,28 @@ def test_reported_by_name_in_textures(device, name):
 def test_image_to_splat_is_checked(device):
     scene = random_scene().to(device)
     image = torch.full((37, 53, 1), float("nan"), device=device)
-    geometry = {
-        name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "viewmat", "K")
-    }
-    with pytest.raises(ArgumentError, match="image: expected finite values"):
-        splat(image, **geometry, options=Options(check_finite=True))
+    options = Options(check_finite=True)
+    refuses(ArgumentError, "image: expected finite values", splat, image, **scene.geometry(), options=options)
 
 
 def test_finite_inputs_pass_the_check(device):
     scene = random_scene().to(device)
     checked = scene.render(rasterize, options=Options(check_finite=True))
     assert torch.equal(checked.color, scene.render(rasterize).color)
-    geometry = {
-        name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "viewmat", "K")
-    }
     for _ in range(8):  # memory that was NaN is handed out again
         torch.full((200, 1), float("nan"), device=device)
-        splat(checked.color.detach(), **geometry, options=Options(check_finite=True))
+        splat(checked.color.detach(), **scene.geometry(), options=Options(check_finite=True))
 
 
 @pytest.mark.parametrize("everywhere", [False, True], ids=["one", "all"])
 @pytest.mark.parametrize("name", TENSORS)
-def test_no_crash(device, drawn, name, everywhere):
+@pytest.mark.parametrize("kind", [*PRIMITIVES.values(), textured], ids=[*PRIMITIVES, "textured"])
+def test_no_crash(device, kind, name, everywhere):
     for value in BAD + ABSURD:
-        scene = spoiled(name, value, everywhere, 50, drawn)
+        scene = kind(spoiled(name, value, everywhere, 50)).to(device)
         with suppress(ArgumentError):  # a skewed K, or one without its last row, is refused
-            scene.to(device).render(rasterize, scene.outputs, Options(antialiased=True))
-            gradients(rasterize, scene.to(device), random_cotangents(scene, names_of(scene)))
-
-
-@pytest.mark.parametrize("everywhere", [False, True], ids=["one", "all"])
-@pytest.mark.parametrize("name", TENSORS)
-def test_no_crash_of_textures(device, name, everywhere):
-    for value in BAD + ABSURD:
-        scene = spoiled(name, value, everywhere, n=50)
-        with suppress(ArgumentError):
-            gradients(rasterize, textured(scene).to(device), random_cotangents(textured(scene), ("color",)))
+            scene.render(rasterize, scene.outputs, Options(antialiased=True))
+            gradients(rasterize, scene, random_cotangents(scene, names_of(scene)))
 
 
 def test_no_crash_on_spoiled_gradients(device, drawn):
