@@ -35,7 +35,7 @@ def test_our_file_has_the_points_as_they_are(tmp_path):
 class TestParaView:
     def test_what_is_written_is_what_is_read(self, tmp_path):
         path = write_paraview(tmp_path / "tf.json", TENT, "bones")
-        np.testing.assert_allclose(read_tf(path, "bones")(OFF_STEPS), TENT(OFF_STEPS), atol=1e-4)
+        np.testing.assert_allclose(read_tf(path)(OFF_STEPS), TENT(OFF_STEPS), atol=1e-4)
 
     def test_written_points_span_one_range_and_end_transparent(self, tmp_path):
         (entry,) = json.loads(write_paraview(tmp_path / "tf.json", TENT, "bones").read_text())
@@ -94,18 +94,6 @@ class TestParaView:
         t = np.linspace(0, 2, 41)
         np.testing.assert_allclose(read_tf(path)(t)[:, 3], [function.GetValue(x) for x in t], atol=0.02)
 
-    def test_a_preset_is_found_by_name(self, tmp_path):
-        path = tmp_path / "two.json"
-        first, second = {"Name": "a", "RGBPoints": RED_TO_BLUE}, {"Name": "b", "RGBPoints": [0, 0, 1, 0] * 2}
-        second["RGBPoints"][4] = 7
-        path.write_text(json.dumps([first, second]))
-        assert read_tf(path, "a").support == (0, 1)
-        assert read_tf(path, "b").support == (0, 7)
-        with pytest.raises(ArgumentError, match="expected a name in the file, got 'c'; it holds a, b"):
-            read_tf(path, "c")
-        with pytest.raises(ArgumentError, match=r"two\.json: expected one preset, got 2: a, b; export the"):
-            read_tf(path)
-
 
 @pytest.mark.parametrize(
     ("content", "message"),
@@ -119,6 +107,10 @@ class TestParaView:
         ('{"format": "texgs-tf", "version": 1, "opacity": []}', "expected the keys opacity, color"),
         ('{"format": "texgs-tf", "version": 1, "opacity": [[0]], "color": []}', "opacity: expected at least"),
         ('[{"Name": "x", "IndexedColors": [1, 1, 1]}]', "preset 'x': expected RGBPoints, got a categorical"),
+        (
+            '[{"Name": "a", "RGBPoints": []}, {"Name": "b", "RGBPoints": []}]',
+            "one preset, got 2: a, b; export",
+        ),
         ('[{"RGBPoints": [0, 0, 0]}]', "RGBPoints: expected four numbers per point, got 3 numbers"),
         ('[{"RGBPoints": []}]', "RGBPoints: expected four numbers per point, got 0"),
         ('[{"RGBPoints": "abcd"}]', "RGBPoints: expected a list of numbers, got 'abcd'"),

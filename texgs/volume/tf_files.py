@@ -21,17 +21,13 @@ FINE = 64  # points of colour, from which on its space makes no difference betwe
 JUST = 1e-6  # of a segment: how close to its ends it is sampled
 
 
-def read_tf(path: str | Path, preset: str | None = None) -> TransferFunction:
-    """Read a transfer function from our JSON or from ParaView's presets (.json).
+def read_tf(path: str | Path) -> TransferFunction:
+    """Read a transfer function from our JSON or from a file of one of ParaView's presets (.json).
 
     What is not piecewise linear in ParaView, colour spaces other than RGB (of fewer than 64 points) and
     opacity with a midpoint or a sharpness, is sampled by VTK at 256 points or so. A preset
     without opacity gets the ramp from 0 to 1 over its range, which is ParaView's default. Presets are often
     given over [0, 1]: see `TransferFunction.scaled`.
-
-    Args:
-        path: the file.
-        preset: name of one of ParaView's presets in the file; it may be left out where there is one.
 
     Raises:
         ArgumentError: if the file is missing, no JSON, of neither format, or holds a wrong point.
@@ -45,7 +41,7 @@ def read_tf(path: str | Path, preset: str | None = None) -> TransferFunction:
             if presets and all(
                 isinstance(p, dict) and p.keys() & {"RGBPoints", "IndexedColors"} for p in presets
             ):
-                return _from_preset(_chosen(presets, preset))
+                return _from_preset(presets)
     except ArgumentError as error:
         raise ArgumentError(f"{path}: {error}") from error
     raise ArgumentError(
@@ -78,23 +74,14 @@ def _from_ours(data: dict[str, Any]) -> TransferFunction:
     return TransferFunction.from_dict({k: v for k, v in data.items() if k not in ("format", "version")})
 
 
-def _chosen(presets: list[dict[str, Any]], name: str | None) -> dict[str, Any]:
-    """Return the preset of that name, or the only one."""
-    if name is None and len(presets) == 1:
-        return presets[0]
-    for preset in presets:
-        if preset.get("Name") == name:
-            return preset
-    names = ", ".join(str(preset.get("Name")) for preset in presets[:10])
-    if name is None:
+def _from_preset(presets: list[dict[str, Any]]) -> TransferFunction:
+    """Return the function of the only preset of ParaView."""
+    if len(presets) > 1:
+        names = ", ".join(str(preset.get("Name")) for preset in presets[:10])
         raise ArgumentError(
             f"expected one preset, got {len(presets)}: {names}; export the one that you mean alone"
         )
-    raise ArgumentError(f"preset: expected a name in the file, got {name!r}; it holds {names}")
-
-
-def _from_preset(preset: dict[str, Any]) -> TransferFunction:
-    """Return the function of a preset of ParaView."""
+    (preset,) = presets
     if "RGBPoints" not in preset:
         raise ArgumentError(
             f"preset {preset.get('Name')!r}: expected RGBPoints, got a categorical colour map; choose another"
