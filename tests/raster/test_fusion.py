@@ -3,7 +3,6 @@
 from operator import attrgetter
 
 import numpy as np
-import pytest
 import torch
 
 from tests.raster.requirements import refuses, require_same_bits
@@ -73,20 +72,18 @@ def test_threads_change_nothing():
 def test_what_does_not_fit_is_refused():
     (view,) = views(1)
     lattice = Lattice(BLOCKS, LOW, VOXEL)
-    with pytest.raises(ArgumentError, match=r"blocks: expected numbers below \(3, 2, 4\), got others"):
-        lattice.add(view, torch.tensor([[0, 2, 0]]), TRUNCATION)
-    with pytest.raises(ShapeError, match=r"blocks: expected \[N, 3\], got \[3\]"):
-        lattice.add(view, torch.tensor([0, 0, 0]), TRUNCATION)
-    with pytest.raises(ArgumentError, match="blocks: expected each one once, got some twice"):
-        lattice.add(view, CHOSEN[[1, 0, 1]], TRUNCATION)
-    with pytest.raises(ArgumentError, match=r"blocks: expected whole numbers, got torch\.float32"):
-        lattice.add(view, CHOSEN.float(), TRUNCATION)
+    for error, message, blocks in (
+        (ArgumentError, r"blocks: expected numbers below \(3, 2, 4\), got others", torch.tensor([[0, 2, 0]])),
+        (ShapeError, r"blocks: expected \[N, 3\], got \[3\]", torch.tensor([0, 0, 0])),
+        (ArgumentError, "blocks: expected each one once, got some twice", CHOSEN[[1, 0, 1]]),
+        (ArgumentError, r"blocks: expected whole numbers, got torch\.float32", CHOSEN.float()),
+    ):
+        refuses(error, message, lattice.add, view, blocks, TRUNCATION)
     refuses(ArgumentError, "truncation: expected a length above 0", lattice.add, view, CHOSEN, 0.0)
-    with pytest.raises(ShapeError, match=r"color: expected \[20, 24, 3\], got \[24, 20, 3\]"):
-        DepthView(view.camera, view.depth, view.color.transpose(0, 1))
-    with pytest.raises(ArgumentError, match=r"color: expected uint8 on cpu, got torch\.float32"):
-        DepthView(view.camera, view.depth, view.color.float())
-    with pytest.raises(DeviceError, match="depth: expected a tensor on cpu, got meta; move it"):
-        DepthView(view.camera, view.depth.to("meta"), view.color)
-    with pytest.raises(DeviceError, match="viewmat: expected a tensor on cpu, got meta; move it"):
-        DepthView(view.camera.to("meta"), view.depth, view.color)
+    camera, depth, color = view.camera, view.depth, view.color
+    message = r"color: expected \[20, 24, 3\], got \[24, 20, 3\]"
+    refuses(ShapeError, message, DepthView, camera, depth, color.transpose(0, 1))
+    refuses(ArgumentError, "color: expected uint8 on cpu, got", DepthView, camera, depth, color.float())
+    elsewhere = "expected a tensor on cpu, got meta; move it"
+    refuses(DeviceError, f"depth: {elsewhere}", DepthView, camera, depth.to("meta"), color)
+    refuses(DeviceError, f"viewmat: {elsewhere}", DepthView, camera.to("meta"), depth, color)

@@ -135,9 +135,10 @@ def test_errors_name_the_argument():
     grid = voxel_scene().grid
     refuses(ArgumentError, "optimizer: expected rmsprop or adam, got 'sgd'", VoxelOptimizer, grid, "sgd")
     other = RowGradient(voxel_scene(size=(8, 8, 8)).grid)
-    with pytest.raises(ShapeError, match=r"into: expected the gradient of .* make a new one for each grid"):
-        add_total_variation(grid, torch.tensor([0]), 1.0, 1.0, other)
-    with pytest.raises(DeviceError, match="blocks: expected device cpu as rows, got meta"):
-        add_total_variation(grid, torch.tensor([0]).to("meta"), 1.0, 1.0, RowGradient(grid))
-    with pytest.raises(ArgumentError, match="blocks: expected places from 0 to"):
-        add_total_variation(grid, torch.tensor([-1]), 1.0, 1.0, RowGradient(grid))
+    message, own = r"into: expected the gradient of .* make a new one for each grid", RowGradient(grid)
+    refuses(ShapeError, message, add_total_variation, grid, torch.tensor([0]), 1.0, 1.0, other)
+    for error, message, blocks in (
+        (DeviceError, "blocks: expected device cpu as rows, got meta", torch.tensor([0]).to("meta")),
+        (ArgumentError, "blocks: expected places from 0 to", torch.tensor([-1])),
+    ):
+        refuses(error, message, add_total_variation, grid, blocks, 1.0, 1.0, own)
