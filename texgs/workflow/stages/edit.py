@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from texgs.edit.task import Task
 
 CAPTIONS = {"style": "styled", "instruction": "instructed"}  # keys of a look by what a method follows
-FALLEN = "How the loss of the edit fell, term by term."
 POINTS = 100  # of a curve of losses at most
 SHOWN = "Before and after the edit; what can be relit, under another light too."
 VIEWS = "views."  # before the name of a model, in the names of inputs
@@ -126,7 +125,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         pictures["edit.png"] = SHOWN
     if edited.losses:
         write_convergence(output / "convergence.png", edited.losses)
-        pictures["convergence.png"] = FALLEN
+        pictures["convergence.png"] = "How the loss of the edit fell, term by term."
     result = EditResult(
         *(task.edit.name, method.name, edited.how, seconds, edited.lambda_s, dict(edited.notes)),
         *(method.follows, followed(task), *fallen(edited.losses)),

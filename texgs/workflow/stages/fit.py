@@ -1,17 +1,126 @@
-"""Stages of fits in one phase: a field of another kind than surfels, from the views alone."""
+"""Stages of fits in one phase, and what the phases of all fits share: rule, loop, evaluation, numbers."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed
+from texgs.core.memory import MIB
 from texgs.fit.kinds import FitSpec, FitTask, fit_specs
+from texgs.fit.settings import Phase
+from texgs.report.results import FitResult
 from texgs.workflow.inputs import is_fit_of, view_set
-from texgs.workflow.stage import Outcome, Stage, read
-from texgs.workflow.stages.phase import PHASE, FitJob, PhaseSettings
+from texgs.workflow.stage import Outcome, Rule, Stage, read
+from texgs.workflow.stages.settings import OfTF, Recipe
+
+if TYPE_CHECKING:
+    import torch
+    from torch import Tensor
+
+    from texgs.fields.field import Field
+    from texgs.fields.surfels.model import Surfels
+    from texgs.fields.surfels.shading import ShadingModel
+    from texgs.volume.images import Images
+    from texgs.volume.view_set import ViewSet
+
+PHASE = Rule("phase", "{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",), target="fits", gpu=("fit",))
+
+
+@dataclass(kw_only=True)
+class PhaseSettings(OfTF):
+    """What all phases read of the configuration."""
+
+    fit: Recipe
+
+
+@dataclass(frozen=True, eq=False)
+class FitJob:
+    """One phase of the fit of a basic TF: what it starts with, and how its result is told."""
+
+    fit: Recipe
+    title: str  # of progress bars
+    device: torch.device
+    views: ViewSet
+    images: Images  # the training views, reduced
+    output: Path
+    metadata: Mapping[str, str]  # of the field: where it is from
+
+    @classmethod
+    def of(cls, settings: PhaseSettings, inputs: Mapping[str, Path], output: Path) -> FitJob:
+        """Return the job with the views that it reads."""
+        from texgs.core.check import torch_device
+        from texgs.volume.images import load
+        from texgs.volume.view_set import read_views
+
+        fit, views = settings.fit, read_views(inputs["views"].parent)
+        title = f"{settings.dataset}/{settings.tf}: {settings.stage}"
+        metadata = {"dataset": settings.dataset, "tf": settings.tf}
+        images = load(views.train, fit.reduce)
+        return cls(fit, title, torch_device(fit.device), views, images, output, metadata)
+
+    def run(
+        self, parameters: Mapping[str, Tensor], shading: ShadingModel, phase: Phase
+    ) -> tuple[Surfels, float, list[float]]:
+        """Run the loop of surfels from the last checkpoint in the folder, if there is one.
+
+        Returns:
+            The model, the seconds of all runs together, and the losses that they looked at. Surfels lie along
+            a Z curve: what a tile of a view shows is then mostly together in memory, texels above all.
+        """
+        from texgs.core.geometry import z_order_of
+        from texgs.fields.surfels.model import Surfels
+        from texgs.fit.checkpoint import FOLDER, run_to_end
+        from texgs.fit.densify import is_shared
+        from texgs.fit.loop import Fit
+
+        fit = Fit(parameters, shading, self.images, phase, self.fit.seed)
+        seconds = run_to_end(fit, self.output / FOLDER, self.title)
+        order = z_order_of(fit.parameters["means"].detach())
+        ordered = {
+            name: x.detach() if is_shared(name, x) else x.detach()[order]
+            for name, x in fit.parameters.items()
+        }
+        return Surfels(ordered, shading), seconds, fit.losses
+
+    def outcome(
+        self,
+        field: Field,
+        seconds: float,
+        iterations: int = 0,
+        losses: Sequence[float] = (),
+        measured: Sequence[str] = ("test",),
+        **more: Any,
+    ) -> Outcome:
+        """Return the result, with the quality on `test` and `train` views; the checkpoint goes."""
+        import torch
+
+        from texgs.fit import checkpoint
+        from texgs.volume.images import smaller
+
+        camera = smaller(self.views.train[0].camera, self.fit.reduce)
+        scores: dict[str, Any] = {}
+        for split in measured:
+            scores |= self.quality(field, split)
+        is_gpu = self.device.type == "cuda"
+        memory = torch.cuda.max_memory_allocated(self.device) / MIB if is_gpu else None
+        checkpoint.discard(self.output / checkpoint.FOLDER)
+        seen = {"train_views": len(self.views.train), "width": camera.width, "height": camera.height}
+        told = {**(seen if measured else {}), **scores, "peak_gpu_memory_mib": memory, **more}
+        return Outcome(FitResult(seconds, len(field), iterations, list(losses), **told))
+
+    def quality(self, field: Field, split: str) -> dict[str, float]:
+        """Return PSNR and SSIM on `test` or `train` views, where there are some, as the result names them."""
+        from texgs.metrics.quality import evaluate, mean
+
+        views, words = (self.views.test, "test") if split == "test" else (self.views.train, "training")
+        if not views:
+            return {}
+        scores = mean(evaluate(field, views, self.fit.reduce, f"{self.title}: {words} views"))
+        return scores if split == "test" else {f"train_{name}": value for name, value in scores.items()}
 
 
 @dataclass(kw_only=True)

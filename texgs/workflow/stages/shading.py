@@ -8,7 +8,7 @@ from pathlib import Path
 from texgs.fit.settings import Material, Phase
 from texgs.workflow.inputs import is_changed, is_fit_of, model_of
 from texgs.workflow.stage import Outcome, Stage, read
-from texgs.workflow.stages.phase import PHASE, FitJob, PhaseSettings
+from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
 from texgs.workflow.stages.settings import Recipe
 
 HARMONICS = ("sh", "sh_rest")

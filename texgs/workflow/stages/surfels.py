@@ -8,7 +8,7 @@ from pathlib import Path
 from texgs.fit.settings import Phase, Seeds
 from texgs.workflow.inputs import is_changed, is_fit_of, prepared_volume, view_set
 from texgs.workflow.stage import Config, Outcome, Stage, read
-from texgs.workflow.stages.phase import PHASE, FitJob, PhaseSettings
+from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
 from texgs.workflow.stages.settings import Recipe
 
 LATER = ("materials", "first_material", "shading", "texture")  # keys of a recipe that later stages read
