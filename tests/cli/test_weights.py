@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.cli.conftest import hide_weights
 from texgs.cli.main import main
 from texgs.config.compose import compose
 from texgs.core.checksum import Checksums
@@ -17,8 +18,7 @@ CLIP = "clip-vit-base-patch32"
 @pytest.fixture
 def there(monkeypatch, tmp_path):
     """Checksums of weights by name, as if they were on this machine."""
-    for name in ("TEXGS_WEIGHTS", "TORCH_HOME", "HF_HOME", "XDG_CACHE_HOME"):
-        monkeypatch.setenv(name, str(tmp_path / "none"))
+    hide_weights(monkeypatch, tmp_path)
     checksums = {}
     monkeypatch.setattr(weights, "checksum", lambda name, _checksums: checksums.get(name))
     return checksums
