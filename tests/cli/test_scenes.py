@@ -11,7 +11,7 @@ import yaml
 from PIL import Image
 from safetensors.torch import save, save_file
 
-from tests.edit.tasks import task
+from tests.edit.scenes import task
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball

@@ -1,9 +1,11 @@
 """Composed scenes of two kinds of objects, and which surfels are of which: the truth of a segmentation."""
 
+import math
+
 import torch
-from kornia.geometry.conversions import rotation_matrix_to_quaternion
 from torch.nn.functional import normalize
 
+from tests.edit.scenes import on_sphere
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
@@ -17,16 +19,8 @@ def shell(n, radius, middle, color, opacity, seed=0):
     """Raw parameters of surfels on a sphere, tangent to it, about as large as the gaps between them."""
     generator = torch.Generator().manual_seed(seed)
     normals = normalize(torch.randn(n, 3, generator=generator), dim=1)
-    aside = normalize(torch.linalg.cross(normals, torch.randn(n, 3, generator=generator)), dim=1)
-    axes = torch.stack([aside, torch.linalg.cross(normals, aside), normals], dim=2)
-    size = 2.0 * radius / n**0.5
-    return {
-        "means": radius * normals + torch.tensor(middle),
-        "quats": rotation_matrix_to_quaternion(axes),
-        "scales": torch.full((n, 2), size).log(),
-        "opacities": torch.full((n,), opacity).logit(),
-        "colors": torch.tensor(color).repeat(n, 1),
-    }
+    p = on_sphere(normals, radius, 2.0 * radius / n**0.5, math.log(opacity / (1 - opacity)))
+    return {**p, "means": p["means"] + torch.tensor(middle), "colors": torch.tensor(color).repeat(n, 1)}
 
 
 def joined(*parts):

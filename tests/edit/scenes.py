@@ -1,40 +1,51 @@
-"""A textured ball in memory, seen from around."""
+"""Textured balls in memory, seen from around, and edits of scenes as methods get them."""
 
 import torch
-from kornia.geometry.conversions import rotation_matrix_to_quaternion
+from torch.nn.functional import normalize
 
 from tests.fit.scenes import HEADLIGHT, RADIUS, cameras
+from texgs.core.camera import orbit
+from texgs.core.lens import Lens
+from texgs.edit.keys import EditKeys
 from texgs.edit.style_picture import StylePicture
+from texgs.edit.task import Task
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
+from texgs.fit.texels import textured
 from texgs.volume.images import Images
+
+SHELL = 0.4  # radius, world units
 
 
 def sphere_points(count):
     """Evenly spread unit vectors [count, 3]: a Fibonacci spiral."""
     index = torch.arange(count) + 0.5
     height = 1 - 2 * index / count
-    angle = index * 2.399963
+    angle = index * -2.399963
     flat = (1 - height**2).sqrt()
     return torch.stack([flat * angle.cos(), height, flat * angle.sin()], dim=1)
 
 
+def on_sphere(normals, radius, size, opacity):
+    """Raw geometry of round surfels on a sphere around the origin that face outwards."""
+    count = len(normals)
+    half = torch.stack([1 + normals[:, 2], -normals[:, 1], normals[:, 0], torch.zeros(count)], dim=1)
+    return {
+        "means": radius * normals,
+        "quats": normalize(half, dim=1),  # turns +z to the normal
+        "scales": torch.full((count, 2), size).log(),
+        "opacities": torch.full((count,), opacity),
+    }
+
+
 def ball(count=400, side=5, opacity=4.0):
-    """Surfels on a sphere that face outwards, with textures of one colour in an order of their own."""
+    """Surfels with textures of one colour in an order of their own."""
     normals = sphere_points(count)
-    helper = torch.eye(3)[normals.abs().argmin(dim=1)]
-    first = torch.nn.functional.normalize(torch.linalg.cross(helper, normals), dim=1)
-    axes = torch.stack([first, torch.linalg.cross(normals, first), normals], dim=2)
-    sigma = 1.6 * RADIUS / count**0.5
     order = torch.randperm(count, generator=torch.Generator().manual_seed(1))
-    colors = torch.tensor([0.3, -0.2, 0.4]).expand(count, 3) + 0.05 * normals
     return Surfels(
         {
-            "means": RADIUS * normals,
-            "quats": rotation_matrix_to_quaternion(axes),
-            "scales": torch.full((count, 2), sigma).log(),
-            "opacities": torch.full((count,), opacity),
-            "colors": colors,
+            **on_sphere(normals, RADIUS, 1.6 * RADIUS / count**0.5, opacity),
+            "colors": torch.tensor([0.3, -0.2, 0.4]) + 0.05 * normals,
             **raw_material(0.4, 0.5, 0.2, 20.0, "bounded"),
             "palette": torch.tensor([0.6, 0.5, 0.1]),
             "texels": torch.zeros(count * side**2, 3),
@@ -43,6 +54,30 @@ def ball(count=400, side=5, opacity=4.0):
         },
         ShadingModel(),
     )
+
+
+def views(count=6, size=64):
+    """Cameras around the ball and their lights."""
+    return cameras(count, size), [HEADLIGHT] * count
+
+
+def shell(count=160, texels=5, opacity=3.0, seed=0):
+    """Surfels that are opaque together, in one colour and some noise: few enough for brute force."""
+    p = {
+        **on_sphere(sphere_points(count), SHELL, 1.5 * SHELL * (torch.pi / count) ** 0.5, opacity),
+        "colors": torch.tensor([[0.7, 0.6, 0.2]]).repeat(count, 1),
+        **raw_material(0.4, 0.6, 0.2, 20, "bounded"),
+    }
+    sizes = torch.full((count, 2), texels, dtype=torch.int32)
+    model = textured(Surfels(p, ShadingModel(low_pass=6.0)), torch.tensor([0.5, 0.5, 0.3]), sizes)
+    noise = torch.randn(model.parameters["texels"].shape, generator=torch.Generator().manual_seed(seed))
+    return Surfels({**model.parameters, "texels": 0.03 * noise}, model.shading, {"dataset": "shell"})
+
+
+def around(count=12, size=48):
+    """Cameras from all sides of the shell, above and below."""
+    heights = torch.linspace(-75, 75, count).tolist()
+    return [orbit(360 * 0.618 * i, height, 2.5, 26, size, size) for i, height in enumerate(heights)]
 
 
 def images_of(field, count=6, size=48):
@@ -61,6 +96,14 @@ def plain_style(color):
     return StylePicture.of(torch.tensor(color)[:, None, None].expand(3, 40, 40).contiguous())
 
 
-def views(count=6, size=64):
-    """Cameras around the ball and their lights."""
-    return cameras(count, size), [HEADLIGHT] * count
+class AnyViews(Task):
+    """A task whose models have no training views."""
+
+    def training_views(self, model):
+        return []
+
+
+def task(scene, output, parts=()):
+    """An edit of parts of a scene, with no settings of a method."""
+    edit = EditKeys("test", parts=list(parts))
+    return AnyViews(None, edit, scene, {}, output, torch.device("cpu"), 1, Lens(), "test")

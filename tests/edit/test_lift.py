@@ -42,20 +42,30 @@ def clicks(*places, negative=(), camera=FRONT):
     return Clicks(camera, points, torch.arange(len(points)) < len(places))
 
 
-def test_a_click_is_where_its_ray_meets_the_surface():
-    model, _ = two_balls()
-    places = places_of(model, clicks((-0.3, 0.05, 0.0), (0.3, 0.1, 0.1), negative=[(-0.25, -0.1, 0.0)]))
+@pytest.fixture(scope="module")
+def balls():
+    """Two balls that do not touch, and which surfels are of the first."""
+    model, number = two_balls()
+    return model, number == 0
+
+
+def agreement(segment, model, expected, views):
+    """Overlap of a segment and the surfels expected, by their weights in the views."""
+    return overlap(segment.mask, expected, sum(truth(model, expected, camera)[1] for camera in views))
+
+
+def test_a_click_is_where_its_ray_meets_the_surface(balls):
+    places = places_of(balls[0], clicks((-0.3, 0.05, 0.0), (0.3, 0.1, 0.1), negative=[(-0.25, -0.1, 0.0)]))
     middles = torch.tensor([[-0.3, 0.0, 0.0], [0.3, 0.1, 0.1], [-0.3, 0.0, 0.0]])
     torch.testing.assert_close((places - middles).norm(dim=1), torch.full((3,), 0.25), atol=0.02, rtol=0)
     assert (places[:, 2] > middles[:, 2]).all(), "on the side that faces the camera"
 
 
-def test_a_click_through_a_thin_layer_is_on_what_shows_through():
-    for opacity, distance in ((0.08, 0.2), (0.9, 0.4)):
-        model, _ = nested(opacity)
-        place = places_of(model, clicks((0.0, 0.0, 0.0)))[0]
-        assert float(place.norm()) == pytest.approx(distance, abs=0.03)
-        assert place[2] > 0
+@pytest.mark.parametrize(("opacity", "distance"), [(0.08, 0.2), (0.9, 0.4)])
+def test_a_click_through_a_thin_layer_is_on_what_shows_through(opacity, distance):
+    place = places_of(nested(opacity)[0], clicks((0.0, 0.0, 0.0)))[0]
+    assert float(place.norm()) == pytest.approx(distance, abs=0.03)
+    assert place[2] > 0
 
 
 @pytest.mark.parametrize(
@@ -66,17 +76,21 @@ def test_a_click_through_a_thin_layer_is_on_what_shows_through():
         ((-1.0, 3.0), r"point \(-1, 3\): expected a place in the view"),
     ],
 )
-def test_clicks_that_are_on_nothing(point, message):
-    model, _ = two_balls()
+def test_clicks_that_are_on_nothing(balls, point, message):
     with pytest.raises(ArgumentError, match=message):
-        lift(model, Clicks(FRONT, torch.tensor([point]), torch.tensor([True])), cameras(), Alike())
+        lift(balls[0], Clicks(FRONT, torch.tensor([point]), torch.tensor([True])), cameras(), Alike())
 
 
-def test_clicks_that_do_not_fit():
-    with pytest.raises(ArgumentError, match="points: expected a positive one at least, got none"):
-        Clicks(FRONT, torch.ones(2, 2), torch.zeros(2, dtype=torch.bool))
-    with pytest.raises(ShapeError, match=r"positive: expected \[2\], got \[1\]"):
-        Clicks(FRONT, torch.ones(2, 2), torch.ones(1, dtype=torch.bool))
+@pytest.mark.parametrize(
+    ("positive", "error", "message"),
+    [
+        ([False, False], ArgumentError, "points: expected a positive one at least, got none"),
+        ([True], ShapeError, r"positive: expected \[2\], got \[1\]"),
+    ],
+)
+def test_clicks_that_do_not_fit(positive, error, message):
+    with pytest.raises(error, match=message):
+        Clicks(FRONT, torch.ones(2, 2), torch.tensor(positive))
 
 
 def test_places_are_visible_where_nothing_is_in_front_of_them():
@@ -96,27 +110,24 @@ def test_places_are_visible_where_nothing_is_in_front_of_them():
     assert not is_visible(*FRONT.project(outside), median, 0.03).any(), "beside and behind the camera"
 
 
-@pytest.mark.parametrize("vote", ["contribution", "centre"])
-def test_one_click_segments_an_object_on_all_of_its_sides(vote):
-    model, numbers = two_balls()
-    segment = lift(model, clicks((-0.3, 0.0, 0.25)), cameras(), Alike(), vote=vote)
-    weights = sum(truth(model, numbers == 0, camera)[1] for camera in cameras())
-    assert overlap(segment.mask, numbers == 0, weights) > (0.97 if vote == "contribution" else 0.8)
+@pytest.mark.parametrize(("vote", "least"), [("contribution", 0.97), ("centre", 0.8)])
+def test_one_click_segments_an_object_on_all_of_its_sides(balls, vote, least):
+    segment = lift(balls[0], clicks((-0.3, 0.0, 0.25)), cameras(), Alike(), vote=vote)
+    assert agreement(segment, *balls, cameras()) > least
     assert segment.used > 30, "also views that see nothing of the place clicked on"
     assert segment.used + segment.left_out == 43
 
 
-def test_grabcut_segments_an_object():
-    model, numbers = two_balls()
+def test_grabcut_segments_an_object(balls):
+    model, is_red = balls
     some = cameras(size=128, frequency=1)
     segment = lift(model, clicks((0.3, 0.1, 0.35), negative=[(-0.3, 0.0, 0.25)]), some, GrabCut())
-    weights = sum(truth(model, numbers == 1, camera)[1] for camera in some)
-    assert overlap(segment.mask, numbers == 1, weights) > 0.95
+    assert agreement(segment, model, ~is_red, some) > 0.95
 
 
-def test_the_mask_model_sees_what_the_view_shows_and_clicks_move_along():
+def test_the_mask_model_sees_what_the_view_shows_and_clicks_move_along(balls):
     """Images are cut out around the object: the colour under the click must be the one clicked on."""
-    model, _ = two_balls()
+    model, _ = balls
     masks = Alike()
     click = clicks((0.3, 0.1, 0.35))
     mask = view_mask(model, click, masks, HEADLIGHT)
@@ -130,29 +141,23 @@ def test_the_mask_model_sees_what_the_view_shows_and_clicks_move_along():
     assert (mask != expected).sum() <= 2
 
 
-def test_a_mask_that_contradicts_the_others_has_no_vote():
-    model, numbers = two_balls()
-
+def test_a_mask_that_contradicts_the_others_has_no_vote(balls):
     class Confused(Alike):
         def __call__(self, image, points, positive):
             right = super().__call__(image, points, positive)
             return ~right if len(self.images) % 4 == 0 else right
 
-    segment = lift(model, clicks((-0.3, 0.0, 0.25)), cameras(), Confused())
-    weights = sum(truth(model, numbers == 0, camera)[1] for camera in cameras())
-    assert overlap(segment.mask, numbers == 0, weights) > 0.97
+    segment = lift(balls[0], clicks((-0.3, 0.0, 0.25)), cameras(), Confused())
+    assert agreement(segment, *balls, cameras()) > 0.97
     assert segment.left_out >= 10
 
 
-def test_a_segment_without_surfels_is_an_error():
-    model, _ = two_balls()
-
-    class Blind(Alike):
-        def __call__(self, image, points, positive):
-            return torch.zeros(image.shape[:2], dtype=torch.bool)
+def test_a_segment_without_surfels_is_an_error(balls):
+    def blind(image, points, positive):
+        return torch.zeros(image.shape[:2], dtype=torch.bool)
 
     with pytest.raises(ArgumentError, match="expected surfels that most masks of 1 views hold, got none"):
-        lift(model, clicks((-0.3, 0.0, 0.25)), cameras(), Blind())
+        lift(balls[0], clicks((-0.3, 0.0, 0.25)), cameras(), blind)
 
 
 def test_the_middle_of_a_mask_is_farthest_from_its_outline():
@@ -163,8 +168,8 @@ def test_the_middle_of_a_mask_is_farthest_from_its_outline():
     assert middle_of(torch.zeros(3, 3, dtype=torch.bool)) is None
 
 
-def test_a_preview_shows_the_mask_and_the_clicks():
-    model, _ = two_balls()
+def test_a_preview_shows_the_mask_and_the_clicks(balls):
+    model, _ = balls
     click = clicks((-0.3, 0.0, 0.25), negative=[(0.3, 0.1, 0.35)])
     mask, picture = preview(model, click, Alike())
     full = model.render(FRONT).color.clamp(0, 1)
@@ -187,32 +192,15 @@ def test_a_segment_of_almost_the_whole_model_is_told():
     )
 
 
-def balls():
-    """Two balls that do not touch, and which surfels are of the first."""
-    model, number = two_balls()
-    return model, number == 0
-
-
-def test_only_the_component_that_holds_the_place_is_kept():
-    model, is_red = balls()
-    both = torch.ones_like(is_red)
-    middle = model.parameters["means"][is_red].mean(0, keepdim=True)
+def test_only_the_component_that_holds_the_place_is_kept(balls):
+    model, is_red = balls
+    means = model.parameters["means"]
+    x, both, one = means[:, 0], torch.ones_like(is_red), torch.arange(len(is_red)) == 7
+    middle, other = (means[which].mean(0, keepdim=True) for which in (is_red, ~is_red))
     assert torch.equal(components_at(model, both, middle), is_red)
-    other = model.parameters["means"][~is_red].mean(0, keepdim=True)
     assert torch.equal(components_at(model, both, torch.cat([middle, other])), both)
-
-
-def test_what_is_not_in_the_segment_connects_nothing():
-    model, is_red = balls()
-    x = model.parameters["means"][:, 0]
+    assert torch.equal(components_at(model, one, torch.zeros(1, 3)), one), "of a single surfel"
     red = x[is_red]
-    ends = is_red & ((x < red.quantile(0.2)) | (x > red.quantile(0.8)))
-    at = model.parameters["means"][is_red & (x == red.min())]
+    ends = is_red & ((x < red.quantile(0.2)) | (x > red.quantile(0.8)))  # what is between connects nothing
+    at = means[is_red & (x == red.min())]
     assert torch.equal(components_at(model, ends, at), ends & (x < red.quantile(0.5)))
-
-
-def test_a_single_surfel_is_a_component():
-    model, is_red = balls()
-    one = torch.zeros_like(is_red)
-    one[7] = True
-    assert torch.equal(components_at(model, one, torch.zeros(1, 3)), one)

@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.edit.textured import RADIUS, around, shell
+from tests.edit.scenes import SHELL, around, shell
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.edit.observations import content, observe, render_views, straight_colors
@@ -48,7 +48,7 @@ def test_points_lie_on_the_sphere_and_normals_point_from_it():
     inside = views.alphas > 0.99
     points, normals = views.points[inside], views.normals[inside]
     assert int(inside.sum()) > 500
-    assert_close(points.norm(dim=1).median(), torch.tensor(RADIUS), atol=0.03, rtol=0)
+    assert_close(points.norm(dim=1).median(), torch.tensor(SHELL), atol=0.03, rtol=0)
     assert torch.nn.functional.cosine_similarity(points, normals, dim=1).median() > 0.95
 
 

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from tests.edit.tasks import task
+from tests.edit.scenes import task
 from tests.fields.surfels.test_composition import ball
 from texgs.core.errors import ArgumentError
 from texgs.edit.task import parts_of, parts_with_surfels, surfels_of

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.edit.textured import around, shell
+from tests.edit.scenes import around, shell
 from texgs.core.light import Light
 from texgs.edit.observations import observe, render_views
 from texgs.edit.texel_solver import back_project, fill_unseen, learn, seen_texels, solve

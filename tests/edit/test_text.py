@@ -8,7 +8,7 @@ import torch
 from torch.testing import assert_close
 
 from tests.edit.guidances import Identity, Returns, Tint
-from tests.edit.textured import around, shell
+from tests.edit.scenes import around, shell
 from tests.fields.surfels.samples import sample
 from tests.raster.requirements import require_same_bits
 from texgs.core.errors import ArgumentError, ShapeError

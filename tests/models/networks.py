@@ -33,6 +33,17 @@ def random_weights(seed=0, last=None):
     return weights
 
 
+def outputs(x, wanted):
+    """Outputs in float64 of modules of torchvision's list, by index, with the random weights."""
+    modules, found = features().double(), []
+    modules.load_state_dict({name.removeprefix("features."): w for name, w in random_weights().items()})
+    x = x.double()
+    for index, module in enumerate(modules[: max(wanted) + 1]):
+        x = module(x)
+        found += [x] if index in wanted else []
+    return found
+
+
 @pytest.fixture(scope="module")
 def vgg(tmp_path_factory):
     """A VGG with random weights up to block 3."""

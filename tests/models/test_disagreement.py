@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from tests.edit.guidances import Tint, Watching
+from tests.edit.guidances import Tint
 from tests.models.views_of import random_views
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
@@ -43,7 +43,7 @@ def test_colours_are_off_by_a_factor_for_each_view_and_channel_and_white_stays()
 
 
 def test_the_other_guidance_sees_points_elsewhere_and_all_else_as_it_is():
-    views, other = many(300), Watching(GREY)
+    views, other = many(300), Tint(GREY)
     Disagreeing(other, 0.2)(views, "anything", generator())
     (seen,) = other.seen
     shifts = seen.points - views.points

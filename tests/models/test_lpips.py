@@ -1,8 +1,8 @@
 import pytest
 import torch
-from torch.nn.functional import conv2d
+from torch.nn.functional import avg_pool2d, conv2d, pad
 
-from tests.models.networks import features, random_weights
+from tests.models.networks import outputs, random_weights
 from tests.real_data import real_data
 from texgs.core.errors import ShapeError
 from texgs.models.lpips import Lpips
@@ -23,21 +23,12 @@ def files(tmp_path_factory):
 
 def defined(image, other, heads):
     """The published formula in float64: inputs in [-1, 1] with its own shift and scale."""
-    shift, scale = torch.tensor([-0.030, -0.088, -0.188]), torch.tensor([0.458, 0.448, 0.450])
-    modules, total = features().double(), 0.0
-    modules.load_state_dict(
-        {name.removeprefix("features."): x.double() for name, x in random_weights().items()}
-    )
-    x, y = (
-        ((2 * z.permute(2, 0, 1) - 1 - shift[:, None, None]) / scale[:, None, None]).double()[None]
-        for z in (image, other)
-    )
-    taps = iter(heads.values())
-    for index, module in enumerate(modules):
-        x, y = module(x), module(y)
-        if index in (3, 8, 15, 22, 29):
-            a, b = (z / (z.square().sum(1, keepdim=True).sqrt() + 1e-10) for z in (x, y))
-            total += float(conv2d((a - b).square(), next(taps).double()).mean().detach())
+    shift, scale = (torch.tensor(x)[:, None, None] for x in ([-0.03, -0.088, -0.188], [0.458, 0.448, 0.45]))
+    both = torch.stack([(2 * x.permute(2, 0, 1) - 1 - shift) / scale for x in (image, other)])
+    total = 0.0
+    for taps, head in zip(outputs(both, (3, 8, 15, 22, 29)), heads.values(), strict=True):
+        a, b = taps / (taps.square().sum(1, keepdim=True).sqrt() + 1e-10)
+        total += float(conv2d((a - b).square()[None], head.double()).mean().detach())
     return total
 
 
@@ -66,10 +57,9 @@ def test_real_weights_find_a_blur_worse_than_a_shade(monkeypatch):
     monkeypatch.setenv("TEXGS_WEIGHTS", str(real_data("weights")))
     lpips = Lpips.load()
     generator = torch.Generator().manual_seed(0)
-    image = torch.rand(16, 16, 3, generator=generator).repeat_interleave(4, 0).repeat_interleave(4, 1)
-    image = 0.25 + 0.5 * image
-    blurred = torch.nn.functional.avg_pool2d(
-        torch.nn.functional.pad(image.permute(2, 0, 1)[None], (2, 2, 2, 2), mode="reflect"), 5, 1
-    )[0].permute(1, 2, 0)
+    image = 0.25 + 0.5 * torch.rand(16, 16, 3, generator=generator)
+    image = image.repeat_interleave(4, 0).repeat_interleave(4, 1)
+    padded = pad(image.permute(2, 0, 1)[None], (2, 2, 2, 2), mode="reflect")
+    blurred = avg_pool2d(padded, 5, 1)[0].permute(1, 2, 0)
     shade = (blurred - image).square().mean().sqrt()
     assert float(lpips.distance(image, blurred)) > 2 * float(lpips.distance(image, image + shade))

@@ -3,7 +3,7 @@ import torch
 from safetensors.torch import save_file
 from torch.testing import assert_close
 
-from tests.models.networks import features, random_weights
+from tests.models.networks import outputs, random_weights
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.models.vgg import Vgg
@@ -21,26 +21,17 @@ def files(tmp_path_factory):
     return folder
 
 
-def expected(image, weights, wanted):
-    """Outputs of torchvision's modules in float64."""
-    modules = features().double()
-    modules.load_state_dict(
-        {name.removeprefix("features."): x.double() for name, x in weights.items()}, strict=False
-    )
+def expected(image, wanted):
+    """Outputs of torchvision's modules for an image in [0, 1]."""
     mean, deviation = torch.tensor([0.485, 0.456, 0.406]), torch.tensor([0.229, 0.224, 0.225])
-    x, outputs = ((image - mean[:, None, None]) / deviation[:, None, None]).double()[None], []
-    for index, module in enumerate(modules[: max(wanted) + 1]):
-        x = module(x)
-        if index in wanted:
-            outputs.append(x)
-    return outputs
+    return outputs(((image - mean[:, None, None]) / deviation[:, None, None])[None], wanted)
 
 
 @pytest.mark.parametrize("name", ["vgg.safetensors", "vgg.pth"])
 def test_features_are_those_of_torchvisions_modules(files, name):
     image = torch.rand(3, 41, 30)
     network = Vgg.load(files / name, dtype=torch.float32)
-    truth = torch.cat(expected(image, random_weights(), STYLE), dim=1)[0]
+    truth = torch.cat(expected(image, STYLE), dim=1)[0]
     maps = network.features(image)
     assert maps.shape == (768, 10, 7)
     assert_close(maps.double(), truth, rtol=1e-4, atol=1e-4)
@@ -48,7 +39,7 @@ def test_features_are_those_of_torchvisions_modules(files, name):
 
 def test_bfloat16_is_close_and_has_gradients(files):
     image = torch.rand(3, 32, 32, requires_grad=True)
-    truth = torch.cat(expected(image.detach(), random_weights(), STYLE), dim=1)[0]
+    truth = torch.cat(expected(image.detach(), STYLE), dim=1)[0]
     maps = Vgg.load(files / "vgg.pth", dtype=torch.bfloat16).features(image)
     assert maps.dtype == torch.bfloat16
     assert torch.cosine_similarity(maps.double(), truth, dim=0).min() > 0.999
@@ -59,14 +50,22 @@ def test_bfloat16_is_close_and_has_gradients(files):
     assert torch.cosine_similarity(gradient.flatten(), other.flatten(), dim=0) > 0.99
 
 
-def test_layers_of_several_blocks_come_one_by_one(files):
-    network = Vgg.load(files / "vgg.pth", layers=("relu1_2", "relu2_2"), dtype=torch.float32)
+def test_layers_of_several_blocks_come_one_by_one_or_joined_by_their_stride(files):
+    names, image = ("relu1_2", "relu2_2"), torch.rand(3, 16, 24)
+    network = Vgg.load(files / "vgg.pth", layers=names, dtype=torch.float32)
     assert len(network.convolutions) == 4, "no more is read than needed"
-    image = torch.rand(3, 16, 24)
-    for layer, truth in zip(
-        network.layers(image[None]), expected(image, random_weights(), (3, 8)), strict=True
-    ):
-        assert_close(layer.double(), truth, rtol=1e-4, atol=1e-4)
+    layers = [x[0] for x in network.layers(image[None])]
+    for layer, truth in zip(layers, expected(image, (3, 8)), strict=True):
+        assert_close(layer.double(), truth[0], rtol=1e-4, atol=1e-4)
+    network = Vgg.load(files / "vgg.pth", dtype=torch.float32)
+    blocks = network.blocks(image, (*names, *STYLE.values()))
+    assert {stride: x.shape for stride, x in blocks.items()} == {
+        1: (64, 16, 24),
+        2: (128, 8, 12),
+        4: (768, 4, 6),
+    }
+    joined = [*(x[0] for x in network.layers(image[None], names)), network.features(image)]
+    assert_close([blocks[1], blocks[2], blocks[4]], joined, rtol=0, atol=0)
 
 
 def test_weights_of_something_else_are_refused(tmp_path):
@@ -85,17 +84,3 @@ def test_real_weights_tell_an_edge_from_noise():
     noise = torch.rand(2, 3, 64, 64)
     a, b, c = (network.features(x).mean(dim=(1, 2)) for x in (*noise, stripes))
     assert torch.cosine_similarity(a, b, dim=0) > torch.cosine_similarity(a, c, dim=0) + 0.2
-
-
-def test_layers_of_a_block_are_joined_by_their_stride(files):
-    network = Vgg.load(files / "vgg.pth", dtype=torch.float32)
-    image = torch.rand(3, 16, 24)
-    blocks = network.blocks(image, ("relu1_2", "relu2_2", *STYLE.values()))
-    assert {stride: x.shape for stride, x in blocks.items()} == {
-        1: (64, 16, 24),
-        2: (128, 8, 12),
-        4: (768, 4, 6),
-    }
-    layers = [x[0] for x in network.layers(image[None], ("relu1_2", "relu2_2"))]
-    assert_close([blocks[1], blocks[2]], layers, rtol=0, atol=0)
-    assert_close(blocks[4], network.features(image), rtol=0, atol=0)

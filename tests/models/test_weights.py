@@ -42,12 +42,8 @@ def test_a_file_is_found_where_it_may_lie_under_either_name(folder, place, name)
     path = put(folder / place / name)
     assert locate("tiny") == path
     assert available("tiny")
-
-
-def test_the_weights_folder_comes_first(folder):
-    put(folder / "torch/hub/checkpoints/tiny.bin")
-    path = put(folder / "weights" / "tiny.bin")
-    assert locate("tiny") == path
+    first = put(folder / "weights" / "tiny.bin")
+    assert locate("tiny") == first, "of several files"
 
 
 def test_another_file_of_that_name_is_refused_also_after_it_was_whole(folder):
@@ -79,12 +75,9 @@ def test_a_folder_is_found_once_it_is_complete(folder, place):
     assert locate("hub") == folder / place
 
 
-def test_a_folder_that_is_missing_names_its_repository(folder):
+def test_a_folder_that_is_missing_names_its_repository_and_an_unknown_name_those_known(folder):
     with pytest.raises(MissingDataError, match=r"hub: .*huggingface.co/texgs/none and put the folder hub"):
         locate("hub")
-
-
-def test_a_name_that_is_unknown_is_answered_with_those_known():
     with pytest.raises(ArgumentError, match=r"expected one of vgg16, .*, got 'vgg19'"):
         locate("vgg19")
 
