@@ -62,9 +62,6 @@ def test_orbit_is_a_rotation_everywhere(polar):
     torch.testing.assert_close(R_cw @ R_cw.T, torch.eye(3), atol=1e-6, rtol=0)
     assert torch.linalg.det(R_cw) == pytest.approx(1, abs=1e-6)
     torch.testing.assert_close(camera.position, 2 * orbit_direction(123, polar).float(), atol=1e-6, rtol=0)
-
-
-def test_orbit_direction_follows_the_test_path():
     expected = torch.tensor([0.0, 0.5, -(0.75**0.5)], dtype=torch.float64)
     torch.testing.assert_close(orbit_direction(90, 30), expected, atol=1e-15, rtol=0)
 

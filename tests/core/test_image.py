@@ -7,20 +7,18 @@ from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.image import read_rgba, to_pillow, write_png
 
 
-def test_values_are_rounded_and_clamped(tmp_path):
-    color = torch.tensor([[[0.0, 0.5, 1.0], [-0.2, 1.7, 0.501]]])
-    write_png(tmp_path / "x.png", color)
+@pytest.mark.parametrize(
+    ("colors", "alphas", "pixels"),
+    [
+        ([[0.0, 0.5, 1.0], [-0.2, 1.7, 0.501]], None, [(0, 128, 255), (0, 255, 128)]),
+        ([[0.25, 0.5, 0.0], [0.0, 0.0, 0.0]], [[0.5, 0.0]], [(128, 255, 0, 128), (0, 0, 0, 0)]),
+    ],
+)
+def test_values_are_rounded_and_clamped_and_of_straight_alpha(tmp_path, colors, alphas, pixels):
+    write_png(tmp_path / "x.png", torch.tensor([colors]), None if alphas is None else torch.tensor(alphas))
     with Image.open(tmp_path / "x.png") as picture:
-        assert picture.mode == "RGB"
-        assert [picture.getpixel((x, 0)) for x in range(2)] == [(0, 128, 255), (0, 255, 128)]
-
-
-def test_file_holds_straight_alpha(tmp_path):
-    color = torch.tensor([[[0.25, 0.5, 0.0], [0.0, 0.0, 0.0]]])
-    alpha = torch.tensor([[0.5, 0.0]])
-    write_png(tmp_path / "x.png", color, alpha)
-    with Image.open(tmp_path / "x.png") as picture:
-        assert [picture.getpixel((x, 0)) for x in range(2)] == [(128, 255, 0, 128), (0, 0, 0, 0)]
+        assert picture.mode == ("RGB" if alphas is None else "RGBA")
+        assert [picture.getpixel((x, 0)) for x in range(2)] == pixels
 
 
 def test_round_trip_is_within_rounding(tmp_path):

@@ -11,17 +11,18 @@ def frames(count=4, height=33, width=47):
     return [np.full((height, width, 3), 40 * (i + 1), dtype=np.uint8) for i in range(count)]
 
 
-def test_one_picture(tmp_path):
+def test_one_picture_and_a_folder_of_pictures_that_is_never_another_films(tmp_path):
     picture = np.random.default_rng(0).integers(0, 256, (5, 7, 3), dtype=np.uint8)
     path = write_frames(tmp_path / "new" / "a.png", [picture])
     assert np.array_equal(np.asarray(Image.open(path)), picture)
-
-
-def test_a_folder_of_pictures(tmp_path):
     write_frames(tmp_path / "turn", iter(frames(3)))
-    names = sorted(path.name for path in (tmp_path / "turn").iterdir())
-    assert names == ["0000.png", "0001.png", "0002.png"]
-    assert np.asarray(Image.open(tmp_path / "turn" / "0002.png"))[0, 0, 0] == 120
+    paths = sorted((tmp_path / "turn").iterdir())
+    assert [path.name for path in paths] == ["0000.png", "0001.png", "0002.png"]
+    assert np.asarray(Image.open(paths[2]))[0, 0, 0] == 120
+    before = [path.read_bytes() for path in paths]
+    with pytest.raises(ArgumentError, match="expected a folder without numbered pictures, got 0000"):
+        write_frames(tmp_path / "turn", frames(2))
+    assert [path.read_bytes() for path in sorted((tmp_path / "turn").iterdir())] == before
 
 
 @pytest.mark.parametrize("fps", [15, 24, 30, 40, 50])
@@ -79,11 +80,3 @@ def test_a_higher_rate_factor_makes_a_smaller_film(tmp_path):
     noise = np.random.default_rng(0).integers(0, 256, (2, 64, 64, 3), dtype=np.uint8)
     fine, coarse = (write_frames(tmp_path / f"{crf}.mp4", noise, crf=crf) for crf in (18, 35))
     assert coarse.stat().st_size < 0.5 * fine.stat().st_size
-
-
-def test_a_folder_with_pictures_of_another_film_stays_as_it_is(tmp_path):
-    write_frames(tmp_path / "turn", frames(4))
-    before = [path.read_bytes() for path in sorted((tmp_path / "turn").iterdir())]
-    with pytest.raises(ArgumentError, match="expected a folder without numbered pictures, got 0000"):
-        write_frames(tmp_path / "turn", frames(2))
-    assert [path.read_bytes() for path in sorted((tmp_path / "turn").iterdir())] == before

@@ -12,11 +12,6 @@ def test_what_is_no_name_of_a_file(name):
         file_name("where", name)
 
 
-def test_names_that_files_can_have():
-    for name in ("TF01.safetensors", "ein Teil", "体积", "a..b", "-x"):
-        assert file_name("where", name) == name
-
-
 @pytest.mark.parametrize(
     ("names", "file"),
     [(("run/balls", "red"), "run-balls-red.safetensors"), (("x", "../../y"), "x-..-..-y.safetensors")],
@@ -34,7 +29,9 @@ def test_what_cannot_be_shown_is_no_label(name):
     assert str(caught.value).isprintable()
 
 
-def test_labels_and_paths():
+def test_names_labels_and_paths_that_are_taken():
+    for name in ("TF01.safetensors", "ein Teil", "体积", "a..b", "-x"):
+        assert file_name("where", name) == name
     assert label("where", 42) == "42"
     assert named_file("where", Path("a"), "../b c.png") == Path("a/../b c.png")
     assert named_file("where", Path("a"), "b\u00a0c.png") == Path("a/b\u00a0c.png")

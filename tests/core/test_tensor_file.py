@@ -7,14 +7,8 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import load_file
 
-from tests.fields.surfels.samples import sample
-from tests.fields.voxels.test_voxels import ball
 from texgs.core.errors import ArgumentError
 from texgs.core.tensor_file import DTYPES, read_tensor_file, write_tensor_file, write_tensors
-from texgs.fields.surfels.variants import write_texture
-from texgs.fields.voxels.file import write_voxels
-from texgs.fields.voxels.model import Voxels
-from texgs.scene.segment_file import write_segment
 
 TENSORS = {"x": torch.arange(6.0).reshape(2, 3)}
 
@@ -43,17 +37,10 @@ def test_a_header_of_something_else(tmp_path, header, message):
 
 
 @pytest.mark.parametrize("metadata", [{"loss": math.nan}, {"camera": object()}])
-@pytest.mark.parametrize("write", ["texture", "segment", "voxels"])
-def test_metadata_that_is_no_json(tmp_path, write, metadata):
-    path = tmp_path / "file"
-    writers = {
-        "texture": lambda: write_texture(path, sample(), metadata),
-        "segment": lambda: write_segment(path, sample(), torch.arange(7) < 3, metadata),
-        "voxels": lambda: write_voxels(path, Voxels(ball().grid, metadata=metadata)),
-    }
+def test_metadata_that_is_no_json(tmp_path, metadata):
     with pytest.raises(ArgumentError, match="metadata cannot be written as JSON"):
-        writers[write]()
-    assert not path.exists()
+        write_tensor_file(tmp_path / "file", "texgs-test", {"metadata": metadata}, TENSORS)
+    assert not (tmp_path / "file").exists()
 
 
 def test_the_library_reads_what_was_written(tmp_path):

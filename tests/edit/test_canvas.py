@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from tests.edit.scenes import ball, views
-from texgs.edit.canvas import mean_alpha, paint, visible_part, visible_range
+from texgs.edit.canvas import mean_alpha, paint, visible_range
 from texgs.edit.recipe import Recipe
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
@@ -61,22 +61,21 @@ def test_the_share_of_chosen_surfels_and_of_the_others_make_up_alpha(scene):
     assert min(share.max() for share in shares) > 0.9
 
 
-def test_the_visible_part_holds_all_that_is_seen_in_multiples_of_eight():
-    alpha = torch.zeros(60, 90)
-    alpha[20:31, 50:52] = 0.5
-    rows, columns = visible_part(alpha)
-    assert (rows.start, rows.stop) == (16, 40)
-    assert (columns.start, columns.stop) == (46, 62)
-    assert alpha[rows, columns].sum() == alpha.sum()
-
-
 @pytest.mark.parametrize(
     ("size", "places", "expected"),
-    [(30, [0], (0, 8)), (30, [29], (25, 30)), (5, [2], (0, 5)), (30, [], (0, 8)), (5, [], (0, 5))],
+    [
+        (60, range(20, 31), (16, 40)),  # in multiples of eight
+        (90, [50, 51], (46, 62)),
+        (30, [0], (0, 8)),
+        (30, [29], (25, 30)),
+        (5, [2], (0, 5)),
+        (30, [], (0, 8)),
+        (5, [], (0, 5)),
+    ],
 )
-def test_an_extent_stays_within_the_image(size, places, expected):
+def test_an_extent_holds_all_that_is_seen_and_stays_within_the_image(size, places, expected):
     seen = torch.zeros(size, dtype=torch.bool)
-    seen[places] = True
+    seen[list(places)] = True
     span = visible_range(seen)
     assert (span.start, span.stop) == expected
 

@@ -11,10 +11,14 @@ from tests.edit.test_gaussians import ball as gaussians
 from tests.fields.voxels.test_voxels import ball as voxels
 from tests.fit.scenes import cameras
 from texgs.core.errors import ArgumentError, FitError, ShapeError
-from texgs.edit.dataset_update import PhotometricLoss, azimuth, field_views, update_field
+from texgs.edit.dataset_update import PhotometricLoss, azimuth, field_views, update_field, update_steps
 from texgs.edit.gaussians import GaussianLearner, radii
 from texgs.edit.methods.dge import DgeKeys
+from texgs.edit.methods.dge import schedule as dge
+from texgs.edit.methods.igs2gs import Igs2gsKeys
+from texgs.edit.methods.igs2gs import schedule as igs2gs
 from texgs.edit.methods.in2n import In2nKeys
+from texgs.edit.methods.in2n import schedule as in2n
 from texgs.edit.methods.updates import UpdateSchedule
 from texgs.edit.voxels import VoxelLearner, corner
 from texgs.fields.optimizer import Rate
@@ -31,9 +35,8 @@ PATCHES = PhotometricLoss(1.0, 0.0)
 def splats(**keys):
     model = gaussians(degree=1)
     images = images_of(model, count=5)
-    return GaussianLearner(
-        DgeKeys(rates=RATES, **{"prune": False, **keys}), model, images, PIXELS, 100
-    ), images
+    keys = DgeKeys(rates=RATES, **{"prune": False, **keys})
+    return GaussianLearner(keys, model, images, PIXELS, 100), images
 
 
 def grid(frozen=False):
@@ -44,7 +47,6 @@ def grid(frozen=False):
 
 
 LEARNERS = {"gaussians": splats, "voxels": grid}
-FROZEN = {"gaussians": lambda: splats(frozen=True), "voxels": lambda: grid(frozen=True)}
 
 
 def color_of(field):
@@ -80,53 +82,41 @@ def test_fields_take_on_the_colour_that_views_are_given(kind, schedule):
     assert (after.mean((0, 1)) - before.mean((0, 1))).norm() > 0.01
 
 
-@pytest.mark.parametrize("kind", FROZEN)
-def test_frozen_geometry_is_kept_bit_for_bit(kind):
-    learner, images = FROZEN[kind]()
+@pytest.mark.parametrize("kind", LEARNERS)
+@pytest.mark.parametrize("frozen", [True, False])
+def test_frozen_geometry_is_kept_bit_for_bit(kind, frozen):
+    learner, images = LEARNERS[kind](frozen=frozen)
+    before = learner.original
     field = update_field(learner, images, Tint(COLOR), "anything", UpdateSchedule(3, 5, views=2)).field
-    for name, x in learner.original.tensors("geometry").items():
-        assert torch.equal(x, field.tensors("geometry")[name]), name
-    assert not torch.equal(learner.original.tensors("appearance")["sh"], field.tensors("appearance")["sh"])
-    learner, images = LEARNERS[kind]()
-    field = update_field(learner, images, Tint(COLOR), "anything", UpdateSchedule(3, 5, views=2)).field
-    assert any(
-        not torch.equal(x, field.tensors("geometry")[n])
-        for n, x in learner.original.tensors("geometry").items()
-    )
+    kept = [torch.equal(x, field.tensors("geometry")[name]) for name, x in before.tensors("geometry").items()]
+    assert all(kept) == frozen
+    assert not torch.equal(before.tensors("appearance")["sh"], field.tensors("appearance")["sh"])
 
 
-def test_edits_stay_close_to_training_views_or_to_the_field_as_it_was():
-    for keeps, expected in ((False, 0.2), (True, None)):
-        learner, images = splats()
-        images.planes[:, :3] = round(0.2 * 255)
-        guidance = Tint(COLOR)
-        schedule = UpdateSchedule(3, 4, views=5, group=5)
-        update_field(learner, images, guidance, "anything", schedule, keeps_renders=keeps)
-        first, *_, last = guidance.seen
-        assert torch.equal(first.conditions, last.conditions), "of all edits, whatever the field is by then"
-        assert not torch.equal(first.images, last.images)
-        if expected is None:
-            torch.testing.assert_close(first.conditions, first.images, atol=1e-6, rtol=0)
-        else:
-            torch.testing.assert_close(first.conditions, torch.full_like(first.conditions, 0.2))
+@pytest.mark.parametrize("keeps", [True, False])
+def test_edits_stay_close_to_training_views_or_to_the_field_as_it_was(keeps):
+    learner, images = splats()
+    images.planes[:, :3] = round(0.2 * 255)
+    guidance = Tint(COLOR)
+    schedule = UpdateSchedule(3, 4, views=5, group=5)
+    update_field(learner, images, guidance, "anything", schedule, keeps_renders=keeps)
+    first, *_, last = guidance.seen
+    assert torch.equal(first.conditions, last.conditions), "of all edits, whatever the field is by then"
+    assert not torch.equal(first.images, last.images)
+    expected = first.images if keeps else torch.full_like(first.conditions, 0.2)
+    torch.testing.assert_close(first.conditions, expected, atol=1e-6, rtol=0)
 
 
-def test_the_guidance_is_told_how_much_noise_to_use():
+def test_the_guidance_is_told_how_much_noise_to_use_and_gets_views_around_the_object():
     learner, images = splats()
     guidance = Tint(COLOR)
-    schedule = UpdateSchedule(2, 2, views=1, levels=((0.9, 0.9), (0.3, 0.3)))
+    schedule = UpdateSchedule(2, 2, group=5, levels=((0.9, 0.9), (0.3, 0.3)))
     update_field(learner, images, guidance, "anything", schedule)
     assert [views.level for views in guidance.seen] == [0.9, 0.3]
-
-
-def test_views_that_are_edited_together_go_around_the_object():
-    learner, images = splats()
-    guidance = Tint(COLOR)
-    update_field(learner, images, guidance, "anything", UpdateSchedule(1, 1, group=5))
-    (views,) = guidance.seen
-    angles = [azimuth(camera) for camera in views.cameras]
-    assert angles == sorted(angles)
-    assert len(angles) == 5
+    for views in guidance.seen:
+        angles = [azimuth(camera) for camera in views.cameras]
+        assert angles == sorted(angles)
+        assert len(angles) == 5
 
 
 def test_views_of_a_field_say_where_its_pixels_are():
@@ -159,14 +149,13 @@ def test_the_first_step_of_gaussians_goes_against_the_gradient_of_the_loss_writt
 
 
 def test_gaussians_that_are_faint_or_large_are_removed():
-    learner, images = splats(prune=True)
+    learner, images = splats()
     model = learner.original
     parameters = {name: x.clone() for name, x in model.parameters.items()}
     parameters["opacities"][:10] = -9.0
     parameters["scales"][10:30, 0] = 0.5
-    learner = GaussianLearner(
-        DgeKeys(rates=RATES), replace(model, parameters=parameters), images, PIXELS, 200
-    )
+    spoilt = replace(model, parameters=parameters)
+    learner = GaussianLearner(DgeKeys(rates=RATES), spoilt, images, PIXELS, 200)
     learner.optimizer._rates = {name: Rate(0.0, 1.0) for name in learner.optimizer._rates}
     for _ in range(100):
         learner.step(images, [0], torch.Generator())
@@ -193,12 +182,8 @@ def test_patches_lie_inside_of_the_image_and_around_what_is_visible():
 
 
 def test_a_loss_and_its_gradient_are_those_of_its_terms():
-    image, wanted = (
-        torch.rand(2, 20, 24, 3, generator=torch.Generator().manual_seed(1))
-        .permute(0, 3, 1, 2)
-        .contiguous()
-        .permute(0, 2, 3, 1)
-    )
+    generator = torch.Generator().manual_seed(1)
+    image, wanted = torch.rand(2, 3, 20, 24, generator=generator).permute(0, 2, 3, 1)
     loss, gradient = PhotometricLoss(3.0, 1.0).with_gradient(image, wanted)
     leaf = image.clone().requires_grad_()
     expected = 3 * (leaf - wanted).abs().mean() + 1 - ssim(leaf, wanted)
@@ -219,3 +204,64 @@ def test_what_a_guidance_returns_is_checked_and_a_loss_has_to_be_finite():
     learner.step = lambda *_: float("nan")
     with pytest.raises(FitError, match="iteration 0: expected a finite loss, got nan; lower the rates"):
         update_field(learner, images, Tint(COLOR), "anything", UpdateSchedule(1, 5))
+
+
+def made(schedule, count, seed=0):
+    return list(update_steps(schedule, count, torch.Generator().manual_seed(seed)))
+
+
+def test_in2n_edits_the_next_view_every_ten_iterations_and_learns_from_all():
+    steps = made(in2n(In2nKeys(passes=2), 7), 7)
+    assert len(steps) == 2 * 7 * 10
+    for iteration, step in enumerate(steps):
+        assert step.edited == ([iteration // 10 % 7] if iteration % 10 == 0 else [])
+        assert list(step.learned) == list(range(7))
+    levels = [step.level for step in steps if step.edited]
+    assert 0.02 <= min(levels) < max(levels) <= 0.98
+
+
+def test_igs2gs_edits_all_views_in_turn_and_learns_from_each_at_once():
+    steps = made(igs2gs(Igs2gsKeys(every=2500), 162), 162)
+    assert len(steps) == 7500
+    assert sum(len(step.edited) for step in steps) == 3 * 162
+    for iteration, step in enumerate(steps):
+        place = iteration % 2500
+        assert step.edited == ([place] if place < 162 else [])
+        assert list(step.learned) == ([place] if place < 162 else list(range(162)))
+    levels = [step.level for step in steps if step.edited]
+    assert 0.7 <= min(levels) < max(levels) <= 0.98
+
+
+def test_dge_edits_twenty_views_together_with_falling_noise_and_learns_from_nothing_else():
+    steps = made(dge(DgeKeys(rounds=5), 92), 92)
+    assert len(steps) == 2500
+    rounds = [step for step in steps if step.edited]
+    assert [step.level for step in rounds] == [0.998, 0.3, 0.3, 0.021, 0.021]
+    for index, step in enumerate(rounds):
+        assert len(set(step.edited)) == 20
+        assert list(step.edited) == sorted(step.edited)
+        for each in steps[500 * index : 500 * (index + 1)]:
+            assert list(each.learned) == list(step.edited)
+    assert list(rounds[0].edited) != list(rounds[1].edited)
+
+
+def test_few_views_are_all_of_a_round():
+    (first, *_) = made(UpdateSchedule(1, 3, views=20, group=20, order="random", learned="round"), 4)
+    assert list(first.edited) == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("run", "message"),
+    [
+        (
+            lambda: next(update_steps(UpdateSchedule(3, 100), 162, torch.Generator())),
+            "expected rounds of at least 162 iterations, in which 162 views are edited, got 100",
+        ),
+        (lambda: in2n(In2nKeys(noise=[0.9, 0.1]), 3), "edit.in2n.noise: expected two shares from 0 to 1"),
+        (lambda: igs2gs(Igs2gsKeys(noise=[0.9]), 3), "edit.igs2gs.noise: expected two shares from 0 to 1"),
+        (lambda: dge(DgeKeys(noise=[2.0]), 3), "edit.dge.noise: expected shares from 0 to 1, at least one"),
+    ],
+)
+def test_noise_out_of_range_names_the_key(run, message):
+    with pytest.raises(ArgumentError, match=message):
+        run()

@@ -12,7 +12,6 @@ from texgs.edit.sliced_wasserstein import (
     patches,
     to_quantiles,
 )
-from texgs.models.nnfm import drawn
 
 
 def noise(seed, *shape):
@@ -134,17 +133,6 @@ def test_only_features_that_count_are_compared():
     nothing = masked.distance(image, torch.zeros_like(region))
     nothing.backward()
     assert float(nothing.detach()) == float(image.grad.abs().max()) == 0
-
-
-def test_a_draw_has_no_feature_twice_and_follows_its_seed():
-    features = torch.arange(60.0).view(1, 6, 10).expand(2, 6, 10)
-    one, same, other = (
-        drawn(features, None, 50, torch.Generator().manual_seed(seed))[:, 0] for seed in (0, 0, 1)
-    )
-    assert len(one.unique()) == 50
-    assert torch.equal(one, same)
-    assert not torch.equal(one, other)
-    assert float(drawn(features, None, 60, torch.Generator())[:, 1].sum()) == 59 * 60 / 2
 
 
 @pytest.mark.parametrize(

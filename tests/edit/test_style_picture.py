@@ -4,6 +4,7 @@ import torch
 from PIL import Image
 
 from texgs.core.errors import ArgumentError, OutOfMemoryError, ShapeError
+from texgs.edit.pictures import PICTURES, picture
 from texgs.edit.style_picture import StylePicture, filled, mirrored_crop, read_style
 
 
@@ -140,3 +141,23 @@ def test_a_part_is_sought_in_the_whole_picture(tmp_path):
 
     assert read_style(tmp_path / "x.png", find).image.shape == (3, 64, 48)
     assert seen == [(64, 96, 3)]
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_a_picture_is_colours_with_contrast_at_any_size(name):
+    image, small = picture(name), picture(name, 96)
+    assert image.shape == (3, 512, 512)
+    assert small.shape == (3, 96, 96)
+    assert 0 <= image.min() <= image.max() <= 1
+    assert small.std(dim=(1, 2)).min() > 0.05
+    assert (small.mean(dim=(1, 2)) - image.mean(dim=(1, 2))).abs().max() < 0.01
+
+
+def test_pictures_differ():
+    means = torch.stack([picture(name).mean(dim=(1, 2)) for name in PICTURES])
+    assert torch.pdist(means).min() > 0.03
+
+
+def test_a_name_that_is_unknown_is_answered_with_those_known():
+    with pytest.raises(ArgumentError, match=r"expected one of strokes, glass, .*, got 'sketch'"):
+        picture("sketch")

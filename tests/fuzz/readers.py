@@ -44,6 +44,7 @@ from texgs.volume.tf_files import read_tf
 from texgs.volume.view_set import View, read_views, write_transforms
 
 STUDY = study("xyz", "zyx")
+PICTURES = ("png", "jpg", "gif", "webp")
 Pack = Callable[[bytes], bytes]
 
 
@@ -108,10 +109,9 @@ def read_function(path: Path) -> None:
 def views(folder: Path) -> Path:
     pictures = []
     for index in range(2):
-        Image.fromarray(np.full((16, 20, 4), 40 * index, np.uint8)).save(folder / f"r_{index}.png")
-        pictures.append(
-            View(orbit(40 * index, 10, 4, 30, 20, 16), folder / f"r_{index}.png", Light("headlight"))
-        )
+        path = folder / f"r_{index}.png"
+        Image.fromarray(np.full((16, 20, 4), 40 * index, np.uint8)).save(path)
+        pictures.append(View(orbit(40 * index, 10, 4, 30, 20, 16), path, Light("headlight")))
     write_transforms(folder, "train", pictures, {"volume": "v", "tf": "TF01"})
     return folder
 
@@ -119,10 +119,6 @@ def views(folder: Path) -> Path:
 def read_view_set(folder: Path) -> None:
     for view in read_views(folder).train:
         view.load()
-
-
-def model(folder: Path) -> Path:
-    return write_model(folder / "model.safetensors", sample())
 
 
 def compact(folder: Path) -> Path:
@@ -150,7 +146,7 @@ def ply(flavour: str, text: bool, folder: Path) -> Path:
 
 
 def scene(folder: Path) -> Path:
-    file = model(folder)
+    file = write_model(folder / "model.safetensors", sample())
     mask = write_segment(folder / "s.safetensors", sample(), torch.arange(7) < 3)
     texture = write_texture(folder / "t.safetensors", sample())
     entry = SceneModel(file, texture=texture, segments={"part": SceneSegment(mask)})
@@ -212,20 +208,8 @@ def ballot(folder: Path) -> Path:
     return folder / "ballot.csv"
 
 
-def read_segment_file(path: Path) -> None:
-    read_segment(path, sample())
-
-
-def read_texture_file(path: Path) -> None:
-    with_texture(sample(), path)
-
-
 READERS: dict[str, Reader] = {
-    **{
-        name: Reader(partial(volume, name), read_volume)
-        for name in WRITERS
-        if not name.endswith((".vti", ".vtk"))
-    },
+    **{name: Reader(partial(volume, name), read_volume) for name in WRITERS},
     "plain.mhd samples": Reader(partial(volume, "compressed.mhd"), read_volume, "compressed.zraw"),
     "nii.gz inside": Reader(
         partial(volume, "packed.nii.gz"), read_volume, None, gzip.decompress, gzip.compress
@@ -237,7 +221,7 @@ READERS: dict[str, Reader] = {
     "tf ParaView": Reader(tf_paraview, read_function),
     "views json": Reader(views, read_view_set, "transforms_train.json"),
     "views png": Reader(views, read_view_set, "r_1.png"),
-    "model": Reader(model, read_model),
+    "model": Reader(lambda folder: write_model(folder / "model.safetensors", sample()), read_model),
     "compact": Reader(compact, open_model),
     "compact inside": Reader(compact, open_model, None, unpacked_compact, packed_compact),
     "gaussians": Reader(lambda folder: write_gaussians(folder / "g", gaussians()), read_gaussians),
@@ -245,9 +229,12 @@ READERS: dict[str, Reader] = {
         lambda folder: write_gaussian_ply(folder / "g.ply", gaussians()), read_gaussian_ply
     ),
     "palette": Reader(lambda folder: write_palette(folder / "p", box()), read_palette),
-    "texture": Reader(lambda folder: write_texture(folder / "t", sample()), read_texture_file),
+    "texture": Reader(
+        lambda folder: write_texture(folder / "t", sample()), lambda path: with_texture(sample(), path)
+    ),
     "segment": Reader(
-        lambda folder: write_segment(folder / "s", sample(), torch.arange(7) < 3), read_segment_file
+        lambda folder: write_segment(folder / "s", sample(), torch.arange(7) < 3),
+        lambda path: read_segment(path, sample()),
     ),
     "scene": Reader(scene, read_whole_scene),
     "2dgs.ply": Reader(partial(ply, "2dgs", False), read_ply),
@@ -257,17 +244,10 @@ READERS: dict[str, Reader] = {
     "release palette": Reader(release, read_ply, "palette_colors_chkpnt.pth"),
     "weights": Reader(partial(weights, False), read_tensors),
     "weights old": Reader(partial(weights, True), read_tensors),
-    "style.png": Reader(partial(picture, "s.png"), read_style),
-    "style.jpg": Reader(partial(picture, "s.jpg"), read_style),
-    "style.gif": Reader(partial(picture, "s.gif"), read_style),
-    "style.webp": Reader(partial(picture, "s.webp"), read_style),
+    **{f"style.{kind}": Reader(partial(picture, f"s.{kind}"), read_style) for kind in PICTURES},
     "style.tif": Reader(partial(picture, "s.tif", compression="tiff_lzw"), read_style),
     "checkpoint": Reader(checkpoint, latest, "checkpoint.safetensors"),
     "json": Reader(metrics, read_json),
     "ballot": Reader(ballot, lambda path: read_ballot(STUDY, path)),
     "study key": Reader(lambda folder: write_key(folder / "key.json", STUDY), read_key),
-    "packed.vti": Reader(partial(volume, "packed.vti"), read_volume),
-    "plain.vti": Reader(partial(volume, "plain.vti"), read_volume),
-    "text.vtk": Reader(partial(volume, "text.vtk"), read_volume),
-    "binary.vtk": Reader(partial(volume, "binary.vtk"), read_volume),
 }

@@ -27,6 +27,8 @@ def test_without_an_amount_it_is_the_other_guidance():
     edited = Disagreeing(filters, 0.0)(views, "a stipple drawing", generator())
     torch.testing.assert_close(edited, filters(views, "a stipple drawing", generator()))
     assert Disagreeing(filters, 0.0).lit == filters.lit
+    with pytest.raises(ArgumentError, match="disagreement: expected 0 or more, got -1"):
+        Disagreeing(filters, -1)
 
 
 def test_colours_are_off_by_a_factor_for_each_view_and_channel_and_white_stays():
@@ -60,8 +62,3 @@ def test_the_same_generator_gives_the_same_images_and_each_call_others():
     assert torch.equal(first, guidance(views, "pencil hatching", generator()))
     assert not torch.equal(first, second)
     assert 0 <= first.min() <= first.max() <= 1
-
-
-def test_an_amount_below_0_is_refused():
-    with pytest.raises(ArgumentError, match="disagreement: expected 0 or more, got -1"):
-        Disagreeing(Tint(GREY), -1)

@@ -1,6 +1,7 @@
 """Mask models on pictures whose objects are known, and weights in the formats that they come in."""
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 import torch
@@ -186,17 +187,15 @@ def test_what_holds_no_sam(tmp_path):
     (tmp_path / "clip").mkdir()
     (tmp_path / "clip" / "config.json").write_text('{"model_type": "clip"}')
     torch.save({"weight": torch.zeros(2)}, tmp_path / "other.pt")
-    for load, message in (
-        (lambda: sam_folder(tmp_path), r"config\.json: no such file"),
-        (lambda: sam_folder(tmp_path / "clip"), "expected a model of type sam, got clip"),
-        (lambda: published_sam("mobile_sam", tmp_path / "none.pt"), r"none\.pt: no such file"),
-        (
-            lambda: published_sam("mobile_sam", tmp_path / "other.pt"),
-            "expected the weights of MobileSAM, got",
-        ),
+    mobile_sam = partial(published_sam, "mobile_sam")
+    for load, path, message in (
+        (sam_folder, tmp_path, r"config\.json: no such file"),
+        (sam_folder, tmp_path / "clip", "expected a model of type sam, got clip"),
+        (mobile_sam, tmp_path / "none.pt", r"none\.pt: no such file"),
+        (mobile_sam, tmp_path / "other.pt", r"other\.pt: expected the weights of MobileSAM, got others"),
     ):
         with pytest.raises(ArgumentError, match=message):
-            load()
+            load(path)
 
 
 def test_the_largest_sam_has_as_many_weights_as_its_file():

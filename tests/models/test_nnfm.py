@@ -68,7 +68,7 @@ def test_only_the_region_counts_and_no_more_positions_than_asked_for():
     assert float(nnfm(style, library, region)) < 1e-6
     assert float(nnfm(style, library, ~region)) > 0.1
     few = StyleFeatures.of(style, positions=20, seed=1)
-    assert len(few.unit) == 20
+    assert len(few.unit) == len(few.unit.unique(dim=0)) == 20, "none twice"
     assert torch.equal(few.unit, StyleFeatures.of(style, positions=20, seed=1).unit)
     assert not torch.equal(few.unit, StyleFeatures.of(style, positions=20, seed=2).unit)
 

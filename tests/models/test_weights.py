@@ -42,7 +42,7 @@ def test_a_file_is_found_where_it_may_lie_under_either_name(folder, place, name)
     path = put(folder / place / name)
     assert locate("tiny") == path
     assert available("tiny")
-    first = put(folder / "weights" / "tiny.bin")
+    first = put(folder / "weights" / name)
     assert locate("tiny") == first, "of several files"
 
 
