@@ -12,11 +12,20 @@ def pixels(height, width, channels=3, seed=0):
     return np.random.default_rng(seed).integers(0, 256, (height, width, channels), dtype=np.uint8)
 
 
+@pytest.fixture
+def read(tmp_path):
+    """Write pixels to a file and read it as a style."""
+
+    def write_and_read(values, find=None, name="x.png", **options):
+        Image.fromarray(values).save(tmp_path / name, **options)
+        return read_style(tmp_path / name, find)
+
+    return write_and_read
+
+
 @pytest.mark.parametrize("ending", ["png", "jpg", "tif", "webp"])
-def test_a_picture_keeps_its_size_and_aspect(tmp_path, ending):
-    values = np.full((60, 90, 3), (200, 100, 50), np.uint8)
-    Image.fromarray(values).save(tmp_path / f"x.{ending}")
-    style = read_style(tmp_path / f"x.{ending}")
+def test_a_picture_keeps_its_size_and_aspect(read, ending):
+    style = read(np.full((60, 90, 3), (200, 100, 50), np.uint8), name=f"x.{ending}")
     assert style.image.shape == (3, 60, 90)
     assert style.region.all()
     torch.testing.assert_close(style.mean, torch.tensor([200, 100, 50]) / 255, atol=0.02, rtol=0)
@@ -36,32 +45,27 @@ def test_any_kind_of_pixels_becomes_red_green_and_blue(tmp_path, mode):
     assert 0 <= style.image.min() < 0.2 < 0.8 < style.image.max() <= 1
 
 
-def test_what_is_transparent_does_not_count(tmp_path):
+def test_what_is_transparent_does_not_count(read):
     values = pixels(64, 64, 4)
     values[..., 3] = 0
     values[10:50, 20:60] = (10, 200, 30, 255)
-    Image.fromarray(values).save(tmp_path / "x.png")
-    style = read_style(tmp_path / "x.png")
-    assert style.image.shape == (3, 40, 40)
-    torch.testing.assert_close(
-        style.image, (torch.tensor([10, 200, 30]) / 255)[:, None, None].expand(3, 40, 40)
-    )
+    expected = (torch.tensor([10, 200, 30]) / 255)[:, None, None].expand(3, 40, 40)
+    torch.testing.assert_close(read(values).image, expected)
 
 
-def test_a_region_is_cut_out_and_what_is_around_it_filled(tmp_path):
+def test_a_region_is_cut_out_and_what_is_around_it_filled(read):
     values = np.full((80, 80, 3), 255, np.uint8)
     y, x = np.mgrid[:80, :80]
     disc = (x - 40) ** 2 + (y - 40) ** 2 < 24**2
     values[disc] = (0, 0, 128)
-    Image.fromarray(values).save(tmp_path / "x.png")
-    style = read_style(tmp_path / "x.png", lambda _: torch.from_numpy(disc))
+    style = read(values, lambda _: torch.from_numpy(disc))
     assert style.image.shape == (3, 47, 47)
     assert not style.region.all()
     assert style.image.max() <= 128 / 255 + 1e-6, "white around it has gone"
     with pytest.raises(ShapeError, match=r"region: expected \[80, 80\]"):
-        read_style(tmp_path / "x.png", lambda _: torch.from_numpy(disc[:70]))
+        read(values, lambda _: torch.from_numpy(disc[:70]))
     with pytest.raises(ArgumentError, match=r"x\.png: region: expected a part of the style"):
-        read_style(tmp_path / "x.png", lambda _: torch.zeros(80, 80, dtype=torch.bool))
+        read(values, lambda _: torch.zeros(80, 80, dtype=torch.bool))
 
 
 def test_filling_takes_the_nearest_colour():
@@ -115,31 +119,29 @@ def test_a_vivid_style_has_its_greys_and_twice_its_differences_from_them():
     torch.testing.assert_close(vivid[:, 0, 30], torch.tensor([0.0, 0.2, 1.0]))
 
 
-def test_a_photograph_is_turned_upright(tmp_path):
+def test_a_photograph_is_turned_upright(read):
     values = np.zeros((40, 60, 3), np.uint8)
     values[:, :30] = (255, 0, 0)  # left as stored; the camera was held upright
-    picture = Image.fromarray(values)
-    picture.getexif()[0x0112] = 6  # stored turned by 90 degrees to the left
-    picture.save(tmp_path / "x.jpg", exif=picture.getexif(), quality=95)
-    style = read_style(tmp_path / "x.jpg")
+    exif = Image.Exif()
+    exif[0x0112] = 6  # stored turned by 90 degrees to the left
+    style = read(values, name="x.jpg", exif=exif, quality=95)
     assert style.image.shape == (3, 60, 40)
     assert style.image[0, :28].min() > 0.9
     assert style.image[0, 32:].max() < 0.1
 
 
-def test_a_part_is_sought_in_the_whole_picture(tmp_path):
+def test_a_part_is_sought_in_the_whole_picture(read):
     """Not in the box around what is visible: clicks are shares of the file."""
     values = pixels(64, 96, 4)
     values[..., 3] = 255
     values[:, :48, 3] = 0
-    Image.fromarray(values).save(tmp_path / "x.png")
     seen = []
 
     def find(image):
         seen.append(image.shape)
         return torch.ones(image.shape[:2], dtype=torch.bool)
 
-    assert read_style(tmp_path / "x.png", find).image.shape == (3, 64, 48)
+    assert read(values, find).image.shape == (3, 64, 48)
     assert seen == [(64, 96, 3)]
 
 
@@ -153,11 +155,8 @@ def test_a_picture_is_colours_with_contrast_at_any_size(name):
     assert (small.mean(dim=(1, 2)) - image.mean(dim=(1, 2))).abs().max() < 0.01
 
 
-def test_pictures_differ():
+def test_pictures_differ_and_a_name_that_is_unknown_is_answered_with_those_known():
     means = torch.stack([picture(name).mean(dim=(1, 2)) for name in PICTURES])
     assert torch.pdist(means).min() > 0.03
-
-
-def test_a_name_that_is_unknown_is_answered_with_those_known():
     with pytest.raises(ArgumentError, match=r"expected one of strokes, glass, .*, got 'sketch'"):
         picture("sketch")

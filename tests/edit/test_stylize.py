@@ -31,6 +31,11 @@ def short(name="default", **changes):
     return preset(name, **{"iterations": 6, **changes})
 
 
+def styled(style, recipe, model=None, **options):
+    """What came of stylising a model, or the ball, in six views."""
+    return stylize(model or ball(), *views(), style, recipe, **options)
+
+
 def base_color(model):
     """c_ind of every texel: palette + offset + texel."""
     p = model.parameters
@@ -45,10 +50,8 @@ def test_only_texels_and_offsets_change_and_base_colours_are_colours(name, vgg, 
     model = ball()
     before = {key: x.clone() for key, x in model.parameters.items()}
     iterations = 0 if name == "preview" else 4
-    done = stylize(model, *views(), style, preset(name, iterations=iterations), vgg=vgg)
-    assert all(torch.equal(before[key], x) for key, x in model.parameters.items()), (
-        "the model given is left alone"
-    )
+    done = styled(style, preset(name, iterations=iterations), model, vgg=vgg)
+    assert all(torch.equal(before[key], x) for key, x in model.parameters.items()), "the model given"
     for key, x in done.model.parameters.items():
         assert torch.equal(x, before[key]) == (key not in CHANGED), key
     assert {*GEOMETRY, *MATERIAL, "sizes", "offsets", "palette"} <= before.keys()
@@ -64,11 +67,10 @@ def test_a_plain_style_becomes_the_colour_of_the_surface():
     style = plain_style(color.tolist())
     model = ball()
     plain = {**model.parameters, "palette": color, "colors": torch.zeros_like(model.parameters["colors"])}
-    cameras, lights = views()
-    done = stylize(model, cameras, lights, style, preset("preview"))
+    done = styled(style, preset("preview"), model)
     for look in ("shaded", "unshaded"):
         image, expected = (
-            Composition([x]).render(cameras[0], look=look).color for x in (done.model, Surfels(plain))
+            Composition([x]).render(views()[0][0], look=look).color for x in (done.model, Surfels(plain))
         )
         torch.testing.assert_close(image, expected, atol=1e-5, rtol=0)
 
@@ -86,13 +88,10 @@ def test_iterations_lower_the_loss_on_views_not_trained_on(vgg, style):
 
 
 def test_without_weights_patches_alone_bring_the_colours_of_the_style(style):
-    cameras, lights = views()
-    done = stylize(
-        ball(), cameras, lights, style, short("patches", iterations=60, start="random", is_lit=False)
-    )
-    image = render_unlit(done.model, cameras[1])
-    assert (image - style.mean).abs().max() < 0.06
-    assert (render_unlit(ball(), cameras[1]) - style.mean).abs().max() > 0.2
+    done = styled(style, short("patches", iterations=60, start="random", is_lit=False))
+    after, before = (render_unlit(model, views()[0][1]) for model in (done.model, ball()))
+    assert (after - style.mean).abs().max() < 0.06
+    assert (before - style.mean).abs().max() > 0.2
 
 
 def render_unlit(model, camera):
@@ -102,10 +101,7 @@ def render_unlit(model, camera):
 
 
 def test_an_edit_is_the_same_with_the_same_seed_and_another_with_another(vgg, style):
-    runs = [
-        stylize(ball(), *views(), style, short(seed=seed), vgg=vgg).model.parameters["texels"]
-        for seed in (1, 1, 2)
-    ]
+    runs = [styled(style, short(seed=seed), vgg=vgg).model.parameters["texels"] for seed in (1, 1, 2)]
     assert torch.equal(runs[0], runs[1])
     assert not torch.equal(runs[0], runs[2])
 
@@ -113,7 +109,7 @@ def test_an_edit_is_the_same_with_the_same_seed_and_another_with_another(vgg, st
 def test_surfels_that_are_not_chosen_stay_as_they_are(vgg, style):
     model = ball()
     chosen = model.parameters["means"][:, 0] > 0
-    done = stylize(model, *views(), style, short(), vgg=vgg, surfels=chosen).model.parameters
+    done = styled(style, short(), model, vgg=vgg, surfels=chosen).model.parameters
     before = model.parameters
     places, surfel = owners(before)
     kept = places[~chosen[surfel]]
@@ -124,23 +120,21 @@ def test_surfels_that_are_not_chosen_stay_as_they_are(vgg, style):
 
 
 def test_the_palette_of_a_styled_model_can_still_be_changed(style):
-    cameras, lights = views()
-    model = stylize(ball(), cameras, lights, style, preset("preview")).model
-    palette = model.parameters["palette"]
-    moved = PartEdit(palette=tuple((palette + torch.tensor([0.1, 0.0, 0.2])).tolist()))
+    model, camera = styled(style, preset("preview")).model, views()[0][0]
+    palette, moved = model.parameters["palette"], torch.tensor([0.1, 0.0, 0.2])
     scene = Composition([model])
-    plain = scene.render(cameras[0], look="unshaded")
-    edited = scene.render(cameras[0], edits=[moved], look="unshaded")
-    expected = plain.color + plain.alpha[..., None] * torch.tensor([0.1, 0.0, 0.2])
-    torch.testing.assert_close(edited.color, expected, atol=1e-5, rtol=0)
+    plain = scene.render(camera, look="unshaded")
+    edit = PartEdit(palette=tuple((palette + moved).tolist()))
+    edited = scene.render(camera, edits=[edit], look="unshaded")
+    torch.testing.assert_close(edited.color, plain.color + plain.alpha[..., None] * moved, atol=1e-5, rtol=0)
     darker = PartEdit(palette=tuple((palette - 0.1).clamp_min(0).tolist()))
-    lit, dark = (scene.render(cameras[0], edits=[edit]).color.mean() for edit in (PartEdit(), darker))
+    lit, dark = (scene.render(camera, edits=[edit]).color.mean() for edit in (PartEdit(), darker))
     assert dark < lit - 0.01, "with light, too, and where colours become smaller"
 
 
 def test_without_texture_each_surfel_has_one_colour_that_learns(style):
-    start = stylize(ball(), *views(), style, short("preview", is_textured=False, iterations=0)).model
-    done = stylize(ball(), *views(), style, short("patches", is_textured=False)).model
+    start = styled(style, short("preview", is_textured=False, iterations=0)).model
+    done = styled(style, short("patches", is_textured=False)).model
     for model in (start, done):
         assert model.parameters["texels"].abs().max() < 1e-6, "the colour is that of the surfel"
     assert (done.parameters["colors"] - start.parameters["colors"]).abs().max() > 0.01
@@ -154,13 +148,12 @@ def test_a_clip_term_is_any_loss_of_an_image(vgg, style):
         seen.append(image.shape)
         return (image - torch.tensor([1.0, 0.0, 0.0])).square().mean()
 
-    cameras, lights = views()
     recipe = short(iterations=30, lambda_s=0.0, patches=0.0, start="mean", rate=0.1)
-    done = stylize(ball(), cameras, lights, style, recipe, clip=redness)
+    done = styled(style, recipe, clip=redness)
     assert all(len(shape) == 3 and shape[2] == 3 for shape in seen)
-    red, green, blue = render_unlit(done.model, cameras[0])
+    red, green, blue = render_unlit(done.model, views()[0][0])
     assert red > 0.7 > 0.3 > max(green, blue)
-    both = stylize(ball(), cameras, lights, style, short(lambda_s=0.9), vgg=vgg, clip=redness)
+    both = styled(style, short(lambda_s=0.9), vgg=vgg, clip=redness)
     assert both.losses.keys() == {"nnfm", "distribution", "clip", "patches"}
 
 
@@ -171,18 +164,14 @@ def test_the_paper_looks_at_the_whole_view_over_white(vgg, style):
         seen.append(image.detach())
         return image.mean()
 
-    cameras, lights = views()
-    stylize(ball(), cameras, lights, style, preset("paper", iterations=2), vgg=vgg, clip=look)
+    styled(style, preset("paper", iterations=2), vgg=vgg, clip=look)
     assert {tuple(image.shape) for image in seen} == {(64, 64, 3)}
     assert all(torch.equal(image[0, 0], torch.ones(3)) for image in seen)
 
 
 def test_starts(style):
-    model, (cameras, lights) = ball(), views()
-    colors = {
-        name: base_color(stylize(model, cameras, lights, style, preset("preview", start=name)).model)
-        for name in ("projected", "mean", "random", "transfer")
-    }
+    names = ("projected", "mean", "random", "transfer")
+    colors = {name: base_color(styled(style, preset("preview", start=name)).model) for name in names}
     style = style.scaled(64)  # as it is laid onto views of that size
     pixels = style.pixels
     assert torch.allclose(colors["mean"], style.mean, atol=1e-5)
@@ -214,7 +203,7 @@ def test_views_that_do_not_show_the_model_change_nothing(vgg, style):
     cameras, lights = views()
     away = [replace(camera, viewmat=torch.diag(torch.tensor([-1.0, 1, -1, 1])) @ camera.viewmat)
             for camera in cameras]  # fmt: skip
-    start = stylize(ball(), cameras, lights, style, preset("preview")).model
+    start = styled(style, preset("preview")).model
     done = stylize(ball(), away, lights, style, short(), vgg=vgg)
     assert torch.equal(done.model.parameters["texels"], start.parameters["texels"])
     assert ball().render(away[0]).alpha.max() == 0
@@ -234,23 +223,16 @@ def test_mistakes_are_named_before_any_work(vgg, style):
         ({"surfels": torch.ones(3, dtype=torch.bool)}, ShapeError, r"surfels: expected \[400\]"),
         ({"surfels": torch.zeros(400, dtype=torch.bool)}, ArgumentError, "surfels: expected at least one"),
     ]
-    given = {
-        "model": ball(),
-        "cameras": cameras,
-        "lights": lights,
-        "style": style,
-        "recipe": short(),
-        "vgg": vgg,
-    }
+    given = {"model": ball(), "cameras": cameras, "lights": lights, "style": style, "recipe": short()}
     for changes, error, message in cases:
         with pytest.raises(error, match=message):
-            stylize(**{**given, **changes})
+            stylize(**{**given, "vgg": vgg, **changes})
 
 
 def test_a_loss_that_is_not_finite_stops_the_edit(style):
     recipe = short(lambda_s=0.0, patches=0.0)
     with pytest.raises(FitError, match="style: the loss is not finite in iteration 1"):
-        stylize(ball(), *views(), style, recipe, clip=lambda image: image.mean() / 0)
+        styled(style, recipe, clip=lambda image: image.mean() / 0)
 
 
 @pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
@@ -258,10 +240,10 @@ def test_half_precision_learns_what_single_precision_does(tmp_path, style, dtype
     """Texels after a few steps: a gradient that underflowed would leave them where they were."""
     torch.save(random_weights(last=14), tmp_path / "vgg.pth")
     recipe = short(iterations=2, patches=0.0)
-    start = stylize(ball(), *views(), style, preset("preview")).model.parameters["texels"]
+    start = styled(style, preset("preview")).model.parameters["texels"]
     moves = []
     for kind in (torch.float32, dtype):
         vgg = Vgg.load(tmp_path / "vgg.pth", dtype=kind)
-        moves.append(stylize(ball(), *views(), style, recipe, vgg=vgg).model.parameters["texels"] - start)
+        moves.append(styled(style, recipe, vgg=vgg).model.parameters["texels"] - start)
     # Adam turns noise of gradients near 0 into whole steps: not all of them agree.
     assert torch.cosine_similarity(moves[0].flatten(), moves[1].flatten(), dim=0) > 0.8
