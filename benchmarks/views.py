@@ -53,10 +53,10 @@ def _run(settings: Settings) -> Section:
     shots = icosphere(3, *Lens().square(pixels))[:n_views]
     where = {"volume": size, "size": pixels}
     vtk = VtkCaster(grid, look, settings.threads[-1])
-    mappers: dict[str, Any] = {"texgs": Caster(grid, look), "VTK": vtk}
+    renderers: dict[str, Any] = {"texgs": Caster(grid, look), "VTK": vtk}
     cases = [
-        Case("frame", where | {"by": name}, {"frame": partial(mapper.render, SHELLS, shots[0], LIGHT)})
-        for name, mapper in mappers.items()
+        Case("frame", where | {"by": name}, {"frame": partial(renderer.render, SHELLS, shots[0], LIGHT)})
+        for name, renderer in renderers.items()
     ]
     cases.append(view_set(grid, look, shots, where | {"views": n_views}))
     section.measurements = measure(cases, settings.rounds, settings.device, "views")
@@ -65,7 +65,7 @@ def _run(settings: Settings) -> Section:
 
 
 def view_set(grid: Grid, look: Appearance, shots: list, where: dict) -> Case:
-    """Render views into PNG files, the mapper's preparation included."""
+    """Render views into PNG files, the preparation of the renderer included."""
 
     def render() -> None:
         with tempfile.TemporaryDirectory() as folder:

@@ -68,7 +68,7 @@ def main() -> None:
         stand_in(data)
         os.environ["TEXGS_DATA"] = str(data)
         os.chdir(temporary)
-        runs = {name: {"experiment": name, "overrides": "missing=stop"} for name in members("experiment")}
+        runs = {name: {"experiment": name, "overrides": "on_missing=stop"} for name in members("experiment")}
         runs |= {name: {"overrides": words} for name, words in RUNS.items()}
         for name, words in runs.items():
             text = json.dumps(plan(words), indent=1, sort_keys=True).replace(str(data), "DATA")

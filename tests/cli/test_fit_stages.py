@@ -69,7 +69,7 @@ def test_texture_makes_what_it_needs_first(fitted_sphere):
     }
     assert {phase: model.stage for phase, model in models.items()} == {phase: phase for phase in models}
     assert models["texture"].metadata["dataset"] == "sphere"
-    assert models["texture"].shading.local_viewer is False, "the CPU's volume mapper has a distant viewer"
+    assert models["texture"].shading.local_viewer is False, "the CPU's caster has a distant viewer"
     shading, texture = numbers(folder, "shading"), numbers(folder, "texture")
     for phase, model in models.items():
         order = z_order_of(model.parameters["means"])

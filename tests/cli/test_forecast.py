@@ -66,7 +66,7 @@ def test_of_a_sweep_the_jobs_are_counted_that_a_run_goes_through():
 
 
 def test_the_doctor_tells_what_a_run_finds_and_about_how_long_it_takes(capsys, tmp_path):
-    words = ["datasets=[engine,wood,orbital]", "views=small", "fit=quick", "missing=skip", "edits=[style]"]
+    words = ["datasets=[engine,wood,orbital]", "views=small", "fit=quick", "on_missing=skip", "edits=[style]"]
     assert main(["doctor", *words]) == 0
     told = capsys.readouterr().out
     assert re.search(r"ok +data set engine +to be downloaded from https://", told)

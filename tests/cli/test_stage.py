@@ -15,7 +15,7 @@ TINY = [*SPHERE, "dataset.volume.size=24", "views.height=32", "views.step=0.5", 
 
 
 class Blank:
-    """A mapper that sees nothing."""
+    """A renderer that sees nothing."""
 
     local_viewer = False
 

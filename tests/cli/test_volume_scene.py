@@ -62,7 +62,7 @@ def of_scene(tmp_path_factory):
         stand_in="",
         tf_values="fraction",
         basic_tfs={"low": BasicTF(**LOW), "high": BasicTF(**HIGH)},
-        views=ViewKeys(shading=Shading(), step=0.5, mapper="cpu", width=8, height=8),
+        views=ViewKeys(shading=Shading(), step=0.5, renderer="cpu", width=8, height=8),
         fit=FitLabel(**label, changed=False),
     )
     return settings, folder

@@ -57,7 +57,7 @@ def test_a_copied_file_does_not_take_the_place_of_its_original(tmp_path, monkeyp
         ("dataset.name=Logs", "dataset.name: Logs is a folder of texgs"),
         ("dataset=123", "expected the name of a file of conf/"),
         ("tracking=http://x", "an address goes to tracking.uri"),
-        ("views.mapper=gpuu", "views.mapper: expected one of cpu, gpu, vtk, got gpuu, did you mean gpu?"),
+        ("views.renderer=gpuu", "views.renderer: expected one of cpu, gpu, vtk, got gpuu, did you mean gpu?"),
         ("dataset=turbulnce", "turbulnce, did you mean turbulence?"),
         ("views=hugge", "views: expected one of default, paper, relight, small, unseen, got hugge"),
         (
@@ -68,6 +68,9 @@ def test_a_copied_file_does_not_take_the_place_of_its_original(tmp_path, monkeyp
         ("a=b=c", "a=b=c: expected key=value"),
         ("views", "views: expected key=value"),
         ("nonsense=1", "nonsense: no such key"),
+        ("views.mapper=gpu", "views.mapper: this key is called views.renderer now"),
+        ("missing=skip", "missing: this key is called on_missing now"),
+        ("+aimed.engine=[]", "aimed: this key is called per_dataset now"),
         ("mesh.tfs=[TF3]", "mesh.tfs: expected some of TF01, TF02, got TF3"),
     ],
 )

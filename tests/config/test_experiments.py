@@ -36,10 +36,11 @@ def project(tmp_path, monkeypatch):
     texts = {
         "scenes": "datasets: [engine, jets, sphere]\nsweeps: {views: jets, resolution: sphere}\n",
         "pictures": "datasets: [engine, wood]\nfits: [quick, gaussians_quick]\nedits: [glass, stylesplat]\n",
-        "both": "experiments: [scenes, pictures]\nmissing: skip\naimed: {wood: [dataset.image=99]}\n",
+        "both": "experiments: [scenes, pictures]\n"
+        "on_missing: skip\nper_dataset: {wood: [dataset.image=99]}\n",
         "more": "experiments: [demo]\nviews: {width: 99}\n",
         "nested": "experiments: [both]\n",
-        "misaimed": "experiments: [scenes, pictures]\naimed: {woud: []}\n",
+        "misaimed": "experiments: [scenes, pictures]\nper_dataset: {woud: []}\n",
     }
     for name, text in texts.items():
         (folder / f"{name}.yaml").write_text(f"# @package _global_\n{text}")
@@ -82,10 +83,13 @@ def test_data_sets_of_a_run_and_of_its_sweeps(project, words, expected):
     [
         (("dataset=engine", "dataset.wood.image=99"), r"dataset\.wood: expected one of the data sets of"),
         (("dataset=engine", "dataset.would.image=99"), r"dataset\.would"),  # there is no such key
-        (("dataset=engine", "+aimed.enginge=[]"), "aimed: expected names of data sets, got enginge"),
-        (("experiment=misaimed",), r"aimed: expected names of data sets, got woud, did you mean wood"),
+        (
+            ("dataset=engine", "+per_dataset.enginge=[]"),
+            "per_dataset: expected names of data sets, got enginge",
+        ),
+        (("experiment=misaimed",), r"per_dataset: expected names of data sets, got woud, did you mean wood"),
         ((BOTH, "dataset=orbital"), "dataset: expected data sets of scenes, pictures, got orbital"),
-        (("experiment=more",), "views: an experiment with `experiments` sets experiments, each"),
+        (("experiment=more",), "views: an experiment with `experiments` sets experiments, common_overrides"),
         (("experiment=nested",), "expected single experiments, got both, which has several"),
         (("datasets=[engine,engine]",), "datasets: expected different names, got engine twice"),
     ],
@@ -126,11 +130,11 @@ def test_a_union_runs_each_of_its_experiments(project):
     ("words", "skips"),
     [
         ((SCENES,), False),
-        ((SCENES, "missing=skip"), True),
+        ((SCENES, "on_missing=skip"), True),
         ((BOTH,), True),  # as its file says
         ((BOTH, "dataset=jets"), False),  # what is asked for by its name is not left out
-        ((BOTH, "dataset=jets", "missing=skip"), True),
-        ((BOTH, "missing=stop"), False),
+        ((BOTH, "dataset=jets", "on_missing=skip"), True),
+        ((BOTH, "on_missing=stop"), False),
     ],
 )
 def test_what_is_missing_is_left_out_and_told_where_that_is_asked_for(project, words, skips):
@@ -143,7 +147,7 @@ def test_what_is_missing_is_left_out_and_told_where_that_is_asked_for(project, w
 
 
 def test_edits_that_lack_something_go_with_all_that_start_from_them():
-    words = ("dataset=orbital", "fit=demo", "edits=[glass,gold,crimson]", "missing=skip")
+    words = ("dataset=orbital", "fit=demo", "edits=[glass,gold,crimson]", "on_missing=skip")
     selection = selected(words, lambda config: ["no weights"] if config.edit.name == "lobe" else [])
     assert [config.edit.name for config in selection.by_sweep[""]] == ["none", "glass", "gold"]
     assert list(selection.by_sweep[""][0].edits) == ["glass", "gold"]  # what the gallery shows
@@ -152,7 +156,7 @@ def test_edits_that_lack_something_go_with_all_that_start_from_them():
 
 def test_a_sweep_of_edits_without_any_has_no_fits_either():
     """Its table would be promised, and nothing would be in it."""
-    words = ("dataset=orbital", "fit=demo", "sweep=lambda_s", "missing=skip")
+    words = ("dataset=orbital", "fit=demo", "sweep=lambda_s", "on_missing=skip")
     selection = selected(words, lambda config: ["no weights"] if config.edit.name == "style" else [])
     assert not selection.by_sweep.get("lambda_s")
     assert {entry.why for entry in selection.left_out} == {"no weights"}
@@ -166,7 +170,7 @@ def test_the_experiments_of_a_union_make_no_two_jobs_in_one_folder():
     assert {"paper", "paper_quick"} <= set(unions)
     for union in unions:
         of_folder = {}
-        for config in selected((f"experiment={union}", "missing=stop"), nothing).configs:
+        for config in selected((f"experiment={union}", "on_missing=stop"), nothing).configs:
             for stage, each in stages_of(config):
                 with contextlib.suppress(MissingDataError):
                     job = stage.settings(each), stage.inputs(each)

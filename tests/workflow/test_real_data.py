@@ -11,7 +11,10 @@ from texgs.volume.view_set import read_views
 pytestmark = pytest.mark.workflow
 
 FILES = {"engine": "engine.vti", "hydrogen": "hydrogen.vti", "frog": "frog.mhd"}
-SMALL = "dataset.volume.generator=null views.width=48 views.height=48 views.train.frequency=1 views.test.count=2 views.turntable=2"
+SMALL = (
+    "dataset.volume.generator=null views.width=48 views.height=48 "
+    "views.train.frequency=1 views.test.count=2 views.turntable=2"
+)
 
 
 @pytest.fixture(scope="module")

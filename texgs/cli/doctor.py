@@ -184,7 +184,7 @@ def opengl() -> Finding:
         return Finding("ok", offscreen_opengl())
     except TexgsError as error:
         trouble, _, advice = str(error).removeprefix("offscreen OpenGL: ").partition("; ")
-        return Finding("missing", trouble, f"only for views.mapper=vtk: {advice}")
+        return Finding("missing", trouble, f"only for views.renderer=vtk: {advice}")
 
 
 def cache() -> Finding:

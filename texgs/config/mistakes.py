@@ -19,6 +19,13 @@ from texgs.core.errors import ConfigError
 from texgs.core.keys import UnknownKey, ValueMismatch
 from texgs.core.names import close
 
+RENAMED = {  # keys of the version before; what they are called now
+    "aimed": "per_dataset",
+    "each": "common_overrides",
+    "missing": "on_missing",
+    "device.mapper": "device.renderer",
+    "views.mapper": "views.renderer",
+}
 # What Hydra and OmegaConf raise for values and files that they do not understand.
 MISTAKES = (
     *(HydraException, OmegaConfBaseException, yaml.YAMLError),
@@ -68,6 +75,8 @@ def sentence(error: Exception) -> str:
 
 def no_such_key(name: str) -> str:
     """Return what to say about a key that the schema does not have."""
+    if name in RENAMED:
+        return f"{name}: this key is called {RENAMED[name]} now"
     names = [entry.name for entry in keys()]
     groups = dict.fromkeys(each.partition(".")[0] for each in names)
     return f"{name}: no such key{close(name, [*groups, *names])}; texgs views --help lists all"

@@ -31,7 +31,7 @@ class Device:
     """What the work runs on."""
 
     name: str = key("cpu", "device that the work runs on", choices=("cpu", "cuda"))
-    mapper: str = key(
+    renderer: str = key(
         "cpu",
         "what renders volumes: the caster, on the CPU or a GPU; or VTK",
         choices=("cpu", "gpu", "vtk"),
@@ -82,11 +82,13 @@ class Config:
     dataset: Dataset = key(Dataset, "the data set")
     datasets: list[str] = key([], "data sets of a whole experiment; default the one of `dataset`")
     experiments: list[str] = key([], "files of conf/experiment that are one run together")
-    aimed: dict[str, list[str]] = field(
+    per_dataset: dict[str, list[str]] = field(
         default_factory=dict, metadata={"help": "overrides that hold for one data set alone, by its name"}
     )
-    each: list[str] = key([], "overrides that hold for each of `experiments`, before those of the command")
-    missing: str = key(
+    common_overrides: list[str] = key(
+        [], "overrides that hold for each of `experiments`, before those of the command"
+    )
+    on_missing: str = key(
         "stop", "what a run does without data or weights that it needs", choices=("stop", "skip")
     )
     tf: str | None = key(None, "basic TF to work on; default each of the data set")

@@ -61,8 +61,8 @@ class ViewKeys:
     shading: Shading = key(Shading, "material of the volume")
     step: float = key(0.25, "sample distance along rays", "voxels", above=0)
     opacity_unit: float = key(0.005, "length over which a TF's opacity applies", "world units", above=0)
-    mapper: str = key(
-        "${device.mapper}",
+    renderer: str = key(
+        "${device.renderer}",
         "what renders the views: the caster, on the CPU or a GPU; or VTK",
         choices=("cpu", "gpu", "vtk"),
     )

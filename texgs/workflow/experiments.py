@@ -20,7 +20,12 @@ from texgs.workflow.stage import edit_folder
 from texgs.workflow.stage_table import STAGES
 from texgs.workflow.sweep import changes, is_of_edits, variants
 
-OF_A_UNION = ("experiments", "each", "aimed", "missing")  # all that an experiment of experiments sets
+OF_A_UNION = (
+    "experiments",
+    "common_overrides",
+    "per_dataset",
+    "on_missing",
+)  # all that an experiment of experiments sets
 NO_SWEEPS = ("sweeps={}", "sweeps=null", "sweep=none")  # what is written to switch them off
 AIMED = re.compile(r"dataset\.([\w-]+)\.(([\w-]+)[^=]*=.*)", re.DOTALL)  # dataset.NAME.KEY=VALUE
 
@@ -93,10 +98,10 @@ def selected(words: Words, lacking: Callable[[Config], Sequence[str]]) -> Select
     """
     plain, aimed = apart(words)
     base = compose(plain)
-    is_asked_for = any(word.startswith("missing=") for word in plain) or not named(plain)
-    selection = Selection(lacking if base.missing == "skip" and is_asked_for else lambda config: ())
+    is_asked_for = any(word.startswith("on_missing=") for word in plain) or not named(plain)
+    selection = Selection(lacking if base.on_missing == "skip" and is_asked_for else lambda config: ())
     reached: set[str] = set()
-    of_union = base.aimed if base.experiments else {}
+    of_union = base.per_dataset if base.experiments else {}
     for part in parts(plain, base):
         reached |= add_part(part, joined(of_union, aimed), selection)
     if beside := next((name for name in aimed if name not in reached), None):
@@ -113,7 +118,7 @@ def add_part(words: Words, aimed: Mapping[str, Words], selection: Selection) -> 
     for key, listed in (("datasets", base.datasets), ("fits", base.fits)):
         if repeated := [name for name in listed if listed.count(name) > 1]:
             raise ConfigError(f"{key}: expected different names, got {repeated[0]} twice")
-    aimed = joined(base.aimed, aimed)
+    aimed = joined(base.per_dataset, aimed)
     names = chosen or base.datasets
     for name in names or [base.dataset.name]:
         of_set = (*words, *((f"dataset={name}",) if names else ()), *aimed.get(name, ()))
@@ -132,7 +137,9 @@ def joined(aimed: Mapping[str, Sequence[str]], later: Mapping[str, Sequence[str]
     """Return the words that are aimed at each data set, first those of an experiment."""
     known = members("dataset")
     if unknown := [name for name in aimed if name not in known]:
-        raise ConfigError(f"aimed: expected names of data sets, got {unknown[0]}{close(unknown[0], known)}")
+        raise ConfigError(
+            f"per_dataset: expected names of data sets, got {unknown[0]}{close(unknown[0], known)}"
+        )
     return {name: (*aimed.get(name, ()), *later.get(name, ())) for name in {*aimed, *later}}
 
 
@@ -151,7 +158,7 @@ def parts(words: Words, base: Config) -> list[Words]:
     wanted, made = named(words), []
     of_all = without(rest, "dataset", "datasets")
     for name in base.experiments:
-        own = f"experiment={name}", *base.each
+        own = f"experiment={name}", *base.common_overrides
         part = compose((*own, *of_all))
         if part.experiments:
             raise ConfigError(f"experiments: expected single experiments, got {name}, which has several")

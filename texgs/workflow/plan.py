@@ -138,7 +138,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     others, outdated = earlier(results, planned, checksums)
     jobs = {folder: plain(job, results) for folder, job in planned.jobs.items()}
     note_results(planned.jobs.values(), [job["settings"] for job in jobs.values()])
-    uses = {"views" for each in configs if each.views.mapper == "gpu"}
+    uses = {"views" for each in configs if each.views.renderer == "gpu"}
     uses |= {"fit" for each in configs if each.device.name == "cuda"}
     plan = Plan(
         results,

@@ -66,8 +66,8 @@ def device(settings: Mapping[str, Any]) -> str:
 
     Some jobs of fits on a GPU do not use it, and then have none.
     """
-    mapper = settings.get("views", {}).get("mapper")
-    kind = settings.get("fit", {}).get("device") or {"gpu": "cuda", "vtk": "VTK"}.get(mapper)
+    renderer = settings.get("views", {}).get("renderer")
+    kind = settings.get("fit", {}).get("device") or {"gpu": "cuda", "vtk": "VTK"}.get(renderer)
     torch = sys.modules.get("torch")
     if kind == "cuda" and torch and torch.cuda.is_initialized():
         return str(torch.cuda.get_device_name())

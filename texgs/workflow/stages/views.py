@@ -60,7 +60,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     grid = open_grid(inputs["volume"])
     (tf,) = basic_tfs_of(inputs["volume"], {settings.tf: settings.points}, settings.tf_values).values()
     appearance = appearance_of(views)
-    renderer = renderer_for(views.mapper, grid, appearance)
+    renderer = renderer_for(views.renderer, grid, appearance)
     times, coverages = Times(output / TIMES), []
     shots = {split: views_of(views, split, output) for split in SPLITS}
     for split, shot in shots.items():
@@ -176,7 +176,7 @@ def describe(
         "tf": {"name": settings.tf, **tf.to_dict()},
         "aabb": [list(corner) for corner in grid.aabb],
         "shading": {"model": "blinn-phong", "local_viewer": renderer.local_viewer, **asdict(views.shading)},
-        "mapper": views.mapper,
+        "renderer": views.renderer,
         "step": views.step,
         "opacity_unit": views.opacity_unit,
     }

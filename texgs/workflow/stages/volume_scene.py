@@ -34,7 +34,7 @@ class VolumeScene:
         self.tfs = basic_tfs_of(volume, settings.basic_tfs, settings.tf_values)
         self.grid = open_grid(volume)
         self.look = appearance_of(settings.views)
-        self._renderer = renderer_for(settings.views.mapper, self.grid, self.look)
+        self._renderer = renderer_for(settings.views.renderer, self.grid, self.look)
 
     def render(self, camera: Camera, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> np.ndarray:
         """Return premultiplied RGBA [H, W, 4] of the basic TFs of a scene's visible models, with their edits.
