@@ -45,9 +45,7 @@ def _measure(name: str, settings: Settings) -> dict:
 
 def _plain(settings: Settings) -> dict:
     """The settings as JSON can hold them."""
-    return {
-        name: str(value) if name in ("device", "json") else value for name, value in vars(settings).items()
-    }
+    return vars(settings) | {name: str(getattr(settings, name)) for name in ("device", "json")}
 
 
 if __name__ == "__main__":

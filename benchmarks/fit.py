@@ -44,14 +44,12 @@ def run(settings: Settings) -> Section:
     section = Section()
     counts = {size: SURFELS.get(size, settings.n_surfels) for size in settings.sizes}
     fits = {size: training(size, n, settings.device) for size, n in counts.items()}
-    cases = [
-        Case("step", {"size": size, "surfels": counts[size]}, {"step": fits[size].step}) for size in counts
-    ]
+    places = {size: {"size": size, "surfels": n} for size, n in counts.items()}
+    cases = [Case("step", where, {"step": fits[size].step}) for size, where in places.items()]
     section.measurements = measure(cases, settings.rounds, settings.device, "fit")
     for size, fit in fits.items():
-        where = {"size": size, "surfels": counts[size]}
         for name, ms in parts(fit).items():
-            section.measurements.append(Measurement(f"part {name}", where, "ms", ms, ms, PROFILED))
+            section.measurements.append(Measurement(f"part {name}", places[size], "ms", ms, ms, PROFILED))
     return section
 
 

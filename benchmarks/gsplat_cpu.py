@@ -80,9 +80,8 @@ def fragments(a: dict) -> tuple[Tensor, Tensor]:
     for chunk in seen.split(max(1, CHUNK // int((2 * reach.max() + 1) ** 2))):
         parts.append(_candidates(chunk, reach, centres, homographies, a))
     surfels, pixels, alphas = (torch.cat(part) for part in zip(*parts, strict=True))
-    rank = seen.new_empty(len(depths)).scatter_(
-        0, torch.argsort(depths, stable=True), torch.arange(len(depths))
-    )
+    nearest = torch.argsort(depths, stable=True)
+    rank = torch.empty_like(nearest).scatter_(0, nearest, torch.arange(len(depths)))
     order = torch.argsort(pixels * len(depths) + rank[surfels])
     surfels, pixels, alphas = surfels[order], pixels[order], alphas[order]
     light = gsplat_torch.weights_by_ray(alphas, pixels, a["width"] * a["height"])[1]

@@ -44,9 +44,8 @@ def run(settings: Settings) -> Section:
 
 def differentiated(function: Callable[..., Tensor], compared: Comparison) -> Callable[[], None]:
     """Forward and backward from a gradient of ones, as that of a loss."""
-    learned = [
-        x.detach().clone(memory_format=torch.preserve_format).requires_grad_() for x in compared.learned
-    ]
+    copies = (x.detach().clone(memory_format=torch.preserve_format) for x in compared.learned)
+    learned = [x.requires_grad_() for x in copies]
 
     def run() -> None:
         for x in learned:

@@ -16,12 +16,8 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 
 MODELS, SURFELS, SIDE = 4, 30_000, 4  # models, surfels in each, texels along each side of a texture
-EDITS = [
-    PartEdit(palette=(0.2, 0.6, 0.4)),
-    PartEdit(opacity=0.5),
-    PartEdit(diffuse=1.5),
-    PartEdit(visible=False),
-]
+CHANGES = ({"palette": (0.2, 0.6, 0.4)}, {"opacity": 0.5}, {"diffuse": 1.5}, {"visible": False})
+EDITS = [PartEdit(**change) for change in CHANGES]
 
 
 def run(settings: Settings) -> Section:

@@ -24,11 +24,8 @@ from torch.nn.functional import normalize
 
 from texgs.core.camera import Camera, orbit
 
-SHARES = (
-    0.55,
-    0.27,
-    0.18,
-)  # of the surfels: wavy sphere of radius 1, torus inside it, sphere inside the torus
+# Of the surfels: wavy sphere of radius 1, torus inside it, sphere inside the torus.
+SHARES = (0.55, 0.27, 0.18)
 WAVE = 0.06  # largest amplitude of the wavy sphere
 RING, TUBE = 0.74, 0.18  # radii of the torus
 INNER = 0.55  # radius of the inner sphere

@@ -73,9 +73,8 @@ def samples(runs: Sequence[str]) -> dict[str, list[Sample]]:
 
 def factor(speed: Speed, some: Sequence[Sample]) -> float:
     """Seconds that samples took, all together, against those that a speed tells."""
-    return sum(each.seconds for each in some) / sum(
-        speed.seconds(each.megapixels, each.iterations) for each in some
-    )
+    told = sum(speed.seconds(each.megapixels, each.iterations) for each in some)
+    return sum(each.seconds for each in some) / told
 
 
 def scaled(speed: Speed, by: float) -> Speed:

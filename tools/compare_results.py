@@ -16,11 +16,8 @@ NOT_COMPARED = ("logs", "tables", "mlartifacts", "report.html", "mlflow.db")
 def without_times(value: object) -> object:
     """Numbers of a job that are the same each time."""
     if isinstance(value, dict):
-        return {
-            key: without_times(entry)
-            for key, entry in value.items()
-            if not any(word in key for word in TIMES)
-        }
+        kept = [key for key in value if not any(word in key for word in TIMES)]
+        return {key: without_times(value[key]) for key in kept}
     return value
 
 

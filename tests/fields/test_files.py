@@ -155,11 +155,7 @@ NETWORKS = "expected the networks of a palette field"
         ("palette", {"tensors": {"light.1": None}}, f"light.1: {NETWORKS}"),
         ("palette", {"tensors": {"extra": torch.ones(1)}}, f"extra: {NETWORKS}"),
         ("palette", {"tensors": {"palette.colors": None}}, f"expected {PALETTE}"),
-        (
-            "palette",
-            {"tensors": {"light.1": lambda x: x[:5]}},
-            r"light.1: .* \[64, 64\], got \[5, 64\]",
-        ),
+        ("palette", {"tensors": {"light.1": lambda x: x[:5]}}, r"light.1: .* \[64, 64\], got \[5, 64\]"),
         ("palette", {"tensors": {"light.1": torch.Tensor.double}}, "light.1: expected float32"),
         ("palette", {"tensors": {"free.0": None}}, f"free.0: {NETWORKS}"),
         ("palette", {"tensors": SHORTER}, "masks: expected the bits of"),

@@ -48,9 +48,6 @@ def test_it_is_adam_with_a_rate_for_each_parameter():
     optimizer = Optimizer(parameters(), RATES)
     descend(optimizer, range(8))
     assert_close(optimizer, oracle(range(8), parameters()))
-
-
-def test_rates_fall_log_linearly():
     rate = Rate(0.02, 0.01)
     assert [rate.at(t) for t in (0.0, 0.5, 1.0)] == pytest.approx([0.02, 0.002, 0.0002])
 

@@ -3,6 +3,7 @@ import weakref
 
 import pytest
 import torch
+from safetensors.torch import save
 
 from texgs.core.errors import ArgumentError, FitError
 from texgs.core.progress import curve_logger
@@ -35,12 +36,9 @@ def test_a_state_before_the_first_step_has_no_moments(tmp_path):
     assert_same(run(fit, 12).state(), run(new_fit(), 12).state())
 
 
-def test_nothing_saved_is_none(tmp_path):
+def test_a_checkpoint_replaces_the_one_before(tmp_path):
     assert checkpoint.latest(tmp_path) is None
     assert checkpoint.latest(tmp_path / "not there") is None
-
-
-def test_a_checkpoint_replaces_the_one_before(tmp_path):
     fit = new_fit()
     for stop in (5, 9):
         checkpoint.save(tmp_path, run(fit, stop))
@@ -58,20 +56,14 @@ def test_a_state_that_is_not_finite_leaves_the_last_checkpoint(tmp_path):
     assert torch.isfinite(checkpoint.latest(tmp_path)["means"]).all()
 
 
-@pytest.mark.parametrize("damage", [lambda data: data[:-100], lambda data: data[:4], lambda _: b"no tensors"])
-def test_a_damaged_file_is_named(tmp_path, damage):
+def test_a_damaged_file_or_one_of_another_kind_is_named(tmp_path):
     path = checkpoint.save(tmp_path, new_fit())
-    path.write_bytes(damage(path.read_bytes()))
-    with pytest.raises(ArgumentError, match=r"safetensors: expected a checkpoint, got .*remove it"):
-        checkpoint.latest(tmp_path)
-
-
-def test_a_file_of_another_kind_is_named(tmp_path):
-    from safetensors.torch import save_file
-
-    save_file({"means": torch.zeros(1, 3)}, tmp_path / checkpoint.NAME)
-    with pytest.raises(ArgumentError, match="found no iteration"):
-        checkpoint.latest(tmp_path)
+    whole, damaged = path.read_bytes(), r"safetensors: expected a checkpoint, got .*remove it"
+    contents = {whole[:-100]: damaged, whole[:4]: damaged, b"no tensors": damaged}
+    for content, message in {**contents, save({"means": torch.zeros(1, 3)}): "found no iteration"}.items():
+        path.write_bytes(content)
+        with pytest.raises(ArgumentError, match=message):
+            checkpoint.latest(tmp_path)
 
 
 class Counter(ResumableFit):

@@ -85,8 +85,5 @@ def test_seeds_are_grey_from_everywhere_and_as_thick_as_wide(tmp_path):
     assert not parameters["sh_rest"].any()
     shown = 0.5 + Y00 * parameters["sh"]
     assert bool(((shown > -1e-6) & (shown < 1 + 1e-6)).all())
-
-
-def test_seeds_in_voxels_are_refused(tmp_path):
     with pytest.raises(ArgumentError, match=r"seeds\.kind=voxels needs a volume"):
         seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), Seeds(kind="voxels"), 3, 0)

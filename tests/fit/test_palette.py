@@ -124,12 +124,13 @@ def test_shares_of_palette_colours_add_up_to_one():
 
 
 def test_errors(images):
-    with pytest.raises(ArgumentError, match=r"fit.palette.voxels.stages: expected sides that double"):
-        PaletteFit(images, replace(SETTINGS, voxels=replace(VOXELS, stages=[])))
-    with pytest.raises(ArgumentError, match=r"fit.palette.hash.entries: expected a power of two, got 1000"):
-        PaletteFit(images, replace(SETTINGS, hash=HashKeys(entries=1000)))
-    with pytest.raises(ArgumentError, match=r"fit.palette.hash.finest: expected at least coarsest"):
-        PaletteFit(images, replace(SETTINGS, hash=HashKeys(coarsest=600)))
+    for keys, message in (
+        ({"voxels": replace(VOXELS, stages=[])}, "voxels.stages: expected sides that double"),
+        ({"hash": HashKeys(entries=1000)}, "hash.entries: expected a power of two, got 1000"),
+        ({"hash": HashKeys(coarsest=600)}, "hash.finest: expected at least coarsest"),
+    ):
+        with pytest.raises(ArgumentError, match=f"fit.palette.{message}"):
+            PaletteFit(images, replace(SETTINGS, **keys))
     with pytest.raises(ArgumentError, match="expected something visible in one of them, found none"):
         PaletteFit(blank_images(), SETTINGS)
     unseen = PaletteFit(images, replace(SETTINGS, voxels=replace(VOXELS, stages=[GridStage(16, 5)])))

@@ -45,9 +45,6 @@ def xyz(n=5):
     return {name: ("float", [axis + 0.25 * row for row in range(n)]) for axis, name in enumerate("xyz")}
 
 
-# --- the hull ---------------------------------------------------------------
-
-
 def test_hull_points_are_seen_by_every_view():
     images = ball_images()
     points = hull_points(images, BOX, 500, random_numbers())
@@ -100,9 +97,6 @@ def test_colours_are_means_without_the_background():
     assert torch.equal(colors[1], torch.zeros(3))
 
 
-# --- surfels ----------------------------------------------------------------
-
-
 def test_scales_are_distances_of_the_three_nearest():
     points = torch.rand(60, 3, generator=random_numbers())
     distances = np.sort(cdist(points.double(), points.double()), axis=1)[:, 1:4]
@@ -151,9 +145,6 @@ def test_images_are_shrunk_by_averages_and_the_rest_is_cut():
     assert shrunk(images, 0) is images
 
 
-# --- given points -----------------------------------------------------------
-
-
 def test_given_points_come_first(tmp_path):
     colors = {name: ("uchar", [0, 51, 102, 153, 255]) for name in ("red", "green", "blue")}
     write_ply(tmp_path / "points3d.ply", {**xyz(), **colors})
@@ -168,11 +159,8 @@ def test_points_without_colours_take_those_of_the_views(tmp_path):
     images = ball_images()
     parameters, colors = seeds(tmp_path, images)
     assert torch.equal(colors, mean_colors(images, parameters["means"]))
-
-
-def test_colours_may_be_floats(tmp_path):
     write_ply(tmp_path / "a.ply", {**xyz(), **{c: ("float", [0.5] * 5) for c in ("red", "green", "blue")}})
-    assert torch.equal(read_points(tmp_path / "a.ply")[1], torch.full((5, 3), 0.5))
+    assert torch.equal(read_points(tmp_path / "a.ply")[1], torch.full((5, 3), 0.5)), "they may be floats"
 
 
 @pytest.mark.parametrize(
@@ -207,9 +195,6 @@ def test_mistakes_in_points_are_named(tmp_path, columns, end, message):
     path.write_bytes(path.read_bytes()[:end])
     with pytest.raises(ArgumentError, match=message):
         seeds(tmp_path)
-
-
-# --- the box ----------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -249,18 +234,12 @@ def test_arguments_out_of_range_are_named():
             seeds(opacity=opacity)
 
 
-# --- real views -------------------------------------------------------------
-
-
 def test_points_published_with_the_paper_are_near_what_its_views_show():
     views = read_views(real_data("vortex/TF01"))
     images = load(views.train[:3], 8)
     parameters, colors = seed_surfels(images, views, Seeds(count=1, half_size=0.55), 0)
     assert len(parameters["means"]) == len(colors) > 9000
     assert (mean_colors(images, parameters["means"]) - colors).abs().mean() < 0.15
-
-
-# --- voxels -----------------------------------------------------------------
 
 
 def test_voxels_of_the_volume_that_views_show():

@@ -97,10 +97,7 @@ def test_mean_color_counts_what_is_there_only():
     planes[1][:3, :, :4] = torch.tensor([0.2, 0.4, 0.6])[:, None, None]
     planes[1][3, :, 4:] = 0
     assert_close(mean_color(images_of(planes, cameras(2, 8))), torch.tensor([0.2, 0.4, 0.6]))
-
-
-def test_mean_color_of_nothing_is_finite():
-    assert mean_color(blank_images()).tolist() == [0, 0, 0]
+    assert mean_color(blank_images()).tolist() == [0, 0, 0], "of nothing it is finite"
 
 
 def test_an_empty_texture_renders_as_before(ball, images):

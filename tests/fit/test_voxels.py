@@ -152,13 +152,6 @@ def test_the_hull_holds_the_ball(images):
     assert len(grid) < torch.tensor(grid.size).prod()
 
 
-def test_views_that_show_nothing():
-    with pytest.raises(ArgumentError, match="visual hull: expected points that every view shows"):
-        hull_box(blank_images(), 0.6)
-    with pytest.raises(ArgumentError, match="expected something visible in one of them, found none"):
-        VoxelFit(blank_images(), SETTINGS)
-
-
 def test_refining_keeps_the_field(fit):
     finer = refined(fit.grid, torch.ones(fit.grid.size, dtype=torch.bool))
     assert finer.spacing == fit.grid.spacing / 2
@@ -199,6 +192,10 @@ def test_schedules():
 
 
 def test_errors(images):
+    with pytest.raises(ArgumentError, match="visual hull: expected points that every view shows"):
+        hull_box(blank_images(), 0.6)
+    with pytest.raises(ArgumentError, match="expected something visible in one of them, found none"):
+        VoxelFit(blank_images(), SETTINGS)
     with pytest.raises(ArgumentError, match=r"stages: expected sides that double .* got \[16, 48\]"):
         VoxelFit(images, replace(SETTINGS, stages=[GridStage(16, 1), GridStage(48, 1)]))
     pruned = VoxelFit(images, replace(SETTINGS, prune_weight=1.0))

@@ -62,12 +62,3 @@ def test_splat_is_the_adjoint_of_rendering(device, drawn):
     sums, _ = splat(image, **scene.geometry(), options=options)
     forward, backward = (rendered.double() * image).sum(), (sums.double() * scene.features).sum()
     assert float(forward) == pytest.approx(float(backward), rel=1e-5)
-
-
-def test_splat_of_ones_gives_the_weights(device, drawn):
-    scene = drawn(random_scene(4)).to(device)
-    ones = torch.ones(scene.height, scene.width, 1, device=device)
-    sums, weights = splat(ones, **scene.geometry())
-    torch.testing.assert_close(sums[:, 0], weights, rtol=1e-5, atol=1e-6)
-    counted = scene.render(rasterize, ("statistics",)).statistics
-    torch.testing.assert_close(counted.weight_sum, weights, rtol=1e-5, atol=1e-6)

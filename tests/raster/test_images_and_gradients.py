@@ -45,6 +45,7 @@ OF_BOTH = {  # a scene, and images whose gradients are compared
     "no shift": (shifted(random_scene(7), 0), ("color",)),
     "black": (replace(random_scene(8), background=None), ("color",)),
     "behind": (with_some_behind(random_scene(13)), ("color",)),
+    "one row of pixels": (random_scene(3, 200, 17, 1), ()),
 }
 TEXTURED = {
     **{f"{size}": (textured(random_scene(9), [size]), ("color", "depth")) for size in TEXTURE_SIZES},
@@ -70,10 +71,6 @@ def test_textures(device, name):
     check_gradients(scene, device, compared)
 
 
-def test_one_row_of_pixels(device, drawn):
-    check_images(drawn(random_scene(3, 200, 17, 1)), device)
-
-
 OPTIONS = [("surfels", options) for options in SURFEL_OPTIONS + OTHER_OPTIONS]
 OPTIONS += [("gaussians", options) for options in GAUSSIAN_OPTIONS + OTHER_OPTIONS]
 
@@ -89,13 +86,6 @@ def test_options(device, kind, options):
 
 def test_texture_on_unfiltered_and_narrow_surfels(device):
     check_images(textured(random_scene(7)), device, Options(low_pass=64.0, filter_sigma=1.0))
-
-
-def test_a_texture_has_its_colour_beside_features(device):
-    scene = textured_with_features(random_scene(6), 4)
-    alone = replace(scene, features=None, background=scene.background[:3]).to(device).render(rasterize)
-    beside = scene.to(device).render(rasterize)
-    torch.testing.assert_close(beside.color[..., :3], alone.color, rtol=0, atol=1e-6)
 
 
 def test_only_what_is_asked_for(device, drawn):

@@ -36,8 +36,8 @@ def test_library_that_lacks_a_function(replaced):
     native.library("cpu")
     replaced(_ctypes.__file__)  # a shared library that every Python has
     refuses(NativeError, "has no function texgs_abi_version; install texgs again", open_library, "cpu")
-    with pytest.raises(NativeError, match="has no function texgs_paint; install texgs again"):
-        native.call("texgs_paint", device=torch.device("cpu"))
+    message, cpu = "has no function texgs_paint; install texgs again", torch.device("cpu")
+    refuses(NativeError, message, native.call, "texgs_paint", device=cpu)
 
 
 def test_device_without_a_library():

@@ -17,33 +17,6 @@ UNFILTERED = Options(low_pass=1e30)
 SMOOTH = Options(alpha_min=0.0, transmittance_min=0.0)
 
 
-def test_frontal_surfel_is_a_gaussian_on_screen():
-    x, y = offsets()
-    sigma_x, sigma_y = FOCAL * 0.2 / 2, FOCAL * 0.1 / 2  # 4 and 2 px
-    alpha = 0.8 * torch.exp(-0.5 * ((x / sigma_x) ** 2 + (y / sigma_y) ** 2))
-    alpha = torch.where(alpha >= 1 / 255, alpha, 0)
-    color, background = torch.tensor([0.2, 0.5, 0.9]).double(), torch.tensor([1.0, 0.0, 0.5]).double()
-    image = rasterize(
-        **view(means=[[0, 0, 2]], scales=[[0.2, 0.1]], opacities=[0.8]),
-        features=color[None],
-        background=background,
-        outputs=OUTPUTS,
-    )
-    torch.testing.assert_close(image.alpha, alpha)
-    torch.testing.assert_close(image.color, alpha[..., None] * color + (1 - alpha[..., None]) * background)
-    torch.testing.assert_close(image.depth, 2 * (alpha > 0).double())
-    torch.testing.assert_close(image.median, 2 * (alpha > 0).double())
-    torch.testing.assert_close(image.normal, alpha[..., None] * torch.tensor([0.0, 0, -1]).double())
-    torch.testing.assert_close(image.distortion, torch.zeros_like(alpha))
-    counted = image.statistics
-    torch.testing.assert_close(counted.weight_sum, alpha.sum()[None])
-    torch.testing.assert_close(counted.weight_max, alpha.max()[None])
-    assert counted.pixels.item() == (alpha > 0).sum()
-    torch.testing.assert_close(
-        counted.radii, sigma_x * torch.tensor([2 * math.log(0.8 * 255)]).double().sqrt()
-    )
-
-
 def test_tilted_surfel_is_hit_where_the_ray_meets_its_plane():
     angle, scale = 1.1, 0.3  # about y, so that the plane is n . x = n . mean with n = (sin, 0, cos)
     x, y = offsets()
@@ -70,16 +43,6 @@ def test_tilted_surfel_is_hit_where_the_ray_meets_its_plane():
     torch.testing.assert_close(image.alpha, alpha)
     torch.testing.assert_close(image.depth, torch.where(alpha > 0, z, 0))
     torch.testing.assert_close(image.normal, alpha[..., None] * -normal)
-
-
-@pytest.mark.parametrize("low_pass", [2.0, 6.0])
-def test_low_pass_widens_a_surfel_smaller_than_a_pixel(low_pass):
-    x, y = offsets()
-    alpha = 0.8 * torch.exp(-0.5 * low_pass * (x**2 + y**2))
-    alpha = torch.where(alpha >= 1 / 255, alpha, 0)
-    tiny = view(means=[[0, 0, 2]], scales=[[1e-4, 1e-4]], opacities=[0.8])
-    image = rasterize(**tiny, features=torch.ones(1, 1).double(), options=Options(low_pass=low_pass))
-    torch.testing.assert_close(image.alpha, alpha)
 
 
 @pytest.mark.parametrize("sigma", [1.0, 3.0])

@@ -1,17 +1,13 @@
 """The definition of 3D Gaussians against closed forms, numerical derivatives and sampled points."""
 
-import math
-
 import pytest
 import torch
 
-from tests.raster.closed_form import CENTRE, FOCAL, HEIGHT, WIDTH, offsets, view
+from tests.raster.closed_form import CENTRE, FOCAL, HEIGHT, WIDTH, view
 from texgs.core.geometry import quats_to_matrices
 from texgs.raster.reference.gaussians import derivative, project
-from texgs.raster.reference.render import rasterize
 from texgs.raster.types import Options
 
-OUTPUTS = ("depth", "median", "distortion", "statistics")
 SMOOTH = Options(alpha_min=0.0, transmittance_min=0.0)
 NAMES = ("means", "quats", "scales", "opacities", "viewmat", "K")
 
@@ -20,33 +16,6 @@ def projected(options=SMOOTH, **gaussians):
     """What `project` makes of Gaussians before the unmoved camera."""
     arguments = view(**gaussians)
     return project(*(arguments[name] for name in NAMES), None, (WIDTH, HEIGHT), options)
-
-
-def test_gaussian_on_the_axis():
-    x, y = offsets()
-    xx, yy = (
-        (FOCAL * 0.2 / 2) ** 2 + 0.3,
-        (FOCAL * 0.1 / 2) ** 2 + 0.3,
-    )  # the third scale points at the camera
-    alpha = 0.8 * torch.exp(-0.5 * (x**2 / xx + y**2 / yy))
-    alpha = torch.where(alpha >= 1 / 255, alpha, 0)
-    color, background = torch.tensor([0.2, 0.5, 0.9]).double(), torch.tensor([1.0, 0.0, 0.5]).double()
-    image = rasterize(
-        **view(means=[[0, 0, 2]], scales=[[0.2, 0.1, 0.3]], opacities=[0.8]),
-        features=color[None],
-        background=background,
-        outputs=OUTPUTS,
-    )
-    torch.testing.assert_close(image.alpha, alpha)
-    torch.testing.assert_close(image.color, alpha[..., None] * color + (1 - alpha[..., None]) * background)
-    torch.testing.assert_close(image.depth, 2 * (alpha > 0).double())
-    torch.testing.assert_close(image.median, 2 * (alpha > 0).double())
-    torch.testing.assert_close(image.distortion, torch.zeros_like(alpha))
-    assert image.normal is None
-    counted = image.statistics
-    torch.testing.assert_close(counted.weight_sum, alpha.sum()[None])
-    assert counted.pixels.item() == (alpha > 0).sum()
-    torch.testing.assert_close(counted.radii, torch.tensor([2 * math.log(0.8 * 255) * xx]).double().sqrt())
 
 
 def test_covariance_is_that_of_projected_points():
@@ -90,16 +59,6 @@ def test_view_around_another_point_reaches_as_far_as_its_edges():
     for side, slope in ((-1, -3.0 / FOCAL - margin), (1, (WIDTH - 3.0) / FOCAL + margin)):
         J = derivative(torch.tensor([[9.0 * side, 0.0, 1.0]]).double(), K, (WIDTH, HEIGHT))
         assert J[0, 0, 2].item() == pytest.approx(-FOCAL * slope)
-
-
-@pytest.mark.parametrize("dilation", [0.3, 1.0])
-def test_dilation_widens_a_gaussian_smaller_than_a_pixel(dilation):
-    x, y = offsets()
-    alpha = 0.8 * torch.exp(-0.5 * (x**2 + y**2) / dilation)
-    tiny = view(means=[[0, 0, 2]], scales=[[1e-5, 1e-5, 1e-5]], opacities=[0.8])
-    ones = torch.ones(1, 1).double()
-    image = rasterize(**tiny, features=ones, options=Options(dilation=dilation))
-    torch.testing.assert_close(image.alpha, torch.where(alpha >= 1 / 255, alpha, 0), atol=1e-6, rtol=0)
 
 
 def test_antialiased_gaussians_keep_their_amount_of_light():

@@ -1,10 +1,12 @@
 """The definition against closed forms: several primitives, and none; and what surfels and Gaussians share."""
 
+import math
+
 import pytest
 import torch
 
 from tests.raster.agreement import images
-from tests.raster.closed_form import HEIGHT, WIDTH, view
+from tests.raster.closed_form import FOCAL, HEIGHT, WIDTH, offsets, view
 from texgs.raster.reference.render import rasterize, splat
 from texgs.raster.types import OUTPUTS, Options
 
@@ -12,6 +14,51 @@ SMOOTH = Options(alpha_min=0.0, transmittance_min=0.0)
 OF_GAUSSIANS = tuple(name for name in OUTPUTS if name != "normal")
 SCALES = {OUTPUTS: [0.3, 0.1], OF_GAUSSIANS: [0.3, 0.1, 0.2]}
 BOTH = pytest.mark.parametrize("outputs", SCALES, ids=["surfels", "gaussians"])
+
+
+@BOTH
+def test_one_that_faces_the_camera_is_a_gaussian_on_screen(outputs):
+    x, y = offsets()
+    is_surfel = outputs == OUTPUTS
+    xx, yy = ((FOCAL * scale / 2) ** 2 + (0 if is_surfel else 0.3) for scale in (0.2, 0.1))  # 4 and 2 px
+    alpha = 0.8 * torch.exp(-0.5 * (x**2 / xx + y**2 / yy))
+    alpha = torch.where(alpha >= 1 / 255, alpha, 0)
+    color, background = torch.tensor([0.2, 0.5, 0.9]).double(), torch.tensor([1.0, 0.0, 0.5]).double()
+    scales = [0.2, 0.1, 0.3][: len(SCALES[outputs])]  # the third points at the camera
+    one = view(means=[[0, 0, 2]], scales=[scales], opacities=[0.8])
+    image = rasterize(**one, features=color[None], background=background, outputs=outputs)
+    torch.testing.assert_close(image.alpha, alpha)
+    torch.testing.assert_close(image.color, alpha[..., None] * color + (1 - alpha[..., None]) * background)
+    torch.testing.assert_close(image.depth, 2 * (alpha > 0).double())
+    torch.testing.assert_close(image.median, 2 * (alpha > 0).double())
+    torch.testing.assert_close(image.distortion, torch.zeros_like(alpha))
+    if is_surfel:
+        torch.testing.assert_close(image.normal, alpha[..., None] * torch.tensor([0.0, 0, -1]).double())
+    else:
+        assert image.normal is None
+    counted = image.statistics
+    torch.testing.assert_close(counted.weight_sum, alpha.sum()[None])
+    torch.testing.assert_close(counted.weight_max, alpha.max()[None])
+    assert counted.pixels.item() == (alpha > 0).sum()
+    torch.testing.assert_close(counted.radii, torch.tensor([2 * math.log(0.8 * 255) * xx]).double().sqrt())
+
+
+WIDENED = {  # variances on screen of points
+    1 / 2: ([1e-4, 1e-4], Options(low_pass=2.0)),
+    1 / 6: ([1e-4, 1e-4], Options(low_pass=6.0)),
+    0.3: ([1e-5, 1e-5, 1e-5], Options(dilation=0.3)),
+    1.0: ([1e-5, 1e-5, 1e-5], Options(dilation=1.0)),
+}
+
+
+@pytest.mark.parametrize("variance", WIDENED)
+def test_what_is_smaller_than_a_pixel_is_widened(variance):
+    x, y = offsets()
+    scales, options = WIDENED[variance]
+    alpha = 0.8 * torch.exp(-0.5 * (x**2 + y**2) / variance)
+    tiny = view(means=[[0, 0, 2]], scales=[scales], opacities=[0.8])
+    image = rasterize(**tiny, features=torch.ones(1, 1).double(), options=options)
+    torch.testing.assert_close(image.alpha, torch.where(alpha >= 1 / 255, alpha, 0))
 
 
 def test_two_layers():

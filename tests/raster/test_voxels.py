@@ -69,21 +69,16 @@ def test_a_slab_by_hand(device):
     assert out.distance[1] == 0
 
 
-def test_samples_kept_or_marched_again(monkeypatch, device):
+def test_samples_kept_used_twice_or_marched_again(monkeypatch, device):
     scene = voxel_scene().to(device)
     rows = scene.grid.rows.requires_grad_()
     kept = gradients(scene, render_rays(scene.grid, scene.rays, scene.march), [rows])[0]
-    monkeypatch.setattr(voxels, "PIECE", 77)
-    again = gradients(scene, render_rays(scene.grid, scene.rays, scene.march, keep=False), [rows])[0]
-    torch.testing.assert_close(again, kept, rtol=1e-4, atol=1e-5)  # another order of sums
-
-
-def test_a_retained_graph_gives_the_same_gradient_twice(device):
-    scene = voxel_scene().to(device)
-    rows = scene.grid.rows.requires_grad_()
     color = render_rays(scene.grid, scene.rays, scene.march).color
     first = torch.autograd.grad(color.sum(), rows, retain_graph=True)[0]
     assert torch.equal(torch.autograd.grad(color.sum(), rows)[0], first)
+    monkeypatch.setattr(voxels, "PIECE", 77)
+    again = gradients(scene, render_rays(scene.grid, scene.rays, scene.march, keep=False), [rows])[0]
+    torch.testing.assert_close(again, kept, rtol=1e-4, atol=1e-5)  # another order of sums
 
 
 def test_gradient_into_a_buffer(device):
@@ -120,15 +115,8 @@ def test_largest_weights(device):
         assert one.max() <= alpha + 1e-6
         assert bool(one.any()) == bool(alpha > 0)
     assert torch.equal(weights, alone)
-
-
-def test_weights_may_start_anywhere(device):
-    scene = voxel_scene(n_rays=40).to(device)
-    samples = Samples(scene.grid, scene.march, scene.rays)
-    weights = torch.zeros(len(scene.grid.rows), device=device)
-    lower = weights - 1
-    samples.mark(weights)
-    samples.mark(lower)
+    lower = torch.zeros_like(weights) - 1  # they may start anywhere
+    Samples(scene.grid, scene.march, scene.rays).mark(lower)
     assert torch.equal(lower.clamp_min(0), weights)
     assert lower.max() > 0 > lower.min()
 
@@ -225,13 +213,8 @@ def test_points_are_on_their_rays_front_to_back():
     same = ray.diff() == 0
     assert bool((ray.diff() >= 0).all())
     assert bool((distance.diff()[same] > 0.49 * SPACING).all())
-
-
-def test_rays_may_be_a_view_with_gaps():
-    scene = voxel_scene(degree=0)
-    strided, expected = (
-        ray_points(scene.grid, rays, March()) for rays in (scene.rays[::2], scene.rays[::2].clone())
-    )
+    views = scene.rays[::2], scene.rays[::2].clone()  # with gaps and without
+    strided, expected = (ray_points(scene.grid, rays, March()) for rays in views)
     assert len(expected.points) > 0
     assert all(map(torch.equal, strided, expected))
 

@@ -82,13 +82,7 @@ def shade(color: Tensor, normal: Tensor, to_viewer: Tensor, to_light: Tensor, lo
     """Return Blinn-Phong with white light: c (k_a + k_d max(n.l, 0)) + k_s max(n.h, 0)^beta, in [0, 1].
 
     n is turned towards the viewer; the last term is there only where n.l > 0. A zero normal is ambient.
-
-    Args:
-        color: [n, 3].
-        normal: [n, 3] unit vectors, or 0.
-        to_viewer: [3] unit vector, the same everywhere: a distant viewer.
-        to_light: [3] unit vector.
-        look: k_a, k_d, k_s and beta.
+    Colours and normals are [n, 3], the directions to the distant viewer and to the light [3].
     """
     normal = torch.where(normal @ to_viewer[:, None] < 0, -normal, normal)
     n_l = (normal @ to_light)[:, None].clamp_min(0)

@@ -76,6 +76,8 @@ def test_test_path_of_any_length_goes_from_pole_to_pole():
     ours = positions(cameras.spiral(7, **LENS))
     full = positions(cameras.spiral(181, **LENS))
     np.testing.assert_allclose(ours, full[::30], atol=1e-5)
+    with pytest.raises(ArgumentError, match="count: expected at least 2 cameras on a path from pole to pole"):
+        cameras.spiral(1, **LENS)
 
 
 def test_orbit_path_is_one_turn_without_its_end():
@@ -93,8 +95,3 @@ def test_cameras_are_spread_evenly_over_a_path():
     assert len(places) == 61
     assert {after - before for before, after in pairwise(places)} <= {2, 3}
     assert cameras.spread(path, 1) == path[:1]
-
-
-def test_a_spiral_has_two_ends():
-    with pytest.raises(ArgumentError, match="count: expected at least 2 cameras on a path from pole to pole"):
-        cameras.spiral(1, **LENS)

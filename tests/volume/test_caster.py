@@ -198,16 +198,10 @@ def test_vtk_sees_the_same(light):
 
 def test_a_value_at_the_end_of_a_function_is_visible(device):
     """All samples of a saturated volume are there: between equal values nothing is rounded away."""
-    rng = np.random.default_rng(0)
-    values = np.full((20, 20, 20), 255, np.uint8)
-    tf = TransferFunction(((200, 0.4), (255, 0.4)), ((200, 1, 1, 1),))
-    camera = orbit(*rng.uniform(-80, 80, 2), 2, 34, 40, 40)
-    look = Appearance(opacity_unit=0.05, step=0.1)
-    inner = TransferFunction(((200, 0.4), (300, 0.4)), ((200, 1, 1, 1),))
-    np.testing.assert_array_equal(
-        Caster(Grid(values), look, device).render(tf, camera, HEADLIGHT),
-        Caster(Grid(values), look, device).render(inner, camera, HEADLIGHT),
-    )
+    caster = Caster(Grid(np.full((20,) * 3, 255, np.uint8)), Appearance(opacity_unit=0.05, step=0.1), device)
+    camera = orbit(*np.random.default_rng(0).uniform(-80, 80, 2), 2, 34, 40, 40)
+    tfs = (TransferFunction(((200, 0.4), (end, 0.4)), ((200, 1, 1, 1),)) for end in (255, 300))
+    np.testing.assert_array_equal(*(caster.render(tf, camera, HEADLIGHT) for tf in tfs))
 
 
 def test_missing_values_are_transparent_and_counted(device):

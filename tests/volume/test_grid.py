@@ -32,8 +32,5 @@ def test_longest_side_is_one_and_the_box_is_centred():
 def test_mistakes_are_named(values, spacing, message):
     with pytest.raises((ArgumentError, ShapeError), match=message):
         Grid(values, spacing)
-
-
-def test_origin_is_finite():
     with pytest.raises(ArgumentError, match="origin: expected three finite numbers"):
         Grid(np.zeros((2, 2, 2)), (1, 1, 1), (0, float("nan"), 0))

@@ -26,6 +26,11 @@ def test_a_ball_has_its_radius_and_faces_outwards():
     radii = np.linalg.norm(mesh.vertices, axis=1)
     assert np.abs(radii - 0.3).max() < 0.02 * step
     assert signed_volume(mesh) == pytest.approx(4 / 3 * np.pi * 0.3**3, rel=0.01)
+    none = isosurface(ball().values, 2.0, (1.0,) * 3, (0.0,) * 3)  # a level that is not reached
+    assert none.vertices.shape == none.triangles.shape == (0, 3)
+    glassy = TransferFunction([(0.2, 0.0), (0.4, 0.1), (0.6, 0.0)], WHITE)
+    with pytest.raises(ArgumentError, match=r"as opaque as 0\.5 somewhere in the volume.*another basic TF"):
+        surface_of(ball(), glassy, 0.5)
 
 
 def test_spacing_and_origin_are_x_y_z():
@@ -34,11 +39,6 @@ def test_spacing_and_origin_are_x_y_z():
     mesh = isosurface(values, 0.5, (1.0, 2.0, 3.0), (10.0, 20.0, 30.0))
     assert mesh.vertices.min(0).tolist() == [10.5, 21.0, 31.5]
     assert mesh.vertices.max(0).tolist() == [16.5, 29.0, 37.5]
-
-
-def test_a_level_that_is_not_reached_has_no_surface():
-    mesh = isosurface(ball().values, 2.0, (1.0,) * 3, (0.0,) * 3)
-    assert mesh.vertices.shape == mesh.triangles.shape == (0, 3)
 
 
 def test_ranges_in_which_a_function_is_opaque():
@@ -69,12 +69,6 @@ def test_what_is_cut_by_the_box_ends_there():
     mesh = surface_of(Grid(values), TransferFunction([(0.0, 0.0), (1.0, 1.0)], WHITE), 0.5)
     assert np.abs(mesh.vertices[:, :2]).max() == pytest.approx(0.5, abs=1e-3)
     assert signed_volume(mesh) == pytest.approx(2 / 7, rel=0.01)
-
-
-def test_a_glassy_function_has_no_surface():
-    tf = TransferFunction([(0.2, 0.0), (0.4, 0.1), (0.6, 0.0)], WHITE)
-    with pytest.raises(ArgumentError, match=r"as opaque as 0\.5 somewhere in the volume.*another basic TF"):
-        surface_of(ball(), tf, 0.5)
 
 
 def ramp(n=24):

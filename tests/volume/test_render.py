@@ -33,13 +33,7 @@ def levels(views):
     return [int(view.load()[0, 0, 3]) for view in views if view.path.exists()]
 
 
-def test_files_that_are_there_are_kept(views):
-    render_views(Grey(), None, views[:2], "some")
-    render_views(Grey(10), None, views, "all")
-    assert levels(views) == [1, 2, 11, 12, 13, 14]
-
-
-def test_an_interruption_before_an_image_is_written_loses_no_time(views, tmp_path, monkeypatch):
+def test_an_interruption_loses_no_file_and_no_time(views, tmp_path, monkeypatch):
     def interrupted(path, *planes):
         if path == views[3].path:
             raise KeyboardInterrupt

@@ -50,12 +50,21 @@ def numbers_at(basic, value):
     [
         (CT, {-1000: [], 40: [1], 1200: [2]}),
         (np.append(CT, RNG.normal(2600, 30, 3000)), {40: [1], 1200: [2], 2600: [3]}),
+        (np.append(CT, np.full(5000, 2000)), {40: [1], 1200: [2], 2000: [3]}),
         (np.append(AIR, RNG.normal(-60, 10, 2000)), {-60: []}),
         (np.append(AIR, RNG.normal(-60, 10, 60_000)), {-60: [1], 0: [], 100: [2]}),
         (np.repeat([0, 1, 2, 7], [900, 50, 10, 2]), {0: [], 1: [1], 2: [2], 7: [3]}),
         (np.repeat([0, 1], [100, 400]), {0: [], 1: [1]}),
     ],
-    ids=["air, tissue, bone", "rare dense", "noise below air", "material below air", "labels", "mask"],
+    ids=[
+        "air, tissue, bone",
+        "rare dense",
+        "saturated",
+        "noise below air",
+        "material below air",
+        "labels",
+        "mask",
+    ],
 )
 def test_materials_and_labels_have_their_functions(values, expected):
     basic, _, _ = suggested(values)
@@ -67,11 +76,6 @@ def test_the_scale_of_values_is_free():
     one, other = suggest(counts, -1024.0, 2000.0), suggest(counts, -1024e-6, 2000e-6)
     for a, b in zip(one.values(), other.values(), strict=True):
         np.testing.assert_allclose(np.array(a.support) * 1e-6, b.support)
-
-
-def test_the_maximum_is_visible():
-    basic, _, _ = suggested(np.append(CT, np.full(5000, 2000)))  # saturated
-    assert numbers_at(basic, 2000) == [len(basic)]
 
 
 FALLING = {
@@ -99,16 +103,13 @@ def test_many_labels_are_grouped():
     labels = np.repeat(np.arange(25), 100)
     assert len(suggested(labels)[0]) == 5
     assert len(suggested(labels, count=24)[0]) == 24
+    assert len(suggest([5, 0, 3], 0, 1, count=4)) == 1, "there are no more values"
 
 
 @pytest.mark.parametrize("count", range(1, 9))
 @pytest.mark.parametrize("values", [CT, RNG.exponential(1, 10_000)], ids=["CT", "simulation"])
 def test_the_count_is_kept(values, count):
     assert len(suggested(values, count)[0]) == count
-
-
-def test_the_count_is_limited_by_the_values():
-    assert len(suggest([5, 0, 3], 0, 1, count=4)) == 1
 
 
 @given(st.lists(st.integers(0, 10**6), min_size=40, max_size=300), st.none() | st.integers(1, 12))

@@ -30,12 +30,10 @@ class TestEvaluation:
         np.testing.assert_allclose(STEPS([math.nextafter(1, 0), 1])[:, 3], [0.4, 0.9])
         np.testing.assert_array_equal(STEPS([0.5, 1])[:, :3], [[1, 0, 0], [0, 1, 0]])
 
-    def test_any_shape_and_dtype(self):
+    def test_any_shape_and_dtype_and_missing_values_are_transparent(self):
         assert TENT(2.0).shape == (4,)
         assert TENT(np.zeros((2, 0, 3), np.float32)).shape == (2, 0, 3, 4)
         np.testing.assert_array_equal(TENT(np.uint8([2, 3])), TENT([2.0, 3.0]))
-
-    def test_missing_values_are_transparent(self):
         np.testing.assert_array_equal(TENT([np.nan, np.inf, -np.inf])[:, 3], 0)
 
     @given(functions())
@@ -54,15 +52,13 @@ class TestScaled:
         tf = TransferFunction(((0, 0), (0.25, 1), (1, 0.5)), ((0, 0, 0, 0), (1, 1, 1, 1))).scaled(-1000, 3000)
         assert tf.opacity == ((-1000, 0), (0, 1), (3000, 0.5))
         assert [value for value, *_ in tf.color] == [-1000, 3000]
+        with pytest.raises(ArgumentError, match=r"opacity\[1\]: expected a fraction .*got 2; do not scale"):
+            TENT.scaled(0, 1)
 
     @given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6))
     def test_ends_are_exact(self, low, width):
         tf = TransferFunction(((0, 0), (1, 1)), GREY).scaled(low, low + width)
         assert tf.support == (low, low + width)
-
-    def test_mistakes_are_named(self):
-        with pytest.raises(ArgumentError, match=r"opacity\[1\]: expected a fraction .*got 2; do not scale"):
-            TENT.scaled(0, 1)
 
 
 class TestWithoutSteps:
@@ -79,13 +75,11 @@ class TestWithoutSteps:
 
     @given(functions())
     def test_is_strictly_ascending_and_ends_transparent(self, tf):
+        assert TENT.without_steps() == TENT
         tf = tf.without_steps()
         assert (np.diff(np.array(tf.opacity)[:, 0]) > 0).all()
         assert (np.diff(np.array(tf.color)[:, 0]) > 0).all()
         assert tf.opacity[0][1] == tf.opacity[-1][1] == 0
-
-    def test_leaves_others_alone(self):
-        assert TENT.without_steps() == TENT
 
 
 class TestDictionary:
@@ -144,6 +138,10 @@ def test_overlap_names_both_functions_and_ranges():
         check_disjoint({"TF01": TENT, "TF02": other})
     check_disjoint({"TF01": TENT, "TF02": TransferFunction(((4, 1), (5, 1)), GREY)})
     check_disjoint({})
+    with pytest.raises(ArgumentError, match="a and b: expected ranges of values that do not overlap"):
+        combine({"a": TENT, "b": TENT})
+    with pytest.raises(ArgumentError, match="transfer functions: expected at least one, got none"):
+        combine({})
 
 
 @given(functions(), functions(), st.integers(0, 40))
@@ -165,13 +163,6 @@ def test_combined_functions_show_what_each_shows(first, second, apart):
         assert both(high)[3] == pytest.approx(first(high)[3], abs=1e-12), "also at its end"
     outside = ~np.any([(values > tf.support[0]) & (values < tf.support[1]) for tf in (first, second)], axis=0)
     assert (both(values[outside])[:, 3] == 0).all()
-
-
-def test_functions_that_overlap_are_not_combined():
-    with pytest.raises(ArgumentError, match="a and b: expected ranges of values that do not overlap"):
-        combine({"a": TENT, "b": TENT})
-    with pytest.raises(ArgumentError, match="transfer functions: expected at least one, got none"):
-        combine({})
 
 
 @pytest.mark.parametrize("value", [0.0, -0.0, 1e-45, -1e-40, 3e-33, 1.0, -255.0, 1e30])

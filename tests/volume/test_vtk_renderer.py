@@ -2,6 +2,7 @@ import contextlib
 import subprocess
 import sys
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -59,14 +60,10 @@ def test_both_see_the_same_on_a_real_volume(offscreen, light):
     assert psnr(over_white(vtk), over_white(own)) > 15
 
 
-def test_pictures_have_more_than_8_bits(renderers):
-    picture = renderers[0].render(SHELLS, orbit(-60, 20, 2.5, 30, 60, 60), HEADLIGHT)
-    assert len({float(alpha) for alpha in picture[..., 3].ravel()}) > 300
-
-
 def test_a_view_does_not_depend_on_the_one_before(renderers):
     camera, vtk = orbit(-60, 20, 2.5, 30, 60, 60), renderers[0]
     first = vtk.render(SHELLS, camera, LIGHTS[1])
+    assert len(set(first[..., 3].ravel().tolist())) > 300, "more than 8 bits"
     other = TransferFunction(((0.1, 0), (0.4, 0.9)), ((0, 1, 0, 0),))
     assert psnr(vtk.render(other, orbit(20, -30, 3, 40, 90, 40), HEADLIGHT).max(), first.max()) < 200
     assert (vtk.render(SHELLS, camera, LIGHTS[1]) == first).all()
@@ -180,13 +177,7 @@ def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch, fields, r
     with pytest.raises(DeviceError) as caught:
         VtkRenderer(ball(8), Appearance())
     assert str(caught.value) == f"offscreen OpenGL: {reason}; {opengl.ADVICE}"
-
-
-def test_a_driver_that_hangs_is_given_up(monkeypatch):
-    def hang(*_args, **_kwargs):
-        raise subprocess.TimeoutExpired("probe", 60)
-
-    monkeypatch.setattr(subprocess, "run", hang)
+    monkeypatch.setattr(subprocess, "run", Mock(side_effect=subprocess.TimeoutExpired("probe", 60)))
     with pytest.raises(DeviceError, match="no answer within 60 s; install libegl1"):
         opengl.offscreen_opengl()
 

@@ -33,13 +33,7 @@ MARGIN = 2  # pixels; the mapper may leave out the last row and column of a view
 
 
 class VtkCaster:
-    """Renders one volume from any camera.
-
-    Args:
-        grid: the volume; not copied where its samples have more than 8 bits.
-        appearance: shading and sampling.
-        threads: that cast rays.
-    """
+    """Renders one volume from any camera; samples of more than 8 bits are not copied."""
 
     def __init__(self, grid: Grid, appearance: Appearance, threads: int) -> None:
         image, self._factor = image_data(grid)

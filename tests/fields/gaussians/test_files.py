@@ -38,9 +38,6 @@ def test_other_programs_can_read_the_tensors(tmp_path):
     assert description == {"version": 1, "filter": {"antialiased": True}, "metadata": sample().metadata}
 
 
-# -- PLY ---
-
-
 @pytest.mark.parametrize("degree", [0, 3])
 def test_the_layout_is_that_of_3dgs_with_248_bytes_each(tmp_path, degree):
     path = write_ply(tmp_path / "m.ply", sample(degree=degree))

@@ -213,10 +213,9 @@ def test_what_cannot_be_written_is_named_and_leaves_nothing(tmp_path):
         (changed(model, texels=model.parameters["texels"] + 1e6), {}, "texels: expected at most 65536, got"),
         (model, {"step": 0}, "step: expected a part of the colour range"),
         (model, {"seen": torch.ones(7)}, "seen: expected bool, got torch.float32"),
+        (model, {"seen": torch.ones(3, dtype=torch.bool)}, r"seen: expected \[7\], got \[3\]"),
     ]
     for given_model, words, message in bad:
-        with pytest.raises(ArgumentError, match=message):
+        with pytest.raises((ArgumentError, ShapeError), match=message):
             write_compact(tmp_path / "m", given_model, **words)
-    with pytest.raises(ShapeError, match=r"seen: expected \[7\], got \[3\]"):
-        write_compact(tmp_path / "m", model, torch.ones(3, dtype=torch.bool))
     assert not list(tmp_path.iterdir())

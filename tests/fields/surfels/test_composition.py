@@ -84,13 +84,8 @@ def test_an_edit_is_the_model_with_other_numbers_and_at_most_opaque(opacity):
     model = ball(4)
     edit = PartEdit(True, (0.1, 0.7, 0.2), opacity, ambient=0.5, diffuse=1.5, specular=2, shininess=0.5)
     p = model.parameters
-    factors = {"ambient": 0.2, "diffuse": 0.75, "specular": 0.4, "shininess": 10.0}
-    opacities = torch.logit((opacity * p["opacities"].sigmoid()).clamp_max(1 - 1e-7))
-    changed = {
-        "palette": torch.tensor(edit.palette),
-        "opacities": opacities,
-        **raw_material(**factors, kind="bounded"),
-    }
+    changed = {"palette": torch.tensor(edit.palette), **raw_material(0.2, 0.75, 0.4, 10.0, "bounded")}
+    changed["opacities"] = torch.logit((opacity * p["opacities"].sigmoid()).clamp_max(1 - 1e-7))
     expected = Surfels({**p, **changed}, model.shading).render(CAMERA, SIDE)
     assert_close(Composition([model]).render(CAMERA, SIDE, [edit]).color, expected.color, atol=2e-5, rtol=0)
 
@@ -124,12 +119,8 @@ def test_without_light_colours_are_those_of_palette_and_texels_and_texels_alone_
 def test_discs_are_opaque_within_one_standard_deviation():
     """A surfel that faces the camera covers a circle, whatever its opacity; one that is hidden nothing."""
     one = {name: x[:1] for name, x in ball(1, stage="shading").parameters.items()}
-    one |= {
-        "means": torch.zeros(1, 3),
-        "quats": torch.tensor([[1.0, 0, 0, 0]]),
-        "opacities": torch.tensor([-2.0]),
-    }
-    one["scales"] = torch.full((1, 2), 0.3).log()
+    one |= {"means": torch.zeros(1, 3), "quats": torch.tensor([[1.0, 0, 0, 0]])}
+    one |= {"opacities": torch.tensor([-2.0]), "scales": torch.full((1, 2), 0.3).log()}
     scene, camera = Composition([Surfels(one, ShadingModel())]), orbit(-90, 0, 4, 30, 200, 200)
     alpha = scene.render(camera, SIDE, look="discs").alpha
     radius = 0.3 * float(camera.K[0, 0]) / 4

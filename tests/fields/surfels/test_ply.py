@@ -15,9 +15,6 @@ from texgs.fields.surfels.shading import ShadingModel, material, raw_material
 RELEASED = ["diffuse_factor", "shininess", "ambient_factor", "specular_factor"]
 
 
-# -- writing ---
-
-
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 def test_properties_are_those_of_2dgs_and_3dgs(tmp_path, degree):
     model = sample("surfels", degree=degree)
@@ -104,9 +101,6 @@ def test_the_release_finds_the_same_factors(tmp_path):
     np.testing.assert_allclose(columns["diffuse_factor"], 0.6, rtol=1e-6)
     np.testing.assert_allclose(5 * sigmoid(columns["specular_factor"]), 0.2, rtol=1e-5)
     np.testing.assert_allclose(50 * sigmoid(columns["shininess"]), 33.0, rtol=1e-5)
-
-
-# -- round trips ---
 
 
 @settings(max_examples=25, deadline=None)
