@@ -114,7 +114,7 @@ from texgs.workflow.stage import Stage
 print(*({'torch', 'kornia', 'numpy', 'mlflow', 'pyvista', 'vtkmodules'} & {*sys.modules}))
 for name in {*members('edit')} - {'none'}:
     edit = compose((f'edit={name}',)).edit
-    methods()[edit.method].check(methods()[edit.method].of(edit))
+    methods()[edit.method].of(edit).check()
 print('torch' in sys.modules)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -14,11 +14,8 @@ from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.dataset_update import PhotometricLoss, azimuth, field_views, update_field, update_steps
 from texgs.edit.gaussians import GaussianLearner, radii
 from texgs.edit.methods.dge import DgeKeys
-from texgs.edit.methods.dge import schedule as dge
 from texgs.edit.methods.igs2gs import Igs2gsKeys
-from texgs.edit.methods.igs2gs import schedule as igs2gs
 from texgs.edit.methods.in2n import In2nKeys
-from texgs.edit.methods.in2n import schedule as in2n
 from texgs.edit.methods.updates import UpdateSchedule
 from texgs.edit.voxels import VoxelLearner, corner
 from texgs.fields.optimizer import Rate
@@ -211,7 +208,7 @@ def made(schedule, count, seed=0):
 
 
 def test_in2n_edits_the_next_view_every_ten_iterations_and_learns_from_all():
-    steps = made(in2n(In2nKeys(passes=2), 7), 7)
+    steps = made(In2nKeys(passes=2).schedule(7), 7)
     assert len(steps) == 2 * 7 * 10
     for iteration, step in enumerate(steps):
         assert step.edited == ([iteration // 10 % 7] if iteration % 10 == 0 else [])
@@ -221,7 +218,7 @@ def test_in2n_edits_the_next_view_every_ten_iterations_and_learns_from_all():
 
 
 def test_igs2gs_edits_all_views_in_turn_and_learns_from_each_at_once():
-    steps = made(igs2gs(Igs2gsKeys(every=2500), 162), 162)
+    steps = made(Igs2gsKeys(every=2500).schedule(162), 162)
     assert len(steps) == 7500
     assert sum(len(step.edited) for step in steps) == 3 * 162
     for iteration, step in enumerate(steps):
@@ -233,7 +230,7 @@ def test_igs2gs_edits_all_views_in_turn_and_learns_from_each_at_once():
 
 
 def test_dge_edits_twenty_views_together_with_falling_noise_and_learns_from_nothing_else():
-    steps = made(dge(DgeKeys(rounds=5), 92), 92)
+    steps = made(DgeKeys(rounds=5).schedule(92), 92)
     assert len(steps) == 2500
     rounds = [step for step in steps if step.edited]
     assert [step.level for step in rounds] == [0.998, 0.3, 0.3, 0.021, 0.021]
@@ -257,9 +254,9 @@ def test_few_views_are_all_of_a_round():
             lambda: next(update_steps(UpdateSchedule(3, 100), 162, torch.Generator())),
             "expected rounds of at least 162 iterations, in which 162 views are edited, got 100",
         ),
-        (lambda: in2n(In2nKeys(noise=[0.9, 0.1]), 3), "edit.in2n.noise: expected two shares from 0 to 1"),
-        (lambda: igs2gs(Igs2gsKeys(noise=[0.9]), 3), "edit.igs2gs.noise: expected two shares from 0 to 1"),
-        (lambda: dge(DgeKeys(noise=[2.0]), 3), "edit.dge.noise: expected shares from 0 to 1, at least one"),
+        (lambda: In2nKeys(noise=[0.9, 0.1]).schedule(3), "edit.in2n.noise: expected two shares from 0 to 1"),
+        (lambda: Igs2gsKeys(noise=[0.9]).schedule(3), "edit.igs2gs.noise: expected two shares from 0 to 1"),
+        (lambda: DgeKeys(noise=[2.0]).schedule(3), "edit.dge.noise: expected one share from 0 to 1 at least"),
     ],
 )
 def test_noise_out_of_range_names_the_key(run, message):

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 from texgs.core.keys import key
-from texgs.edit.method import Method
+from texgs.edit.method import Method, MethodKeys
 
 
-@dataclass
-class FadeKeys:
+@dataclass(frozen=True)
+class FadeKeys(MethodKeys):
     """How much."""
 
     opacity: float = key(0.5, "factor on opacities", least=0, most=1)
@@ -24,12 +24,4 @@ def run(task):
     return EditedScene(session.scene, "a toy")
 
 
-METHOD = Method(
-    "fade",
-    "let a scene fade",
-    FadeKeys,
-    run,
-    check=lambda settings: None,
-    weights=lambda settings: {},
-    needs=frozenset({"opacity"}),
-)
+METHOD = Method("fade", "let a scene fade", FadeKeys, run, needs=frozenset({"opacity"}))

@@ -33,7 +33,7 @@ def override(claim):
 def test_keys_are_there_and_can_have_the_papers_values(claim):
     group, method, *rest = claim.key.split(".")
     if group == "edit" and rest[0] == "recipe":
-        numbers = methods()[method].numbers(methods()[method].settings(recipe="paper"))
+        numbers = methods()[method].settings(recipe="paper").numbers()
         assert rest[1] in numbers
     else:
         assert claim.key in {key.name for key in keys()}

@@ -10,15 +10,57 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from texgs.core.keys import typed
 from texgs.core.specifications import specifications
 from texgs.fields.kinds import kinds
 
+if TYPE_CHECKING:
+    from texgs.edit.style_picture import StylePicture
+
 PACKAGE = "texgs.edit.methods"
 NO_METHOD = "none"  # of scenes as they are fitted
-Settings = TypeVar("Settings")
+
+
+@dataclass(frozen=True)
+class MethodKeys:
+    """Keys of a method, `edit.NAME` in the configuration, and what follows from them alone."""
+
+    node = ""  # `edit.NAME`, for messages
+
+    def check(self) -> None:
+        """Raise an ArgumentError for what is wrong with them."""
+
+    def check_fit(self, fit: Any) -> None:
+        """Raise an ArgumentError where they do not go with those of the fit, the node `fit`."""
+
+    def weights(self) -> Mapping[str, str]:
+        """Return names of the weights that are needed, each with the word that does without; or ""."""
+        return {}
+
+    def files(self) -> Mapping[str, Path]:
+        """Return the files that are read besides scene and views."""
+        return {}
+
+    def adds(self, models: Sequence[str]) -> Sequence[str]:
+        """Return the parts that a scene of these models has afterwards in addition."""
+        return ()
+
+    def picture(self) -> StylePicture | None:
+        """Return the style that the result is compared with; None where there is none, or several."""
+        return None
+
+    def followed(self) -> str:
+        """Return what an edit follows, in tables: the name of a picture, or words."""
+        return ""
+
+    def numbers(self) -> Mapping[str, Any]:
+        """Return the numbers of the recipe that is chosen, with what is changed about it."""
+        return {}
+
+
+Settings = TypeVar("Settings", bound=MethodKeys)
 
 
 @dataclass(frozen=True)
@@ -27,26 +69,11 @@ class Method(Generic[Settings]):
 
     name: str
     summary: str  # what it does, in `texgs --help`
-    settings: type[Settings]  # dataclass of its keys, `edit.NAME` in the configuration
+    settings: type[Settings]  # dataclass of its keys
     run: Callable[[Any], Any]  # from a `Task[Settings]` of texgs/edit/task.py to an `EditedScene`
-    check: Callable[[Settings], None]
-    """Raises an ArgumentError for what is wrong with its settings, without scene and weights."""
-    weights: Callable[[Settings], Mapping[str, str]]
-    """Names of the weights that it needs, each with the word of its settings that does without; or ""."""
     needs: frozenset[str] = frozenset()  # what fields have to be capable of, see `Capability`
     fields: frozenset[str] = frozenset()  # kinds that it is made for; empty: all that can what it needs
-    check_fit: Callable[[Settings, Any], None] = lambda settings, fit: None
-    """Raises an ArgumentError where its settings do not go with those of the fit, the node `fit`."""
-    files: Callable[[Settings], Mapping[str, Path]] = lambda settings: {}  # read besides scene and views
-    adds: Callable[[Settings, Sequence[str]], Sequence[str]] = lambda settings, models: ()
-    """Parts that the scene has afterwards in addition, from the names of its models."""
-    style: Callable[[Settings], Any] | None = None
-    """The `StylePicture` that it follows, which the result is compared with; None where there are several."""
     follows: str = ""  # which of its keys, "style" or "instruction", looks of a data set have a value of
-    followed: Callable[[Settings], str] = lambda settings: ""
-    """What it follows, in tables: the name of a picture, or words."""
-    numbers: Callable[[Settings], Mapping[str, Any]] = lambda settings: {}
-    """Numbers of the recipe that its settings name, with what they change about it."""
     is_look: bool = True  # whether the scene looks different afterwards
 
     @property

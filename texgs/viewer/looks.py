@@ -123,7 +123,7 @@ class Looks:
             choices = [{"text": {"instruction": said, "guidance": guidance}} for guidance in GUIDANCE]
         *others, last = (edit_with(asked.parts, choice) for choice in choices)
         edit = next((each for each in others if has_weights(each)), last)
-        method_of(edit).check(method_of(edit).of(edit))
+        method_of(edit).of(edit).check()
         return edit
 
     def make(self, scene: Scene, edit: Any, output: Path, show: Callable[[str, Path], None]) -> EditedScene:
@@ -202,4 +202,4 @@ def edit_with(parts: Sequence[str], choice: dict[str, Any]) -> Any:
 
 def has_weights(edit: Any) -> bool:
     """Return whether all that an edit needs is on this machine."""
-    return all(map(available, method_of(edit).weights(method_of(edit).of(edit))))
+    return all(map(available, method_of(edit).of(edit).weights()))

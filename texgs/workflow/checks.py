@@ -41,8 +41,8 @@ def check_edit(config: Config) -> None:
         method = method_of(config.edit)
         require(config.fit.field, method.needs, f"edit {config.edit.name}", method.fields)
         for look in looks_of(config).values() or [None]:
-            method.check(method.of(config.edit, look))
-        method.check_fit(method.of(config.edit), config.fit)
+            method.of(config.edit, look).check()
+        method.of(config.edit).check_fit(config.fit)
 
 
 def check_basic_tfs(dataset: Any) -> None:

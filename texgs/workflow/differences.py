@@ -132,7 +132,7 @@ def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
     config, prefix, numbers = compose((f"{group}={name}",)), "fit.", dict[str, Any]()
     if group == "edit" and config.edit.method != NO_METHOD:
         method = method_of(config.edit)
-        prefix, numbers = f"edit.{method.name}.", dict(method.numbers(method.of(config.edit)))
+        prefix, numbers = f"edit.{method.name}.", dict(method.of(config.edit).numbers())
     elif group == "edit" or config.fit.field != "surfels":
         return
 

@@ -88,8 +88,7 @@ def require_parts(chain: Sequence[Words]) -> None:
 
 def added_parts(edit: EditKeys, models: Sequence[str]) -> Sequence[str]:
     """Return the parts that an edit adds to a scene of some models."""
-    method = method_of(edit)
-    return method.adds(method.of(edit), models)
+    return method_of(edit).of(edit).adds(models)
 
 
 def ancestry(name: str) -> list[EditKeys]:

@@ -48,7 +48,7 @@ def needed(config: Config) -> Mapping[str, str]:
     if config.edit.method == NO_METHOD:
         return {}
     method = method_of(config.edit)
-    words = method.weights(method.of(config.edit))
+    words = method.of(config.edit).weights()
     return {name: word and f"edit.{method.name}.{word}" for name, word in words.items()}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
@@ -11,13 +10,12 @@ from texgs.edit.methods.igs2gs import rates
 from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, update_method
 from texgs.fit.settings import CommonRates
 
-if TYPE_CHECKING:
-    from texgs.edit.gaussians import GaussianLearner
-
 
 @dataclass(frozen=True)
 class DgeKeys(UpdateKeys):
     """How Gaussians follow: rounds, in each of which some views are edited together and learned from."""
+
+    node = "edit.dge"
 
     l1: float = key(10.0, "weight of the absolute difference to edited views", least=0)
     dssim: float = key(0.0, "weight of D-SSIM", least=0)
@@ -33,28 +31,18 @@ class DgeKeys(UpdateKeys):
         default_factory=lambda: rates(0.0125, 0.1), metadata={"help": "learning rates"}
     )
 
-
-def schedule(keys: DgeKeys, views: int) -> UpdateSchedule:
-    """Edit some views together in each round, and learn from nothing but them."""
-    if not keys.noise or not all(0 <= level <= 1 for level in keys.noise):
-        raise ArgumentError(f"edit.dge.noise: expected shares from 0 to 1, at least one, got {keys.noise}")
-    levels = tuple((level, level) for level in keys.noise)
-    return UpdateSchedule(keys.rounds, keys.every, keys.views, keys.views, "random", "round", levels)
-
-
-def learner() -> type[GaussianLearner]:
-    """Return what learns from whole views."""
-    from texgs.edit.gaussians import GaussianLearner
-
-    return GaussianLearner
+    def schedule(self, views: int) -> UpdateSchedule:
+        """Edit some views together in each round, and learn from nothing but them."""
+        if not self.noise or not all(0 <= level <= 1 for level in self.noise):
+            raise ArgumentError(f"edit.dge.noise: expected one share from 0 to 1 at least, got {self.noise}")
+        levels = tuple((level, level) for level in self.noise)
+        return UpdateSchedule(self.rounds, self.every, self.views, self.views, "random", "round", levels)
 
 
 METHOD = update_method(
     "dge",
     "edit some views of a scene of 3D Gaussians together by an instruction, as DGE does",
     DgeKeys,
-    schedule,
-    learner,
     "gaussians",
     keeps_renders=True,
 )

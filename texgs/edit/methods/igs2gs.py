@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
 from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, update_method
 from texgs.fit.settings import CommonRates
-
-if TYPE_CHECKING:
-    from texgs.edit.gaussians import GaussianLearner
 
 
 def rates(zeroth: float, means_final: float) -> CommonRates:
@@ -22,6 +18,8 @@ def rates(zeroth: float, means_final: float) -> CommonRates:
 class Igs2gsKeys(UpdateKeys):
     """How Gaussians follow: all views are edited one after the other, then learned from for a while."""
 
+    node = "edit.igs2gs"
+
     passes: int = key(3, "times that each view is edited", least=1)
     every: int = key(2500, "iterations from pass to pass", least=1)
     noise: list[float] = key([0.7, 0.98], "level of noise of an edit, from and to, as a share")
@@ -29,25 +27,15 @@ class Igs2gsKeys(UpdateKeys):
         default_factory=lambda: rates(0.0025, 0.01), metadata={"help": "learning rates"}
     )
 
-
-def schedule(keys: Igs2gsKeys, views: int) -> UpdateSchedule:
-    """Edit all views in passes, and learn from each when it is edited."""
-    levels = noise_range("edit.igs2gs.noise", keys.noise)
-    return UpdateSchedule(keys.passes, keys.every, learned="newest", levels=levels)
-
-
-def learner() -> type[GaussianLearner]:
-    """Return what learns from whole views."""
-    from texgs.edit.gaussians import GaussianLearner
-
-    return GaussianLearner
+    def schedule(self, views: int) -> UpdateSchedule:
+        """Edit all views in passes, and learn from each when it is edited."""
+        levels = noise_range("edit.igs2gs.noise", self.noise)
+        return UpdateSchedule(self.passes, self.every, learned="newest", levels=levels)
 
 
 METHOD = update_method(
     "igs2gs",
     "edit all views of a scene of 3D Gaussians in turn by an instruction, as Instruct-GS2GS does",
     Igs2gsKeys,
-    schedule,
-    learner,
     "gaussians",
 )

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods import style
-from texgs.edit.methods.style import StyleKeys
+from texgs.edit.methods.style import Look, StyleKeys
 from texgs.models.catalogue import CLIP_BACKBONES
 
 if TYPE_CHECKING:
@@ -22,12 +20,12 @@ if TYPE_CHECKING:
     from texgs.fields.surfels.model import Surfels
     from texgs.volume.view_set import View
 
-KEYS = "edit.image"  # where its keys stand
-
 
 @dataclass(frozen=True)
 class ImageKeys(StyleKeys):
     """How texels take on a style."""
+
+    node = "edit.image"
 
     recipe: str = key(
         "default",
@@ -52,6 +50,27 @@ class ImageKeys(StyleKeys):
     )
     textured: bool = key(True, "each texel learns, or each surfel one colour: the paper's ablation")
 
+    def recipe_of(self, seed: int = 0) -> Recipe:
+        """Return the recipe, with what the configuration changes about it."""
+        from texgs.edit.recipe import preset
+
+        changes: dict[str, Any] = {"pattern": self.pattern, "is_textured": self.textured, "seed": seed}
+        for name in ("iterations", "lambda_s", "start"):
+            if (value := getattr(self, name)) is not None:
+                changes[name] = value
+        return preset(self.recipe, **changes)
+
+    def weights(self) -> dict[str, str]:
+        """Return those of the recipe, and what finds an object in the picture."""
+        recipe = self.recipe_of()
+        vgg = {"vgg16": "recipe=patches"} if recipe.needs_vgg else {}
+        clip = {self.clip: "lambda_s=1"} if recipe.needs_clip else {}
+        return {**vgg, **super().weights(), **clip}
+
+    def numbers(self) -> dict[str, Any]:
+        """Return those of the recipe."""
+        return vars(self.recipe_of())
+
 
 def run(task: Task[ImageKeys]) -> EditedScene:
     """Give the parts the style; write style.png."""
@@ -62,8 +81,8 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     from texgs.models.vgg import Vgg
     from texgs.volume.images import smaller
 
-    keys, recipe = task.settings, recipe_of(task.settings, task.edit.seed)
-    look = style.Look(task, Vgg.load(device=task.device) if recipe.needs_vgg else None)
+    keys, recipe = task.settings, task.settings.recipe_of(task.edit.seed)
+    look = Look(task, Vgg.load(device=task.device) if recipe.needs_vgg else None)
     network = Clip.load(keys.clip, task.device) if recipe.needs_clip else None
     seconds: dict[str, dict[str, float]] = {}
     adapted: list[Recipe] = []
@@ -92,17 +111,6 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     return EditedScene(scene, how(adapted, keys.clip), look.write_pictures(), lambda_s, notes, look.losses)
 
 
-def recipe_of(settings: ImageKeys, seed: int = 0) -> Recipe:
-    """Return the recipe of an edit, with what the configuration changes about it."""
-    from texgs.edit.recipe import preset
-
-    changes: dict[str, Any] = {"pattern": settings.pattern, "is_textured": settings.textured, "seed": seed}
-    for name in ("iterations", "lambda_s", "start"):
-        if (value := getattr(settings, name)) is not None:
-            changes[name] = value
-    return preset(settings.recipe, **changes)
-
-
 def how(recipes: Sequence[Recipe], clip: str) -> str:
     """Return what the edit of some parts works with, for tables; `clip` is the backbone of a CLIP term."""
     names = {
@@ -115,25 +123,11 @@ def how(recipes: Sequence[Recipe], clip: str) -> str:
     return words if recipes[0].is_textured else f"{words}, without texture"
 
 
-def weights(settings: ImageKeys) -> Mapping[str, str]:
-    """Return those of the recipe, and what finds an object in the picture."""
-    recipe = recipe_of(settings)
-    vgg = {"vgg16": "recipe=patches"} if recipe.needs_vgg else {}
-    clip = {settings.clip: "lambda_s=1"} if recipe.needs_clip else {}
-    return {**vgg, **style.weights(settings), **clip}
-
-
 METHOD = Method(
     "image",
     "give a scene the style of a picture",
     ImageKeys,
     run,
-    lambda settings: style.check(settings, KEYS),
-    weights,
     needs=frozenset({"texture", "relight"}),
-    files=style.files,
-    style=lambda settings: style.style_of(settings, KEYS),
     follows="style",
-    followed=lambda settings: Path(settings.style).name,
-    numbers=lambda settings: vars(recipe_of(settings)),
 )

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
 from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, update_method
-
-if TYPE_CHECKING:
-    from texgs.edit.voxels import VoxelLearner
 
 
 @dataclass(frozen=True)
 class In2nKeys(UpdateKeys):
     """How a grid follows: one view is edited at a time, and patches of all views are learned from."""
+
+    node = "edit.in2n"
 
     l1: float = key(1.0, "weight of the absolute difference to edited views", least=0)
     dssim: float = key(0.0, "weight of D-SSIM, which patches have not", least=0, most=0)
@@ -27,25 +25,15 @@ class In2nKeys(UpdateKeys):
     density: float = key(0.05, "learning rate of densities", least=0)
     sh: float = key(0.01, "learning rate of spherical harmonics", least=0)
 
-
-def schedule(keys: In2nKeys, views: int) -> UpdateSchedule:
-    """Edit one view after the other."""
-    rounds = max(1, round(keys.passes * views))
-    return UpdateSchedule(rounds, keys.every, views=1, levels=noise_range("edit.in2n.noise", keys.noise))
-
-
-def learner() -> type[VoxelLearner]:
-    """Return what learns from patches."""
-    from texgs.edit.voxels import VoxelLearner
-
-    return VoxelLearner
+    def schedule(self, views: int) -> UpdateSchedule:
+        """Edit one view after the other."""
+        rounds = max(1, round(self.passes * views))
+        return UpdateSchedule(rounds, self.every, views=1, levels=noise_range("edit.in2n.noise", self.noise))
 
 
 METHOD = update_method(
     "in2n",
     "edit views of a scene of voxels one by one by an instruction, as Instruct-NeRF2NeRF does",
     In2nKeys,
-    schedule,
-    learner,
     "voxels",
 )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
+from texgs.edit.method import MethodKeys
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,7 +20,7 @@ SHOWN = 6  # edited views in the picture of them
 
 
 @dataclass(frozen=True)
-class InstructionKeys:
+class InstructionKeys(MethodKeys):
     """What to do, and what edits the views. The scales are those of TexGS-VolVis."""
 
     instruction: str = key("", "what to do, such as 'make it gold'")
@@ -68,6 +69,10 @@ class InstructionKeys:
     def weights(self) -> dict[str, str]:
         """Return the diffusion model, where it edits the views."""
         return {"instruct-pix2pix": "guidance=filters"} if self.guidance == "instruct_pix2pix" else {}
+
+    def followed(self) -> str:
+        """Return the instruction."""
+        return self.instruction
 
 
 def write_views(folder: Path, rows: Mapping[str, Sequence[np.ndarray]]) -> dict[str, str]:

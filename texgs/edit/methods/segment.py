@@ -10,7 +10,7 @@ from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.keys import key
 from texgs.core.lens import Lens, frequency_of
 from texgs.core.names import require_name
-from texgs.edit.method import Method
+from texgs.edit.method import Method, MethodKeys
 from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, normalized_clicks
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ DIMMED = 0.15  # opacity of what is not in the segment, in its picture
 
 
 @dataclass(frozen=True)
-class SegmentKeys:
+class SegmentKeys(MethodKeys):
     """Where is clicked, and how masks become surfels."""
 
     model: str = key("", "model whose part it is; may be left out where there is one")
@@ -51,6 +51,33 @@ class SegmentKeys:
     )
     views: int = key(42, "number of views of the icosphere, 10 f^2 + 2", least=12)
     size: int = key(512, "side of these views", "pixels", least=32)
+
+    def places(self) -> list[list[float]]:
+        """Return the clicks, those beside the part last, as shares of the sides of the view."""
+        places = normalized_clicks("edit.segment.points", [*self.points, *self.others])
+        if not self.points:
+            raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
+        if len(self.view) != 2:
+            raise ArgumentError(f"edit.segment.view: expected azimuth and polar angle, got {self.view}")
+        return places
+
+    def check(self) -> None:
+        """Require a name, clicks, and a number of views that an icosphere has."""
+        require_name(self.name, "edit.segment.name")
+        self.places()
+        frequency_of(self.views, "edit.segment.views")
+
+    def weights(self) -> dict[str, str]:
+        """Return those of what finds the part."""
+        return mask_weights(self.masks)
+
+    def adds(self, models: Sequence[str]) -> Sequence[str]:
+        """Return the name of the segment."""
+        model = self.model or (models[0] if len(models) == 1 else "")
+        if model not in models:
+            expected = f"expected one of {', '.join(models)}"
+            raise ConfigError(f"edit.segment.model: {expected}, got {model or 'none'}")
+        return [f"{model}/{self.name}"]
 
 
 def run(task: Task[SegmentKeys]) -> EditedScene:
@@ -97,16 +124,6 @@ def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
     return [camera.to(task.device) for camera in cameras]
 
 
-def normalized(settings: SegmentKeys) -> list[list[float]]:
-    """Return the clicks, those beside the part last, as shares of the sides of the view."""
-    places = normalized_clicks("edit.segment.points", [*settings.points, *settings.others])
-    if not settings.points:
-        raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
-    if len(settings.view) != 2:
-        raise ArgumentError(f"edit.segment.view: expected azimuth and polar angle, got {settings.view}")
-    return places
-
-
 def clicks_of(settings: SegmentKeys, lens: Lens, device: torch.device) -> Clicks:
     """Return clicks in pixels of a view through a lens."""
     import torch
@@ -114,7 +131,7 @@ def clicks_of(settings: SegmentKeys, lens: Lens, device: torch.device) -> Clicks
     from texgs.core.camera import orbit
     from texgs.edit.clicks import Clicks
 
-    places, (azimuth, polar) = normalized(settings), settings.view
+    places, (azimuth, polar) = settings.places(), settings.view
     camera = orbit(azimuth, polar, *lens).to(device)
     points = lens.width * torch.tensor(places, dtype=torch.float32, device=device)
     positive = torch.arange(len(points), device=device) < len(settings.points)
@@ -146,29 +163,11 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
     write_grid(task.output / "edit.png", {"": [image.cpu().numpy() for image in pictures]}, titles)
 
 
-def check(settings: SegmentKeys) -> None:
-    """Require a name, clicks, and a number of views that an icosphere has."""
-    require_name(settings.name, "edit.segment.name")
-    normalized(settings)
-    frequency_of(settings.views, "edit.segment.views")
-
-
-def adds(settings: SegmentKeys, models: Sequence[str]) -> Sequence[str]:
-    """Return the name of the segment."""
-    model = settings.model or (models[0] if len(models) == 1 else "")
-    if model not in models:
-        raise ConfigError(f"edit.segment.model: expected one of {', '.join(models)}, got {model or 'none'}")
-    return [f"{model}/{settings.name}"]
-
-
 METHOD = Method(
     "segment",
     "make a segment of a model of a scene, by clicks of the configuration",
     SegmentKeys,
     run,
-    check,
-    lambda settings: mask_weights(settings.masks),
     needs=frozenset({"segments"}),
-    adds=adds,
     is_look=False,
 )

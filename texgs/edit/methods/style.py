@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.edit.method import Method
+from texgs.edit.method import Method, MethodKeys
 from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, normalized_clicks
 
 if TYPE_CHECKING:
@@ -26,12 +26,45 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class StyleKeys:
+class StyleKeys(MethodKeys):
     """The picture, and the object of it that counts."""
 
     style: str = key("strokes", "picture that texgs paints (strokes, glass, marble, ...), or a picture file")
     region: list[Any] = key([], "clicks on the object of the picture that counts, as shares; default all")
     masks: str = key("mobile_sam", "what finds that object; grabcut needs no weights", choices=MASKS)
+
+    def check(self) -> None:
+        """Require a picture that is there, and clicks on it."""
+        require_picture(self.style, f"{self.node}.style")
+        normalized_clicks(f"{self.node}.region", self.region)
+
+    def weights(self) -> dict[str, str]:
+        """Return what finds the object, where that needs weights."""
+        return mask_weights(self.masks) if self.region else {}
+
+    def files(self) -> dict[str, Path]:
+        """Return the picture's file, where it is one."""
+        path = Path(self.style)
+        return {"style": path} if path.is_file() else {}
+
+    def followed(self) -> str:
+        """Return the name of the picture."""
+        return Path(self.style).name
+
+    def picture(self) -> StylePicture | None:
+        """Return the picture, of it the object that was clicked on."""
+        import torch
+
+        from texgs.models.masks import mask_model
+
+        def find(image: Tensor) -> Tensor:
+            height, width = image.shape[:2]
+            clicks = normalized_clicks(f"{self.node}.region", self.region)
+            points = torch.tensor(clicks) * torch.tensor([width, height])
+            masks = mask_model(self.masks, torch.device("cpu"))
+            return masks(image, points, torch.ones(len(points), dtype=torch.bool))
+
+        return picture_of(self.style, f"{self.node}.style", find if self.region else None)
 
 
 @dataclass(frozen=True)
@@ -42,6 +75,20 @@ class FeatureKeys(StyleKeys):
     patches: float = key(0.0, "weight of the sliced Wasserstein distance of patches", least=0)
     foreground: bool = key(True, "only what is on the object counts, not what is behind")
     sampled: bool = key(False, "features are drawn at random and searched roughly, for CPUs")
+
+    def check(self) -> None:
+        """Require a picture, and that something is compared with it."""
+        if not self.nnfm and not self.patches:
+            raise ArgumentError(
+                f"{self.node}.nnfm, {self.node}.patches: expected a weight above 0 for one of them, got 0 "
+                "for both"
+            )
+        super().check()
+
+    def weights(self) -> dict[str, str]:
+        """Return VGG where features are compared, and what finds the object."""
+        without = "nnfm=0" if self.patches else ""
+        return {**({"vgg16": without} if self.nnfm > 0 else {}), **super().weights()}
 
     def recipe(self, iterations: int, seed: int, **changes: Any) -> Recipe:
         """Return the losses, with changes to other fields of `Recipe`."""
@@ -83,8 +130,10 @@ class Look(Generic[Keys]):
 
     def picture(self, part: str) -> StylePicture:
         """Return what a part follows."""
-        self.pictures[part] = style_of(self.task.settings_for(part), f"edit.{self.task.edit.method}")
-        return self.pictures[part]
+        picture = self.task.settings_for(part).picture()
+        assert picture is not None
+        self.pictures[part] = picture
+        return picture
 
     def write_pictures(self) -> dict[str, str]:
         """Write style.png, or one for each part where pictures differ; return what they show."""
@@ -112,19 +161,13 @@ def look_method(
     name: str, summary: str, settings: type[FeatureKeysType], stylize: Stylize[FeatureKeysType], kind: str
 ) -> Method[FeatureKeysType]:
     """Return the specification of a method that gives models of one kind of field the style of a picture."""
-    where = f"edit.{name}"
     return Method(
         name,
         summary,
         settings,
         partial(_run, stylize),
-        partial(_check_features, where),
-        _feature_weights,
         fields=frozenset({kind}),
-        files=files,
-        style=lambda values: style_of(values, where),
         follows="style",
-        followed=lambda values: Path(values.style).name,
     )
 
 
@@ -144,32 +187,6 @@ def _run(stylize: Stylize[FeatureKeysType], task: Task[FeatureKeysType]) -> Edit
     scene = task.each_model(one)
     how = " + ".join(["VGG-16"] * (keys.nnfm > 0) + ["patches"] * (keys.patches > 0))
     return EditedScene(scene, how, look.write_pictures(), notes=look.notes, losses=look.losses)
-
-
-def _check_features(where: str, settings: FeatureKeys) -> None:
-    """Require that something is compared with the style."""
-    if not settings.nnfm and not settings.patches:
-        raise ArgumentError(
-            f"{where}.nnfm, {where}.patches: expected a weight above 0 for one of them, got 0 for both"
-        )
-    check(settings, where)
-
-
-def _feature_weights(settings: FeatureKeys) -> dict[str, str]:
-    """Return VGG where features are compared, and what finds the object."""
-    without = "nnfm=0" if settings.patches else ""
-    return {**({"vgg16": without} if settings.nnfm > 0 else {}), **weights(settings)}
-
-
-def files(settings: StyleKeys) -> dict[str, Path]:
-    """Return the picture's file, where it is one."""
-    path = Path(settings.style)
-    return {"style": path} if path.is_file() else {}
-
-
-def weights(settings: StyleKeys) -> dict[str, str]:
-    """Return what finds the object, where that needs weights."""
-    return mask_weights(settings.masks) if settings.region else {}
 
 
 def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
@@ -196,25 +213,3 @@ def require_picture(name: str, key: str) -> None:
 
     if name not in PICTURES:
         picture_of(name, key)
-
-
-def check(settings: StyleKeys, where: str) -> None:
-    """Require a picture that is there, and clicks on it."""
-    require_picture(settings.style, f"{where}.style")
-    normalized_clicks(f"{where}.region", settings.region)
-
-
-def style_of(settings: StyleKeys, where: str) -> StylePicture:
-    """Return the picture, of it the object that was clicked on."""
-    import torch
-
-    from texgs.models.masks import mask_model
-
-    def find(image: Tensor) -> Tensor:
-        height, width = image.shape[:2]
-        clicks = normalized_clicks(f"{where}.region", settings.region)
-        points = torch.tensor(clicks) * torch.tensor([width, height])
-        masks = mask_model(settings.masks, torch.device("cpu"))
-        return masks(image, points, torch.ones(len(points), dtype=torch.bool))
-
-    return picture_of(settings.style, f"{where}.style", find if settings.region else None)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.edit.methods import style
-from texgs.edit.methods.style import FeatureKeys, Look, look_method
+from texgs.edit.methods.style import FeatureKeys, Look, look_method, picture_of, require_picture
 
 if TYPE_CHECKING:
     from texgs.edit.style_loop import Losses
+    from texgs.edit.style_picture import StylePicture
     from texgs.fields.palette.model import PaletteField
     from texgs.volume.view_set import View
 
@@ -24,6 +24,8 @@ STYLES = "edit.stylerf.styles"
 class StyleRfKeys(FeatureKeys):
     """How palette colours take on styles."""
 
+    node = "edit.stylerf"
+
     styles: list[str] = key(
         [], "a picture for each palette colour of the fit, whatever looks say; default: `style` for all"
     )
@@ -31,6 +33,33 @@ class StyleRfKeys(FeatureKeys):
     distillation: int = key(500, "steps before, in which free colours learn the recoloured palette", least=0)
     rate: float = key(1e-2, "learning rate of free colours", above=0)
     variation: float = key(1.0, "weight of total variation of the image", least=0)
+
+    def check(self) -> None:
+        """Require pictures that are there."""
+        super().check()
+        for name in self.styles:
+            require_picture(name, STYLES)
+
+    def check_fit(self, fit: Any) -> None:
+        """Require a style for each palette colour of a fit."""
+        if self.styles and len(self.styles) != fit.palette.colors:
+            raise ArgumentError(
+                f"{STYLES}: expected one for each of {fit.palette.colors} palette colours of "
+                f"fit={fit.name}, got {len(self.styles)}; or name one `style` for all"
+            )
+
+    def files(self) -> dict[str, Path]:
+        """Return the pictures that are files."""
+        several = {f"style{i}": Path(name) for i, name in enumerate(self.styles) if Path(name).is_file()}
+        return {**super().files(), **several}
+
+    def picture(self) -> StylePicture | None:
+        """Return the style of all palette colours; None where each has its own."""
+        return None if self.styles else super().picture()
+
+    def followed(self) -> str:
+        """Return the names of the pictures."""
+        return ", ".join(Path(name).name for name in self.styles or [self.style])
 
 
 def stylize(
@@ -42,7 +71,7 @@ def stylize(
 
     keys, task = look.keys, look.task
     recipe = keys.recipe(round(keys.epochs * len(views)), task.edit.seed, reduce=2, rate=keys.rate)
-    pictures = [style.picture_of(each, STYLES) for each in keys.styles]
+    pictures = [picture_of(each, STYLES) for each in keys.styles]
     look.pictures.update({f"{name}-{index + 1}": each for index, each in enumerate(pictures)})
     pictures = pictures or [look.picture(name)] * len(model.colors)
     images, title = load(views, task.reduce), task.title_of(name)
@@ -51,40 +80,10 @@ def stylize(
     return edited, losses
 
 
-def check(settings: StyleRfKeys) -> None:
-    """Require pictures that are there."""
-    LOOK.check(settings)
-    for name in settings.styles:
-        style.require_picture(name, STYLES)
-
-
-def check_fit(settings: StyleRfKeys, fit: Any) -> None:
-    """Require a style for each palette colour of a fit."""
-    if settings.styles and len(settings.styles) != fit.palette.colors:
-        raise ArgumentError(
-            f"{STYLES}: expected one for each of {fit.palette.colors} palette colours of "
-            f"fit={fit.name}, got {len(settings.styles)}; or name one `style` for all"
-        )
-
-
-def files(settings: StyleRfKeys) -> dict[str, Path]:
-    """Return the pictures that are files."""
-    several = {f"style{i}": Path(name) for i, name in enumerate(settings.styles) if Path(name).is_file()}
-    return {**style.files(settings), **several}
-
-
-LOOK = look_method(
+METHOD = look_method(
     "stylerf",
     "give a scene of palette fields the styles of pictures, as StyleRF-VolVis does",
     StyleRfKeys,
     stylize,
     "palette",
-)
-METHOD = replace(
-    LOOK,
-    check=check,
-    check_fit=check_fit,
-    files=files,
-    style=lambda settings: None if settings.styles else style.style_of(settings, "edit.stylerf"),
-    followed=lambda settings: ", ".join(Path(name).name for name in settings.styles or [settings.style]),
 )

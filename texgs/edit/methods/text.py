@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
@@ -36,6 +36,17 @@ class TextKeys(InstructionKeys):
     textured: bool = key(True, "each texel follows, or each surfel has one colour: the paper's comparison")
     size: int = key(512, "longer side of the six views", "pixels", least=64)
 
+    def recipe_of(self) -> TextRecipe:
+        """Return the recipe, with the views that the configuration chooses."""
+        from texgs.edit.text import RECIPES
+
+        recipe = RECIPES[self.recipe]
+        return replace(recipe, views=self.views) if self.views else recipe  # type: ignore[arg-type]
+
+    def numbers(self) -> dict[str, Any]:
+        """Return those of the recipe."""
+        return vars(self.recipe_of())
+
 
 def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
@@ -52,7 +63,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
         result = edit_by_text(
             model,
             [smaller(view.camera, task.reduce).to(task.device) for view in views],
-            *(guidance, task.settings_for(name).instruction, recipe_of(settings)),
+            *(guidance, task.settings_for(name).instruction, settings.recipe_of()),
             light=views[0].light,
             surfels=surfels,
             size=settings.size,
@@ -73,23 +84,11 @@ def run(task: Task[TextKeys]) -> EditedScene:
     )
 
 
-def recipe_of(settings: TextKeys) -> TextRecipe:
-    """Return the recipe of an edit, with the views that the configuration chooses."""
-    from texgs.edit.text import RECIPES
-
-    recipe = RECIPES[settings.recipe]
-    return replace(recipe, views=settings.views) if settings.views else recipe  # type: ignore[arg-type]
-
-
 METHOD = Method(
     "text",
     "give a scene the look that an instruction asks for",
     TextKeys,
     run,
-    lambda settings: settings.check(),
-    lambda settings: settings.weights(),
     needs=frozenset({"texture", "relight"}),
     follows="instruction",
-    followed=lambda settings: settings.instruction,
-    numbers=lambda settings: vars(recipe_of(settings)),
 )

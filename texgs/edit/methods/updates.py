@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
@@ -15,10 +15,9 @@ from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
 if TYPE_CHECKING:
     import numpy as np
 
-    from texgs.edit.dataset_update import Learner, PhotometricLoss
+    from texgs.edit.dataset_update import PhotometricLoss
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.field import Field
-    from texgs.volume.images import Images
     from texgs.volume.view_set import View
 
 
@@ -30,6 +29,19 @@ class UpdateKeys(InstructionKeys):
     l1: float = key(0.8, "weight of the absolute difference to edited views", least=0)
     dssim: float = key(0.2, "weight of D-SSIM", least=0)
     lpips: float = key(0.0, "weight of LPIPS on VGG-16; 0 needs no weights", least=0)
+
+    def schedule(self, views: int) -> UpdateSchedule:
+        """Return when which of so many views are edited."""
+        raise NotImplementedError
+
+    def check(self) -> None:
+        """Require an instruction, a loss and a schedule that there can be."""
+        super().check()
+        if not (self.l1 or self.dssim or self.lpips):
+            raise ArgumentError(
+                f"{self.node}.l1, dssim, lpips: expected a weight above 0 for one of them, got 0 for all"
+            )
+        self.schedule(1)
 
     def loss(self, device: Any) -> PhotometricLoss:
         """Return the loss on views."""
@@ -77,50 +89,37 @@ def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float]
 Keys = TypeVar("Keys", bound=UpdateKeys)
 
 
-# What makes a learner, imported late: from the keys, a model, its views, the loss and a number of iterations.
-MakeLearner = Callable[[], "Callable[[Any, Any, Images, PhotometricLoss, int], Learner]"]
-
-
 def update_method(
     name: str,
     summary: str,
     settings: type[Keys],
-    schedule: Callable[[Keys, int], UpdateSchedule],
-    learner: MakeLearner,
     kind: str,
     *,
     keeps_renders: bool = False,
 ) -> Method[Keys]:
     """Return the specification of a method that edits training views while a kind of field learns from them.
 
-    From its keys and a number of views follows the schedule. What learns is made from the keys, a model, the
-    training views, the loss on them and a number of iterations. Where renders are kept, edits stay close to
-    views of the fitted model and not to the training views.
+    Where renders are kept, edits stay close to views of the fitted model and not to the training views.
     """
     return Method(
         name,
         summary,
         settings,
-        partial(_run, schedule, learner, keeps_renders),
-        partial(_check, name, schedule),
-        lambda values: values.weights(),
+        partial(_run, kind, keeps_renders),
         fields=frozenset({kind}),
         follows="instruction",
-        followed=lambda values: values.instruction,
     )
 
 
-def _run(
-    schedule: Callable[[Keys, int], UpdateSchedule],
-    learner: MakeLearner,
-    keeps_renders: bool,
-    task: Task[Keys],
-) -> EditedScene:
+def _run(kind: str, keeps_renders: bool, task: Task[Keys]) -> EditedScene:
     """Give the models the look; write views.png."""
     from texgs.edit.dataset_update import update_field
+    from texgs.edit.gaussians import GaussianLearner
     from texgs.edit.task import EditedScene
+    from texgs.edit.voxels import VoxelLearner
     from texgs.volume.images import load
 
+    learner: Any = {"gaussians": GaussianLearner, "voxels": VoxelLearner}[kind]
     keys, guidance = task.settings, task.settings.opened(task.device)
     loss = keys.loss(task.device)
     rows: dict[str, list[np.ndarray]] = {}
@@ -128,9 +127,9 @@ def _run(
     notes: dict[str, Any] = {}
 
     def one(name: str, model: Field, views: Sequence[View]) -> Field:
-        images, plan = load(views, task.reduce), schedule(keys, len(views))
+        images, plan = load(views, task.reduce), keys.schedule(len(views))
         updated = update_field(
-            *(learner()(keys, model, images, loss, plan.iterations), images, guidance),
+            *(learner(keys, model, images, loss, plan.iterations), images, guidance),
             task.settings_for(name).instruction,
             plan,
             keeps_renders=keeps_renders,
@@ -148,13 +147,3 @@ def _run(
     notes["instruction"] = task.followed or keys.instruction
     how = f"{guidance.name}, geometry {'frozen' if keys.frozen else 'learns'}"
     return EditedScene(scene, how, write_views(task.output, rows), notes=notes, losses=losses)
-
-
-def _check(name: str, schedule: Callable[[Keys, int], UpdateSchedule], settings: Keys) -> None:
-    """Require an instruction, a loss and a schedule that there can be."""
-    settings.check()
-    if not (settings.l1 or settings.dssim or settings.lpips):
-        raise ArgumentError(
-            f"edit.{name}.l1, dssim, lpips: expected a weight above 0 for one of them, got 0 for all"
-        )
-    schedule(settings, 1)

@@ -151,11 +151,10 @@ def followed(task: Task[Any]) -> dict[str, str]:
     """Return the picture or the words that each part follows; none where the method follows neither."""
     from texgs.edit.task import parts_of
 
-    method = method_of(task.edit)
-    if not method.follows:
+    if not method_of(task.edit).follows:
         return {}
     parts = parts_of(task.scene, task.edit.parts)
-    return {part: method.followed(task.settings_for(part)) for part in parts}
+    return {part: task.settings_for(part).followed() for part in parts}
 
 
 def edited_scene(config: Config) -> dict[str, Path]:
@@ -172,7 +171,7 @@ def edited_scene(config: Config) -> dict[str, Path]:
     files = {
         f"{key}.{name}" if name else key: path
         for name, look in looks.items()
-        for key, path in method.files(method.of(config.edit, look)).items()
+        for key, path in method.of(config.edit, look).files().items()
     }
     return {"scene": scene, **models, **views, **files}
 

@@ -65,11 +65,11 @@ def styles_of(settings: Settings, scene: Scene, longest: int) -> list[StyledMode
 
     edit = settings.edit
     parts, method = parts_of(scene, edit.parts), method_of(edit)
-    if method.style is None or any(part not in scene.models for part in parts):
+    if any(part not in scene.models for part in parts):
         return []
     styles = []
     for part in parts:
-        picture = method.style(method.of(edit, settings.followed.get(part)))
+        picture = method.of(edit, settings.followed.get(part)).picture()
         if picture is None:
             return []
         style = picture.scaled(longest)
