@@ -10,7 +10,7 @@ from texgs.core.light import HEADLIGHT
 from texgs.edit.clicks import Clicks, is_visible, places_of
 from texgs.edit.lift import Lifted, components_at, lift, middle_of, view_mask
 from texgs.edit.new_segment import preview
-from texgs.models.grabcut import GrabCut
+from texgs.models.masks import GrabCut
 
 SIZE = 120
 FRONT = orbit(-90, 0, 4.0, 22.0, SIZE, SIZE)  # on +z

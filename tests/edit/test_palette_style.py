@@ -53,12 +53,11 @@ def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypat
     monkeypatch.setattr(palette_style, "RAYS", rays)
     monkeypatch.setattr(palette_style, "LEAST_WEIGHT", -1.0)
     field, camera = one_colored(field), images.cameras[0]
-    run = PalettePainting(field, torch.Generator().manual_seed(0))
     recipe = replace(RECIPE, features=1.0)
     objective = Objective.of(recipe, STYLE.scaled(48), 2, vgg, None)
+    run = PalettePainting(field, [camera], [objective], [0.4], 0.7, 0.0, torch.Generator().manual_seed(0))
     (layer,) = run.layers(camera)
     monkeypatch.setattr(run, "step", lambda iteration: None)
-    run.follow([camera], [objective], [0.4], 0.7, 0.0)
     losses = learn_style(run, 1, replace(recipe, iterations=1), "test")
     values = {name: each[0] for name, each in losses.items()}
     deferred = {name: x.grad.clone() for name, x in run.free.items()}
@@ -87,7 +86,7 @@ def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypat
 def test_free_colours_learn_those_of_the_recoloured_palette(field, images):
     colors = torch.tensor([[0.1, 0.7, 0.3], [0.2, 0.2, 0.9]])
     recolored = replace(field, parameters={**field.parameters, "palette.colors": colors})
-    run = PalettePainting(recolored, torch.Generator().manual_seed(0))
+    run = PalettePainting(recolored, [], [], [], 0.0, 0.0, torch.Generator().manual_seed(0))
     error = run.distil(images, 150, "test")
     with torch.no_grad():
         points = points_on(camera_rays(images.cameras[1]).flatten(0, 1), field.geometry, field.parameters)
@@ -130,7 +129,7 @@ def test_a_plain_style_becomes_the_colour_of_the_ball(field, images):
 
 def test_layers_of_palette_colours_are_apart_and_together_everything(field, images):
     camera = images.cameras[2]
-    run = PalettePainting(field, torch.Generator())
+    run = PalettePainting(field, [], [], [], 0.0, 0.0, torch.Generator())
     rays = camera_rays(camera).flatten(0, 1)
     points = points_on(rays, field.geometry, field.parameters)
     shares = palette_color(points.at, field.parameters, field.geometry.levels).shares

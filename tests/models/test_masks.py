@@ -9,8 +9,7 @@ import torch
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.models.catalogue import CATALOGUE
-from texgs.models.grabcut import GrabCut
-from texgs.models.masks import Remembered
+from texgs.models.masks import GrabCut, Remembered
 from texgs.models.sam import PUBLISHED, Sam, published_sam, sam_folder
 
 SIZE = 96

@@ -18,7 +18,7 @@ from texgs.edit.lift import lift
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
-from texgs.models.grabcut import GrabCut
+from texgs.models.masks import GrabCut
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment

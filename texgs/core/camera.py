@@ -134,16 +134,10 @@ def orbit(
     height: int,
     target: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Camera:
-    """Return the camera on a sphere around a target that looks at the target; float32.
+    """Return the camera on a sphere around a target [3] that looks at the target; float32.
 
-    Args:
-        azimuth: degrees, see `orbit_direction`.
-        polar: degrees above the horizon, -90 to 90; the poles are as good as any other place.
-        radius: world units, above 0.
-        fov_y: vertical field of view, degrees.
-        width: pixels.
-        height: pixels.
-        target: [3] world units.
+    Angles are in degrees: for azimuth and polar see `orbit_direction`, the field of view is vertical. The
+    poles are as good as any other place.
     """
     if not isfinite(azimuth):
         raise ArgumentError(f"azimuth: expected degrees, got {azimuth}")

@@ -113,14 +113,8 @@ def write_grid(
 ) -> Path:
     """Write a PNG with rows of pictures and a title over each column.
 
-    All show the same part of theirs, the smallest square in which one differs from its corner.
-
-    Args:
-        path: target file.
-        rows: pictures [H, W, 3] of one size by the name of the row, in [0, 1] or uint8; as many as titles.
-            A place with None stays empty.
-        titles: of the columns.
-        below: words under the pictures of each row; by default there are none.
+    Pictures [H, W, 3] are of one size, in [0, 1] or uint8, by the name of the row; a place with None stays
+    empty. All show the same part of theirs, the smallest square in which one differs from its corner.
     """
     return draw(path, grid_rows(rows, titles, below), columns=len(titles))
 

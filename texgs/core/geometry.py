@@ -22,10 +22,9 @@ def quats_to_matrices(quats: Tensor) -> Tensor:
 
 
 def z_order(cells: Tensor) -> Tensor:
-    """Return the order [N], int64, of cells along a Z curve (Morton 1966); equal ones keep theirs.
+    """Return the order [N], int64, of cells [N, D] along a Z curve (Morton 1966); equal ones keep theirs.
 
-    Args:
-        cells: [N, D] whole numbers of 0 or more; D times their bits have to fit into 63.
+    Cells are whole numbers of 0 or more; D times their bits have to fit into 63.
     """
     axes = cells.shape[1]
     code = cells.new_zeros(len(cells), dtype=torch.long)

@@ -31,11 +31,9 @@ def open_picture(path: str | Path, what: str = "an image") -> Iterator[Image.Ima
 
 
 def to_pillow(color: Tensor, alpha: Tensor | None = None) -> Image.Image:
-    """Round an image to 8 bits, clamped to [0, 1] first.
+    """Round an image [H, W, 3] or [H, W, 1] to 8 bits, clamped to [0, 1] first.
 
-    Args:
-        color: [H, W, 3] or [H, W, 1]; premultiplied where `alpha` is given. Any device and dtype.
-        alpha: [H, W]; colour is divided by it, so that the file holds straight alpha.
+    Where alpha [H, W] is given, colour is premultiplied, and divided by it: the file holds straight alpha.
     """
     if color.ndim != 3 or color.shape[2] not in (1, 3):
         raise ShapeError(f"color: expected [H, W, 3] or [H, W, 1], got {list(color.shape)}")

@@ -53,12 +53,8 @@ def key(
 ) -> Any:
     """Return a dataclass field that `--help` and the checks can read.
 
-    Args:
-        default: a value, a class (one instance each), or a list (a copy each).
-        help: what the key means.
-        unit: of its numbers.
-        choices: the only values allowed, where these are few.
-        bounds: of its numbers, by the names of `Bounds`: least, most, above, below.
+    A class as default gives each its own instance, and a list its own copy. Numbers have the unit and bounds
+    by the names of `Bounds`: least, most, above, below.
     """
     metadata = {"help": help, "unit": unit, "choices": choices, "bounds": Bounds(**bounds)}
     if isinstance(default, type):
@@ -94,16 +90,10 @@ class MissingKey(ValueMismatch):
 
 
 def typed(kind: type[T], values: Mapping[str, Any], key: str = "") -> T:
-    """Return an instance of a dataclass, its parts too, from plain values.
+    """Return an instance of a dataclass, its parts too, from plain values by the names of its fields.
 
-    Args:
-        kind: of lists, tables with any names, further dataclasses, and single values.
-        values: by the names of its fields; those that are not given get their defaults.
-        key: of the values, in front of the names in messages.
-
-    Raises:
-        ValueMismatch: for a name that is unknown or missing, a value of another type, and one that its field
-            does not allow.
+    The dataclass is of lists, tables with any names, further dataclasses, and single values. Fields that are
+    not given get their defaults. Messages, of a ValueMismatch, put the key in front of the names.
     """
     known = _fields(cast(Any, kind))
     made = {}

@@ -22,11 +22,7 @@ class Lens(NamedTuple):
 
 
 def frequency_of(count: int, where: str = "views") -> int:
-    """Return the frequency f of the icosphere that has so many vertices, 10 f^2 + 2.
-
-    Raises:
-        ArgumentError: naming `where` the number comes from, if no icosphere has so many.
-    """
+    """Return the frequency f of the icosphere that has so many vertices, 10 f^2 + 2."""
     frequency = isqrt(max(count - 2, 0) // 10)
     if frequency < 1 or 10 * frequency**2 + 2 != count:
         raise ArgumentError(f"{where}: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {count}")

@@ -25,12 +25,9 @@ FINE = 18  # constant rate factor of H.264 that looks like the frames
 def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25.0, crf: int = FINE) -> Path:
     """Write frames as they come and return the path; the file appears when it is complete.
 
-    Args:
-        path: ends in .png for one frame, .gif or .mp4 for several; without an ending it is a folder, which
-            receives one PNG a frame and must not have pictures of another film.
-        frames: [H, W, 3] uint8, of one size.
-        fps: frames per second.
-        crf: constant rate factor of H.264 in MP4, 0 to 51: the higher, the smaller and the coarser.
+    The path ends in .png for one frame, .gif or .mp4 for several; without an ending it is a folder, which
+    receives one PNG a frame and must not have pictures of another film. Frames are [H, W, 3] uint8, of one
+    size. The constant rate factor of H.264 is 0 to 51: the higher, the smaller and the coarser.
     """
     path = Path(path)
     if path.suffix not in ("", *KINDS):

@@ -41,9 +41,7 @@ PlainLoader.add_implicit_resolver("tag:yaml.org,2002:float", NUMBER, list("-+.01
 def parse_yaml(text: str) -> Any:
     """Return the values of a text.
 
-    Raises:
-        ArgumentError: if it is no YAML, or has aliases, tags, or values in one another without end.
-        yaml.YAMLError, ValueError: if it has characters that no text has, or a value such as 2001-99-99.
+    PyYAML raises a YAMLError or ValueError for characters that no text has and values such as 2001-99-99.
     """
     try:
         return yaml.load(text, PlainLoader)

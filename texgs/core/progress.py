@@ -61,13 +61,7 @@ def progress(iterable: Iterable[T], total: int | None = None, *, title: str, uni
 
     A terminal shows one moving bar. Anything else, such as the log file of a job, gets a plain line at most
     every five seconds and one at the end, also where the loop was left early; none where there is nothing to
-    do. The rates of these lines are means since the start.
-
-    Args:
-        iterable: items of the loop.
-        total: number of items; by default the iterable's length where it has one.
-        title: what is being done, at the start of each line.
-        unit: name of one item, such as "view".
+    do. The rates of these lines are means since the start. The unit names one item, such as "view".
 
     Example:
         >>> list(progress("ab", title="letters", unit="letter"))

@@ -116,9 +116,7 @@ def _description(path: Path, format: str, newest: int, header: dict[str, str]) -
 def load_torch(path: Path) -> Any:
     """Return what torch.load makes of a file, on the CPU, without running anything that it may hold.
 
-    Raises:
-        ValueError: if it holds more than tensors, lists, tables, numbers and text; torch raises other errors
-            over files that are damaged.
+    A file of more than tensors, lists, tables, numbers and text is a ValueError.
     """
     is_zip = is_zipfile(path)
     for pickled in _pickles(path, is_zip):

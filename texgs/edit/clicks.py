@@ -39,9 +39,6 @@ def places_of(model: Surfels, clicks: Clicks) -> Tensor:
     """Return where in the world [P, 3] clicks are: on the layer of surfels that makes up most of the pixel.
 
     Behind a layer that lets through more than it shows, a click is on what shows through.
-
-    Raises:
-        ArgumentError: if a point is outside of the view or on the background.
     """
     thickness = TOLERANCE * extent(model)
     return torch.stack([_place(model, clicks.camera, x, y, thickness) for x, y in clicks.points.tolist()])

@@ -31,16 +31,13 @@ class Learner(Protocol):
     @property
     def original(self) -> Field:
         """Return the field as it was at first."""
-        ...
 
     @property
     def field(self) -> Field:
         """Return the field as it is now."""
-        ...
 
     def step(self, images: Images, views: Sequence[int], generator: torch.Generator) -> float:
         """Learn from some of these views, all that memory and method allow; return the loss."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,16 +104,6 @@ def update_steps(schedule: UpdateSchedule, count: int, generator: torch.Generato
         yield UpdateStep(edited, level, learned[schedule.learned])
 
 
-class Updated(NamedTuple):
-    """What an edit gives."""
-
-    field: Field
-    views: list[tuple[Tensor, Tensor]]  # some that were edited, [H, W, 3]: as they were, and as they are
-    losses: list[float]  # in each iteration
-    edits: int  # of single views
-    guided: float  # seconds that edits of views took
-
-
 def update_field(
     learner: Learner,
     images: Images,
@@ -125,37 +112,33 @@ def update_field(
     schedule: UpdateSchedule,
     *,
     keeps_renders: bool = False,
-    shown: int = 1,
     seed: int = 0,
     title: str = "edit",
 ) -> Updated:
     """Edit a field by editing its training views, which it learns from as they are then.
 
     The images given stay as they are. Where renders are kept, edits stay close to views of the field as it
-    was, as in DGE; else to the training views. So many views as are to be shown are returned, at most. The
-    seed is of all random numbers.
+    was, as in DGE; else to the training views. The seed is of all random numbers.
     """
     generator = torch.Generator().manual_seed(seed)
-    edits = _Edits(
+    updated = Updated(
         *(learner, images, replace(images, planes=images.planes.clone()), guidance),
         *(require_instruction(instruction), keeps_renders, generator),
     )
-    losses: list[float] = []
     steps = update_steps(schedule, len(images), generator)
     for iteration, step in enumerate(progress(steps, schedule.iterations, title=title, unit="step")):
         if step.edited:
-            edits.make(step.edited, step.level)
-        losses.append(learner.step(edits.images, step.learned, generator))
-        if not isfinite(losses[-1]):
-            raise FitError(
-                f"iteration {iteration}: expected a finite loss, got {losses[-1]}; lower the rates"
-            )
-    return Updated(learner.field, edits.some(shown), losses, edits.count, edits.seconds)
+            updated.edit(step.edited, step.level)
+        loss = learner.step(updated.images, step.learned, generator)
+        updated.losses.append(loss)
+        if not isfinite(loss):
+            raise FitError(f"iteration {iteration}: expected a finite loss, got {loss}; lower the rates")
+    return updated
 
 
 @dataclass(eq=False)
-class _Edits:
-    """The views that are learned from, as they are edited."""
+class Updated:
+    """A field and the views that it learns from, as they are edited."""
 
     learner: Learner
     before: Images
@@ -164,12 +147,13 @@ class _Edits:
     instruction: str
     keeps_renders: bool
     generator: torch.Generator
+    losses: list[float] = field(default_factory=list)  # in each iteration
     edited: set[int] = field(default_factory=set)
-    count: int = 0
-    seconds: float = 0.0
+    count: int = 0  # edits of single views
+    seconds: float = 0.0  # that these took
 
     @torch.no_grad()
-    def make(self, ids: Sequence[int], level: float) -> None:
+    def edit(self, ids: Sequence[int], level: float) -> None:
         """Edit some views together, as the field shows them now."""
         start, shown = time.monotonic(), self.learner.field
         ids = sorted(ids, key=lambda view: azimuth(self.images.cameras[view]))  # those that follow are alike

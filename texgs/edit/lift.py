@@ -76,9 +76,6 @@ def lift(
         threshold: of the votes; by default 0.5 of contributions, 0.7 of views.
         connected: whether only the connected components that hold a positive click are kept.
         title: of the progress bar.
-
-    Raises:
-        ArgumentError: if a click is outside of the view or on the background, or no surfel is selected.
     """
     places, camera = places_of(model, clicks), clicks.camera
     find = partial(view_mask, model, masks=masks, light=light)

@@ -94,9 +94,6 @@ def preview(
     """Return the mask [H, W] bool of a view from clicks on it, and a picture [H, W, 3] of both.
 
     A mask model that remembers images answers the second click on a view at once.
-
-    Raises:
-        ArgumentError: if a click is outside of the view or on the background.
     """
     places_of(model, clicks)  # they have to be on the model
     mask = view_mask(model, clicks, masks, light)

@@ -61,11 +61,11 @@ def stylize_palette(
         )
     dominant = [cluster_colors(style.pixels, CLUSTERS, recipe.seed)[0] for style in styles]
     field = replace(field, parameters={**field.parameters, "palette.colors": torch.stack(dominant)})
-    run = PalettePainting(field, torch.Generator().manual_seed(recipe.seed))
-    error = run.distil(images, keys.distillation, title)
     objectives = [Objective.of_views(recipe, style, images.size, vgg) for style in styles]
     greys = [float(style.mean @ torch.tensor(LUMINANCE)) for style in styles]
-    run.follow(images.cameras, objectives, greys, keys.variation, recipe.rate)
+    generator = torch.Generator().manual_seed(recipe.seed)
+    run = PalettePainting(field, images.cameras, objectives, greys, keys.variation, recipe.rate, generator)
+    error = run.distil(images, keys.distillation, title)
     losses = learn_style(run, len(images), recipe, title)
     return run.field, losses, error
 
@@ -87,15 +87,27 @@ class Layer(NamedTuple):
 class PalettePainting:
     """A recoloured field whose free colours are on their way to styles.
 
-    They begin with the features of the palette's hash grid; networks and rays are drawn at random.
+    They begin with the features of the palette's hash grid; networks and rays are drawn at random. By palette
+    colour they follow an objective, over a grey.
     """
 
-    def __init__(self, field: PaletteField, generator: torch.Generator) -> None:
+    def __init__(
+        self,
+        field: PaletteField,
+        cameras: Sequence[Camera],
+        objectives: Sequence[Objective],
+        greys: Sequence[float],
+        variation: float,
+        rate: float,
+        generator: torch.Generator,
+    ) -> None:
         self.levels, self.generator = field.geometry.levels, generator
+        self.cameras, self.objectives, self.greys = cameras, objectives, greys
         free = new_networks(["free"], self.levels, len(field.colors), generator)
         free["free.table"] = field.parameters["palette.table"].clone()
         self.free = {name: x.requires_grad_() for name, x in free.items()}
         self.recolored = field
+        self.variation, self.optimizer = variation, self.adam(rate)
 
     @property
     def field(self) -> PaletteField:
@@ -119,18 +131,6 @@ class PalettePainting:
             adam.step()
             adam.zero_grad()
         return loss.sqrt().item()
-
-    def follow(
-        self,
-        cameras: Sequence[Camera],
-        objectives: Sequence[Objective],
-        greys: Sequence[float],
-        variation: float,
-        rate: float,
-    ) -> None:
-        """Learn from whole views from now on: by palette colour its distance to a style, over a grey."""
-        self.cameras, self.objectives, self.greys = cameras, objectives, greys
-        self.variation, self.optimizer = variation, self.adam(rate)
 
     def render(self, view: int) -> list[Painting]:
         """Show what a view has of each palette colour."""

@@ -71,9 +71,6 @@ def learn_style(
     """Bring a field closer to its styles, by one of its views in each iteration.
 
     The watch measures the parts of iterations; `show` is called after each.
-
-    Raises:
-        FitError: if the loss is no longer finite.
     """
     watch = watch or Stopwatch(torch.device("cpu"))
     losses: Losses = defaultdict(list)

@@ -97,10 +97,6 @@ def read_style(path: str | Path, find: Find | None = None) -> StylePicture:
             one of a camera is turned as its file says.
         find: returns the part that counts, [h, w] bool, of the whole picture [h, w, 3], such as the mask of
             an object in it; by default all.
-
-    Raises:
-        ArgumentError: if the file is missing, no picture, too large or too small, or the part is empty.
-        ShapeError: if `find` returns another size.
     """
     try:
         with warnings.catch_warnings():

@@ -63,10 +63,6 @@ def stylize(
         surfels: [N] bool, the ones to change; by default all. Texels and colours of others stay, bit for bit.
         title: of the progress bar.
         show: is called after each iteration with a function that makes the model as it is then.
-
-    Raises:
-        ArgumentError, ShapeError: if the model has no texture, there is no view, or a term is missing.
-        FitError: if the loss is no longer finite; nothing is returned then.
     """
     require_editable(model, surfels)
     if not cameras or len(lights) != len(cameras):

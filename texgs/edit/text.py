@@ -37,8 +37,7 @@ NEAREST = 0.05  # distance to the nearest point against that to the middle
 class TextRecipe:
     """Which views are edited, and how texels follow; the defaults are those of `default`."""
 
-    views: Literal["axes", "nearest", "all"] = "axes"
-    """Six new ones along the axes, filled by the scene; six training views nearest to the axes; or all."""
+    views: Literal["axes", "nearest", "all"] = "axes"  # new ones, or training views nearest to axes; or all
     opacities: tuple[float, ...] = (2.0, 1.0, 0.5)  # factors on the scene's opacity while texels are found
     sweeps: int = 3  # of the solver, where there are no iterations
     iterations: int = 0  # of Adam, over which opacities follow each other; 0: solve

@@ -98,11 +98,7 @@ class Consistency:
     ) -> Tensor:
         """Return the noise [3, V, ...] of all views in one denoising step.
 
-        Args:
-            branches: runs the UNet on some views: [3, K, ...].
-            count: of views.
-            time: of the step.
-            generator: draws the keys.
+        `branches` runs the UNet on some views: [3, K, ...]. The generator draws the keys.
         """
         try:
             if time < LAST:

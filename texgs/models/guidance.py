@@ -18,18 +18,12 @@ from texgs.core.errors import ArgumentError
 class EditViews:
     """Views of one scene to be edited together; all of one size, on one device, over white."""
 
-    images: Tensor
-    """[V, H, W, 3] the scene as it looks now, in [0, 1]."""
-    conditions: Tensor
-    """[V, H, W, 3] the scene before any edit of this run: what an edit should stay close to."""
-    alphas: Tensor
-    """[V, H, W] in [0, 1]."""
-    points: Tensor
-    """[V, H, W, 3] place in the world of what a pixel shows; of no meaning where alpha is 0."""
-    normals: Tensor
-    """[V, H, W, 3] world axes, facing the camera; 0 where alpha is 0."""
-    cameras: Sequence[Camera]
-    """One for each view."""
+    images: Tensor  # [V, H, W, 3] the scene as it looks now, in [0, 1]
+    conditions: Tensor  # [V, H, W, 3] the scene before any edit of this run: an edit should stay close to it
+    alphas: Tensor  # [V, H, W] in [0, 1]
+    points: Tensor  # [V, H, W, 3] place in the world of what a pixel shows; of no meaning where alpha is 0
+    normals: Tensor  # [V, H, W, 3] world axes, facing the camera; 0 where alpha is 0
+    cameras: Sequence[Camera]  # one for each view
     level: float | None = None
     """Share of the noise schedule that images are noised to before they are edited, 0 to 1: how far from them
     an edit may go. By default as the guidance does; filters take no notice."""
@@ -51,18 +45,13 @@ class EditViews:
 class Guidance(Protocol):
     """Edits views as an instruction says."""
 
-    name: str
-    """For reports and metadata."""
-    lit: bool
-    """True if it wants to see the scene with light; false for the bare colours that light falls on."""
+    name: str  # for reports and metadata
+    lit: bool  # whether it wants to see the scene with light, or the bare colours that light falls on
 
     def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
         """Return the edited images [V, H, W, 3] over white.
 
-        Args:
-            views: to edit.
-            instruction: what to do, in words.
-            generator: of all random numbers, on the CPU; the same one gives the same images.
+        The generator is of all random numbers, on the CPU; the same one gives the same images.
         """
 
 
@@ -78,11 +67,8 @@ class Disagreeing:
     """Another guidance, whose patterns lie elsewhere and whose colours are off in each view of each call.
 
     It does what an editor of single images does to views of one scene. With it, methods that edit all views
-    again and again can be compared with those that edit a few once, without a diffusion model.
-
-    Args:
-        guidance: that edits.
-        amount: standard deviation of shifts of patterns, world units, and of factors on colours.
+    again and again can be compared with those that edit a few once, without a diffusion model. The amount is
+    the standard deviation of shifts of patterns, world units, and of factors on colours.
     """
 
     def __init__(self, guidance: Guidance, amount: float) -> None:

@@ -1,4 +1,4 @@
-"""Models that find an object in an image from clicks: their names, what they take, give and remember."""
+"""Models that find an object in an image from clicks: what all take, give and remember, and GrabCut."""
 
 from __future__ import annotations
 
@@ -8,28 +8,33 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Protocol
 
+import cv2
+import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError
 
 REMEMBERED = 64  # images whose features are kept: the training views of a lift, and the view clicked on
+SIZE = 320  # pixels of the longer side that is segmented; larger images are reduced, and masks enlarged
+SEED = 0.01  # radius of what a click marks for certain, of the longer side
+ALIKE = 16  # largest difference per channel of 255 of what is probably the same object as a click
+PLAIN = 20  # largest difference per channel within an empty background; less parts objects that nearly touch
+ROUNDS = 5
 
 
 class MaskModel(Protocol):
     """Finds what the positive points lie on and the negative ones do not."""
 
-    name: str
-    """For tables and files."""
+    name: str  # for tables and files
 
     def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
-        """Return the object in an image, [H, W] bool, on the image's device.
+        """Return the object in an image [H, W, 3] as shown on a screen, [H, W] bool, on its device.
 
-        Args:
-            image: [H, W, 3] in [0, 1], as shown on a screen.
-            points: [P, 2] right and down in pixels; the centre of the first pixel is (0.5, 0.5).
-            positive: [P] bool, at least one of them true.
+        Points [P, 2] are right and down in pixels; the centre of the first pixel is (0.5, 0.5). At least one
+        is positive [P] bool.
         """
 
 
@@ -70,7 +75,6 @@ class Remembered:
 
 def mask_model(name: str, device: torch.device) -> MaskModel:
     """Return the mask model of a name, or in a folder."""
-    from texgs.models.grabcut import GrabCut
     from texgs.models.sam import PUBLISHED, published_sam, sam_folder
 
     if name == "grabcut":
@@ -82,3 +86,93 @@ def mask_model(name: str, device: torch.device) -> MaskModel:
             f"masks: expected {', '.join(PUBLISHED)}, grabcut or a folder with a SAM, got {name}"
         )
     return sam_folder(name, device)
+
+
+class GrabCut:
+    """A mask model without learned weights: the offline counterpart of SAM (Rother et al. 2004).
+
+    It separates objects by colour and contrast. A plain border of the image is background, and so is what
+    this separates from all positive clicks. Of the rest, what is connected to a click and of its colour is
+    taken for the object at first, or not, as the click says; Gaussian mixtures of the colours of both and a
+    minimal cut then move the outline.
+    """
+
+    name = "GrabCut"
+
+    def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
+        """Return the object [H, W] bool in an image, on the image's device; see `MaskModel`."""
+        check_clicks(image, points, positive)
+        shape = (image.shape[0], image.shape[1])
+        scale = min(SIZE / max(shape), 1.0)
+        height, width = (max(round(side * scale), 1) for side in shape)
+        planes = image.detach().cpu().float().permute(2, 0, 1)[None]
+        planes = F.interpolate(planes, (height, width), mode="bilinear", antialias=True)
+        pixels = planes[0].clamp(0, 1).mul(255).round().to(torch.uint8).permute(1, 2, 0).contiguous().numpy()
+        shrink = points.new_tensor([width / shape[1], height / shape[0]])
+        places = np.floor((points * shrink).cpu().numpy()).astype(int).clip(0, (width - 1, height - 1))
+        foreground = cut(pixels, places, positive.cpu().numpy())
+        mask = torch.from_numpy(foreground).float()[None, None]
+        return (F.interpolate(mask, shape, mode="bilinear")[0, 0] > 0.5).to(image.device)
+
+
+def cut(pixels: np.ndarray, places: np.ndarray, positive: np.ndarray) -> np.ndarray:
+    """Return the object [H, W] bool in an 8-bit image with clicks at pixels [P, 2]."""
+    plain = plain_border(pixels)
+    clicked = connected(~plain, places[positive])
+    # Other objects would teach the mixture of the background their colours, which may be those of this one.
+    emptied = np.where(clicked[..., None], pixels, np.median(pixels[plain], axis=0) if plain.any() else 0)
+    emptied = emptied.astype(np.uint8)
+    labels = first_guess(emptied, clicked, places, positive)
+    is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
+    if is_object.any() and not is_object.all():
+        cv2.setRNGSeed(0)
+        models = np.zeros((2, 1, 65))
+        cv2.grabCut(emptied, labels, (0, 0, 0, 0), models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
+        is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
+    return connected(is_object, places[positive])
+
+
+def first_guess(
+    pixels: np.ndarray, clicked: np.ndarray, places: np.ndarray, positive: np.ndarray
+) -> np.ndarray:
+    """Return the labels [H, W] that GrabCut starts from: certain at clicks and outside, else probable."""
+    smooth = cv2.GaussianBlur(pixels, (3, 3), 0)
+    labels = np.where(clicked, cv2.GC_PR_BGD, cv2.GC_BGD).astype(np.uint8)
+    edge = np.concatenate([clicked[0], clicked[-1], clicked[:, 0], clicked[:, -1]])
+    if not edge.any():  # what a plain border surrounds is the object, but for what looks like negative clicks
+        colors = smooth[places[:, 1], places[:, 0]].astype(int)  # [P, 3]
+        nearest = np.abs(smooth[..., None, :].astype(int) - colors).sum(axis=-1).argmin(axis=-1)  # [H, W]
+        labels[clicked & positive[nearest]] = cv2.GC_PR_FGD
+    order = np.argsort(~positive, kind="stable")  # negative clicks last: they take from positive ones
+    clicks = list(zip(places[order], positive[order], strict=True))
+    for place, is_positive in clicks:
+        alike = flooded(smooth, place, ALIKE) & clicked
+        labels[alike] = cv2.GC_PR_FGD if is_positive else cv2.GC_PR_BGD
+    radius = max(round(SEED * max(labels.shape)), 1)
+    for place, is_positive in clicks:
+        certain = cv2.GC_FGD if is_positive else cv2.GC_BGD
+        cv2.circle(labels, tuple(map(int, place)), radius, int(certain), -1)
+    return labels
+
+
+def plain_border(pixels: np.ndarray) -> np.ndarray:
+    """Return pixels [H, W] bool of one colour that are connected to a corner."""
+    height, width = pixels.shape[:2]
+    corners = ((0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1))
+    return np.any([flooded(pixels, corner, PLAIN) for corner in corners], axis=0)
+
+
+def connected(mask: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the connected parts of a mask that places lie on."""
+    _, parts = cv2.connectedComponents(mask.astype(np.uint8))
+    return np.isin(parts, list({parts[y, x] for x, y in places} - {0}))
+
+
+def flooded(pixels: np.ndarray, place: tuple[int, int] | np.ndarray, most: int) -> np.ndarray:
+    """Return pixels [H, W] bool connected to a place whose channels differ from it by at most so much."""
+    height, width = pixels.shape[:2]
+    filled = np.zeros((height + 2, width + 2), dtype=np.uint8)
+    flags = 4 | cv2.FLOODFILL_MASK_ONLY | cv2.FLOODFILL_FIXED_RANGE | (1 << 8)
+    x, y = (int(value) for value in place)
+    cv2.floodFill(pixels.copy(), filled, (x, y), 0, (most,) * 3, (most,) * 3, flags)
+    return filled[1:-1, 1:-1] > 0

@@ -60,9 +60,8 @@ class Vgg:
     def layers(self, images: Tensor, wanted: Sequence[str] | None = None) -> list[Tensor]:
         """Return outputs [N, C, H/s, W/s] of some layers, s = 1, 2, 4 ... by block; differentiable.
 
-        Args:
-            images: [N, 3, H, W], red, green and blue in [0, 1].
-            wanted: names of layers up to the last one that was loaded, in order; by default those loaded for.
+        Images [N, 3, H, W] are red, green and blue in [0, 1]. Layers are named up to the last one that was
+        loaded, in order; by default those loaded for.
         """
         from kornia.enhance import normalize
 

@@ -20,13 +20,6 @@ def locate(name: str) -> Path:
 
     Looked for in the weights folder (TEXGS_WEIGHTS), in the caches of the hubs, and then downloaded with
     a line that says so and a progress bar, at a pinned revision or with a known checksum, into the cache.
-
-    Args:
-        name: of the catalogue, such as "vgg16" or "clip-vit-base-patch32".
-
-    Raises:
-        ArgumentError: if the name is unknown, or a file is not what its checksum says.
-        MissingDataError: if the weights are nowhere and cannot be downloaded.
     """
     return find(name) or _download(name, CATALOGUE[name])
 

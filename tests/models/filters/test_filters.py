@@ -10,7 +10,7 @@ from torch.testing import assert_close
 from tests.models.views_of import random_views
 from texgs.core.camera import orbit
 from texgs.models.filters import FILTERS, ProceduralFilters
-from texgs.models.filters.material import GOLD, tint
+from texgs.models.filters.painting import GOLD, tint
 from texgs.models.filters.surface import (
     Surface,
     cell_hash,

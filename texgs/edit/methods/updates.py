@@ -133,15 +133,15 @@ def _run(kind: str, keeps_renders: bool, task: Task[Keys]) -> EditedScene:
             task.settings_for(name).instruction,
             plan,
             keeps_renders=keeps_renders,
-            shown=SHOWN,
             seed=task.edit.seed,
             title=task.title_of(name),
         )
-        rows[f"{name} before"] = [old.numpy() for old, _ in updated.views]
-        rows[f"{name} edited"] = [new.numpy() for _, new in updated.views]
-        notes[name] = {"edits": updated.edits, "seconds of them": updated.guided}
+        before, after = zip(*updated.some(SHOWN), strict=True)
+        rows[f"{name} before"] = [old.numpy() for old in before]
+        rows[f"{name} edited"] = [new.numpy() for new in after]
+        notes[name] = {"edits": updated.count, "seconds of them": updated.seconds}
         losses[name] = {"loss": updated.losses}
-        return updated.field
+        return updated.learner.field
 
     scene = task.each_model(one)
     notes["instruction"] = task.followed or keys.instruction

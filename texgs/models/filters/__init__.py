@@ -8,7 +8,7 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from texgs.models.filters import material, painting
+from texgs.models.filters import painting
 from texgs.models.filters.surface import Surface, surface_of
 from texgs.models.guidance import EditViews
 from texgs.models.instruction import understand
@@ -22,12 +22,12 @@ FILTERS: dict[str, Filter] = {  # by the names of the vocabulary
     "watercolour": painting.watercolour,
     "oil painting": painting.oil,
     "cartoon": painting.cartoon,
-    "marble": material.marble,
-    "wood": material.wood,
-    "mosaic": material.mosaic,
-    "gold": partial(material.metal, tones=material.GOLD),
-    "silver": partial(material.metal, tones=material.SILVER),
-    "copper": partial(material.metal, tones=material.COPPER),
+    "marble": painting.marble,
+    "wood": painting.wood,
+    "mosaic": painting.mosaic,
+    "gold": partial(painting.metal, tones=painting.GOLD),
+    "silver": partial(painting.metal, tones=painting.SILVER),
+    "copper": partial(painting.metal, tones=painting.COPPER),
 }
 
 
@@ -48,7 +48,7 @@ class ProceduralFilters:
     def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
         """Edit the views; see `Guidance`."""
         name, color = understand(instruction)
-        function = FILTERS[name] if color is None else partial(material.tint, color=color)
+        function = FILTERS[name] if color is None else partial(painting.tint, color=color)
         surface, where = surface_of(views)
         edited = views.images.clone()
         alpha = views.alphas[where][:, None]
