@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import texgs.metrics.edits
-from tests.cli.test_edit_metrics import scenes, subject  # noqa: F401
+from tests.metrics.test_edit_metrics import scenes, subject  # noqa: F401
 from tests.report.written import metrics as write_metrics
 from tests.report.written import records, rows
 from texgs.core.specifications import specifications
