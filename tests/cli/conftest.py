@@ -1,5 +1,6 @@
 """A small project that several files start from: views of a sphere, and a scene of an orbital."""
 
+import json
 import shutil
 
 import pytest
@@ -68,6 +69,11 @@ def gaussians(at, sphere, tmp_path_factory):
 def scene_of_two(at, tmp_path_factory):
     """Results with a scene of two models of an orbital."""
     return at(tmp_path_factory.mktemp("orbital"), ["compose", *ORBITAL])
+
+
+def numbers(folder):
+    """Return what a job has measured, of its folder."""
+    return json.loads((folder / "metrics.json").read_text())["numbers"]
 
 
 def hide_weights(patch, folder):

@@ -1,13 +1,11 @@
 """Baselines of the paper on small fits of their own fields, from the volume to the measures of the edit."""
 
-import json
-
 import numpy as np
 import pytest
 import torch
 from PIL import Image
 
-from tests.cli.conftest import GAUSSIANS, SPHERE
+from tests.cli.conftest import GAUSSIANS, SPHERE, numbers
 from texgs.scene.scene_file import read_scene
 
 pytestmark = pytest.mark.stages
@@ -50,10 +48,6 @@ def edited(request, at, gaussians):
     words = [*SPHERE, *fit, f"edit={edit}", *(f"edit.{method}.{value}" for value in values)]
     results = at(gaussians.parent, [f"edit_{method}", *words], ["edit_metrics", *words])
     return results / "sphere" / "scene" / fit[0].removeprefix("fit=") / "edits" / edit, method
-
-
-def numbers(folder):
-    return json.loads((folder / "metrics.json").read_text())["numbers"]
 
 
 def test_geometry_is_kept_and_colours_are_not(edited):

@@ -9,7 +9,7 @@ import torch
 from PIL import Image
 
 from tests.cli.conftest import ORBITAL as WORDS
-from tests.cli.conftest import hide_weights
+from tests.cli.conftest import hide_weights, numbers
 from tests.models.clips import write_clip
 from texgs.cli.main import main
 from texgs.core.errors import MissingDataError
@@ -44,10 +44,6 @@ def beside(results, tmp_path, monkeypatch):
     """Where the results are, without weights."""
     monkeypatch.chdir(results.parents[3])
     hide_weights(monkeypatch, tmp_path)
-
-
-def numbers(folder):
-    return json.loads((folder / "metrics.json").read_text())["numbers"]
 
 
 def parameters(results, scene, name):

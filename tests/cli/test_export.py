@@ -192,10 +192,11 @@ def test_surfels_of_other_programs_open_as_surfels(tmp_path, flavour):
     assert isinstance(open_field(write_ply(tmp_path / "model.ply", model, flavour)), Surfels)
 
 
-@pytest.mark.parametrize("kind", ["2dgs", "release", "points"])
+@pytest.mark.parametrize("kind", ["2dgs", "release", "points", "html"])
 def test_what_gaussians_cannot_become_is_one_sentence(tmp_path, capsys, kind):
     source = write_gaussians(tmp_path / "model.safetensors", gaussians(5))
-    assert export(source, tmp_path / "x.ply", "--kind", kind) == 2
+    target = tmp_path / ("x.html" if kind == "html" else "x.ply")
+    assert export(source, target, "--kind", kind) == 2
     said = capsys.readouterr().err
     assert f"--kind {kind}: expected surfels, got gaussians, which can be exported as 3dgs or mesh" in said
-    assert not (tmp_path / "x.ply").exists()
+    assert not target.exists()

@@ -1,6 +1,5 @@
 """The three phases by hand, and a fit of 3D Gaussians, on views of a small sphere."""
 
-import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from tests.cli.conftest import GAUSSIANS, SPHERE, TINY, copied
+from tests.cli.conftest import GAUSSIANS, SPHERE, TINY, copied, numbers
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
@@ -22,7 +21,6 @@ from texgs.fit.loop import Fit
 from texgs.report import fit_figure
 from texgs.scene.scene_file import read_scene
 from texgs.volume import view_set
-from texgs.volume.view_set import read_views
 
 
 @pytest.fixture
@@ -47,17 +45,6 @@ def viewed(seeded):
     return seeded
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """Where phases will be written, in a folder without results."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path / "results" / "sphere" / "TF01" / "demo"
-
-
-def numbers(folder, phase):
-    return json.loads((folder / phase / "metrics.json").read_text())["numbers"]
-
-
 def shown_files(folder):
     return sorted(path.name for path in folder.iterdir() if path.name[0] != ".")
 
@@ -70,7 +57,7 @@ def test_texture_makes_what_it_needs_first(fitted_sphere):
     assert {phase: model.stage for phase, model in models.items()} == {phase: phase for phase in models}
     assert models["texture"].metadata["dataset"] == "sphere"
     assert models["texture"].shading.local_viewer is False, "the CPU's caster has a distant viewer"
-    shading, texture = numbers(folder, "shading"), numbers(folder, "texture")
+    shading, texture = numbers(folder / "shading"), numbers(folder / "texture")
     for phase, model in models.items():
         order = z_order_of(model.parameters["means"])
         assert order.equal(torch.arange(400)), f"{phase}: along a curve, with all that is theirs"
@@ -87,7 +74,7 @@ def test_harmonics_first_as_in_the_paper(viewed):
     model = read_model(viewed / "surfels" / "model.safetensors")
     assert model.parameters["sh"].shape[1:] == (16, 3)
     assert model.parameters["sh"][:, 9:].abs().max() > 0, "degree 3 has learned"
-    assert numbers(viewed, "surfels")["psnr"] > 22
+    assert numbers(viewed / "surfels")["psnr"] > 22
     assert "sh" not in read_model(viewed / "shading" / "model.safetensors").parameters
 
 
@@ -125,7 +112,8 @@ def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
     assert int(state["iteration"]) == 50
     monkeypatch.setattr(checkpoint, "latest", lambda _folder: {**state, "seconds": state["seconds"] + 1000})
     assert main(["shading", *TINY]) == 0
-    assert numbers(seeded, "shading")["fit_seconds"] > 1000
+    assert numbers(seeded / "shading")["fit_seconds"] > 1000
+    assert shown_files(seeded / "shading") == ["metrics.json", "model.safetensors"], "no checkpoint is left"
 
 
 def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatch):
@@ -140,7 +128,7 @@ def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatc
     assert (reduce, title.partition(":")[0]) == (1, "sphere/TF01, recipe demo")
     assert path == Path("results/sphere/TF01/demo/.figure.work/figure.png")
     assert (fitted / "figure" / "figure.png").stat().st_size > 10_000
-    assert numbers(fitted, "figure")["shown"] == ["test view 0", "test view 1"]
+    assert numbers(fitted / "figure")["shown"] == ["test view 0", "test view 1"]
 
 
 def test_figure_without_test_views_shows_training_views(fitted, monkeypatch):
@@ -163,23 +151,9 @@ def test_a_gpu_that_is_not_there_is_one_sentence(seeded, capsys, monkeypatch):
     assert "device=cuda: torch sees no GPU; leave it out to work on the CPU" in capsys.readouterr().err
 
 
-def test_a_finished_phase_leaves_no_checkpoint(seeded, monkeypatch):
-    monkeypatch.setattr(checkpoint, "SAVED_EVERY", 0.0)
-    assert main(["shading", *TINY]) == 0
-    assert shown_files(seeded / "shading") == ["metrics.json", "model.safetensors"]
-
-
-def test_test_views_may_have_lights_of_their_own(folder):
-    words = [*TINY, "views.test_lights=[{kind: directional, azimuth: 60, polar: 20}]"]
-    assert main(["views", *words]) == 0
-    views = read_views(folder.parent / "views")
-    assert {view.light.kind for view in views.train} == {"headlight"}
-    assert {(view.light.kind, view.light.azimuth) for view in views.test} == {("directional", 60.0)}
-
-
 def test_a_fit_has_a_model_and_numbers_and_leaves_no_checkpoint(gaussians):
     folder = gaussians / "sphere" / "TF01" / "gaussians_quick" / "gaussians"
-    told = numbers(folder.parent, "gaussians")
+    told = numbers(folder.parent / "gaussians")
     assert told["psnr"] > 25
     assert told["sizes"]["total_mib"] * 2**20 == pytest.approx(400 * 248)
     field = open_field(folder / "model.safetensors")
@@ -211,6 +185,6 @@ def test_two_recipes_side_by_side_are_fitted_first(gaussians, tmp_path, monkeypa
     assert main(["comparison", *SPHERE, *GAUSSIANS, *few]) == 0
     folder = tmp_path / "results" / "sphere" / "TF01"
     shown = {"recipes": ["gaussians_quick", "demo"], "shown": ["test view 0", "test view 1"]}
-    assert numbers(folder / "comparison", "looks") == shown
+    assert numbers(folder / "comparison" / "looks") == shown
     assert (folder / "comparison" / "looks" / "comparison.png").stat().st_size > 1000
     assert (folder / "demo" / "texture" / "model.safetensors").exists()

@@ -1,7 +1,5 @@
 """`texgs init` and `texgs new`: a project whose files compose, and data sets from volume files."""
 
-import json
-
 import numpy as np
 import pytest
 import yaml
@@ -10,6 +8,7 @@ from texgs.cli import new
 from texgs.cli.main import main
 from texgs.config.compose import compose
 from texgs.config.project import ROOT, groups, members
+from texgs.core.io import write_json
 from texgs.volume.transfer import TransferFunction
 
 DOCUMENT = "name: mine\ntitle: another\nvolume: {file: scan.npy}\n"
@@ -48,11 +47,6 @@ def test_a_data_set_with_suggested_tfs(conf, scan, capsys):
     assert (conf.parent / "results" / "my_scan" / "transfer" / "transfer.png").exists()
     text = (conf / "dataset" / "my_scan.yaml").read_text()
     assert yaml.safe_load(text)["volume"]["file"] == str(scan)
-
-
-def write_tf(path, tf):
-    """A transfer function in our JSON, as a user writes it."""
-    path.write_text(json.dumps({"format": "texgs-tf", "version": 1, **tf.to_dict()}))
 
 
 def test_a_data_set_is_only_replaced_where_that_is_asked_for_and_that_of_texgs_never(conf, scan, capsys):
@@ -123,7 +117,7 @@ def test_tfs_of_a_narrow_range_far_from_zero_keep_their_digits(conf, tmp_path):
 
 def test_tfs_from_files_keep_every_digit(conf, scan, tmp_path):
     tf = TransferFunction(((100.12345678901234, 0), (120, 0.5), (140, 0)), ((100, 1, 0, 0),))
-    write_tf(tmp_path / "tf.json", tf)
+    write_json(tmp_path / "tf.json", {"format": "texgs-tf", "version": 1, **tf.to_dict()})
     assert main(["new", str(scan), "--name", "mine", "--tf", "tf.json"]) == 0
     (read,) = compose(("dataset=mine",)).dataset.basic_tfs.values()
     assert [tuple(point) for point in read.opacity] == list(tf.opacity)
@@ -134,10 +128,6 @@ def test_a_document_that_is_read_as_something_else_is_not_written(conf, scan, ca
     assert main(["new", str(scan), "--name", "mine"]) == 2
     assert "mine: expected to read" in capsys.readouterr().err
     assert not conf.exists()
-
-
-def contents(folder):
-    return {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 def test_what_it_writes_composes(tmp_path, monkeypatch, capsys):
@@ -153,10 +143,10 @@ def test_what_it_writes_composes(tmp_path, monkeypatch, capsys):
 def test_a_project_is_left_as_it_is(tmp_path, capsys):
     assert main(["init", str(tmp_path)]) == 0
     (tmp_path / "README.md").write_text("mine")
-    before = contents(tmp_path)
+    files = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     assert main(["init", str(tmp_path)]) == 0
     assert "is a project already" in capsys.readouterr().out
-    assert contents(tmp_path) == before
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == files
 
 
 def test_a_folder_of_something_else_is_refused(tmp_path, capsys):

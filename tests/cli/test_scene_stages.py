@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.conftest import ORBITAL
+from tests.cli.conftest import ORBITAL, numbers
 from texgs.cli.main import main
 from texgs.scene.scene_file import read_scene
 
@@ -18,14 +18,10 @@ def results(at, scene_of_two):
     return scene_of_two / "orbital" / "scene" / "demo"
 
 
-def numbers(results, stage):
-    return json.loads((results / stage / "metrics.json").read_text())["numbers"]
-
-
 def test_the_scene_has_all_models_and_a_picture(results):
     scene = read_scene(results / "compose" / "scene.yaml")
     assert list(scene.models) == ["TF01", "TF02"]
-    assert len(scene.open()) == numbers(results, "compose")["primitives"]
+    assert len(scene.open()) == numbers(results / "compose")["primitives"]
     picture = np.asarray(Image.open(results / "compose" / "scene.png"))
     assert picture.min() < 200, "there is something to see"
 
@@ -35,12 +31,12 @@ def test_fits_tell_which_views_they_are_of_and_what_their_data_stand_in_for(resu
     for folder in (*phases, results / "pse"):
         assert json.loads((folder / "metrics.json").read_text())["stand_in"] == "vortex"
     for folder in phases:
-        metrics = numbers(folder.parent, folder.name)
+        metrics = numbers(folder)
         assert (metrics["train_views"], metrics["width"], metrics["height"]) == (12, 48, 48)
 
 
 def test_edits_are_compared_with_the_volume(results):
-    metrics = numbers(results, "pse")
+    metrics = numbers(results / "pse")
     titles = [step["title"] for step in metrics["pse"]]
     assert titles[:3] == ["as fitted", "+ opacity of TF01 x 0.4", "+ other colours"]
     assert titles[3:] == ["+ k_a x 0.7, k_d x 1.2, k_s x 2", "+ light from the left"]
@@ -58,7 +54,7 @@ def test_edits_are_compared_with_the_volume(results):
 
 
 def test_frames_are_timed_beside_the_volume(results):
-    metrics = numbers(results, "timing")
+    metrics = numbers(results / "timing")
     assert 0 < metrics["frame_mean_ms"] <= metrics["frame_max_ms"]
     assert metrics["volume_mean_ms"] > 0
     assert (metrics["width"], metrics["height"]) == (48, 48)

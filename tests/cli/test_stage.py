@@ -1,14 +1,15 @@
 """The verbs of the stages, by hand: what they write, when they do nothing, and what survives a kill."""
 
-import json
-
 import numpy as np
 import pytest
 
-from tests.cli.conftest import SPHERE
+from tests.cli.conftest import SPHERE, numbers
 from texgs.cli.main import main
+from texgs.config.compose import compose
 from texgs.volume.view_set import read_views
+from texgs.workflow.job import settings_file
 from texgs.workflow.result import METRICS
+from texgs.workflow.stage_table import STAGES
 from texgs.workflow.stages import views as views_stage
 
 TINY = [*SPHERE, "dataset.volume.size=24", "views.height=32", "views.step=0.5", "views.radius=4.0311"]
@@ -27,11 +28,6 @@ class Blank:
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path / "results" / "sphere"
-
-
-def numbers(views):
-    """What the stage says about its folder."""
-    return json.loads((views / METRICS).read_text())["numbers"]
 
 
 def test_views_makes_what_it_needs_first(folder, capsys):
@@ -79,6 +75,13 @@ def test_geometry_of_the_test_views(folder):
     assert normal[16, 24] @ [1, 0, 0] > 0.9, "test view 1 of 3 is on the +x axis"
 
 
+def test_test_views_may_have_lights_of_their_own(folder):
+    main(["views", *TINY, "views.test_lights=[{kind: directional, azimuth: 60, polar: 20}]"])
+    views = read_views(next(folder.glob("*/views")))
+    assert {view.light.kind for view in views.train} == {"headlight"}
+    assert {(view.light.kind, view.light.azimuth) for view in views.test} == {("directional", 60.0)}
+
+
 def test_empty_views_fail_again_the_same_way(folder, capsys, monkeypatch):
     monkeypatch.setattr(views_stage, "renderer_for", lambda *_: Blank())
     for _ in range(2):
@@ -109,10 +112,6 @@ def test_a_resumed_job_may_have_only_empty_views_left(folder, monkeypatch):
 
 
 def test_a_job_of_the_workflow(folder, capsys):
-    from texgs.config.compose import compose
-    from texgs.workflow.job import settings_file
-    from texgs.workflow.stage_table import STAGES
-
     settings = settings_file(STAGES["volume"].settings(compose(tuple(TINY))), "results")
     output = folder / "elsewhere"
     assert main(["volume", "--settings", settings, "--output", str(output)]) == 0
@@ -143,11 +142,3 @@ def test_mistakes_are_one_sentence(folder, capsys, words, message):
     error = capsys.readouterr().err
     assert message in error.splitlines()[-1]
     assert "Traceback" not in error
-
-
-def test_help_lists_every_key(capsys):
-    with pytest.raises(SystemExit):
-        main(["views", "--help"])
-    out = capsys.readouterr().out
-    assert "views.fov_y=30.0" in out
-    assert "dataset=" in out

@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from dataclasses import FrozenInstanceError, asdict
+from dataclasses import asdict
 
 import pytest
 from hydra import compose as hydra_compose
@@ -17,6 +17,7 @@ from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 
 SHIPPED = ROOT / "conf"
+MANY = "9" * 400
 GROUPS = ("dataset", "device", "experiment", "tracking", "views")
 
 
@@ -72,23 +73,32 @@ def test_a_copied_file_does_not_take_the_place_of_its_original(tmp_path, monkeyp
         ("missing=skip", "missing: this key is called on_missing now"),
         ("+aimed.engine=[]", "aimed: this key is called per_dataset now"),
         ("mesh.tfs=[TF3]", "mesh.tfs: expected some of TF01, TF02, got TF3"),
+        ("dataset=vortex|mesh.tfs=[TF01]", "mesh.tfs: data set vortex starts from views and has no volume"),
+        ("views.width='???'", "views.width: expected an integer, got '???'"),
+        ("fit.seed=${views.widht}", "fit.seed: ${views.widht} refers to views.widht, which is no key"),
+        ("fit.seed=${fit.seed}", "fit.seed: ${fit.seed} refers to itself; write a value"),
+        ("sweeps.lambda=engine", "sweeps.lambda: no such key"),
+        ("dataset.basic_tfs.TF7.opacity=[]", "dataset.basic_tfs.TF7.opacity: no such key"),
+        ("views.lights.3.kind=headlight", "views.lights.3.kind: no such key"),
+        ("~views.widht", "views.widht: no such key"),
+        (f"views.width={MANY}", "views.width: expected an integer of 64 bits, got 9999"),
+        (f"views.fov_y={MANY}", "views.fov_y: expected a finite number, got 9999"),
+        (f"dataset.volume.spacing=[{MANY},1,1]", "spacing.0: expected a finite number"),
+        ("dataset.volume.spacing=[nan,1,inf]", "dataset.volume.spacing: expected a finite number, got nan"),
+        (f"views.width={'9' * 5000}", "Exceeds the limit (4300 digits)"),
+        (f"dataset.title={'[' * 3000}", "expected key=value"),
+        (f"dataset.title={'[' * 3000}{']' * 3000}", "expected fewer brackets"),
+        ("views=[1,2]", "a group: expected the name of a file of conf/"),
+        ("dataset.name=" + "a" * 300, "dataset.name: expected at most 100 characters, got 300"),
+        ("dataset.name=inf", "dataset.name: inf is a word that YAML or Hydra"),
     ],
 )
 def test_a_mistake_is_one_sentence_that_names_the_key(override, message):
     with pytest.raises(ConfigError) as error:
-        compose((override,))
+        compose(tuple(override.split("|")))
     assert message in str(error.value)
     assert "\n" not in str(error.value)
-
-
-def test_views_have_no_volume_that_meshes_are_compared_with():
-    with pytest.raises(ConfigError, match=r"mesh\.tfs: data set vortex starts from views and has no volume"):
-        compose(("dataset=vortex", "mesh.tfs=[TF01]"))
-
-
-def test_the_composition_cannot_be_changed():
-    with pytest.raises(FrozenInstanceError):
-        compose().views.width = 3
+    assert len(str(error.value)) < 500
 
 
 def test_every_key_says_what_it_means():
@@ -175,23 +185,6 @@ def test_values_may_refer_to_others(words, key, expected):
 def test_references_stand_in_texts_and_behind_a_backslash_for_themselves():
     assert compose(("fit=quick", "results=out/${fit.name}")).tracking.uri == "sqlite:///out/quick/mlflow.db"
     assert compose((r"results='\${fit.name}'",)).results == "${fit.name}"
-
-
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        ("views.width='???'", r"views\.width: expected an integer, got '\?\?\?'"),
-        ("fit.seed=${views.widht}", r"fit\.seed: \$\{views\.widht\} refers to views\.widht, which is no key"),
-        ("fit.seed=${fit.seed}", r"fit\.seed: \$\{fit\.seed\} refers to itself; write a value"),
-        ("sweeps.lambda=engine", r"sweeps\.lambda: no such key"),
-        ("dataset.basic_tfs.TF7.opacity=[]", r"dataset\.basic_tfs\.TF7\.opacity: no such key"),
-        ("views.lights.3.kind=headlight", r"views\.lights\.3\.kind: no such key"),
-        ("~views.widht", r"views\.widht: no such key"),
-    ],
-)
-def test_a_word_that_cannot_be_done_is_one_sentence(word, message):
-    with pytest.raises(ConfigError, match=message):
-        compose((word,))
 
 
 def test_a_plus_adds_a_name():

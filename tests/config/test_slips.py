@@ -82,22 +82,3 @@ def test_a_file_that_is_not_chosen_does_no_harm(mine):
 def test_a_name_that_yaml_does_not_read_as_text(mine):
     mine.write_text("name: no\n")
     assert "dataset.name: False is a word that YAML or Hydra does not read as text" in told("dataset=mine")
-
-
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        (f"views.width={MANY}", "views.width: expected an integer of 64 bits, got 9999"),
-        (f"views.fov_y={MANY}", "views.fov_y: expected a finite number, got 9999"),
-        (f"dataset.volume.spacing=[{MANY},1,1]", "spacing.0: expected a finite number"),
-        ("dataset.volume.spacing=[nan,1,inf]", "dataset.volume.spacing: expected a finite number, got nan"),
-        (f"views.width={'9' * 5000}", "Exceeds the limit (4300 digits)"),
-        (f"dataset.title={'[' * 3000}", "expected key=value"),
-        (f"dataset.title={'[' * 3000}{']' * 3000}", "expected fewer brackets"),
-        ("views=[1,2]", "a group: expected the name of a file of conf/"),
-        ("dataset.name=" + "a" * 300, "dataset.name: expected at most 100 characters, got 300"),
-        ("dataset.name=inf", "dataset.name: inf is a word that YAML or Hydra"),
-    ],
-)
-def test_odd_overrides(word, message):
-    assert message in told(word)

@@ -7,8 +7,7 @@ from texgs.report.metrics_files import LeftOut
 from texgs.report.results import EditResult, FitResult, SceneResult
 from texgs.report.sections import SECTIONS
 from texgs.report.tables import specs, tables_of
-from texgs.study.ballots import Ballot, Votes, votes_beside
-from texgs.study.questions import write_key
+from texgs.study.ballots import Ballot, Votes
 from texgs.study.votes import study_table
 from texgs.workflow.stage_table import STAGES
 
@@ -58,17 +57,6 @@ def test_a_user_study_has_its_votes_and_without_them_the_papers_where_its_data_a
     table = tables_of(records(tmp_path), given=given)["user_study"]
     assert "No votes but the paper's." in table.caption
     assert set(table.frame["edit"]) == {"the paper"}
-
-
-def test_the_ballots_beside_a_key_are_counted(tmp_path):
-    assert votes_beside(tmp_path / "key.json") is None
-    write_key(tmp_path / "key.json", study("xy"))
-    assert votes_beside(tmp_path / "key.json") is None
-    (tmp_path / "votes").mkdir()
-    lines = ["study,ballot,question,option,rank", "0123456789ab,aa,1,A,1", "0123456789ab,aa,1,B,2"]
-    (tmp_path / "votes" / "ballot-aa.csv").write_text("\n".join(lines))
-    (ballot,) = votes_beside(tmp_path / "key.json").ballots
-    assert ballot.ranks == [[1, 2]]
 
 
 def test_captions_say_what_is_left_out(tmp_path):

@@ -4,7 +4,8 @@ import pytest
 
 from tests.study.studies import study
 from texgs.core.errors import ArgumentError
-from texgs.study.ballots import read_ballot, read_votes
+from texgs.study.ballots import read_ballot, read_votes, votes_beside
+from texgs.study.questions import write_key
 
 STUDY = study("xyz", "zy")
 LINES = ["1,A,2", "1,B,3", "1,C,1", "2,A,1", "2,B,2"]
@@ -28,6 +29,16 @@ def test_a_spreadsheet_may_have_saved_it(tmp_path):
     path = ballot(tmp_path)
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
     assert read_ballot(STUDY, path).ranks == [[2, 3, 1], [1, 2]]
+
+
+def test_the_ballots_beside_a_key_are_counted(tmp_path):
+    key = tmp_path / "key.json"
+    assert votes_beside(key) is None
+    write_key(key, STUDY)
+    assert votes_beside(key) is None
+    (tmp_path / "votes").mkdir()
+    ballot(tmp_path / "votes")
+    assert [each.ranks for each in votes_beside(key).ballots] == [[[2, 3, 1], [1, 2]]]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
 from tests.viewer.drawing import rendered
@@ -18,7 +17,6 @@ from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.gaussians.files import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
@@ -281,15 +279,6 @@ def test_a_scene_without_surfels_shows_its_background(chromium, tmp_path):
     settle(page)
     assert (shown(page)[4:-4, 4:-4] == [51, 102, 153]).all()
     page.close()
-
-
-def test_other_fields_are_refused(tmp_path, capsys):
-    file = write_gaussians(tmp_path / "g.safetensors", gaussians())
-    assert main(["export", str(file), "--to", str(tmp_path / "g.html")]) == 2
-    assert "--kind html: expected surfels, got gaussians, which can be exported as 3dgs or mesh" in (
-        capsys.readouterr().err
-    )
-    assert not (tmp_path / "g.html").exists()
 
 
 def test_scenes_that_are_too_large_are_refused(scene, tmp_path, capsys, monkeypatch):

@@ -57,7 +57,7 @@ def test_losses_are_a_curve_over_iterations_and_times_one_over_frames():
     assert list(curves({"frames_ms": [4, 5]})) == [(0, {"frames_ms": 4.0}), (1, {"frames_ms": 5.0})]
 
 
-def test_edits_by_numbers_have_a_metric_each_and_their_mean():
+def test_edits_by_numbers_and_pictures_of_a_gallery_have_a_metric_each_and_their_mean():
     compared = [Comparison("as fitted", 30.0, 0.9), Comparison("other colours", 20.0, 0.8)]
     metrics = scalars(plain(PseResult(2, compared, [Comparison("light")])))
     assert metrics == {
@@ -68,6 +68,13 @@ def test_edits_by_numbers_have_a_metric_each_and_their_mean():
         "pse_ssim": pytest.approx(0.85),
         "pse_ssim/as fitted": 0.9,
         "pse_ssim/other colours": 0.8,
+    }
+    shown = [Shown("polar", "error", "0°", psnr=30.0), Shown("polar", "error", "30°", psnr=20.0)]
+    result = GalleryResult("relight", [Shown("polar", "as fitted", "0°"), *shown])
+    assert scalars(plain(result)) == {
+        "shown_psnr/polar/error/0°": 30.0,
+        "shown_psnr/polar/error/30°": 20.0,
+        "shown_psnr": 25.0,
     }
 
 
@@ -80,16 +87,6 @@ def test_the_workflow_says_which_run_a_job_is_inside_of(tmp_path, monkeypatch):
     told = {output.as_posix(): {"parent": "abc", "swept": {"fit.seed": "1"}}}
     (tmp_path / "runs.json").write_text(json.dumps(told))
     assert of_workflow(output) == (Tracking("sqlite:///x.db", "texgs", "abc"), {"fit.seed": "1"})
-
-
-def test_pictures_of_a_gallery_have_a_metric_each():
-    shown = [Shown("polar", "error", "0°", psnr=30.0), Shown("polar", "error", "30°", psnr=20.0)]
-    result = GalleryResult("relight", [Shown("polar", "as fitted", "0°"), *shown])
-    assert scalars(plain(result)) == {
-        "shown_psnr/polar/error/0°": 30.0,
-        "shown_psnr/polar/error/30°": 20.0,
-        "shown_psnr": 25.0,
-    }
 
 
 class Cuda:

@@ -192,6 +192,9 @@ def test_files_that_are_no_segment(folder):
     rewritten(path, "texgs-segment", {"mask": HALF.float()})
     with pytest.raises(ArgumentError, match="expected a mask and anchors"):
         read_segment(path, ball(1))
+    rewritten(path, "texgs-segment", {"mask": HALF, "anchors": torch.full((150, 3), torch.nan)})
+    with pytest.raises(ArgumentError, match="expected a segment of this model"):
+        read_segment(path, ball(1))
 
 
 @pytest.mark.parametrize(
