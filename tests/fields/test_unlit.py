@@ -73,7 +73,6 @@ def test_what_cannot_be_shown_is_refused(field):
     ):
         with pytest.raises(TexgsError, match=message):
             render()
-    with pytest.raises(
-        ConfigError, match=f"expected a fit of surfels, got one of {field.kind}, which has no"
-    ):
+    message = f"expected a fit of surfels, got one of {field.kind}, which has no"
+    with pytest.raises(ConfigError, match=message):
         require(field.kind, {"palette"}, "edit=crimson")

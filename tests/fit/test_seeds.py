@@ -208,9 +208,8 @@ def test_mistakes_in_points_are_named(tmp_path, columns, end, message):
     ],
 )
 def test_the_box_is_that_of_the_data_with_a_margin_or_a_cube(metadata, half_size, low, high):
-    torch.testing.assert_close(
-        torch.stack(box_of(view_set(**metadata), half_size)), torch.tensor([low, high])
-    )
+    box = torch.stack(box_of(view_set(**metadata), half_size))
+    torch.testing.assert_close(box, torch.tensor([low, high]))
 
 
 FORM, ORDER = "two corners of three numbers", "the lowest corner, then the highest"

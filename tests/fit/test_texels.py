@@ -127,9 +127,8 @@ def test_all_else_stays(ball, images):
 
 
 def test_same_seed_same_texels(ball, images):
-    first, second, other = (
-        texturize(ball, images, TextureKeys(sweeps=1, iterations=3), s) for s in (1, 1, 2)
-    )
+    keys = TextureKeys(sweeps=1, iterations=3)
+    first, second, other = (texturize(ball, images, keys, seed) for seed in (1, 1, 2))
     assert torch.equal(first.parameters["texels"], second.parameters["texels"])
     assert not torch.equal(first.parameters["texels"], other.parameters["texels"])
 

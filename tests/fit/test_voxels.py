@@ -53,9 +53,8 @@ def test_the_ball_is_found(fit, images):
 
 def test_published_views():
     views = read_views(real_data("vortex/TF04_400"))
-    fit = VoxelFit(
-        load(views.train, reduce=4), VoxelKeys(stages=[GridStage(32, 60), GridStage(64, 120)], rays=2048)
-    )
+    keys = VoxelKeys(stages=[GridStage(32, 60), GridStage(64, 120)], rays=2048)
+    fit = VoxelFit(load(views.train, reduce=4), keys)
     list(fit.run())
     assert quality(Voxels(fit.grid, fit.march), load(views.test[::30], reduce=4)) > 27
 
@@ -199,9 +198,8 @@ def test_errors(images):
     with pytest.raises(ArgumentError, match=r"stages: expected sides that double .* got \[16, 48\]"):
         VoxelFit(images, replace(SETTINGS, stages=[GridStage(16, 1), GridStage(48, 1)]))
     pruned = VoxelFit(images, replace(SETTINGS, prune_weight=1.0))
-    with pytest.raises(
-        FitError, match="expected some that show in the views, found none; lower prune_weight"
-    ):
+    message = "expected some that show in the views, found none; lower prune_weight"
+    with pytest.raises(FitError, match=message):
         pruned.refine()
     broken = VoxelFit(images, replace(SETTINGS, stages=[GridStage(16, 100)]))
     broken.grid.rows[1:, 0] = float("nan")

@@ -58,9 +58,8 @@ def decided(scene, options=DEFAULT_OPTIONS):
     same = ~near_texel_centre(scene, options)
     for factor in (1 - MARGIN, 1 + MARGIN):
         brighter = replace(scene, opacities=scene.opacities * factor)
-        thresholds = {
-            name: getattr(options, name) * factor for name in ("low_pass", "transmittance_min", "near")
-        }
+        names = ("low_pass", "transmittance_min", "near")
+        thresholds = {name: factor * getattr(options, name) for name in names}
         for other in (decisions(brighter, options), decisions(scene, replace(options, **thresholds))):
             same &= (counts == other).all(1)
     return same.reshape(scene.height, scene.width)
@@ -121,9 +120,8 @@ def gradients(rasterize, scene, cotangents, options=DEFAULT_OPTIONS, wanted=None
     leaves = {name: x.detach().clone().requires_grad_() for name, x in leaves.items()}
     outputs = tuple(name for name in cotangents if name not in ("color", "alpha"))
     rendered = images(scene.with_leaves(leaves).render(rasterize, outputs, options))
-    total = sum(
-        (rendered[name] * cotangent.to(rendered[name])).sum() for name, cotangent in cotangents.items()
-    )
+    products = (rendered[name] * cotangent.to(rendered[name]) for name, cotangent in cotangents.items())
+    total = sum(product.sum() for product in products)
     derivatives = torch.autograd.grad(total, list(leaves.values()), allow_unused=True)
     return {
         name: torch.zeros_like(leaf) if gradient is None else gradient

@@ -9,10 +9,8 @@ CENTRE = (15.5, 12.5)  # principal point: the centre of pixel (15, 12)
 def view(**surfels):
     """Arguments of rasterize for an unmoved camera; one row per surfel, rotations default to facing it."""
     surfels = {name: torch.tensor(rows, dtype=torch.float64) for name, rows in surfels.items()}
-    if "quats" not in surfels:
-        surfels["quats"] = torch.tensor([[1.0, 0, 0, 0]], dtype=torch.float64).expand(
-            len(surfels["means"]), 4
-        )
+    facing = torch.tensor([[1.0, 0, 0, 0]], dtype=torch.float64)
+    surfels.setdefault("quats", facing.expand(len(surfels["means"]), 4))
     K = torch.tensor([[FOCAL, 0, CENTRE[0]], [0, FOCAL, CENTRE[1]], [0, 0, 1]], dtype=torch.float64)
     return {"viewmat": torch.eye(4, dtype=torch.float64), "K": K, "width": WIDTH, "height": HEIGHT, **surfels}
 

@@ -123,10 +123,8 @@ def squared_distances(centres, homographies, size):
     """Squared distance [P, N] of each pixel from each surfel in standard deviations, low-pass filtered."""
     x, y = (at[:, None] for at in pixel_centres(*size))
     Tu, Tv, Tw = (homographies[None, :, row] for row in range(3))
-    p, q = (
-        Tw * x[..., None] - Tu,
-        Tw * y[..., None] - Tv,
-    )  # [P, N, 3] planes through the pixel, in surfel space
+    # [P, N, 3] planes through the pixel, in surfel space
+    p, q = Tw * x[..., None] - Tu, Tw * y[..., None] - Tv
     hit = torch.linalg.cross(p, q)
     rho = ((hit[..., :2] / hit[..., 2:]) ** 2).sum(-1)
     return torch.minimum(rho, 2 * ((x - centres[:, 0]) ** 2 + (y - centres[:, 1]) ** 2))

@@ -168,9 +168,8 @@ def textured_with_features(scene: Scene, channels: int, seed: int = 0) -> Scene:
 
 def few(seed: int = 0, n: int = 12, **changes) -> Scene:
     """A few larger surfels, some of whose tensors are replaced."""
-    scene = random_scene(
-        seed, n, **{name: changes.pop(name) for name in ("width", "height") if name in changes}
-    )
+    size = {name: changes.pop(name) for name in ("width", "height") if name in changes}
+    scene = random_scene(seed, n, **size)
     return replace(scene, scales=3 * scene.scales, **changes)
 
 

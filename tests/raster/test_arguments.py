@@ -149,10 +149,8 @@ def test_library_refuses_what_gaussians_do_not_have():
     refuses(ArgumentError, "texture: 3D Gaussians have none", bin_surfels, *of_texture, {})
     normal = {"normal": torch.zeros(3, 8, 8)}
     refuses(ArgumentError, "normal: 3D Gaussians have none", bin_surfels, *tensors_of(scene), normal)
-    five, message = (
-        tensors_of(scene, scales=torch.rand(N, 5)),
-        "surfels: expected 2 scales of surfels or 3 of",
-    )
+    five = tensors_of(scene, scales=torch.rand(N, 5))
+    message = "surfels: expected 2 scales of surfels or 3 of"
     refuses(ArgumentError, message, bin_surfels, *five, {})
 
 
@@ -218,12 +216,8 @@ def test_memory_layout_does_not_matter(device, drawn):
     result |= gradients(rasterize, strided, cotangents)
     for name, value in expected.items():
         assert torch.equal(result[name], value), name
-
-
-def test_expanded_gradients_and_tensors(device):
-    scene = random_scene().to(device)
-    expanded = replace(scene, opacities=torch.tensor(0.5, device=device).expand(N))
-    dense = replace(scene, opacities=torch.full((N,), 0.5, device=device))
+    half = torch.tensor(0.5, device=device)
+    expanded, dense = (replace(scene, opacities=x) for x in (half.expand(N), half.repeat(N)))
     assert torch.equal(expanded.render(rasterize).color, dense.render(rasterize).color)
 
 

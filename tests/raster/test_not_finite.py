@@ -45,20 +45,16 @@ def test_reported_by_name_in_textures(device, name):
     scene.render(rasterize)
 
 
-def test_image_to_splat_is_checked(device):
-    scene = random_scene().to(device)
-    image = torch.full((37, 53, 1), float("nan"), device=device)
-    options = Options(check_finite=True)
-    refuses(ArgumentError, "image: expected finite values", splat, image, **scene.geometry(), options=options)
-
-
-def test_finite_inputs_pass_the_check(device):
+def test_finite_inputs_pass_the_check_and_images_to_splat_are_checked(device):
     scene = random_scene().to(device)
     checked = scene.render(rasterize, options=Options(check_finite=True))
     assert torch.equal(checked.color, scene.render(rasterize).color)
+    splatted = {**scene.geometry(), "options": Options(check_finite=True)}
     for _ in range(8):  # memory that was NaN is handed out again
         torch.full((200, 1), float("nan"), device=device)
-        splat(checked.color.detach(), **scene.geometry(), options=Options(check_finite=True))
+        splat(checked.color.detach(), **splatted)
+    image = torch.full((37, 53, 1), float("nan"), device=device)
+    refuses(ArgumentError, "image: expected finite values", splat, image, **splatted)
 
 
 @pytest.mark.parametrize("everywhere", [False, True], ids=["one", "all"])
@@ -75,9 +71,8 @@ def test_no_crash(device, kind, name, everywhere):
 def test_no_crash_on_spoiled_gradients(device, drawn):
     scene = drawn(random_scene()).to(device)
     for value in BAD:
-        cotangents = {
-            name: torch.full_like(x, value) for name, x in random_cotangents(scene, names_of(scene)).items()
-        }
+        cotangents = random_cotangents(scene, names_of(scene))
+        cotangents = {name: torch.full_like(x, value) for name, x in cotangents.items()}
         gradients(rasterize, scene, cotangents)
 
 
@@ -90,9 +85,8 @@ def test_one_bad_surfel_does_not_spoil_the_others(device, drawn, name, value):
     bad = 2 // (getattr(scene, name)[0].numel())
     others = [i for i in range(200) if i != bad]
     alone = scene.with_leaves({tensor: leaf[others] for tensor, leaf in scene.leaves().items()})
-    torch.testing.assert_close(
-        scene.render(rasterize).color, alone.render(rasterize).color, rtol=0, atol=1e-6
-    )
+    color, expected = (shown.render(rasterize).color for shown in (scene, alone))
+    torch.testing.assert_close(color, expected, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("scale", [1e-18, 1e-20, 1e-22, 1e-23, 1e-24, 1e-26])

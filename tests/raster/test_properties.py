@@ -63,9 +63,8 @@ def test_constant_texture_is_a_constant_colour(device, scene, width, height):
         sizes=textured_scene.texture.sizes,
         offsets=torch.arange(n) * width * height,
     )
-    plain = (
-        replace(scene, features=base + gain[:, None] * scene.features).to(device).render(rasterize, OUTPUTS)
-    )
+    constant = replace(scene, features=base + gain[:, None] * scene.features)
+    plain = constant.to(device).render(rasterize, OUTPUTS)
     rendered = replace(textured_scene, texture=texture).to(device).render(rasterize, OUTPUTS)
     for name, image in images(plain).items():
         torch.testing.assert_close(getattr(rendered, name), image, **CLOSE)
@@ -74,15 +73,13 @@ def test_constant_texture_is_a_constant_colour(device, scene, width, height):
 @examples
 @given(front=of_all, seed=st.integers(0, 10_000), n=st.integers(0, 120))
 def test_union_of_a_front_and_a_back_set_is_their_composite(device, front, seed, n):
-    back = replace(
-        random_scene(seed, n), **{name: getattr(front, name) for name in ("viewmat", "K", "width", "height")}
-    )
+    view = {name: getattr(front, name) for name in ("viewmat", "K", "width", "height")}
+    back = replace(random_scene(seed, n), **view)
     back = replace(back, means=back.means + 2 * front.viewmat[2, :3])  # both balls have a radius of 0.6
     if front.scales.shape[1] == 3:
         back = PRIMITIVES["gaussians"](back)
-    both = front.with_leaves(
-        {name: torch.cat([leaf, back.leaves()[name]]) for name, leaf in front.leaves().items()}
-    )
+    joined = {name: torch.cat([leaf, back.leaves()[name]]) for name, leaf in front.leaves().items()}
+    both = front.with_leaves(joined)
     normal = set(front.outputs) & {"normal"}
     over, under, union = (
         replace(scene, background=None).to(device).render(rasterize, normal, UNENDED)

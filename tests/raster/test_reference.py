@@ -21,16 +21,12 @@ def test_tilted_surfel_is_hit_where_the_ray_meets_its_plane():
     angle, scale = 1.1, 0.3  # about y, so that the plane is n . x = n . mean with n = (sin, 0, cos)
     x, y = offsets()
     ray = torch.stack([x / FOCAL, y / FOCAL, torch.ones_like(x)], -1)
-    mean, normal = (
-        torch.tensor([0.1, -0.05, 2.0]).double(),
-        torch.tensor([math.sin(angle), 0, math.cos(angle)]).double(),
-    )
+    mean = torch.tensor([0.1, -0.05, 2.0]).double()
+    normal = torch.tensor([math.sin(angle), 0, math.cos(angle)]).double()
     z = (mean @ normal) / (ray @ normal)
     point = z[..., None] * ray - mean
-    u, v = (
-        point @ torch.tensor([math.cos(angle), 0, -math.sin(angle)]).double() / scale,
-        point[..., 1] / scale,
-    )
+    u = point @ torch.tensor([math.cos(angle), 0, -math.sin(angle)]).double() / scale
+    v = point[..., 1] / scale
     alpha = torch.where(z > 0.2, 0.9 * torch.exp(-0.5 * (u**2 + v**2)), 0)
     alpha = torch.where(alpha >= 1 / 255, alpha, 0)
     tilted = view(
@@ -89,20 +85,15 @@ def bilinear(texel, x, y):
 def test_edge_on_surfel_is_drawn_by_the_low_pass_filter_alone():
     x, y = offsets()
     half_turn = math.sqrt(0.5)
-    surfel = view(
-        means=[[0, 0, 2]], scales=[[0.3, 0.2]], opacities=[0.8], quats=[[half_turn, 0, half_turn, 0]]
-    )
-    for name in ("means", "quats", "scales", "opacities"):
-        surfel[name].requires_grad_()
+    quats = [[half_turn, 0, half_turn, 0]]
+    surfel = view(means=[[0, 0, 2]], scales=[[0.3, 0.2]], opacities=[0.8], quats=quats)
+    leaves = [surfel[name].requires_grad_() for name in ("means", "quats", "scales", "opacities")]
     image = rasterize(**surfel, features=torch.ones(1, 1).double(), outputs=OUTPUTS)
     off_plane = x != 0
     alpha = 0.8 * torch.exp(-(x**2 + y**2))
     torch.testing.assert_close(image.alpha[off_plane], torch.where(alpha >= 1 / 255, alpha, 0)[off_plane])
     total = image.color.sum() + image.depth.sum() + image.normal.sum() + image.distortion.sum()
-    for gradient in torch.autograd.grad(
-        total, [surfel[n] for n in ("means", "quats", "scales", "opacities")]
-    ):
-        assert gradient.isfinite().all()
+    assert all(bool(gradient.isfinite().all()) for gradient in torch.autograd.grad(total, leaves))
 
 
 def test_features_beside_a_texture_follow_it():

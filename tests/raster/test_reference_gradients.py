@@ -77,9 +77,8 @@ def test_median_passes_its_gradient_to_the_depth_of_one_fragment():
     for sign in (1, -1):
         moved = {**tensors, "means": tensors["means"] + sign * step}
         medians.append(rasterize(**CAMERA, **SIZE, **moved, outputs=("median",), options=SMOOTH).median.sum())
-    torch.testing.assert_close(
-        (medians[0] - medians[1]) / 2, (by_name["means"] * step).sum(), rtol=1e-5, atol=0
-    )
+    expected = (by_name["means"] * step).sum()
+    torch.testing.assert_close((medians[0] - medians[1]) / 2, expected, rtol=1e-5, atol=0)
 
 
 def test_gradients_of_textured_surfels():

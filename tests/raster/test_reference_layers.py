@@ -78,9 +78,8 @@ def test_two_layers():
 
 
 def test_median_is_the_last_depth_that_half_of_the_light_reaches():
-    layers = view(
-        means=[[0, 0, z] for z in (2, 3, 4, 5)], scales=[[1, 1]] * 4, opacities=[0.3, 0.25, 0.2, 0.9]
-    )
+    means, opacities = [[0, 0, z] for z in (2, 3, 4, 5)], [0.3, 0.25, 0.2, 0.9]
+    layers = view(means=means, scales=[[1, 1]] * 4, opacities=opacities)
     image = rasterize(**layers, features=torch.ones(4, 1).double(), outputs=("median",))
     assert image.median[12, 15] == 4  # light before each: 1, 0.7, 0.525, 0.42
 
@@ -152,8 +151,7 @@ def test_splat_is_the_adjoint():
     features = torch.rand(2, 3).double().requires_grad_()
     image = torch.rand(HEIGHT, WIDTH, 3).double()
     rendered = rasterize(**surfels, features=features, outputs=("statistics",))
-    sums, weights = splat(
-        image, *(surfels[n] for n in ("means", "quats", "scales", "opacities", "viewmat", "K"))
-    )
+    geometry = (surfels[name] for name in ("means", "quats", "scales", "opacities", "viewmat", "K"))
+    sums, weights = splat(image, *geometry)
     torch.testing.assert_close(sums, torch.autograd.grad((rendered.color * image).sum(), features)[0])
     torch.testing.assert_close(weights, rendered.statistics.weight_sum)

@@ -71,11 +71,8 @@ def test_an_affine_map_of_colours(degree, device):
     assert before.alpha.max() > 0.9
     torch.testing.assert_close(after.color, expected, rtol=1e-5, atol=2e-6)
     assert torch.equal(after.alpha, before.alpha)
-
-
-def test_the_identity_changes_nothing():
-    grid = voxel_scene().grid
-    torch.testing.assert_close(recolored(grid, torch.eye(3), torch.zeros(3)).rows, grid.rows)
+    same = recolored(grid, torch.eye(3).to(matrix), torch.zeros_like(offset))
+    torch.testing.assert_close(same.rows, grid.rows)
 
 
 def test_dropped_harmonics():
@@ -102,7 +99,6 @@ def test_what_makes_no_grid():
     refuses(DeviceError, "rows: expected device cpu as masks", grid.with_rows, grid.rows.to("meta"))
     refuses(ShapeError, r"rows: expected \[\d+, K\], got \[3, 32\]", grid.with_rows, torch.zeros(3, 32))
     refuses(ShapeError, "rows: expected 4, 16 or 32 floats", grid.with_rows, torch.zeros(len(grid.rows), 8))
-    refuses(
-        ShapeError, r"matrix: expected \[3, 3\], got \[3, 4\]", recolored, grid, torch.zeros(3, 4), OFFSET
-    )
+    wide = torch.zeros(3, 4)
+    refuses(ShapeError, r"matrix: expected \[3, 3\], got \[3, 4\]", recolored, grid, wide, OFFSET)
     refuses(ShapeError, r"offset: expected \[3\], got \[1\]", recolored, grid, MATRIX, torch.zeros(1))

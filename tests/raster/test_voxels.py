@@ -228,9 +228,8 @@ def test_rays_and_marches_that_are_refused():
     refuses(ArgumentError, "rays: expected float32, got float64", render_rays, grid, rays.double())
     refuses(ArgumentError, "rays: not differentiable", render_rays, grid, rays.clone().requires_grad_())
     refuses(ArgumentError, r"step: expected 0\.1 to 8 spacings", render_rays, grid, rays, March(step=0.01))
-    refuses(
-        ArgumentError, "transmittance_min: expected 0 to 1", render_rays, grid, rays, March((1, 1, 1), 1, 1)
-    )
+    opaque = March(transmittance_min=1)
+    refuses(ArgumentError, "transmittance_min: expected 0 to 1", render_rays, grid, rays, opaque)
     refuses(DeviceError, "rows: expected device meta as rays, got cpu", render_rays, grid, rays.to("meta"))
     refuses(DeviceError, "rays: expected a tensor on cpu", ray_points, grid, rays.to("meta"), March())
     elsewhere = replace(grid, rows=grid.rows.to("meta"))

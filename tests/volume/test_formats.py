@@ -231,9 +231,8 @@ def test_other_types_are_refused(tmp_path):
     nibabel.save(nibabel.Nifti1Image(sample_values("complex64"), np.eye(4)), tmp_path / "v.nii")
     np.save(tmp_path / "pickle.npy", np.array([[[{}]]]), allow_pickle=True)
     for path in sorted(tmp_path.iterdir()):
-        with pytest.raises(
-            ArgumentError, match=r"expected (integers, floats or bool, got complex64|a .npy f)"
-        ):
+        message = "a .npy f" if path.stem == "pickle" else "integers, floats or bool, got complex64"
+        with pytest.raises(ArgumentError, match=f"expected {message}"):
             open_source(path)
 
 

@@ -25,9 +25,8 @@ def test_volume_is_as_its_manifest_says(tmp_path, capfd, entry):
     assert (summary.minimum, summary.maximum) == (entry["min"], entry["max"])
     assert sum(summary.histogram) == summary.voxels == np.prod(source.dims)
     middle = source.dims[2] // 2
-    np.testing.assert_array_equal(
-        open_grid(tmp_path / "v.nrrd").values[middle], source.slices(middle, middle + 1)[0]
-    )
+    written = open_grid(tmp_path / "v.nrrd").values[middle]
+    np.testing.assert_array_equal(written, source.slices(middle, middle + 1)[0])
     assert capfd.readouterr() == ("", "")
 
 

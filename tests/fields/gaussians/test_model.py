@@ -16,9 +16,8 @@ CAMERA = orbit(30, 20, 3, 40, 48, 40)
 
 def directional(camera, means, sh):
     """Colours of harmonics of degree 0 and 1 as 3DGS has them, in float64."""
-    x, y, z = torch.nn.functional.normalize(means.double() - camera.position.double(), dim=1)[
-        ..., None
-    ].unbind(1)
+    away = torch.nn.functional.normalize(means.double() - camera.position.double(), dim=1)
+    x, y, z = away[..., None].unbind(1)
     sh = sh.double()
     linear = -y * sh[:, 1] + z * sh[:, 2] - x * sh[:, 3]
     return (0.5 + 0.28209479177387814 * sh[:, 0] + 0.4886025119029199 * linear).clamp_min(0)

@@ -106,9 +106,7 @@ def test_looks_of_the_material_are_its_factors():
 
 
 @pytest.mark.parametrize(("look", "texels", "shown"), [("unshaded", 0.0, None), ("texture", 0.125, 0.625)])
-def test_without_light_colours_are_those_of_palette_and_texels_and_texels_alone_are_around_grey(
-    look, texels, shown
-):
+def test_without_light_palette_and_texels_are_seen_or_texels_around_grey(look, texels, shown):
     p = ball(1, n=3000).parameters
     flat = {**p, "texels": torch.full_like(p["texels"], texels), "colors": torch.zeros_like(p["colors"])}
     rendered = Composition([Surfels(flat)]).render(CAMERA, SIDE, look=look, background=torch.zeros(3))

@@ -90,9 +90,8 @@ def test_the_release_finds_the_same_factors(tmp_path):
     """Its activations: k_a and k_d none, k_s = 5 sigmoid, beta = 50 sigmoid."""
     model = sample("shading")
     wanted = raw_material(0.3, 0.6, 0.2, 33.0, "bounded")
-    columns = vertices(
-        write_ply(tmp_path / "m.ply", Surfels({**model.parameters, **wanted}, model.shading), "release")
-    )
+    lit = Surfels({**model.parameters, **wanted}, model.shading)
+    columns = vertices(write_ply(tmp_path / "m.ply", lit, "release"))
 
     def sigmoid(x):
         return 1 / (1 + np.exp(-x.astype(np.float64)))

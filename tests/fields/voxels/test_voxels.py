@@ -104,7 +104,6 @@ def test_edits_of_opacity_and_visibility():
     hidden = scene.render(CAMERA, edits=[PartEdit(visible=False), PartEdit()])
     assert (hidden.alpha - fields[1].render(CAMERA).alpha).abs().max() < 0.2
     thin = VoxelScene(fields[:1]).render(CAMERA, edits=[PartEdit(opacity=0.5)]).alpha
-    exact = fields[0].grid.with_rows(
-        pack_rows(0.5 * unpack_rows(fields[0].grid.rows)[0], unpack_rows(fields[0].grid.rows)[1])
-    )
+    density, sh = unpack_rows(fields[0].grid.rows)
+    exact = fields[0].grid.with_rows(pack_rows(0.5 * density, sh))
     assert torch.equal(thin, replace(fields[0], grid=exact).render(CAMERA).alpha)
