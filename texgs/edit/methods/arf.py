@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
-from texgs.edit.methods.style import FeatureKeys, Look, look_method
+from texgs.edit.method import Method
+from texgs.edit.methods.style import FeatureKeys, Look, run
 
 if TYPE_CHECKING:
     from texgs.edit.style_loop import Losses
@@ -28,18 +29,21 @@ class ArfKeys(FeatureKeys):
     sh_variation: float = key(5e-3, "weight of total variation of the coefficients", least=0)
     exact: bool = key(True, "colours are moved, not their coefficients as if they were colours (ARF's code)")
 
+    def stylize(self, look: Look, name: str, model: Voxels, views: Sequence[View]) -> tuple[Voxels, Losses]:
+        """Give a grid the style of its picture; features see half of the resolution, and the style too."""
+        from texgs.edit.voxels import stylize_voxels
+        from texgs.volume.images import load
 
-def stylize(look: Look[ArfKeys], name: str, model: Voxels, views: Sequence[View]) -> tuple[Voxels, Losses]:
-    """Give a grid the style of its picture; features see half of the resolution, and the style too."""
-    from texgs.edit.voxels import stylize_voxels
-    from texgs.volume.images import load
-
-    keys = look.keys
-    recipe = keys.recipe(round(keys.epochs * len(views)), look.task.edit.seed, reduce=2)
-    images, picture = load(views, look.task.reduce), look.picture(name)
-    return stylize_voxels(model, images, picture, recipe, keys, look.vgg, look.task.title_of(name))
+        recipe = self.recipe(round(self.epochs * len(views)), look.task.edit.seed, reduce=2)
+        images, picture = load(views, look.task.reduce), look.picture(name)
+        return stylize_voxels(model, images, picture, recipe, self, look.vgg, look.task.title_of(name))
 
 
-METHOD = look_method(
-    "arf", "give a scene of voxels the style of a picture, as ARF does", ArfKeys, stylize, "voxels"
+METHOD = Method(
+    "arf",
+    "give a scene of voxels the style of a picture, as ARF does",
+    ArfKeys,
+    run,
+    fields=frozenset({"voxels"}),
+    follows="style",
 )

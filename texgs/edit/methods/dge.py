@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
+from texgs.edit.method import Method
 from texgs.edit.methods.igs2gs import rates
-from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, update_method
+from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, run
 from texgs.fit.settings import CommonRates
 
 
@@ -16,6 +17,7 @@ class DgeKeys(UpdateKeys):
     """How Gaussians follow: rounds, in each of which some views are edited together and learned from."""
 
     node = "edit.dge"
+    keeps_renders = True
 
     l1: float = key(10.0, "weight of the absolute difference to edited views", least=0)
     dssim: float = key(0.0, "weight of D-SSIM", least=0)
@@ -39,10 +41,11 @@ class DgeKeys(UpdateKeys):
         return UpdateSchedule(self.rounds, self.every, self.views, self.views, "random", "round", levels)
 
 
-METHOD = update_method(
+METHOD = Method(
     "dge",
     "edit some views of a scene of 3D Gaussians together by an instruction, as DGE does",
     DgeKeys,
-    "gaussians",
-    keeps_renders=True,
+    run,
+    fields=frozenset({"gaussians"}),
+    follows="instruction",
 )

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from texgs.core.keys import key
-from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, update_method
+from texgs.edit.method import Method
+from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, run
 from texgs.fit.settings import CommonRates
 
 
@@ -33,9 +34,11 @@ class Igs2gsKeys(UpdateKeys):
         return UpdateSchedule(self.passes, self.every, learned="newest", levels=levels)
 
 
-METHOD = update_method(
+METHOD = Method(
     "igs2gs",
     "edit all views of a scene of 3D Gaussians in turn by an instruction, as Instruct-GS2GS does",
     Igs2gsKeys,
-    "gaussians",
+    run,
+    fields=frozenset({"gaussians"}),
+    follows="instruction",
 )

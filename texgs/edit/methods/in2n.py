@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from texgs.core.keys import key
-from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, update_method
+from texgs.edit.method import Method
+from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, run
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,11 @@ class In2nKeys(UpdateKeys):
         return UpdateSchedule(rounds, self.every, views=1, levels=noise_range("edit.in2n.noise", self.noise))
 
 
-METHOD = update_method(
+METHOD = Method(
     "in2n",
     "edit views of a scene of voxels one by one by an instruction, as Instruct-NeRF2NeRF does",
     In2nKeys,
-    "voxels",
+    run,
+    fields=frozenset({"voxels"}),
+    follows="instruction",
 )

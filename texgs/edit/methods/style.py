@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.edit.method import Method, MethodKeys
+from texgs.edit.method import MethodKeys
 from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, normalized_clicks
 
 if TYPE_CHECKING:
@@ -90,6 +89,10 @@ class FeatureKeys(StyleKeys):
         without = "nnfm=0" if self.patches else ""
         return {**({"vgg16": without} if self.nnfm > 0 else {}), **super().weights()}
 
+    def stylize(self, look: Look, name: str, model: Any, views: Sequence[View]) -> tuple[Any, Losses]:
+        """Return a model of this name with the style of its picture, by training views; and the losses."""
+        raise NotImplementedError
+
     def recipe(self, iterations: int, seed: int, **changes: Any) -> Recipe:
         """Return the losses, with changes to other fields of `Recipe`."""
         from texgs.edit.recipe import Recipe
@@ -109,24 +112,15 @@ class FeatureKeys(StyleKeys):
         )
 
 
-Keys = TypeVar("Keys", bound=StyleKeys)
-FeatureKeysType = TypeVar("FeatureKeysType", bound=FeatureKeys)
-
-
 @dataclass(frozen=True, eq=False)
-class Look(Generic[Keys]):
+class Look:
     """Pictures on their way onto the parts of a scene, and what there is to tell about it."""
 
-    task: Task[Keys]
+    task: Task[Any]
     vgg: Vgg | None
     pictures: dict[str, StylePicture] = field(default_factory=dict)  # by part
     losses: dict[str, Losses] = field(default_factory=dict)  # by part
     notes: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def keys(self) -> Keys:
-        """Return what the configuration says."""
-        return self.task.settings
 
     def picture(self, part: str) -> StylePicture:
         """Return what a part follows."""
@@ -153,25 +147,7 @@ class Look(Generic[Keys]):
         return shown
 
 
-# From a look, the name of a model, the model and its training views to the edited model and the losses.
-Stylize = Callable[[Look[FeatureKeysType], str, Any, "Sequence[View]"], "tuple[Any, Losses]"]
-
-
-def look_method(
-    name: str, summary: str, settings: type[FeatureKeysType], stylize: Stylize[FeatureKeysType], kind: str
-) -> Method[FeatureKeysType]:
-    """Return the specification of a method that gives models of one kind of field the style of a picture."""
-    return Method(
-        name,
-        summary,
-        settings,
-        partial(_run, stylize),
-        fields=frozenset({kind}),
-        follows="style",
-    )
-
-
-def _run(stylize: Stylize[FeatureKeysType], task: Task[FeatureKeysType]) -> EditedScene:
+def run(task: Task[FeatureKeys]) -> EditedScene:
     """Give the models the style; write style.png."""
     from texgs.edit.task import EditedScene
     from texgs.models.vgg import Vgg
@@ -181,7 +157,7 @@ def _run(stylize: Stylize[FeatureKeysType], task: Task[FeatureKeysType]) -> Edit
 
     def one(name: str, model: Field, views: Sequence[View]) -> Field:
         edited: Field
-        edited, look.losses[name] = stylize(look, name, model, views)
+        edited, look.losses[name] = keys.stylize(look, name, model, views)
         return edited
 
     scene = task.each_model(one)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.edit.methods.style import FeatureKeys, Look, look_method, picture_of, require_picture
+from texgs.edit.method import Method
+from texgs.edit.methods.style import FeatureKeys, Look, picture_of, require_picture, run
 
 if TYPE_CHECKING:
     from texgs.edit.style_loop import Losses
@@ -61,29 +62,29 @@ class StyleRfKeys(FeatureKeys):
         """Return the names of the pictures."""
         return ", ".join(Path(name).name for name in self.styles or [self.style])
 
+    def stylize(
+        self, look: Look, name: str, model: PaletteField, views: Sequence[View]
+    ) -> tuple[PaletteField, Losses]:
+        """Give palette colours the styles of their pictures; features see half of the resolution."""
+        from texgs.edit.palette_style import stylize_palette
+        from texgs.volume.images import load
 
-def stylize(
-    look: Look[StyleRfKeys], name: str, model: PaletteField, views: Sequence[View]
-) -> tuple[PaletteField, Losses]:
-    """Give palette colours the styles of their pictures; features see half of the resolution."""
-    from texgs.edit.palette_style import stylize_palette
-    from texgs.volume.images import load
-
-    keys, task = look.keys, look.task
-    recipe = keys.recipe(round(keys.epochs * len(views)), task.edit.seed, reduce=2, rate=keys.rate)
-    pictures = [picture_of(each, STYLES) for each in keys.styles]
-    look.pictures.update({f"{name}-{index + 1}": each for index, each in enumerate(pictures)})
-    pictures = pictures or [look.picture(name)] * len(model.colors)
-    images, title = load(views, task.reduce), task.title_of(name)
-    edited, losses, error = stylize_palette(model, images, pictures, recipe, keys, look.vgg, title)
-    look.notes.setdefault("distillation_rmse", {})[name] = error
-    return edited, losses
+        task = look.task
+        recipe = self.recipe(round(self.epochs * len(views)), task.edit.seed, reduce=2, rate=self.rate)
+        pictures = [picture_of(each, STYLES) for each in self.styles]
+        look.pictures.update({f"{name}-{index + 1}": each for index, each in enumerate(pictures)})
+        pictures = pictures or [look.picture(name)] * len(model.colors)
+        images, title = load(views, task.reduce), task.title_of(name)
+        edited, losses, error = stylize_palette(model, images, pictures, recipe, self, look.vgg, title)
+        look.notes.setdefault("distillation_rmse", {})[name] = error
+        return edited, losses
 
 
-METHOD = look_method(
+METHOD = Method(
     "stylerf",
     "give a scene of palette fields the styles of pictures, as StyleRF-VolVis does",
     StyleRfKeys,
-    stylize,
-    "palette",
+    run,
+    fields=frozenset({"palette"}),
+    follows="style",
 )

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
-from texgs.edit.methods.style import FeatureKeys, Look, look_method
+from texgs.edit.method import Method
+from texgs.edit.methods.style import FeatureKeys, Look, run
 
 if TYPE_CHECKING:
     from texgs.edit.style_loop import Losses
@@ -24,24 +25,24 @@ class StyleSplatKeys(FeatureKeys):
     iterations: int = key(2000, "steps of the style, of one view each", least=0)
     rate: float = key(0.005, "learning rate of zeroth harmonics; the others have a twentieth", above=0)
 
+    def stylize(
+        self, look: Look, name: str, model: Gaussians, views: Sequence[View]
+    ) -> tuple[Gaussians, Losses]:
+        """Give Gaussians the style of their picture; features see every pixel."""
+        from texgs.edit.gaussians import stylize_gaussians
+        from texgs.volume.images import smaller
 
-def stylize(
-    look: Look[StyleSplatKeys], name: str, model: Gaussians, views: Sequence[View]
-) -> tuple[Gaussians, Losses]:
-    """Give Gaussians the style of their picture; features see every pixel."""
-    from texgs.edit.gaussians import stylize_gaussians
-    from texgs.volume.images import smaller
-
-    keys, task = look.keys, look.task
-    recipe = keys.recipe(keys.iterations, task.edit.seed, reduce=1, rate=keys.rate)
-    cameras = [smaller(view.camera, task.reduce) for view in views]
-    return stylize_gaussians(model, cameras, look.picture(name), recipe, look.vgg, task.title_of(name))
+        task = look.task
+        recipe = self.recipe(self.iterations, task.edit.seed, reduce=1, rate=self.rate)
+        cameras = [smaller(view.camera, task.reduce) for view in views]
+        return stylize_gaussians(model, cameras, look.picture(name), recipe, look.vgg, task.title_of(name))
 
 
-METHOD = look_method(
+METHOD = Method(
     "stylesplat",
     "give a scene of 3D Gaussians the style of a picture, as StyleSplat does",
     StyleSplatKeys,
-    stylize,
-    "gaussians",
+    run,
+    fields=frozenset({"gaussians"}),
+    follows="style",
 )

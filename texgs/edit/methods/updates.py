@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.edit.method import Method
 from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
 
 if TYPE_CHECKING:
@@ -24,6 +22,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class UpdateKeys(InstructionKeys):
     """How a field follows views that are edited again and again."""
+
+    keeps_renders = False  # edits stay close to views of the fitted model, and not to the training views
 
     frozen: bool = key(False, "geometry stays as it is, bit for bit: the paper's second comparison")
     l1: float = key(0.8, "weight of the absolute difference to edited views", least=0)
@@ -86,32 +86,7 @@ def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float]
     return ((noise[0], noise[1]),)
 
 
-Keys = TypeVar("Keys", bound=UpdateKeys)
-
-
-def update_method(
-    name: str,
-    summary: str,
-    settings: type[Keys],
-    kind: str,
-    *,
-    keeps_renders: bool = False,
-) -> Method[Keys]:
-    """Return the specification of a method that edits training views while a kind of field learns from them.
-
-    Where renders are kept, edits stay close to views of the fitted model and not to the training views.
-    """
-    return Method(
-        name,
-        summary,
-        settings,
-        partial(_run, kind, keeps_renders),
-        fields=frozenset({kind}),
-        follows="instruction",
-    )
-
-
-def _run(kind: str, keeps_renders: bool, task: Task[Keys]) -> EditedScene:
+def run(task: Task[UpdateKeys]) -> EditedScene:
     """Give the models the look; write views.png."""
     from texgs.edit.dataset_update import update_field
     from texgs.edit.gaussians import GaussianLearner
@@ -119,7 +94,7 @@ def _run(kind: str, keeps_renders: bool, task: Task[Keys]) -> EditedScene:
     from texgs.edit.voxels import VoxelLearner
     from texgs.volume.images import load
 
-    learner: Any = {"gaussians": GaussianLearner, "voxels": VoxelLearner}[kind]
+    learners: Any = {"gaussians": GaussianLearner, "voxels": VoxelLearner}
     keys, guidance = task.settings, task.settings.opened(task.device)
     loss = keys.loss(task.device)
     rows: dict[str, list[np.ndarray]] = {}
@@ -129,10 +104,11 @@ def _run(kind: str, keeps_renders: bool, task: Task[Keys]) -> EditedScene:
     def one(name: str, model: Field, views: Sequence[View]) -> Field:
         images, plan = load(views, task.reduce), keys.schedule(len(views))
         updated = update_field(
-            *(learner(keys, model, images, loss, plan.iterations), images, guidance),
+            learners[model.kind](keys, model, images, loss, plan.iterations),
+            *(images, guidance),
             task.settings_for(name).instruction,
             plan,
-            keeps_renders=keeps_renders,
+            keeps_renders=keys.keeps_renders,
             seed=task.edit.seed,
             title=task.title_of(name),
         )
