@@ -69,16 +69,21 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.parametrize(
-    ("stdin", "is_saved"), [(Terminal("y\n"), True), (Terminal("\n"), False), (Terminal(""), False)]
+    ("stdin", "is_saved"),
+    [(Terminal("y\n"), True), (Terminal("\n"), False), (Terminal(""), False), (io.StringIO(), False)],
 )
-def test_unsaved_edits_are_asked_about(scene_file, monkeypatch, capsys, stdin, is_saved):  # noqa: F811
+def test_unsaved_edits_are_asked_about_or_told(scene_file, monkeypatch, capsys, stdin, is_saved):  # noqa: F811
     edits = Server(open_scene(scene_file)).edits
     view.ask_to_save(edits)
     assert capsys.readouterr().out == "", "nothing is unsaved"
     edits.change(Edit("TF01", "visible", False, 0), author=1)
     monkeypatch.setattr("sys.stdin", stdin)
     view.ask_to_save(edits)
-    assert "Edits are not saved. Write them to" in capsys.readouterr().out
+    said = capsys.readouterr()
+    if isinstance(stdin, Terminal):
+        assert "Edits are not saved. Write them to" in said.out
+    else:
+        assert said.err == "Edits were not saved.\n", "nobody can be asked"
     assert read_scene(scene_file).models["TF01"].edit.visible is not is_saved
 
 
@@ -98,11 +103,3 @@ def test_another_file_is_not_replaced_without_a_word(scene_file, monkeypatch, ca
     view.ask_to_save(edits)
     assert "save as: expected" in capsys.readouterr().err
     assert not read_scene(scene_file.parent / "other.yaml").models["TF01"].edit.visible
-
-
-def test_unsaved_edits_are_told_where_nobody_can_be_asked(scene_file, monkeypatch, capsys):  # noqa: F811
-    edits = Server(open_scene(scene_file)).edits
-    edits.change(Edit("TF01", "visible", False, 0), author=1)
-    monkeypatch.setattr("sys.stdin", io.StringIO())
-    view.ask_to_save(edits)
-    assert capsys.readouterr().err == "Edits were not saved.\n"

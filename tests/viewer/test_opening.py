@@ -17,11 +17,14 @@ from texgs.viewer.description import describe
 from texgs.viewer.shared_edits import open_scene
 
 
-def test_a_scene_is_saved_in_its_place(scene_file, tmp_path):
+def test_a_scene_and_a_model_are_saved_in_their_place(scene_file, tmp_path):
     opened = open_scene(scene_file)
     assert list(opened.scene.models) == ["TF01", "TF02"]
     assert (opened.folder, opened.name, opened.file) == (tmp_path, "scene.yaml", scene_file)
     assert open_scene(scene_file, tmp_path / "mine").folder == tmp_path / "mine"
+    opened = open_scene(write_model(tmp_path / "shell.safetensors", ball(1)))
+    assert list(opened.scene.models) == ["shell"]
+    assert (opened.folder, opened.name) == (tmp_path, "scene.yaml")
 
 
 def test_a_job_keeps_its_scene_and_its_folder(scene_file, tmp_path, monkeypatch):
@@ -42,12 +45,6 @@ def test_a_folder_with_one_scene(scene_file, tmp_path):
     (tmp_path / "other" / "scene.yaml").write_text(scene_file.read_text())
     with pytest.raises(ArgumentError, match=r"got 2 \(other/scene.yaml, scene.yaml\); name one of them"):
         open_scene(tmp_path)
-
-
-def test_a_model_is_a_scene(tmp_path):
-    opened = open_scene(write_model(tmp_path / "shell.safetensors", ball(1)))
-    assert list(opened.scene.models) == ["shell"]
-    assert (opened.folder, opened.name) == (tmp_path, "scene.yaml")
 
 
 def test_what_is_missing_is_told(tmp_path):

@@ -194,10 +194,7 @@ async def test_edits_of_one_movement_are_one_step(browser):
 @pytest.mark.parametrize(
     ("edit", "message"),
     [
-        (
-            {"part": "TF03", "key": "opacity", "value": 1},
-            "a model of the scene (TF01, TF02), got TF03",
-        ),
+        ({"part": "TF03", "key": "opacity", "value": 1}, "a model of the scene (TF01, TF02), got TF03"),
         ({"part": "TF01", "key": "palette", "value": {"a": 1}}, "expected three numbers from 0 to 1"),
         ({"part": "", "key": "light", "value": "up"}, "expected headlight, or azimuth and polar"),
     ],

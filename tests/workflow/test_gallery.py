@@ -125,11 +125,7 @@ def test_models_of_a_comparison_are_those_of_the_last_phases_of_all_recipes():
     [
         ("[{edit: glas}]", "edits=[glass]", r"\.edit: expected one of none, glass, got glas, did"),
         ("[{edit: glass}]", "", r"\.edit: expected one of none, got glass"),
-        (
-            "[{edit: stylesplat}]",
-            "edits=[stylesplat]",
-            r"\.edit: stylesplat works on none of quick; add a",
-        ),
+        ("[{edit: stylesplat}]", "edits=[stylesplat]", r"\.edit: stylesplat works on none of quick; add a"),
         ("[{fit: demos}]", "fits=[quick,demo]", r"\.fit: expected one of quick, demo, got demos"),
         (
             *("[{edit: glass, fit: plenoxels}]", "fits=[quick,plenoxels] edits=[glass]"),

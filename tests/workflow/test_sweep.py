@@ -10,6 +10,10 @@ from texgs.workflow.stage import edit_folder, fit_folder
 from texgs.workflow.stage_table import STAGES
 from texgs.workflow.sweep import as_sweep, swept, variants
 
+SEEDS = "expected seeds of a sweep in sweep.seeds"
+OVERRIDES = "expected overrides of views, fit, device or edit"
+OTHER_KEYS = "expected to change edit gold, whose keys are edit.text, got edit.image.lambda_s"
+
 
 @pytest.mark.parametrize("name", [name for name in members("sweep") if name != "none"])
 def test_every_sweep_of_conf_composes(name):
@@ -124,16 +128,10 @@ def test_swept_values_are_told_in_full():
         ((*words_of(a=[]), "sweep.edit_seeds=[1,1]"), "sweep.edit_seeds: expected different seeds, got 1"),
         (
             (*words_of(a=[]), "fit.seed=3"),
-            "fit.seed: expected seeds of a sweep in sweep.seeds, got fit.seed=3",
+            f"fit.seed: {SEEDS}, got fit.seed=3",
         ),
-        (
-            words_of(a=["dataset=sphere"]),
-            "sweep.variants.a: expected overrides of views, fit, device or edit",
-        ),
-        (
-            ("results=x,y",),
-            "sweep.variants.x: expected overrides of views, fit, device or edit, got results=x",
-        ),
+        (words_of(a=["dataset=sphere"]), f"sweep.variants.a: {OVERRIDES}"),
+        (("results=x,y",), f"sweep.variants.x: {OVERRIDES}, got results=x"),
         (("dataset=engine,fuel",), "got dataset=engine; the rest is the same for all variants, and several"),
         (words_of(a=["fit.seed=1"]), "sweep.variants.a: got fit.seed=1, whose values go to sweep.seeds"),
         (("edit=gold,glass",), "sweep.variants.gold: got edit=gold, whose values go to edits=[...]"),
@@ -147,10 +145,7 @@ def test_swept_values_are_told_in_full():
         (("sweep.name=x",), "sweep x: expected variants, keys to sweep over or several seeds, got none"),
         (("+sweep.variants.a=[]",), "sweep.name: expected a name for the table of the variants, got none"),
         (("edit.image.lambda_s=0,1",), "sweep lambda_s: expected an edit that its variants change, got none"),
-        (
-            ("edit.image.lambda_s=0,1", "edits=[style,gold]"),
-            "sweep lambda_s: expected to change edit gold, whose keys are edit.text, got edit.image.lambda_s",
-        ),
+        (("edit.image.lambda_s=0,1", "edits=[style,gold]"), f"sweep lambda_s: {OTHER_KEYS}"),
         (("variant=a/b",), "variant: expected at most 100 letters, digits, _, - or ., got 'a/b'"),
     ],
 )

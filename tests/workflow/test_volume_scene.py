@@ -155,6 +155,7 @@ def test_a_picture_is_a_frame_of_the_changed_scene(renderer):
     np.testing.assert_array_equal(np.round(changed * 255), expected)
     np.testing.assert_array_equal(renderer.render(cell()).pixels, plain, "changes are taken back")
     assert np.abs(changed - plain).max() > 0.1
+    assert renderer.render(cell("")).pixels is None, "a place may be empty"
 
 
 @pytest.mark.parametrize("show", ["scene", "volume"])
@@ -186,10 +187,6 @@ def test_an_error_is_that_of_the_worst_channel_with_its_psnr(renderer):
     red, blue = error.pixels[..., 0] - error.pixels[..., 2], np.abs(signed) > 0.02
     assert np.array_equal(np.sign(red[blue]), np.sign(signed[blue])), "red is too bright"
     assert renderer.render(cell("volume", **words)).psnr is None
-
-
-def test_a_place_may_be_empty(renderer):
-    assert renderer.render(cell("")).pixels is None
 
 
 def test_a_change_that_cannot_be_made_is_named_and_leaves_nothing(renderer):
