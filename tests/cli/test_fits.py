@@ -31,10 +31,7 @@ def empty(tmp_path, monkeypatch):
     ("words", "message"),
     [
         ("texture fit=gaussians_quick", FITS.format("texture", "surfels", "gaussians_quick", "gaussians")),
-        (
-            "gaussians fit=quick",
-            OTHER,
-        ),
+        ("gaussians fit=quick", OTHER),
         ("comparison fit=quick", "fits: expected several recipes to compare, such as fits=[quick,demo]"),
         ("comparison fits=[quick,plenoxels] device=cuda", PLENOXELS),
         ("voxels fit=plenoxels device=cuda", PLENOXELS),

@@ -114,10 +114,7 @@ KEYS = ("id", "camera", "mode", "moving", "before", "only", "part", "key", "valu
         "model", "points")  # fmt: skip
 
 
-@given(
-    st.sampled_from(TYPES),
-    st.dictionaries(st.sampled_from(KEYS), VALUES),
-)
+@given(st.sampled_from(TYPES), st.dictionaries(st.sampled_from(KEYS), VALUES))
 def test_nothing_else_is_raised(kind, values):
     try:
         parse(json.dumps({"type": kind, **values}))

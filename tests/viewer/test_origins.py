@@ -71,6 +71,9 @@ def test_the_view_that_is_nearest_is_shown(scene):
     truth = origins(scene).frame(view("truth"), shown, 1.0)
     rendered = Session(shown).frame(camera_at(*PLACES[1]), scene=replace(shown, light=LIGHT))
     assert (truth == rendered).all()
+    wide = origins(scene).frame(view("truth", width=2 * SIZE), shown, 1.0)
+    assert (wide[:, SIZE // 2 : -SIZE // 2] == truth).all(), "the view is in the middle of a wide frame"
+    assert (wide[:, : SIZE // 2] == truth[0, 0]).all()
 
 
 def test_the_difference_is_that_of_the_scene_under_the_light_of_the_view(scene):
@@ -79,13 +82,6 @@ def test_the_difference_is_that_of_the_scene_under_the_light_of_the_view(scene):
     entry = shown.models["TF01"]
     half = replace(shown, models={**shown.models, "TF01": replace(entry, edit=PartEdit(opacity=0.5))})
     assert result.frame(view("difference"), half, 1.0).max() > 10 * GAIN
-
-
-def test_a_wide_frame_has_the_view_in_its_middle(scene):
-    truth = origins(scene).frame(view("truth", width=2 * SIZE), only(scene, "TF01"), 1.0)
-    square = origins(scene).frame(view("truth"), only(scene, "TF01"), 1.0)
-    assert (truth[:, SIZE // 2 : -SIZE // 2] == square).all()
-    assert (truth[:, : SIZE // 2] == square[0, 0]).all()
 
 
 def test_views_show_one_transfer_function(scene):

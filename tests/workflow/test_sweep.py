@@ -126,10 +126,7 @@ def test_swept_values_are_told_in_full():
     [
         ((*words_of(a=[]), "sweep.seeds=[]"), "sweep.seeds: expected at least one, got none"),
         ((*words_of(a=[]), "sweep.edit_seeds=[1,1]"), "sweep.edit_seeds: expected different seeds, got 1"),
-        (
-            (*words_of(a=[]), "fit.seed=3"),
-            f"fit.seed: {SEEDS}, got fit.seed=3",
-        ),
+        ((*words_of(a=[]), "fit.seed=3"), f"fit.seed: {SEEDS}, got fit.seed=3"),
         (words_of(a=["dataset=sphere"]), f"sweep.variants.a: {OVERRIDES}"),
         (("results=x,y",), f"sweep.variants.x: {OVERRIDES}, got results=x"),
         (("dataset=engine,fuel",), "got dataset=engine; the rest is the same for all variants, and several"),
