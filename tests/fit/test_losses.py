@@ -66,11 +66,8 @@ def test_smoothness_of_each_map_of_the_material(target):
         expected += float(bilateral_smoothness(plane.double(), target.color.double(), target.alpha.double()))
     without, with_it = loss(parameters, target), loss(parameters, target, smoothness=0.01)
     assert with_it - without == pytest.approx(0.01 * expected, rel=1e-3)
-
-
-def test_one_material_for_all_is_smooth_already(target):
-    parameters = ball_seeds(60)
-    assert loss(parameters, target, smoothness=5.0) == loss(parameters, target)
+    shared = ball_seeds(60)  # one material for all is smooth already
+    assert loss(shared, target, smoothness=5.0) == loss(shared, target)
 
 
 def test_normals_count_from_their_iteration_on(target):
