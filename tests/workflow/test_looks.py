@@ -7,8 +7,8 @@ from texgs.config.project import members
 from texgs.core.errors import ConfigError
 from texgs.edit.pictures import PICTURES
 from texgs.models.instruction import understand
+from texgs.workflow.edits import captions, edited_scene, looks_of
 from texgs.workflow.stage_table import STAGES
-from texgs.workflow.stages.edit import captions, edited_scene, looks_of
 
 
 def test_an_edit_follows_its_own_picture_unless_it_asks_for_looks():

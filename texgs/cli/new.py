@@ -11,6 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from texgs.config.compose import compose
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.io import is_there, read_json, write_bytes
 
@@ -117,7 +118,6 @@ def changed(overrides: list[str]) -> list[str]:
 
 def configuration(name: str, file: Path, overrides: list[str]) -> Config:
     """Return the configuration as it will be with the new data set, but without basic TFs and tracking."""
-    from texgs.config.compose import compose
     from texgs.config.dataset import Dataset, Volume
 
     path = str(file.absolute())
@@ -194,7 +194,6 @@ def document(config: Config, keys: list[str]) -> str:
 
 def check_document(text: str, config: Config) -> None:
     """Require that the configuration reads a document as the data set that it was written for."""
-    from texgs.config.compose import compose
     from texgs.workflow.checks import check_basic_tfs
 
     name = config.dataset.name

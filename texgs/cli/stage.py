@@ -7,7 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from texgs.config.compose import compose
+from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
+from texgs.edit.method import NO_METHOD
+from texgs.workflow.checks import check_basic_tfs, require_edit, require_fit, require_fits
+from texgs.workflow.job import Job
+from texgs.workflow.locate import cached_volume, source_file, tf_names
+from texgs.workflow.missing import needed
 from texgs.workflow.stage import Stage
 from texgs.workflow.stage_table import STAGES, jobs
 
@@ -20,7 +27,6 @@ class HelpWithKeys(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_rest: object) -> None:
         """Print the help and exit."""
-        from texgs.config.compose import compose
         from texgs.config.describe import describe
         from texgs.config.project import groups
 
@@ -57,10 +63,6 @@ def run(arguments: argparse.Namespace) -> int:
             "--input, --output: expected only with --settings, as the workflow runs a job; by hand, "
             "results=FOLDER says where results go"
         )
-    from texgs.config.compose import compose
-    from texgs.workflow.checks import check_basic_tfs, require_edit, require_fit, require_fits
-    from texgs.workflow.locate import tf_names
-
     words = tuple(arguments.overrides)
     config, stage = compose(words), STAGES[arguments.verb]
     check_basic_tfs(config.dataset)
@@ -78,7 +80,6 @@ def run(arguments: argparse.Namespace) -> int:
 def fetch_volume(config: Config) -> None:
     """Download the volume's file, where it is not on this machine."""
     from texgs.volume.download import download
-    from texgs.workflow.locate import cached_volume, source_file
 
     volume, path = config.dataset.volume, source_file(config)
     if path is not None and volume.url and path == cached_volume(volume) and not path.exists():
@@ -87,9 +88,6 @@ def fetch_volume(config: Config) -> None:
 
 def makers(words: tuple[str, ...]) -> dict[Path, tuple[Stage, Config]]:
     """Return the jobs that can make what a stage reads, by their folders."""
-    from texgs.config.compose import compose
-    from texgs.edit.method import NO_METHOD
-
     config = compose(words)
     fits = [(*words, f"fit={recipe}") for recipe in config.fits] or [words]
     configs = [compose((*each, "edit=none")) for each in fits]
@@ -109,10 +107,8 @@ def ensure(
     Those jobs are `known` by their folders, of which those that were run are taken out; `force` runs the
     stage itself in any case.
     """
-    from texgs.core.checksum import Checksums
     from texgs.models.weights import locate
-    from texgs.workflow.job import Job, execute
-    from texgs.workflow.missing import needed
+    from texgs.workflow.execution import execute
     from texgs.workflow.tracked import Tracking
 
     if stage.name == "volume":
@@ -137,7 +133,7 @@ def run_settings(arguments: argparse.Namespace) -> int:
     """Run one job from the file of its settings."""
     import yaml
 
-    from texgs.workflow.job import Job, execute
+    from texgs.workflow.execution import execute
     from texgs.workflow.tracked import of_workflow
 
     if arguments.overrides or arguments.force or arguments.output is None:

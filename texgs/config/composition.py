@@ -20,18 +20,19 @@ from hydra._internal.config_repository import CachingConfigRepository, ConfigRep
 from hydra._internal.config_search_path_impl import ConfigSearchPathImpl
 from hydra._internal.defaults_list import create_defaults_list
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override, OverrideType
+from hydra.core.override_parser.types import Override, OverrideType, Quote, QuotedString
 from hydra.core.plugins import Plugins
+from hydra.errors import HydraException
 from hydra.plugins.config_source import ConfigResult
 from omegaconf import OmegaConf
 
 from texgs.config.describe import keys
 from texgs.config.mistakes import MISTAKES, misread
+from texgs.config.project import Words
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.core.keys import UnknownKey, mismatch
 
-Words = tuple[str, ...]
 Places = tuple[Path, ...]
 ALONE = ("fit", "edit")  # groups of which a run combines many files with those of others
 REFERENCE = re.compile(r"(?<!\\)\$\{(\.*)([\w.-]+)\}")
@@ -149,6 +150,37 @@ def parsed(word: str) -> Override:
 @cache
 def _parser() -> OverridesParser:
     return OverridesParser.create()
+
+
+def has_several(word: str) -> bool:
+    """Return whether a word gives its key several values."""
+    try:
+        return bool(parsed(word).is_sweep_override())
+    except HydraException:  # which `compose` tells
+        return False
+
+
+def several(word: str) -> list[str]:
+    """Return the values that a word gives its key, as people write them.
+
+    That is true instead of Hydra's True, and 100000 instead of 1e5 where an integer is expected.
+    """
+    if not has_several(word) or not (parsed(word).is_choice_sweep() or parsed(word).is_range_sweep()):
+        raise ConfigError(
+            f"{word}: expected several values, such as fit.low_pass=2,6 or fit.seed=range(3); "
+            "a list stands in brackets, a text with a comma in quotes"
+        )
+    texts = [
+        text.lower() if text in ("True", "False") else text for text in parsed(word).sweep_string_iterator()
+    ]
+    key = word.partition("=")[0].lstrip("+")
+    is_whole = any(entry.name == key and "float" not in entry.type for entry in keys())
+    return [re.sub(r"^(-?\d+)\.0$", r"\1", text) for text in texts] if is_whole else texts
+
+
+def quoted(word: str) -> str:
+    """Return a word as an item of a list."""
+    return str(QuotedString(word, Quote.single).with_quotes())
 
 
 def apply(values: dict[str, Any], override: Override) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from texgs.core.errors import ConfigError
 from texgs.core.keys import mismatch
 
+Words = tuple[str, ...]  # overrides of the configuration, in Hydra's syntax
 PACKAGE = Path(__file__).parents[1]
 INSTALLED = PACKAGE / "_project"  # where a wheel puts them, see CMakeLists.txt
 ROOT = INSTALLED if INSTALLED.is_dir() else PACKAGE.parent  # holds Snakefile, conf/ and workflow/

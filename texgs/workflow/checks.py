@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.compose import compose
-from texgs.config.composition import Words
-from texgs.config.project import members
+from texgs.config.project import Words, members
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import kinds, require
 from texgs.fields.surfels.material import require_material
 from texgs.fit.kinds import fit_specs
-from texgs.workflow.edits import lineage
+from texgs.workflow.edits import lineage, looks_of
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.stage import Stage
-from texgs.workflow.stages.edit import looks_of
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config

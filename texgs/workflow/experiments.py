@@ -8,9 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
 from texgs.config.compose import compose
-from texgs.config.composition import Words
 from texgs.config.dataset import Dataset
-from texgs.config.project import members
+from texgs.config.project import Words, members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.core.names import close

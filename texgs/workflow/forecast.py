@@ -12,6 +12,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from texgs.workflow.sweep import as_sweep
+
 if TYPE_CHECKING:
     from texgs.config.schema import Config
     from texgs.workflow.experiments import Selection
@@ -51,7 +53,6 @@ def forecast(words: tuple[str, ...]) -> Forecast:
     """Return what a run with these words would do; nothing is written."""
     from texgs.core.checksum import Checksums
     from texgs.workflow.graph import drawn
-    from texgs.workflow.sweep import as_sweep
 
     selection, planned = drawn(as_sweep(words), Checksums.load())
     lack_files = {folder for folders in planned.missing.values() for folder in folders}

@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+from texgs.config.compose import compose
 from texgs.config.project import is_scene_file, members
 from texgs.config.schema import NO_SWEEP, Config
 from texgs.core.errors import ConfigError, MissingDataError
@@ -14,8 +15,7 @@ from texgs.edit.method import NO_METHOD
 from texgs.fit.kinds import fit_specs
 from texgs.workflow.locate import tf_names, views_folder
 from texgs.workflow.stage import edit_folder, folder_of, made, plain
-
-# `compose` and `sweep` are imported where they are called: Hydra, which these load, takes 0.3 s.
+from texgs.workflow.sweep import changes, fit_variant
 
 
 def is_fit(config: Config) -> bool:
@@ -40,8 +40,6 @@ def has_scene(config: Config) -> bool:
 
 def is_swept(config: Config) -> bool:
     """Return whether the configuration is of a sweep."""
-    from texgs.workflow.sweep import changes
-
     return bool(changes(config))
 
 
@@ -112,16 +110,9 @@ def shown_tfs(config: Config) -> dict[str, Any]:
     return {name: basic[name] for name in tf_names(config) if name in basic}
 
 
-def variant_of_fit(config: Config) -> str:
-    """Return the variant of the fit; empty for a fit that all variants of a sweep share."""
-    from texgs.workflow.sweep import fit_variant
-
-    return fit_variant(config)
-
-
 def sweep_of_fit(config: Config) -> str:
     """Return the sweep that the fit is of."""
-    return config.sweep.name if variant_of_fit(config) else NO_SWEEP
+    return config.sweep.name if fit_variant(config) else NO_SWEEP
 
 
 def is_changed(fit: Any, later: Sequence[str] = ()) -> bool:
@@ -131,8 +122,6 @@ def is_changed(fit: Any, later: Sequence[str] = ()) -> bool:
         fit: recipe of a job.
         later: keys of it that only later jobs read.
     """
-    from texgs.config.compose import compose
-
     if fit.name not in members("fit"):
         return True
     file, ignored = compose((f"fit={fit.name}",)).fit, ("seed", *later)
@@ -152,7 +141,5 @@ def without(table: Any, *names: str) -> dict[str, Any]:
 
 def with_recipe(config: Config, name: str) -> Config:
     """Return the configuration with another recipe's name and field: what decides where its models are."""
-    from texgs.config.compose import compose
-
     recipe = compose((f"fit={name}",)).fit
     return replace(config, fit=replace(config.fit, name=recipe.name, field=recipe.field))

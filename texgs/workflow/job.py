@@ -1,8 +1,7 @@
-"""Run one job: a stage with its settings, in a folder of its own, tracked, its numbers in metrics.json."""
+"""A job: a stage with its settings, the files it reads and the folder of its result."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,16 +11,11 @@ import yaml
 
 from texgs.config.schema import Config
 from texgs.core.checksum import Checksums, digest
-from texgs.core.errors import ArgumentError
-from texgs.core.io import write_bytes, write_json
-from texgs.core.keys import ValueMismatch, typed
-from texgs.core.progress import curve_logger
-from texgs.report.results import plain
-from texgs.workflow import result, tracked
-from texgs.workflow.missing import require_same, weights_of
-from texgs.workflow.provenance import record
-from texgs.workflow.runs import run
-from texgs.workflow.stage import Outcome, Stage
+from texgs.core.io import write_bytes
+from texgs.workflow import result
+from texgs.workflow.missing import weights_of
+from texgs.workflow.stage import Stage
+from texgs.workflow.sweep import swept
 
 
 @dataclass(frozen=True)
@@ -38,8 +32,6 @@ class Job:
     @classmethod
     def of(cls, stage: Stage, config: Config, checksums: Checksums) -> Job:
         """Return the job that a configuration describes; its settings name the weights that it works with."""
-        from texgs.workflow.sweep import swept  # not at the top: jobs go without Hydra
-
         settings, weights = stage.settings(config), weights_of(stage, config, checksums)
         named = {} if weights is None else {"weights": weights}
         files = stage.inputs(config), stage.output(config)
@@ -61,60 +53,6 @@ class Job:
         return all(path.exists() for path in self.inputs.values()) and (
             result.stamped(self.output) == self.identity()
         )
-
-
-def execute(job: Job, tracking: tracked.Tracking, *, force: bool = False) -> bool:
-    """Run a job, unless its result is there, and return whether there was something to do.
-
-    An interrupted run of the same job goes on, unless it is forced to begin from nothing. The result before
-    it stays until this one is complete.
-    """
-    with result.alone(job.output):
-        result.recover(job.output)
-        if not force and job.is_done():
-            return False
-        _execute(job, tracking, is_fresh=force)
-    return True
-
-
-def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
-    """Run a job in its work folder, and put its result in place."""
-    for name, path in job.inputs.items():
-        if not path.exists():
-            raise ArgumentError(
-                f"{name}: expected the file {path}, which is not there; run the stage that makes it"
-            )
-        result.require_intact(path)
-    require_same(job.settings.get("weights", {}))
-    try:
-        settings = typed(job.stage.schema, job.settings)
-    except ValueMismatch as error:
-        raise ArgumentError(f"settings of a {job.stage.name} job: {error}") from error
-    identity = job.identity()
-    inputs = job.inputs.items()
-    made_from = {name: path.as_posix() for name, path in inputs if path.name in result.recorded(path.parent)}
-    work = result.claim(job.output, identity, is_fresh=is_fresh)
-    with run(
-        tracking.uri,
-        experiment=tracking.experiment,
-        name=tracked.name(job),
-        tags=tracked.tags(job, identity, tracking.parent),
-        params={**job.swept, **job.settings},
-    ) as recorded:
-        start = time.perf_counter()
-        with curve_logger(recorded.log if recorded.id else None):
-            outcome: Outcome = job.stage.work(settings, dict(job.inputs), work)
-        seconds = time.perf_counter() - start
-        metrics = {
-            **record(job.settings, identity, made_from, seconds),
-            "run": recorded.id,
-            "result": type(outcome.result).__name__,
-            "numbers": plain(outcome.result),
-            "pictures": dict(job.stage.rule.shown if outcome.pictures is None else outcome.pictures),
-        }
-        write_json(work / result.METRICS, metrics)
-        result.publish(job.output)
-        tracked.log_result(recorded, job, metrics)
 
 
 def settings_file(settings: dict[str, Any], results: str) -> str:

@@ -10,15 +10,12 @@ import os
 from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from texgs.core.cache import keep, recall
 from texgs.core.checksum import Checksums, sha256
 from texgs.core.io import write_bytes
+from texgs.workflow.job import Job
 from texgs.workflow.result import METRICS
-
-if TYPE_CHECKING:
-    from texgs.workflow.job import Job
 
 LONG_AGO = 946684800  # the year 2000, in seconds
 

@@ -13,21 +13,23 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from texgs.config.compose import compose
 from texgs.config.project import ROOT, folders
+from texgs.config.schema import Config
 from texgs.core.cache import keep, recall
-from texgs.core.checksum import digest, of_folders
+from texgs.core.checksum import Checksums, digest, of_folders
 from texgs.core.errors import ConfigError
 from texgs.core.io import write_bytes
-from texgs.workflow.stage import edit_folder, fit_folder
+from texgs.workflow.experiments import LeftOut, apart
+from texgs.workflow.graph import drawn, earlier
+from texgs.workflow.job import Job, settings_file
+from texgs.workflow.locate import cached_volume
+from texgs.workflow.notes import note_results, note_tables
+from texgs.workflow.stage import Rule, edit_folder, fit_folder
 from texgs.workflow.stage_table import RULES, STAGES, SWEPT
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
-    from texgs.workflow.experiments import LeftOut
-    from texgs.workflow.job import Job
-    from texgs.workflow.stage import Rule
+from texgs.workflow.sweep import as_sweep
 
 GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
 
@@ -87,8 +89,6 @@ class Plan:
 
 def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what Snakemake's `--config` says, in Hydra's syntax; keys with several values are a sweep."""
-    from texgs.workflow.sweep import as_sweep  # where it is called: jobs on a cluster go without Hydra
-
     if unknown := sorted(set(config) - {*GROUPS, "overrides", "pathvars"}):
         expected = ", ".join(GROUPS)
         raise ConfigError(
@@ -125,12 +125,6 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
 
 def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     """Plan a run, and note in their settings which results are not those of the plan; see `planned`."""
-    from texgs.config.compose import compose
-    from texgs.core.checksum import Checksums
-    from texgs.workflow.experiments import apart
-    from texgs.workflow.graph import drawn, earlier
-    from texgs.workflow.notes import note_results, note_tables
-
     checksums = Checksums.load()
     selection, planned = drawn(words, checksums)
     config, configs = compose(apart(words)[0]), selection.configs
@@ -160,8 +154,6 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
 
 def plain(job: Job, results: str) -> dict[str, Any]:
     """Return a job in plain values; its settings file is written."""
-    from texgs.workflow.job import settings_file
-
     return {
         "stage": job.stage.name,
         "place": job.stage.place,
@@ -196,8 +188,6 @@ def left_out(entries: Mapping[LeftOut, Iterable[str]], results: str) -> str:
 
 def downloads(configs: Iterable[Config]) -> dict[str, tuple[str, str]]:
     """Return address and checksum of the volumes that are not in the data folder, by the files they go to."""
-    from texgs.workflow.locate import cached_volume
-
     volumes = [(config.data_folder, config.dataset.volume) for config in configs]
     absent = [each for folder, each in volumes if each.url and not Path(folder, each.file or "").exists()]
     return {cached_volume(each).as_posix(): (str(each.url), str(each.sha256)) for each in absent}

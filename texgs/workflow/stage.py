@@ -19,7 +19,9 @@ from texgs.fields.kinds import kinds
 from texgs.metrics.metric import metrics
 from texgs.report.results import Result
 from texgs.workflow.code import code_digest
+from texgs.workflow.sweep import edit_variant, fit_variant
 
+RULES: dict[str, Rule] = {}  # those of all stages, by name; texgs.workflow.stage_table fills it
 EVERY = 1024  # threads, of which a job gets as many as there are
 
 
@@ -130,8 +132,6 @@ def plain(value: Any) -> Any:
 
 def folder_of(rule: str, config: Config, phase: str = "", tf: str | None = None) -> Path:
     """Return the folder of a job's files; `tf`: of another basic TF than `config.tf`."""
-    from texgs.workflow.stage_table import RULES  # not at the top: stages import this module
-
     return Path(config.results) / RULES[rule].folder.format(
         dataset=config.dataset.name,
         tf=tf or config.tf,
@@ -145,22 +145,16 @@ def folder_of(rule: str, config: Config, phase: str = "", tf: str | None = None)
 
 def made(rule: str, config: Config, phase: str = "", tf: str | None = None) -> Path:
     """Return the file of a job that other jobs ask for."""
-    from texgs.workflow.stage_table import RULES
-
     return folder_of(rule, config, phase, tf) / RULES[rule].files[0]
 
 
 def fit_folder(config: Config) -> str:
     """Return the name of a fit's folder: the recipe, the variant of a sweep, and a seed other than 0."""
-    from texgs.workflow.sweep import fit_variant  # not at the top: it loads Hydra
-
     return _folder(config.fit.name, fit_variant(config), config.fit.seed)
 
 
 def edit_folder(config: Config, name: str = "") -> str:
     """Return that of an edit in the same way; `name`: of another edit than that of `config`."""
-    from texgs.workflow.sweep import edit_variant
-
     return _folder(name or config.edit.name, edit_variant(config), config.edit.seed)
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from texgs.workflow.inputs import is_fit
 from texgs.workflow.locate import tf_names
-from texgs.workflow.stage import Rule, Stage
+from texgs.workflow.stage import RULES, Stage
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config
@@ -32,7 +32,7 @@ def discovered() -> Iterator[Stage]:
 STAGES: dict[str, Stage] = {
     stage.name: stage for stage in sorted(discovered(), key=lambda stage: (stage.order, stage.name))
 }
-RULES: dict[str, Rule] = {stage.rule.name: stage.rule for stage in STAGES.values()}
+RULES |= {stage.rule.name: stage.rule for stage in STAGES.values()}
 
 
 def jobs(config: Config) -> list[tuple[Stage, Config]]:

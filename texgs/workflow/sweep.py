@@ -10,12 +10,9 @@ from dataclasses import fields
 from functools import lru_cache
 from itertools import product
 
-from hydra.core.override_parser.types import Quote, QuotedString
-from hydra.errors import HydraException
-
 from texgs.config.compose import compose
-from texgs.config.composition import Words, parsed
-from texgs.config.describe import keys, value_at
+from texgs.config.describe import value_at
+from texgs.config.project import Words
 from texgs.config.schema import NO_SWEEP, Config
 from texgs.core.errors import ConfigError
 from texgs.edit.keys import EditKeys
@@ -47,55 +44,34 @@ def label(value: str) -> str:
     return text if re.fullmatch(r"-?\d[\d.]*", text) else text.strip("-.") or "empty"
 
 
-def has_several(word: str) -> bool:
-    """Return whether a word gives its key several values."""
-    try:
-        return bool(parsed(word).is_sweep_override())
-    except HydraException:  # which `compose` tells
-        return False
-
-
-def values(word: str) -> list[str]:
-    """Return the values that a word gives its key, as people write them.
-
-    That is true instead of Hydra's True, and 100000 instead of 1e5 where an integer is expected.
-    """
-    if not has_several(word) or not (parsed(word).is_choice_sweep() or parsed(word).is_range_sweep()):
-        raise ConfigError(
-            f"{word}: expected several values, such as fit.low_pass=2,6 or fit.seed=range(3); "
-            "a list stands in brackets, a text with a comma in quotes"
-        )
-    texts = [
-        text.lower() if text in ("True", "False") else text for text in parsed(word).sweep_string_iterator()
-    ]
-    is_whole = any(entry.name == key_of(word) and "float" not in entry.type for entry in keys())
-    return [re.sub(r"^(-?\d+)\.0$", r"\1", text) for text in texts] if is_whole else texts
-
-
 def as_sweep(words: Words) -> Words:
     """Return the words, with those that give a key several values as a sweep, named after the keys.
 
     Each combination of values is a variant. Seeds make none: they are what means are over.
     """
-    several = [word for word in words if has_several(word)]
-    rest = tuple(word for word in words if word not in several)
-    seeds = tuple(f"sweep.{SEEDS[key_of(x)]}=[{','.join(values(x))}]" for x in several if key_of(x) in SEEDS)
-    over = [word for word in several if key_of(word) not in SEEDS]
+    from texgs.config.composition import has_several, quoted, several
+
+    swept = [word for word in words if has_several(word)]
+    rest = tuple(word for word in words if word not in swept)
+    seeds = tuple(f"sweep.{SEEDS[key_of(x)]}=[{','.join(several(x))}]" for x in swept if key_of(x) in SEEDS)
+    over = [word for word in swept if key_of(word) not in SEEDS]
     chosen = [word for word in rest if key_of(word) == "sweep" and word != "sweep=none"]
     if over and chosen:
         raise ConfigError(f"{over[0]}: {chosen[0]} has variants of its own; leave out one of the two")
-    if chosen or not several:
+    if chosen or not swept:
         return (*rest, *seeds)
     name = "-".join(key_of(word).rpartition(".")[2] for word in over) or ONLY_SEEDS
-    listed = ",".join(QuotedString(word, Quote.single).with_quotes() for word in over)
+    listed = ",".join(map(quoted, over))
     return (*rest, *seeds, f"sweep.name={name}", f"sweep.over=[{listed}]")
 
 
 @lru_cache(maxsize=64)
 def combinations(over: Words) -> Mapping[str, Words]:
     """Return the overrides of each combination of the values of some keys, by the values."""
+    from texgs.config.composition import several
+
     overrides: dict[str, Words] = {}
-    for choice in product(*map(values, over)):
+    for choice in product(*map(several, over)):
         name = "-".join(map(label, choice))
         if name in overrides:
             raise ConfigError(f"sweep.over: expected different variants, got {name} twice")

@@ -4,70 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from yaml import YAMLError
-
-from texgs.config.project import is_scene_file
 from texgs.config.recipes import Edit
-from texgs.core.errors import ArgumentError, ConfigError
-from texgs.core.plain_yaml import parse_yaml
-from texgs.edit.keys import EditKeys
 from texgs.edit.method import Method, method_of, methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import EditResult
-from texgs.workflow.inputs import models_of_scene, scene_before, view_set
-from texgs.workflow.locate import tf_names
-from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
+from texgs.workflow.edits import VIEWS, edit_keys, edited_scene, looks_of
+from texgs.workflow.stage import Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import Distance, FitLabel, OfDataset
 
 if TYPE_CHECKING:
     from texgs.edit.task import Task
 
-CAPTIONS = {"style": "styled", "instruction": "instructed"}  # keys of a look by what a method follows
 POINTS = 100  # of a curve of losses at most
 SHOWN = "Before and after the edit; what can be relit, under another light too."
-VIEWS = "views."  # before the name of a model, in the names of inputs
-
-
-def edit_keys(config: Config) -> dict[str, Any]:
-    """Return what jobs of edits read of theirs: what all edits have, and the keys of the method."""
-    keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
-    return {name: getattr(config.edit, name) for name in keys} | captions(config)
-
-
-def captions(config: Config) -> dict[str, str]:
-    """Return both captions of an edit: its own, or those of all basic scenes together."""
-    edit, table = config.edit, config.dataset.looks
-    names = list(looks_of(config))
-    if not names:
-        return {name: getattr(edit, name) for name in ("source_caption", "target_caption")}
-    after = CAPTIONS[method_of(edit).follows]
-    return {
-        "source_caption": " and ".join(table[name].caption for name in names),
-        "target_caption": " and ".join(getattr(table[name], after) for name in names),
-    }
-
-
-def looks_of(config: Config) -> dict[str, str]:
-    """Return what each model of a scene follows; empty where all follow what the edit itself says."""
-    edit, dataset, table = config.edit, config.dataset.name, config.dataset.looks
-    if not edit.looks:
-        return {}
-    follows, names = method_of(edit).follows, tf_names(config)
-    if not follows:
-        raise ConfigError(
-            f"edit.looks: expected a method that follows a picture or an instruction, got {edit.method}"
-        )
-    for name in names:
-        if name not in table:
-            raise ConfigError(
-                f"dataset.looks of {dataset}: expected a look for each of {', '.join(names)}, got none for "
-                f"{name}; add one, or set edit.looks=false"
-            )
-    return {name: getattr(table[name], follows) for name in names}
 
 
 @dataclass(kw_only=True)
@@ -155,41 +108,6 @@ def followed(task: Task[Any]) -> dict[str, str]:
         return {}
     parts = parts_of(task.scene, task.edit.parts)
     return {part: task.settings_for(part).followed() for part in parts}
-
-
-def edited_scene(config: Config) -> dict[str, Path]:
-    """Return the scene that an edit starts from, its models, their training views, and files of styles."""
-    if config.edit.base == config.edit.name:
-        raise ConfigError(f"edit.base: {config.edit.name} starts from itself; choose another base")
-    if config.tf is not None:
-        raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
-    views = {f"{VIEWS}{name}": view_set(config, name)["views"] for name in tf_names(config)}
-    method = method_of(config.edit)
-    scene = scene_before(config)
-    models = files_of_scene(scene) if is_scene_file(config.edit.base or "") else models_of_scene(config)
-    looks: dict[str, str | None] = {**looks_of(config)} or {"": None}
-    files = {
-        f"{key}.{name}" if name else key: path
-        for name, look in looks.items()
-        for key, path in method.of(config.edit, look).files().items()
-    }
-    return {"scene": scene, **models, **views, **files}
-
-
-def files_of_scene(scene: Path) -> dict[str, Path]:
-    """Return the files that a scene's file names, where they are there: they decide what it shows, too."""
-    try:
-        named: list[object] = [parse_yaml(scene.read_text(encoding="utf-8"))]
-    except (OSError, ValueError, YAMLError, ArgumentError):
-        return {}  # the job tells what is wrong with it
-    files: dict[str, Path] = {}
-    while named:
-        table = named.pop()
-        for key, value in table.items() if isinstance(table, dict) else ():
-            if key in ("file", "texture") and (path := scene.parent / str(value)).is_file():
-                files[f"of_scene.{len(files)}"] = path
-            named.append(value)
-    return files
 
 
 RULE = Rule(

@@ -10,10 +10,10 @@ from texgs.config.views import ViewKeys
 from texgs.edit.method import method_of, methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import EditMeasures
+from texgs.workflow.edits import edited_scene
 from texgs.workflow.inputs import view_settings, with_recipe
 from texgs.workflow.stage import EVERY, Config, Outcome, Rule, Stage, made, read
 from texgs.workflow.stages.edit import Settings as EditSettings
-from texgs.workflow.stages.edit import edited_scene
 
 if TYPE_CHECKING:
     from texgs.metrics.metric import StyledModel

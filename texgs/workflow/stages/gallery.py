@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from texgs.core.progress import progress
 from texgs.report.results import GalleryResult, Shown
+from texgs.workflow.galleries import gallery_command, gallery_grids, gallery_inputs
 from texgs.workflow.inputs import has_scene, is_first_recipe
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import OfScene
+from texgs.workflow.sweep import changes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,20 +25,6 @@ ERRORS = (
     "Errors are those of the worst channel, four times enlarged, red where the scene is too bright and blue "
     "where it is too dark, with the PSNR of the picture."
 )
-
-
-def command(config: Config) -> str:
-    """Return the command that makes the pictures."""
-    from texgs.workflow.galleries import gallery_command  # not at the top: it loads Hydra
-
-    return gallery_command(config)
-
-
-def grids(config: Config) -> list[dict[str, Any]]:
-    """Return the pictures of all places."""
-    from texgs.workflow.galleries import gallery_grids
-
-    return gallery_grids(config)
 
 
 @dataclass
@@ -77,8 +65,8 @@ class Settings(OfScene):
 
     section: str = read("gallery.section")
     size: int = read("gallery.size")
-    command: str = read(command)
-    grids: list[Grid] = read(grids)
+    command: str = read(gallery_command)
+    grids: list[Grid] = read(gallery_grids)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,17 +193,8 @@ class GalleryRenderer:
         return image[rows[:, None], columns]
 
 
-def inputs(config: Config) -> dict[str, Path]:
-    """Return the scenes of all places, and the volume where one is shown."""
-    from texgs.workflow.galleries import gallery_inputs
-
-    return gallery_inputs(config)
-
-
 def applies(config: Config) -> bool:
     """Return whether this is the first of the recipes and variants of an experiment with scenes to show."""
-    from texgs.workflow.sweep import changes
-
     variants = list(changes(config))
     shows_all = len(config.edits) > 1 and not variants
     if not has_scene(config) or not (config.gallery.grids or shows_all):
@@ -232,7 +211,7 @@ STAGE = Stage(
     help="show all looks of a data set side by side",
     rule=Rule("gallery", "{dataset}/gallery/{gallery}", target="galleries", gpu=("views", "fit")),
     schema=Settings,
-    inputs=inputs,
+    inputs=gallery_inputs,
     work=work,
     applies=applies,
 )

@@ -15,8 +15,9 @@ from texgs.config.views import ViewKeys
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.core.lens import Lens
-from texgs.workflow.inputs import is_changed, shown_tfs, sweep_of_fit, variant_of_fit, view_settings
+from texgs.workflow.inputs import is_changed, shown_tfs, sweep_of_fit, view_settings
 from texgs.workflow.stage import read
+from texgs.workflow.sweep import fit_variant
 
 if TYPE_CHECKING:
     from texgs.volume.transfer import TransferFunction
@@ -46,7 +47,7 @@ class FitLabel:
     field: str = read("fit.field")  # a kind of field
     seed: int = read("fit.seed")
     sweep: str = read(sweep_of_fit)
-    variant: str = read(variant_of_fit)
+    variant: str = read(fit_variant)
     device: str = read("device.name")
     changed: bool = read(lambda config: is_changed(config.fit))  # from the file of its name
 
