@@ -106,11 +106,22 @@ def test_imports_point_to_the_left():
     assert not wrong, "\n".join(wrong)
 
 
+class WithoutTypes(ast.NodeTransformer):
+    """Takes out what is imported for annotations alone."""
+
+    def visit_If(self, node: ast.If) -> ast.If | None:
+        return None if ast.unparse(node.test) == "TYPE_CHECKING" else node
+
+
+def test_no_imports_in_circles():
+    sources = {name: WithoutTypes().visit(ast.parse(ast.unparse(tree))) for name, tree in modules().items()}
+    circles = networkx.strongly_connected_components(networkx.DiGraph(sorted(arrows(sources))))
+    assert not [sorted(circle) for circle in circles if len(circle) > 1]
+
+
 def test_no_imports_in_circles_between_packages():
-    graph = networkx.DiGraph(sorted(arrows(modules())))
-    circles = networkx.strongly_connected_components(graph)
-    between = [sorted(circle) for circle in circles if len({package_of(module) for module in circle}) > 1]
-    assert not between
+    circles = networkx.strongly_connected_components(networkx.DiGraph(sorted(arrows(modules()))))
+    assert not [circle for circle in circles if len({package_of(module) for module in circle}) > 1]
 
 
 @pytest.mark.parametrize(

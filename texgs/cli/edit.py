@@ -94,7 +94,7 @@ def run_segment(arguments: argparse.Namespace) -> int:
     from texgs.core.check import torch_device
     from texgs.core.image import write_png
     from texgs.edit.new_segment import clicked_model, model_name, new_segment, preview
-    from texgs.models.masks import mask_model
+    from texgs.models.sam import mask_model
     from texgs.scene.scene_file import read_scene, write_scene
     from texgs.volume.cameras import icosphere_of
 

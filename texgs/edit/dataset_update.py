@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2, ceil, isfinite
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import torch
 from torch import Tensor
@@ -14,7 +14,6 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, FitError
 from texgs.core.progress import progress
-from texgs.edit.methods.updates import UpdateSchedule
 from texgs.edit.objective import LOSS_SCALE
 from texgs.edit.observations import edit_views
 from texgs.fields.field import Field
@@ -23,6 +22,9 @@ from texgs.models.instruction import require_instruction
 from texgs.models.lpips import Lpips
 from texgs.raster.losses import l1_dssim
 from texgs.volume.images import Images
+
+if TYPE_CHECKING:
+    from texgs.edit.methods.updates import UpdateSchedule
 
 
 class Learner(Protocol):

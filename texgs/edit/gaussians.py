@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.edit.dataset_update import PhotometricLoss
-from texgs.edit.methods.dge import DgeKeys
-from texgs.edit.methods.igs2gs import Igs2gsKeys
 from texgs.edit.objective import Objective
 from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import Losses, Painting, learn_style
@@ -23,6 +22,10 @@ from texgs.fit.loop import extent, rates
 from texgs.fit.settings import Rates
 from texgs.models.vgg import Vgg
 from texgs.volume.images import Images
+
+if TYPE_CHECKING:
+    from texgs.edit.methods.dge import DgeKeys
+    from texgs.edit.methods.igs2gs import Igs2gsKeys
 
 HIGHER = 1 / 20  # rate of the higher harmonics in styles, against that of the zeroth
 PRUNE_EVERY = 100  # iterations
@@ -94,7 +97,7 @@ class GaussianLearner:
         iterations: int,
     ) -> None:
         self.original, self.loss, self.iterations = model, loss, iterations
-        self.prunes = isinstance(keys, DgeKeys) and keys.prune and not keys.frozen
+        self.prunes = bool(getattr(keys, "prune", False)) and not keys.frozen  # of DGE
         self.extent = extent(images.cameras, model.parameters["means"].cpu())
         raw = {**model.parameters, **split(model.parameters["sh"])}
         chosen = rates(raw, Rates(**asdict(keys.rates)), self.extent)

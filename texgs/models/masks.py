@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable
 from hashlib import blake2b
-from pathlib import Path
 from typing import Protocol
 
 import cv2
@@ -71,21 +70,6 @@ class Remembered:
                 self.results.popitem(last=False)
         self.results.move_to_end(key)
         return self.results[key]
-
-
-def mask_model(name: str, device: torch.device) -> MaskModel:
-    """Return the mask model of a name, or in a folder."""
-    from texgs.models.sam import PUBLISHED, published_sam, sam_folder
-
-    if name == "grabcut":
-        return GrabCut()
-    if name in PUBLISHED:
-        return published_sam(name, device=device)
-    if not Path(name).is_dir():
-        raise ArgumentError(
-            f"masks: expected {', '.join(PUBLISHED)}, grabcut or a folder with a SAM, got {name}"
-        )
-    return sam_folder(name, device)
 
 
 class GrabCut:

@@ -11,7 +11,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core.errors import ArgumentError
-from texgs.models.masks import Remembered, check_clicks
+from texgs.models.masks import GrabCut, MaskModel, Remembered, check_clicks
 from texgs.models.networks import fast_dtype, read_folder, read_tensors
 from texgs.models.weights import locate
 
@@ -143,3 +143,16 @@ def _transformers(model: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
         return answer.pred_masks[0, 0], answer.iou_scores[0, 0]
 
     return encode, decode
+
+
+def mask_model(name: str, device: torch.device) -> MaskModel:
+    """Return the mask model of a name, or in a folder."""
+    if name == "grabcut":
+        return GrabCut()
+    if name in PUBLISHED:
+        return published_sam(name, device=device)
+    if not Path(name).is_dir():
+        raise ArgumentError(
+            f"masks: expected {', '.join(PUBLISHED)}, grabcut or a folder with a SAM, got {name}"
+        )
+    return sam_folder(name, device)

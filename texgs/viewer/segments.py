@@ -20,7 +20,8 @@ from texgs.edit.lift import Lifted, lift, view_mask
 from texgs.edit.new_segment import clicked_model
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
-from texgs.models.masks import MaskModel, mask_model
+from texgs.models.masks import MaskModel
+from texgs.models.sam import mask_model
 from texgs.scene.parts import entry_of, split
 from texgs.scene.scene import Scene
 from texgs.scene.session import state_of

@@ -85,7 +85,7 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
     from texgs.core.names import part_file
     from texgs.edit.new_segment import model_name, new_segment
     from texgs.edit.task import EditedScene
-    from texgs.models.masks import mask_model
+    from texgs.models.sam import mask_model
 
     settings, device = task.settings, task.device
     name = model_name(task.scene, settings.model, "edit.segment.model")

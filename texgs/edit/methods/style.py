@@ -54,7 +54,7 @@ class StyleKeys(MethodKeys):
         """Return the picture, of it the object that was clicked on."""
         import torch
 
-        from texgs.models.masks import mask_model
+        from texgs.models.sam import mask_model
 
         def find(image: Tensor) -> Tensor:
             height, width = image.shape[:2]
