@@ -21,10 +21,8 @@ from texgs.cli.main import STAGE_VERBS, main, parse
 from texgs.config.compose import compose
 
 ROOT = Path(__file__).parents[1]
-PAGES = (
-    "README.md",
-    *(f"docs/{name}.md" for name in ("usage", "data", "fits", "scenes", "looks", "workflow", "api")),
-)
+USED = ("usage", "data", "fits", "scenes", "looks", "workflow", "api")
+PAGES = ("README.md", *(f"docs/{name}.md" for name in USED))
 OTHERS = {path.relative_to(ROOT).as_posix() for path in [ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]}
 ALL = (*PAGES, *sorted(OTHERS - set(PAGES)))  # later pages use what earlier ones wrote
 
@@ -34,8 +32,9 @@ SMALL = """
     fit.gaussians.seeds.count=300 edit.image.iterations=5 edit.text.size=64 mesh.voxel=0.02
     tracking=none
 """
-FILM = ["--width", "32", "--height", "32"]
 
+
+PLAN = "{python} -m snakemake --snakefile {root}/Snakefile --dry-run"
 # Commands that are not run as they stand: what is run instead (nothing: the command is skipped), and why.
 INSTEAD = (
     (r"make ", "make --directory {root} --dry-run {words}", "it installs, or runs this test again"),
@@ -51,14 +50,10 @@ INSTEAD = (
     (r"texgs run experiment=paper ", "texgs run experiment=demo --dry-run", "it plans 1,000 jobs"),
     (r"texgs run dataset=vortex ", "texgs run {words} --dry-run", "its views have to be downloaded"),
     (r"texgs run dataset=scan ", "texgs run {words} volumes sheets", "that of engine goes on to the report"),
-    (
-        r"snakemake .*/profiles/local ",
-        "{python} -m snakemake --snakefile {root}/Snakefile --dry-run {words}",
-        "texgs run runs the same workflow",
-    ),
+    (r"snakemake .*/profiles/local ", f"{PLAN} {{words}}", "texgs run runs the same workflow"),
     (
         r"snakemake .*/profiles/slurm ",
-        "{python} -m snakemake --snakefile {root}/Snakefile --dry-run --executor local --cores 1 {words}",
+        f"{PLAN} --executor local --cores 1 {{words}}",
         "it needs a cluster; make test-cluster runs the profile on one",
     ),
     (r"(ssh|git clone|tmux)( |$)", "", "it needs another machine"),
@@ -120,8 +115,9 @@ def small(words):
         given = {word.partition("=")[0] for word in rest}
         return [verb, *(word for word in SMALL.split() if word.partition("=")[0] not in given), *rest]
     if verb == "render":
-        rest = [word for word in rest if word not in ("--width", "1200")] + FILM
-        return [verb, *rest, *(("--frames", "3") if "--path" in rest else ())]
+        rest = [word for word in rest if word not in ("--width", "1200")]
+        frames = ["--frames", "3"] if "--path" in rest else []
+        return [verb, *rest, "--width", "32", "--height", "32", *frames]
     if verb == "export" and "mesh" in rest:
         return [*words, "--voxel", "0.02"]
     if verb == "segment":

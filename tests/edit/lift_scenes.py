@@ -1,11 +1,10 @@
 """Composed scenes of two kinds of objects, and which surfels are of which: the truth of a segmentation."""
 
-import math
-
 import torch
 from torch.nn.functional import normalize
 
 from tests.edit.scenes import on_sphere
+from tests.fit.scenes import logit
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
@@ -19,7 +18,7 @@ def shell(n, radius, middle, color, opacity, seed=0):
     """Raw parameters of surfels on a sphere, tangent to it, about as large as the gaps between them."""
     generator = torch.Generator().manual_seed(seed)
     normals = normalize(torch.randn(n, 3, generator=generator), dim=1)
-    p = on_sphere(normals, radius, 2.0 * radius / n**0.5, math.log(opacity / (1 - opacity)))
+    p = on_sphere(normals, radius, 2.0 * radius / n**0.5, logit(opacity))
     return {**p, "means": p["means"] + torch.tensor(middle), "colors": torch.tensor(color).repeat(n, 1)}
 
 

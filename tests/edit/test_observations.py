@@ -90,9 +90,7 @@ def test_views_that_are_not_edited_are_solved_by_the_colours_they_have(model, li
 @pytest.mark.parametrize("factor", [2.0, 0.5])
 def test_at_another_opacity_the_same_colour_is_wanted_at_its_alpha(model, factor):
     color = torch.tensor([0.3, 0.5, 0.9])
-    _, ((first, *_),) = observed(
-        model, lambda v: color * v.alphas[..., None] + 1 - v.alphas[..., None], opacities=(factor,)
-    )
+    _, ((first, *_),) = observed(model, lambda v: 1 - v.alphas[..., None] * (1 - color), opacities=(factor,))
     expected = first.cover[..., None] * color.expand(*first.cover.shape, 3)
     assert_close(first.wanted, expected, atol=2e-3, rtol=0)
     opacities = (model.parameters["opacities"].sigmoid() * factor).clamp(1e-7, 1 - 1e-7).logit()

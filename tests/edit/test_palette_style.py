@@ -118,16 +118,17 @@ def test_only_colours_change(field, images, vgg, features):
 
 def test_a_plain_style_becomes_the_colour_of_the_ball(field, images):
     field, style = one_colored(field), plain_style([0.2, 0.6, 0.3])
-    edited, *_ = stylize_palette(
-        field, images, [style], replace(RECIPE, iterations=60), replace(WEIGHTS, variation=0.0)
-    )
+    weights = replace(WEIGHTS, variation=0.0)
+    edited, *_ = stylize_palette(field, images, [style], replace(RECIPE, iterations=60), weights)
     torch.testing.assert_close(edited.colors, style.mean[None])
     shown = edited.render(cameras(1, 48)[0])
     color = (shown.color - 1 + shown.alpha[..., None])[shown.alpha > 0.99]
     torch.testing.assert_close(color.mean(0), style.mean, atol=0.06, rtol=0)  # the rate stays high
 
 
-def test_layers_of_palette_colours_are_apart_and_together_everything(field, images):
+def test_layers_of_palette_colours_are_apart_and_together_everything_and_each_has_a_style(field, images):
+    with pytest.raises(ArgumentError, match="styles: expected one for each of 2 palette colours, got 1"):
+        stylize_palette(field, images, [STYLE], RECIPE, WEIGHTS)
     camera = images.cameras[2]
     run = PalettePainting(field, [], [], [], 0.0, 0.0, torch.Generator())
     rays = camera_rays(camera).flatten(0, 1)
@@ -138,8 +139,3 @@ def test_layers_of_palette_colours_are_apart_and_together_everything(field, imag
         depth = torch.zeros(len(rays)).index_add_(0, points.ray, sigma)
         alpha = torch.cat([part.values(run.colors(part))[:, 3] for part in layer])
         torch.testing.assert_close(alpha, 1 - torch.exp(-depth), atol=0.02, rtol=0)  # small weights are left
-
-
-def test_each_palette_colour_has_a_style(field, images):
-    with pytest.raises(ArgumentError, match="styles: expected one for each of 2 palette colours, got 1"):
-        stylize_palette(field, images, [STYLE], RECIPE, WEIGHTS)

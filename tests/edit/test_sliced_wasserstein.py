@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 import torch
-from scipy.stats import wasserstein_distance
 from torch.nn.functional import unfold
 
 from texgs.core.errors import ShapeError
@@ -10,7 +9,6 @@ from texgs.edit.sliced_wasserstein import (
     PatchStatistics,
     at_quantiles,
     patches,
-    to_quantiles,
 )
 
 
@@ -34,23 +32,6 @@ def test_quantiles_are_numpys(n, count):
     values = noise(1, 4, n).sort(dim=1).values
     expected = np.quantile(values.numpy(), (np.arange(count) + 0.5) / count, axis=1, method="hazen").T
     np.testing.assert_allclose(at_quantiles(values, count).numpy(), expected, atol=1e-6)
-
-
-def test_in_one_dimension_it_is_the_wasserstein_distance():
-    """Of a sample and the same moved aside, the mean distance is how far: its square is the result."""
-    values = noise(2, 3, 200)
-    moved = values[:, torch.randperm(200)] + 0.25
-    result = float(to_quantiles(moved, at_quantiles(values.sort(dim=1).values, 200)))
-    distance = wasserstein_distance(values[0].numpy(), moved[0].numpy())
-    assert result == pytest.approx(distance**2, abs=1e-5)
-
-
-def test_the_gradient_is_that_of_sorting():
-    values, quantiles = noise(3, 2, 40).double(), noise(4, 2, 40).double().sort(dim=1).values
-    one, other = (values.clone().requires_grad_() for _ in range(2))
-    to_quantiles(one, quantiles).backward()
-    (other.sort(dim=1).values - quantiles).square().mean().backward()
-    torch.testing.assert_close(one.grad, other.grad)
 
 
 def test_a_uniform_shift_of_colour_is_found_exactly():

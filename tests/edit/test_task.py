@@ -40,12 +40,10 @@ def test_parts_are_named_once_and_by_default_all_models(tmp_path):
     scene = scene_of(tmp_path, a=torch.arange(len(ball(1))) < 10)
     assert parts_of(scene, []) == ["plain", "cut"]
     assert parts_of(scene, ["cut/a", "plain"]) == ["cut/a", "plain"]
-    for names, message in (
-        (["cut/b"], "edit.parts: expected some of plain, cut, cut/a, got cut/b"),
-        (["cut", "cut"], "edit.parts: expected different names, got cut twice"),
-    ):
-        with pytest.raises(ArgumentError, match=message):
-            parts_of(scene, names)
+    with pytest.raises(ArgumentError, match=r"edit\.parts: expected some of plain, cut, cut/a, got cut/b"):
+        parts_of(scene, ["cut/b"])
+    with pytest.raises(ArgumentError, match=r"edit\.parts: expected different names, got cut twice"):
+        parts_of(scene, ["cut", "cut"])
 
 
 def test_a_new_look_takes_the_palette_of_an_earlier_edit_back(tmp_path):

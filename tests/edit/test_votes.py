@@ -85,7 +85,7 @@ def test_centres_vote_as_counted_by_hand():
     for inside, expected in ((7, False), (8, True)):  # more than 0.7 of all views are needed
         votes = CentreVotes(model)
         for view in range(10):
-            votes.add(camera, everywhere if view < inside else ~everywhere)
+            votes.add(camera, everywhere & (view < inside))
         assert bool(votes.selected().all()) is expected
     half = CentreVotes(model, threshold=0.4)
     away = camera.crop(200, 0, 296, 96)  # sees nothing: votes -1

@@ -17,7 +17,9 @@ from PIL import Image
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import sample
-from tests.study.studies import study
+from tests.fields.surfels.test_release_texture import release_run
+from tests.study.test_ballots import STUDY, ballot
+from tests.volume.test_tf_files import RAMP, TENT, preset
 from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.camera import orbit
 from texgs.core.io import read_json, write_json
@@ -43,7 +45,6 @@ from texgs.volume.sources import open_source
 from texgs.volume.tf_files import read_tf
 from texgs.volume.view_set import View, read_views, write_transforms
 
-STUDY = study("xyz", "zyx")
 PICTURES = ("png", "jpg", "gif", "webp")
 Pack = Callable[[bytes], bytes]
 
@@ -88,18 +89,7 @@ def slices(folder: Path) -> Path:
 
 
 def tf_ours(folder: Path) -> Path:
-    points = {"opacity": [[0, 0.0], [50, 1.0], [99, 0.0]], "color": [[0, 1.0, 0.5, 0.25], [99, 0, 0, 0]]}
-    return write_json(folder / "tf.json", {"format": "texgs-tf", "version": 1, **points})
-
-
-def tf_paraview(folder: Path) -> Path:
-    preset = {
-        "Name": "a",
-        "ColorSpace": "Diverging",
-        "RGBPoints": [0, 1, 0.5, 0.2, 0.5, 0.1, 0.1, 0.9, 1, 0, 0, 1],
-        "Points": [0, 0, 0.5, 0, 0.4, 1, 0.3, 0.6, 1, 0, 0.5, 0],
-    }
-    return write_json(folder / "tf.json", [preset])
+    return write_json(folder / "tf.json", {"format": "texgs-tf", "version": 1, **TENT.to_dict()})
 
 
 def read_function(path: Path) -> None:
@@ -165,23 +155,6 @@ def weights(old: bool, folder: Path) -> Path:
     return folder / "w.pth"
 
 
-def release(folder: Path) -> Path:
-    """Surfels of the release with textures: two files beside the PLY."""
-    from plyfile import PlyData, PlyElement
-
-    surfels, p = sample("shading", material="paper"), sample().parameters
-    data = PlyData.read(write_ply(folder / "m.ply", surfels, "release"))["vertex"].data
-    names = [(name, "<f4") for name in data.dtype.names if not name.startswith("f_rest_")]
-    vertices = np.zeros(len(data), [*names, ("mappings_0", "<f4")])
-    for name, _ in names:
-        vertices[name] = data[name]
-    PlyData([PlyElement.describe(vertices, "vertex")]).write(folder / "point_cloud.ply")
-    dims = torch.cat([p["sizes"].long(), p["offsets"][:, None]], dim=1)
-    np.savez_compressed(folder / "texture.npz", texture_dc=p["texels"].numpy(), texture_dims=dims.numpy())
-    torch.save(([torch.rand(3)], 7), folder / "palette_colors_chkpnt.pth")
-    return folder / "point_cloud.ply"
-
-
 def picture(name: str, folder: Path, **options: Any) -> Path:
     pixels = np.random.default_rng(0).integers(0, 255, (48, 40, 3), np.uint8)
     Image.fromarray(pixels).save(folder / name, **options)
@@ -195,19 +168,6 @@ def checkpoint(folder: Path) -> Path:
     return folder
 
 
-def metrics(folder: Path) -> Path:
-    return write_json(
-        folder / "metrics.json", {"stage": "views", "numbers": {"a": [1, 2.5, None], "b": {"c": "d"}}}
-    )
-
-
-def ballot(folder: Path) -> Path:
-    header, ids = "study,ballot,question,option,rank", "0123456789ab,aa"
-    ranked = [f"{ids},{number},{letter},{rank}" for number in (1, 2) for rank, letter in enumerate("ABC", 1)]
-    (folder / "ballot.csv").write_text("\n".join([header, *ranked]))
-    return folder / "ballot.csv"
-
-
 READERS: dict[str, Reader] = {
     **{name: Reader(partial(volume, name), read_volume) for name in WRITERS},
     "plain.mhd samples": Reader(partial(volume, "compressed.mhd"), read_volume, "compressed.zraw"),
@@ -218,7 +178,7 @@ READERS: dict[str, Reader] = {
     "packed.slc": Reader(partial(slc, 1), read_volume),
     "slices": Reader(slices, read_volume, "slices/0.tif"),
     "tf ours": Reader(tf_ours, read_function),
-    "tf ParaView": Reader(tf_paraview, read_function),
+    "tf ParaView": Reader(lambda folder: preset(folder, ColorSpace="Diverging", Points=RAMP), read_function),
     "views json": Reader(views, read_view_set, "transforms_train.json"),
     "views png": Reader(views, read_view_set, "r_1.png"),
     "model": Reader(lambda folder: write_model(folder / "model.safetensors", sample()), read_model),
@@ -240,14 +200,14 @@ READERS: dict[str, Reader] = {
     "2dgs.ply": Reader(partial(ply, "2dgs", False), read_ply),
     "3dgs.ply text": Reader(partial(ply, "3dgs", True), read_ply),
     "release.ply": Reader(partial(ply, "release", False), read_ply),
-    "release texture": Reader(release, read_ply, "texture.npz"),
-    "release palette": Reader(release, read_ply, "palette_colors_chkpnt.pth"),
+    "release texture": Reader(lambda folder: release_run(folder)[0], read_ply, "texture.npz"),
+    "release palette": Reader(lambda folder: release_run(folder)[0], read_ply, "palette_colors_chkpnt.pth"),
     "weights": Reader(partial(weights, False), read_tensors),
     "weights old": Reader(partial(weights, True), read_tensors),
     **{f"style.{kind}": Reader(partial(picture, f"s.{kind}"), read_style) for kind in PICTURES},
     "style.tif": Reader(partial(picture, "s.tif", compression="tiff_lzw"), read_style),
     "checkpoint": Reader(checkpoint, latest, "checkpoint.safetensors"),
-    "json": Reader(metrics, read_json),
+    "json": Reader(lambda folder: write_json(folder / "m", {"a": [1, 2.5, None], "b": {"c": 0}}), read_json),
     "ballot": Reader(ballot, lambda path: read_ballot(STUDY, path)),
     "study key": Reader(lambda folder: write_key(folder / "key.json", STUDY), read_key),
 }

@@ -101,8 +101,8 @@ def stub(best=1, size=32):
         x, y = points[0, 0].tolist()
         near = torch.maximum((at[None] - x).abs(), (at[:, None] - y).abs())
         logits = torch.stack([side / 2 - near for side in (4.0, 8.0, 16.0)])
-        quality = torch.eye(3)[best]
-        return (logits, quality) if several else (logits[:1], quality[:1])
+        count = 3 if several else 1
+        return logits[:count], torch.eye(3)[best][:count]
 
     return Sam("stub", encode, decode, size), asked
 
@@ -116,8 +116,7 @@ def test_masks_come_back_where_the_click_was(shape):
     rows, columns = mask.nonzero().double().add(0.5).unbind(1)
     assert columns.mean() == pytest.approx(x, abs=0.06 * max(shape))
     assert rows.mean() == pytest.approx(y, abs=0.06 * max(shape))
-    sides = 8 * max(shape) / 32
-    assert mask.sum() == pytest.approx(sides**2, rel=0.3)
+    assert mask.sum() == pytest.approx((8 * max(shape) / 32) ** 2, rel=0.3)
     assert asked[0].shape == (1, 3, 32, 32)
 
 
@@ -150,10 +149,8 @@ def tiny_sam(tmp_path_factory):
     vision |= {"mlp_dim": 32, "num_pos_feats": 16}
     prompt = {"hidden_size": 32, "image_size": 64, "patch_size": 16, "mask_input_channels": 4}
     decoder = {"hidden_size": 32, "mlp_dim": 32, "num_hidden_layers": 1, "num_attention_heads": 2}
-    decoder |= {"iou_head_hidden_dim": 16}
-    config = transformers.SamConfig(
-        vision_config=vision, prompt_encoder_config=prompt, mask_decoder_config=decoder
-    )
+    parts = {"vision_config": vision, "prompt_encoder_config": prompt}
+    config = transformers.SamConfig(**parts, mask_decoder_config=decoder | {"iou_head_hidden_dim": 16})
     folder = tmp_path_factory.mktemp("weights") / "tiny-sam"
     transformers.SamModel(config).save_pretrained(folder)
     return folder
@@ -170,14 +167,10 @@ def test_a_sam_folder_agrees_with_the_pipeline_of_transformers(tiny_sam):
     pixels = processor((image * 255).byte().numpy(), return_tensors="pt")["pixel_values"]
     sam = sam_folder(tiny_sam, dtype=torch.float32)
     torch.testing.assert_close(sam.prepared(image), pixels.float(), atol=1e-5, rtol=1e-5)
-    model = SamModel.from_pretrained(tiny_sam).eval()
+    labels = torch.tensor([[[1, 0]]])
+    prompts = {"input_points": points[None, None] - 0.5, "input_labels": labels, "multimask_output": False}
     with torch.no_grad():
-        outputs = model(
-            pixel_values=pixels.float(),
-            input_points=points[None, None] - 0.5,
-            input_labels=torch.tensor([[[1, 0]]]),
-            multimask_output=False,
-        )
+        outputs = SamModel.from_pretrained(tiny_sam).eval()(pixel_values=pixels.float(), **prompts)
     logits = torch.nn.functional.interpolate(outputs.pred_masks[0], (64, 64), mode="bilinear")[0, 0]
     assert torch.equal(sam(image, points, torch.tensor([True, False])), logits > 0)
 
@@ -214,9 +207,8 @@ def test_a_published_sam_of_another_size_gives_the_masks_of_kornia(tmp_path, mon
     from kornia.models import sam as kornia
 
     torch.manual_seed(0)
-    small = kornia.SamConfig(
-        encoder_embed_dim=16, encoder_depth=2, encoder_num_heads=2, encoder_global_attn_indexes=(1,)
-    )
+    small = {"encoder_embed_dim": 16, "encoder_depth": 2, "encoder_num_heads": 2}
+    small = kornia.SamConfig(**small, encoder_global_attn_indexes=(1,))
     torch.save(kornia.Sam.from_config(small).state_dict(), tmp_path / "random.pth")
     monkeypatch.setattr(kornia, "SamConfig", lambda kind: small)
     ours = published_sam("sam_vit_h", tmp_path / "random.pth", dtype=torch.float32)

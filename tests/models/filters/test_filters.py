@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import pytest
 import torch
+from scipy.ndimage import find_objects, label
 from torch.testing import assert_close
 
 from tests.models.views_of import random_views
@@ -21,7 +22,6 @@ from texgs.models.filters.surface import (
     value_noise,
 )
 from texgs.models.guidance import EditViews
-from texgs.models.instruction import WORDS
 
 GENERATOR = torch.Generator()
 
@@ -38,25 +38,23 @@ def plane(tone=0.5, side=160, cells=14.0, normal=(0.0, 0.0, 1.0)):
     at = (torch.arange(side) + 0.5) / side * cells
     y, x = torch.meshgrid(at, at, indexing="ij")
     points = torch.stack([x, y, torch.full_like(x, 0.37)], dim=-1).reshape(-1, 3)
-    n = len(points)
-    tones = torch.full((n,), tone)
-    normals = torch.tensor(normal).expand(n, 3)
-    return Surface(torch.full((n, 3), 0.6), tones, tones, points, normals, cells / side)
-
-
-def test_every_filter_has_words():
-    assert list(FILTERS) == list(WORDS)
+    tones = torch.full((len(points),), tone)
+    normals = torch.tensor(normal).expand_as(points)
+    return Surface(torch.full_like(points, 0.6), tones, tones, points, normals, cells / side)
 
 
 @pytest.mark.parametrize("name", [*FILTERS, "make it teal"])
 def test_edits_are_images_over_white_and_change_what_is_seen(name):
     views = plain_views()
-    edited = ProceduralFilters()(views, name, GENERATOR)
+    edited, again = (ProceduralFilters()(views, name, torch.Generator().manual_seed(k)) for k in (0, 1))
+    assert torch.equal(edited, again), "patterns do not depend on the call"
     assert edited.shape == views.images.shape
     assert 0 <= float(edited.min()) <= float(edited.max()) <= 1
     outside = views.alphas == 0
     assert (edited[outside] == 1).all()
     assert (edited - views.images)[~outside].abs().mean() > 0.02
+    empty = replace(views, alphas=torch.zeros_like(views.alphas), images=torch.ones_like(views.images))
+    assert (ProceduralFilters()(empty, name, GENERATOR) == 1).all(), "nothing to paint on"
 
 
 @pytest.mark.parametrize("name", list(FILTERS))
@@ -68,18 +66,10 @@ def test_the_same_place_looks_the_same_in_another_view(name):
     def shuffled(x):
         return torch.stack([x[0], x[0].flatten(0, 1)[order].reshape(x[0].shape)])
 
-    pair = EditViews(
-        *(shuffled(x) for x in (views.images, views.conditions, views.alphas, views.points, views.normals)),
-        cameras=views.cameras,
-    )
+    planes = (views.images, views.conditions, views.alphas, views.points, views.normals)
+    pair = EditViews(*map(shuffled, planes), cameras=views.cameras)
     one, other = ProceduralFilters()(pair, name, GENERATOR)
     assert_close(one.flatten(0, 1)[order].reshape(other.shape), other, atol=1e-5, rtol=0)
-
-
-def test_patterns_do_not_depend_on_the_call():
-    views = plain_views()
-    one, other = (ProceduralFilters()(views, "marble", torch.Generator().manual_seed(k)) for k in (0, 1))
-    assert torch.equal(one, other)
 
 
 @pytest.mark.parametrize("name", ["stipple drawing", "pencil hatching", "woodcut"])
@@ -92,11 +82,8 @@ def test_drawings_have_as_much_ink_as_it_is_dark(name):
 
 def test_dots_are_round_and_apart():
     image = FILTERS["stipple drawing"](plane(0.7))[:, 0].reshape(160, 160)
-    from scipy.ndimage import find_objects, label
-
-    dark = (image < 0.5).numpy()
-    places, count = label(dark)
-    boxes = [(part[0].stop - part[0].start, part[1].stop - part[1].start) for part in find_objects(places)]
+    places, count = label((image < 0.5).numpy())
+    boxes = [[part.stop - part.start for part in box] for box in find_objects(places)]
     whole = [box for box in boxes if min(box) >= 4]
     assert count > 60
     assert sum(0.6 < h / w < 1.6 for h, w in whole) > 0.85 * len(whole)
@@ -126,13 +113,6 @@ def test_tint_keeps_light_and_dark():
     assert (tinted[:, 1].diff() > -1e-6).all()
     middle = (surface.color[:, 0] - surface.color.mean()).abs().argmin()
     assert_close(tinted[middle], torch.tensor([0.1, 0.5, 0.5]), atol=0.01, rtol=0)
-
-
-def test_nothing_to_paint_on():
-    views = plain_views()
-    empty = replace(views, alphas=torch.zeros_like(views.alphas), images=torch.ones_like(views.images))
-    for name in [*FILTERS, "make it teal"]:
-        assert (ProceduralFilters()(empty, name, GENERATOR) == 1).all()
 
 
 def test_straight_colours_of_half_transparent_views():

@@ -3,6 +3,7 @@
 import pytest
 
 from texgs.core.errors import ArgumentError
+from texgs.models.filters import FILTERS
 from texgs.models.instruction import WORDS, named_color, understand, vocabulary
 
 WORDINGS = {
@@ -47,7 +48,8 @@ def test_what_is_not_in_the_vocabulary_is_answered_by_it(instruction):
     assert repr(instruction) in message
 
 
-def test_every_entry_is_understood_as_itself():
+def test_every_filter_has_words_and_is_understood_as_itself():
+    assert list(FILTERS) == list(WORDS)
     for name, words in WORDS.items():
         assert understand(name)[0] == name
         for word in words:
