@@ -6,6 +6,7 @@ import pytest
 from tests.cli.conftest import SPHERE, numbers
 from texgs.cli.main import main
 from texgs.config.compose import compose
+from texgs.core.errors import DeviceError
 from texgs.volume.view_set import read_views
 from texgs.workflow.job import settings_file
 from texgs.workflow.result import METRICS
@@ -80,6 +81,27 @@ def test_test_views_may_have_lights_of_their_own(folder):
     views = read_views(next(folder.glob("*/views")))
     assert {view.light.kind for view in views.train} == {"headlight"}
     assert {(view.light.kind, view.light.azimuth) for view in views.test} == {("directional", 60.0)}
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_vtk_renders_some_views_to_compare_times(folder, capsys, monkeypatch, works):
+    shown = []
+
+    def vtk_or_none(kind, *of_volume):
+        if kind != "vtk":
+            return renderer_for(kind, *of_volume)
+        if not works:
+            raise DeviceError("offscreen OpenGL: none")
+        monkeypatch.setattr(Blank, "render", lambda _self, _tf, camera, _light: shown.append(camera))
+        return Blank()
+
+    renderer_for = views_stage.renderer_for
+    monkeypatch.setattr(views_stage, "renderer_for", vtk_or_none)
+    assert main(["views", *TINY, "metric.vtk_frames=2"]) == 0
+    (views,) = folder.glob("*/views")
+    assert len(shown) == 3 * works, "the first one is rendered twice and does not count"
+    assert ("vtk_frame_ms" in numbers(views)) == works
+    assert ("VTK's time is not measured: offscreen OpenGL: none" in capsys.readouterr().err) != works
 
 
 def test_empty_views_fail_again_the_same_way(folder, capsys, monkeypatch):

@@ -39,12 +39,13 @@ def test_edits_with_and_without_a_volume(tmp_path):
 def test_data_sets_by_size_of_their_views(tmp_path):
     metrics(tmp_path, "volume", VolumeResult([4, 5, 6], "uint8", **LATTICE, volume_mib=2.5))
     for tf, size, ms in (("TF01", 64, 10.0), ("TF02", 64, 30.0), ("TF01", 512, 500.0)):
-        metrics(tmp_path, "views", ViewsResult(9, 2, size, size, frame_ms=ms), tf=tf)
+        metrics(tmp_path, "views", ViewsResult(9, 2, size, size, frame_ms=ms, vtk_frame_ms=30 * ms), tf=tf)
     table = datasets(records(tmp_path))
     by_size = {row["image, pixels"]: row for row in rows(table)}
     small, large = by_size["64x64"], by_size["512x512"]
     assert (small["basic scenes"], small["ms / frame"]) == (2, 20.0)
     assert (large["basic scenes"], large["ms / frame"]) == (1, 500.0)
+    assert (small["VTK, ms / frame"], large["VTK, ms / frame"]) == (600.0, 15000.0)
     assert (small["volume, samples"], small["volume MiB"]) == ("4x5x6", 2.5)
     assert (small["samples (paper)"], small["MiB (paper)"]) == ("256x256x128", 32.0)
     assert (small["ms / frame (paper)"], large["ms / frame (paper)"]) == (UNLIKE, 16.14)

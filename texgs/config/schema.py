@@ -40,12 +40,15 @@ class Device:
 
 @dataclass(frozen=True)
 class Metric:
-    """What edited scenes are measured with, besides what needs no weights."""
+    """What volumes and edited scenes are measured with, besides what needs no weights."""
 
     clip: str = key(
         CLIP_BACKBONES[0],
         "backbone of CLIP's metrics, where its weights are on this machine; losses have their own",
         choices=CLIP_BACKBONES,
+    )
+    vtk_frames: int = key(
+        0, "test views that VTK renders too, to compare times, where offscreen OpenGL works", least=0
     )
     views: int = key(12, "views of the test path that measure style distance, consistency and LPIPS", least=2)
 

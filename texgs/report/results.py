@@ -57,6 +57,7 @@ class ViewsResult(Result, section="data"):
     frame_max_ms: float | None = None
     first_frame_ms: float | None = None
     frames_ms: list[float] = field(default_factory=list)
+    vtk_frame_ms: float | None = None  # median of VTK, where it was asked to render some
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -11,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from texgs.config.dataset import BasicTF
 from texgs.config.views import CameraPath, ViewKeys
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.io import write_atomic
 from texgs.core.lens import Lens
 from texgs.core.progress import progress
@@ -41,6 +43,7 @@ class Settings(OfTF):
     tf_values: str = read("dataset.tf_values")
     points: BasicTF = read(basic_tf)
     views: ViewKeys = read(view_settings)
+    vtk_frames: int = read("metric.vtk_frames")
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -76,7 +79,11 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         write_geometry(caster, tf, shots["test"], output / "geometry", title)
     for split, shot in shots.items():
         write_transforms(output, split, shot, describe(settings, tf, grid, renderer))
-    return Outcome(result_of(shots, times, coverages), {"turntable.png": "One turn around the volume."})
+    result = result_of(shots, times, coverages)
+    if settings.vtk_frames:
+        by_vtk = vtk_frame_ms(grid, appearance, tf, shots["test"][: settings.vtk_frames], title)
+        result = replace(result, vtk_frame_ms=by_vtk)
+    return Outcome(result, {"turntable.png": "One turn around the volume."})
 
 
 def appearance_of(views: ViewKeys) -> Appearance:
@@ -96,6 +103,23 @@ def renderer_for(kind: str, grid: Grid, appearance: Appearance) -> VolumeRendere
 
         return VtkRenderer(grid, appearance)
     return Caster(grid, appearance, torch_device("cuda" if kind == "gpu" else "cpu"))
+
+
+def vtk_frame_ms(
+    grid: Grid, appearance: Appearance, tf: TransferFunction, shot: Sequence[View], title: str
+) -> float | None:
+    """Return the median milliseconds of views that VTK renders; None where it cannot, offscreen."""
+    try:
+        vtk = renderer_for("vtk", grid, appearance)
+    except DeviceError as error:
+        print(f"{title}: VTK's time is not measured: {error}", file=sys.stderr)
+        return None
+    frames = []
+    for view in progress([shot[0], *shot], title=f"{title}: views by VTK", unit="view"):
+        start = time.perf_counter()
+        vtk.render(tf, view.camera, view.light)
+        frames.append(1e3 * (time.perf_counter() - start))
+    return median(frames[1:])  # the first one uploads the volume
 
 
 def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
