@@ -174,7 +174,7 @@ def test_a_scene_opens_and_fades(gaussians, tmp_path):
     assert float(after) < 0.8 * float(before)
     palette = ["TF01.palette=#ff0000", "--output", str(tmp_path / "red.yaml")]
     assert main(["edit", str(path), *palette]) == 2
-    message = "palette: expected a model that can change it, got one of gaussians"
+    message = "palette: expected a model that can change it, got gaussians"
     with pytest.raises(ArgumentError, match=message):
         composed.render(camera, edits=[PartEdit(palette=(1, 0, 0))])
 

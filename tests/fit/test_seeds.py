@@ -212,7 +212,7 @@ def test_the_box_is_that_of_the_data_with_a_margin_or_a_cube(metadata, half_size
     torch.testing.assert_close(box, torch.tensor([low, high]))
 
 
-FORM, ORDER = "two corners of three numbers", "the lowest corner, then the highest"
+FORM, ORDER = r"two corners \[2, 3\]", "the lowest corner, then the highest"
 
 
 @pytest.mark.parametrize(

@@ -111,7 +111,7 @@ def test_slices_that_are_no_lattice_are_refused(tmp_path, places, message):
 def test_other_slices_among_them_are_refused(tmp_path):
     write_series(tmp_path, sample_values()[:4])
     write_series(tmp_path, sample_values()[:1, :5], [(10, 10, 40)], number=9)
-    with pytest.raises(ArgumentError, match="expected the size, spacing and orientation of"):
+    with pytest.raises(ArgumentError, match="expected size, spacing and orientation of"):
         open_source(tmp_path)
 
 

@@ -36,7 +36,7 @@ def test_a_file_is_downloaded_once_and_this_is_said(address, tmp_path, capsys):
     assert not capsys.readouterr().err
     require_whole(path, SHA256)
     path.write_bytes(b"A volume")
-    with pytest.raises(ArgumentError, match=r"a\.raw: expected the checksum .* delete the file"):
+    with pytest.raises(ArgumentError, match=r"a\.raw: expected the checksum .* delete it"):
         require_whole(path, SHA256)
 
 

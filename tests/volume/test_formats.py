@@ -16,7 +16,8 @@ from tests.volume.volume_files import (
     write_image,
 )
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.volume.sources import RawSource, open_source
+from texgs.volume.slabs import RawSource
+from texgs.volume.sources import open_source
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "int16", "float32"])

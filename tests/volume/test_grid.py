@@ -21,7 +21,7 @@ def test_longest_side_is_one_and_the_box_is_centred():
         (np.zeros((2, 2)), (1, 1, 1), r"expected a scalar field \[Z, Y, X\], got the shape \[2, 2\]"),
         (np.zeros((2, 5, 6, 3)), (1, 1, 1), "3 components per sample"),
         (np.zeros((2, 5, 1)), (1, 1, 1), r"at least 2 samples along x, y and z, got \[1, 5, 2\]"),
-        (np.zeros((2, 2, 2)), (1, 0, 1), r"above 0 \(x, y, z\), got \[1, 0, 1\]; set the right spacing"),
+        (np.zeros((2, 2, 2)), (1, 0, 1), r"above 0, got \[1, 0, 1\]; set it right"),
         (np.zeros((2, 2, 2)), (1, 1, float("inf")), "three finite numbers above 0"),
         (np.zeros((2, 2, 2)), (-1, 1, 1), "three finite numbers above 0"),
         (np.zeros((2, 2, 2)), (1, 1), "three finite numbers above 0"),

@@ -7,8 +7,8 @@ from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Grid
 from texgs.volume.headers import samples_of
-from texgs.volume.slabs import slab_bounds
-from texgs.volume.sources import ArraySource, open_source
+from texgs.volume.slabs import ArraySource, slab_bounds
+from texgs.volume.sources import open_source
 
 DIMS = (13, 12, 11)
 WORDS = {"dims": DIMS, "dtype": "uint16"}
@@ -81,7 +81,7 @@ def test_mistakes_in_the_path(tmp_path, monkeypatch):
     Path("empty").mkdir()
     for name, dims, message in [
         ("none.vti", None, f"none.vti: no such file or folder; looked for {tmp_path}/none.vti"),
-        ("v.dcm", None, r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .* or DICOM slices"),
+        ("v.dcm", None, r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .* or a folder of slices"),
         ("v.raw.gz", None, r"unknown suffix '.raw.gz'"),
         ("empty", None, r"expected a folder of DICOM slices or TIFFs \(.tif, .tiff\), found none"),
         ("v.npy", DIMS, "this format has a header; leave them out"),

@@ -164,6 +164,6 @@ def test_mistakes_in_the_folder_are_named(folder):
     refused(r"r_0001.png: expected an image")
     images[1].unlink()
     images[2].unlink()
-    refused(r"r_0001.png: no such image, of 2 missing of the 3")
+    refused(r"r_0001.png: no such image; 2 of 3")
     (folder / "transforms_train.json").write_text("{")
     refused(r"transforms_train.json: expected JSON")

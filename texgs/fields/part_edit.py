@@ -48,9 +48,7 @@ def require_possible(edit: PartEdit, kind: str) -> None:
         needs = NEEDS.get(each.name, "relight")
         if needs not in kinds()[kind].can and getattr(edit, each.name) != each.default:
             able = " or ".join(name for name, other in kinds().items() if needs in other.can)
-            raise ArgumentError(
-                f"{each.name}: expected a model that can change it, got one of {kind}; fit {able} for this"
-            )
+            raise ArgumentError(f"{each.name}: expected a model that can change it, got {kind}; fit {able}")
 
 
 def opacity_factors(edits: Sequence[PartEdit] | None, count: int, kind: str) -> list[float]:

@@ -36,11 +36,7 @@ class ResumableFit(ABC):
 
     @abstractmethod
     def run(self) -> Iterator[int]:
-        """Iterate to the end, and yield how many iterations are done.
-
-        Raises:
-            FitError: if the loss or a parameter is no longer finite.
-        """
+        """Iterate to the end, and yield how many iterations are done."""
 
     def psnr(self) -> float | None:
         """Return the PSNR in dB of training images as they are now, where it is known."""
@@ -86,10 +82,6 @@ def run_to_end(fit: ResumableFit, folder: Path, title: str) -> float:
 
     An interruption loses half a minute at most. Whoever has written the result removes the checkpoint, see
     `discard`.
-
-    Raises:
-        FitError: if the loss or a parameter is no longer finite.
-        ArgumentError: if the checkpoint cannot be read, or none be written.
     """
     restore(fit, folder)
     saved = time.monotonic()
@@ -124,23 +116,14 @@ def _tell(fit: ResumableFit, n_told: int) -> int:
 
 
 def save(folder: str | Path, fit: ResumableFit) -> Path:
-    """Write the state of a fit, and return the file; the one before stays until this one is complete.
-
-    Raises:
-        FitError: if a value is NaN or infinite; the last good checkpoint stays.
-        ArgumentError: if the folder cannot be written to, or the disk is full.
-    """
+    """Write the state of a fit, and return the file; the one before stays until this one is complete."""
     state = {name: x.contiguous() for name, x in fit.state().items()}
     require_finite(fit.iteration, state)
     return write_tensors(Path(folder) / NAME, state)
 
 
 def latest(folder: str | Path) -> dict[str, Tensor] | None:
-    """Read the state that `save` wrote last, on the CPU, for `restore`; None where there is none.
-
-    Raises:
-        ArgumentError: if the file cannot be read or is no checkpoint.
-    """
+    """Read the state that `save` wrote last, on the CPU, for `restore`; None where there is none."""
     from safetensors.torch import load_file
 
     path = Path(folder) / NAME

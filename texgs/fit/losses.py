@@ -31,14 +31,8 @@ def view_loss(
 ) -> Tensor:
     """Render a view and compare it: L1 + D-SSIM of colour and alpha, normals, smooth material.
 
-    Args:
-        parameters: raw, of surfels or 3D Gaussians.
-        shading: of the model.
-        target: the view.
-        weights: of the losses.
-        shift: [N, 2] zeros that receive the screen-space gradient, or None.
-        iteration: from 1; losses may start later.
-        turns_normals: whether shading has gradients into the surfels' orientation and place.
+    `shift` [N, 2] are zeros that receive the screen-space gradient. Iterations count from 1, as losses may
+    start later. `turns_normals` says whether shading has gradients into the surfels' orientation and place.
     """
     camera = target.camera
     fixed = {} if turns_normals else {name: parameters[name].detach() for name in ("means", "quats")}
@@ -55,7 +49,10 @@ def view_loss(
     color, *attributes = (x.permute(1, 2, 0) for x in render.color.permute(2, 0, 1).split(channels))
     loss = l1_dssim(color, target.color, weights.dssim)
     if weights.alpha > 0:
-        loss = loss + weights.alpha * alpha_loss(render.alpha, target.alpha, weights)
+        alphas = (render.alpha, target.alpha)
+        only_dssim = not weights.alpha_l1
+        apart = weights.dssim * (1 - ssim(*alphas)) if only_dssim else l1_dssim(*alphas, weights.dssim)
+        loss = loss + weights.alpha * apart
     if has_normals:
         drawn = cast(tuple[Tensor, Tensor, Tensor], (render.normal, render.depth, render.alpha))
         loss = loss + weights.normal * normal_consistency(*drawn, camera.viewmat, camera.K)
@@ -85,13 +82,6 @@ def draw(
         options=shading.options,
         **more,
     )
-
-
-def alpha_loss(alpha: Tensor, target: Tensor, weights: Losses) -> Tensor:
-    """Compute L1 + D-SSIM of alpha [H, W], or D-SSIM alone at the same weight."""
-    if weights.alpha_l1:
-        return l1_dssim(alpha, target, weights.dssim)
-    return weights.dssim * (1 - ssim(alpha, target))
 
 
 def material_maps(parameters: Mapping[str, Tensor], shading: Shading) -> Tensor | None:

@@ -44,27 +44,13 @@ PHASE = Phase(
 def seed_surfels(
     images: Images, views: ViewSet, seeds: Seeds, seed: int, volume: Grid | None = None
 ) -> tuple[dict[str, Tensor], Tensor]:
-    """Place the first surfels.
+    """Return raw `means`, `quats`, `scales` and `opacities` of the first surfels by name, and colours [N, 3].
 
-    Surfels that opaque matter hides never show, and still count under the cap of density control: seeds
-    "visible" start without them.
-
-    Args:
-        images: training views.
-        views: the same with their folder and metadata.
-        seeds: where. "points" are all in the folder's points3d.ply; "hull", points that no view sees through;
-            "visible", those of them that a quick fit finds to be seen; "voxels", the same from the volume's
-            samples that the views' transfer function shows; "random" in the box; "auto", points if there are
-            any, else visible. Opacity is that before the quick fit. The half size is one of the box of the
-            data, or in world units where views have none.
-        seed: of random numbers; the same one gives the same surfels.
-        volume: that the views show; for "voxels".
-
-    Returns:
-        Raw `means`, `quats`, `scales` and `opacities` by name, and colours [N, 3] in [0, 1].
-
-    Raises:
-        ArgumentError: if an opacity is out of range, there are no points, or the views show nothing.
+    "points" are all in the folder's points3d.ply; "hull", points that no view sees through; "visible", those
+    of them that a quick fit finds to be seen, as hidden ones never show and still count under the cap of
+    density control; "voxels", the same from the volume's samples that the views' transfer function shows;
+    "random" in the box; "auto", points if there are any, else visible. Opacity is that before the quick fit.
+    The half size is one of the box of the data, or in world units where views have none.
     """
     kind, count, half_size = seeds.kind, seeds.count, seeds.half_size
     if not 0 < seeds.opacity < 1:
@@ -127,9 +113,7 @@ def box_of(views: ViewSet, half_size: float | None) -> Box:
     try:
         low, high = torch.tensor(aabb, dtype=torch.float32).reshape(2, 3)
     except (TypeError, ValueError, RuntimeError) as error:
-        raise ArgumentError(
-            f"{views.folder}: aabb: expected two corners of three numbers, got {aabb}"
-        ) from error
+        raise ArgumentError(f"{views.folder}: aabb: expected two corners [2, 3], got {aabb}") from error
     if not bool((low <= high).all()):  # NaN ends here too
         raise ArgumentError(f"{views.folder}: aabb: expected the lowest corner, then the highest, got {aabb}")
     longest = (high - low).max()
@@ -181,11 +165,7 @@ def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> di
 def most_seen(
     surfels: Mapping[str, Tensor], colors: Tensor, images: Images, count: int, seed: int
 ) -> tuple[dict[str, Tensor], Tensor]:
-    """Fit surfels for a moment and keep the `count` that contribute most to all views together.
-
-    Returns:
-        Raw geometry as fitted, and colours in [0, 1]; fewer if there are not so many.
-    """
+    """Fit surfels for a moment and keep the `count` that contribute most to all views, as they are then."""
     small = shrunk(images, max(images.planes.shape[2:]) // PIXELS)
     start = {**surfels, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20.0, "bounded")}
     fit = Fit(start, ShadingModel(), small, PHASE, seed)

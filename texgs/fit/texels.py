@@ -24,19 +24,8 @@ def texturize(
 ) -> Surfels:
     """Give the surfels of a relightable model textures (the paper's section Textured Gaussian Primitives).
 
-    Args:
-        model: of stage shading.
-        images: training views.
-        keys: how many texels, and how they are found.
-        seed: of the order of views; with the same one, machine and versions, results are the same.
-        title: of the progress bars.
-
-    Returns:
-        A model of stage texture; all other parameters are those of the model.
-
-    Raises:
-        ArgumentError: if the model is of another stage, or asks for no texels or too many.
-        FitError: if texels are no longer finite.
+    All other parameters stay. With the same seed of the order of views, machine and versions, results are
+    the same.
     """
     if model.stage != "shading":
         raise ArgumentError(f"model: expected stage shading, got {model.stage}; pass what that stage wrote")

@@ -35,10 +35,8 @@ def solve(
     A step divides the gradient by an estimate of the row sums A'A 1 of the Hessian in one view, A being the
     weights of texels in its pixels: by the row sums themselves, no eigenvalue would exceed 1. To the estimate
     `keys.ridge` times its median is added, which keeps texels that are hardly seen in place.
-    `of_surfels` is the curvature [N] of the model, see `texels.Sight`.
-
-    Returns:
-        The model with new texels; the one given, if these would not lower the squared error.
+    `of_surfels` is the curvature [N] of the model, see `texels.Sight`. Texels that do not lower the squared
+    error are not taken.
     """
     texels = model.parameters["texels"].clone().requires_grad_()
     moving = replace(model, parameters={**model.parameters, "texels": texels})

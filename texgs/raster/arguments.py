@@ -147,9 +147,7 @@ def view(
     try:
         width, height = (index(side) for side in size)
     except TypeError:
-        raise ArgumentError(
-            f"width, height: expected whole numbers, got {size[0]!r} and {size[1]!r}"
-        ) from None
+        raise ArgumentError(f"width, height: expected whole numbers, got {size[0]!r}, {size[1]!r}") from None
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise ArgumentError(f"width, height: expected 1 to {MAX_SIDE} pixels, got {width} x {height}")
     if options.check_finite:

@@ -41,15 +41,10 @@ native.declare("texgs_convolve", NativeConvolution, "ppp")
 
 @dataclass(frozen=True, eq=False)
 class RectifiedConvolution:
-    """max(0, weight * image + bias) with zeros around the image; differentiable once, in the image.
+    """max(0, weight * image + bias) with zeros around the image; differentiable once, in the image."""
 
-    Args:
-        weight: [out, in, 3, 3] float32, constant.
-        bias: [out] float32, constant.
-    """
-
-    weight: Tensor
-    bias: Tensor
+    weight: Tensor  # [out, in, 3, 3] float32, constant
+    bias: Tensor  # [out] float32, constant
 
     def __post_init__(self) -> None:
         given = {"weight": (self.weight, "outputs inputs 3 3"), "bias": (self.bias, "outputs")}

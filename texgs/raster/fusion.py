@@ -48,23 +48,15 @@ class DepthView:
         require({"depth": (self.depth, size), "viewmat": (viewmat, "4 4"), "K": (K, "3 3")}, cpu="move it")
         check.shape("color", self.color, f"{size} 3")
         if self.color.dtype != torch.uint8 or self.color.device.type != "cpu":
-            raise ArgumentError(
-                f"color: expected uint8 on cpu, got {self.color.dtype} on {self.color.device}"
-            )
+            raise ArgumentError(f"color: expected uint8 on cpu, got {self.color.dtype}, {self.color.device}")
 
 
 class Lattice:
     """Means over the views that saw a voxel, of a box of blocks of 8 x 8 x 8 voxels.
 
-    Args:
-        blocks: along x, y and z.
-        lower: place of the first voxel [3], world units.
-        spacing: distance of voxels, world units.
-
-    Attributes:
-        distance: to the surface in truncations [Z, Y, X], from -1, behind it, to 1.
-        views: how many saw a voxel [Z, Y, X].
-        color: [Z, Y, X, 3], 0 to 255.
+    `distance` [Z, Y, X] is that to the surface in truncations, from -1, behind it, to 1; `views` [Z, Y, X]
+    are how many saw a voxel, and `color` [Z, Y, X, 3] is from 0 to 255. `blocks` count along x, y and z;
+    `lower` [3] is the place of the first voxel, and `spacing` the distance of voxels, in world units.
     """
 
     def __init__(self, blocks: tuple[int, int, int], lower: Tensor, spacing: float) -> None:

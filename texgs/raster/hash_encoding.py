@@ -50,8 +50,7 @@ class HashLevels:
             raise ArgumentError(f"entries: expected a power of two from 8 to 2^24, got {self.entries}")
         if not 1 <= self.coarsest <= self.finest < 1 << 20:
             raise ArgumentError(
-                f"coarsest, finest: expected 1 to 2^20 - 1 cells, the coarsest first, got {self.coarsest} "
-                f"and {self.finest}"
+                f"coarsest, finest: expected 1 to 2^20 - 1, ascending, got {self.coarsest}, {self.finest}"
             )
 
     @cached_property

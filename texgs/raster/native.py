@@ -106,12 +106,7 @@ def library_path(device_type: str = "cpu") -> Path:
 
 @cache
 def library(device_type: str = "cpu") -> ctypes.CDLL:
-    """Open the library for "cpu" or "cuda" tensors; the second time, the same object.
-
-    Raises:
-        DeviceError: if there is no library for such tensors.
-        NativeError: if it is missing, does not load, or was built from other sources than this package.
-    """
+    """Open the library for "cpu" or "cuda" tensors; the second time, the same object."""
     if device_type not in ("cpu", "cuda"):
         raise DeviceError(f"texgs.raster: expected tensors on cpu or cuda, got {device_type}; move them")
     path = library_path(device_type)
@@ -198,9 +193,6 @@ def call(name: str, *arguments, device: torch.device) -> None:
     """Call a function of the library for `device` with its current stream as the last argument.
 
     Tensors are dense; the library gets their address, and NULL for None.
-
-    Raises:
-        ArgumentError, OutOfMemoryError, DeviceError: with the library's own sentence.
     """
     lib = library(device.type)
     if device.type == "cpu":

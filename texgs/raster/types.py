@@ -129,6 +129,5 @@ def check_primitive(scales: Tensor, has_texture: bool, outputs: Collection[str])
         )
     if "normal" in outputs:
         raise ArgumentError(
-            "outputs: 3D Gaussians (scales [N, 3]) have no normal; leave it out, or pass scales [N, 2] "
-            "to draw surfels"
+            "outputs: 3D Gaussians (scales [N, 3]) have no normal; leave it out, or draw surfels"
         )

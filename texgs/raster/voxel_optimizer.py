@@ -40,14 +40,8 @@ class VoxelOptimizer:
     """RMSProp as in Plenoxels, or Adam, on the rows that have a gradient; all others stay as they are.
 
     Running means start at the first gradient of a row and its square, so that the first step of each float
-    is its rate, and no correction is needed.
-
-    Args:
-        grid: whose rows are changed in place; its density follows them, its occupancy does not.
-        kind: "rmsprop" or "adam".
-
-    Raises:
-        ArgumentError: if the kind is unknown.
+    is its rate, and no correction is needed. The rows of the grid change in place; its density follows them,
+    its occupancy does not.
     """
 
     def __init__(self, grid: VoxelGrid, kind: str = "rmsprop") -> None:

@@ -77,14 +77,10 @@ class RowGradient:
 
 
 class Samples:
-    """The samples of rays in the library: marched once, then gathered as often as wanted.
+    """The samples of rays [N, 6] in the library: marched once, then gathered as often as wanted.
 
-    Args:
-        grid: its density and occupancy up to date.
-        march: how rays are sampled.
-        rays: [N, 6].
-        out: where colour, alpha and distance are written, dense; None: nowhere.
-        keep: the samples, 36 bytes each; without them nothing can be gathered.
+    Colour, alpha and distance are written to `out`, dense. Without `keep` nothing can be gathered: a sample
+    takes 36 bytes. Density and occupancy of the grid are up to date.
     """
 
     def __init__(

@@ -45,17 +45,7 @@ def write_fit_figure(
     A row for each view: the view, the model after each phase with its PSNR, and the error of the last one,
     that of the worst channel with its sign, four times enlarged. Then the maps of the last model in the first
     view: normals, depth, alpha and material. All cells show the same part of the frame, on white; PSNR is of
-    the whole frame.
-
-    Args:
-        path: the file to write.
-        models: by phase, the last of which has one; None for a phase that only seeds.
-        views: by the name that stands beside them, at least one; all of one size.
-        reduce: of the images, as in `images.load`.
-        title: line at the top.
-
-    Raises:
-        ArgumentError: if there is no view, a model is missing, or the path is not writable.
+    the whole frame. Views are all of one size; a phase that only seeds has no model.
     """
     last = list(models.values())[-1] if models else None
     if not views or last is None:
@@ -82,9 +72,6 @@ def write_comparison(
 
     Each view has a row with the view and each fit with its PSNR, and below it a row with the errors, as in
     the figure of one fit. More recipes than a row has room for go on in further rows, beside the view again.
-
-    Raises:
-        ArgumentError: if there is no view or no model, or the path is not writable.
     """
     if not views or not models:
         raise ArgumentError(f"{path}: expected models and views, got {len(models)} and {len(views)}")

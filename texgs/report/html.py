@@ -34,12 +34,7 @@ def write_report(
 ) -> Path:
     """Write a report that needs no other file, but for pages of scenes that are too large for it.
 
-    Args:
-        path: target, .html.
-        records: of all jobs to report; their pictures lie beside them.
-        left_out: what is not there.
-        given: tables that need more than records, by name, as for `tables_of`.
-        more: figures that need more than records, by section.
+    Tables by name and figures by section that need more than records are `given` and `more`.
     """
     from jinja2 import Environment
 

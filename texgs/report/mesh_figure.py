@@ -28,13 +28,7 @@ def write_mesh_figure(
 ) -> Path:
     """Draw a mesh beside the surface that it should be as PNG, in one step, from two sides.
 
-    Args:
-        path: the file to write.
-        mesh: to show.
-        reference: the surface that it should be.
-        surface: points on what counts of that; errors are distances from them.
-        lens: of the pictures, but for their size.
-        title: line at the top.
+    Errors are distances from `surface`, points on what counts of the reference.
     """
     truth, ours = sample(reference, COUNT), sample(mesh, COUNT)
     error = Scale(0, FAR, "inferno")

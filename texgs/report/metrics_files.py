@@ -77,21 +77,12 @@ class OtherVersionError(ArgumentError):
 
 
 def read(paths: Iterable[str | Path]) -> list[Record[Any]]:
-    """Read all metrics, in the order of their paths.
-
-    Raises:
-        ArgumentError: if a file is no metrics file, of another version of texgs, or holds a value of another
-            type than declared.
-    """
+    """Read all metrics, in the order of their paths."""
     return [_record(path) for path in sorted(map(Path, paths))]
 
 
 def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[LeftOut]]:
-    """Read the metrics of this version of texgs, as `read`, and say how many are of other versions.
-
-    Raises:
-        ArgumentError: if a file is no metrics file, or all are of other versions.
-    """
+    """Read the metrics of this version of texgs, as `read`, and say how many are of other versions."""
     records: list[Record[Any]] = []
     others: dict[Path, OtherVersionError] = {}
     for path in sorted(map(Path, paths)):
@@ -110,11 +101,7 @@ def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[Lef
 
 
 def read_left_out(path: str | Path | None) -> list[LeftOut]:
-    """Return what a file says was left out; nothing without a file.
-
-    Raises:
-        ArgumentError: if the file is no list of entries with `what`, `why` and `places`.
-    """
+    """Return what a file says was left out; nothing without a file."""
     if path is None or not Path(path).exists():
         return []
     entries = read_json(path)

@@ -111,12 +111,9 @@ def beside_paper(
 ) -> Table:
     """Return a table of fits: means over the basic scenes of a data set, beside the paper's numbers.
 
-    Args:
-        rows: of single basic scenes, made of `cells`, with `alike`.
-        name: of the paper's file.
-        keys: titles that tell rows of one data set and recipe apart, by their headings in the file.
-        columns: of the numbers, by their headings in the file.
-        is_sum: whether rows are sums instead, so that the paper's have to be of as many basic scenes.
+    Rows are of single basic scenes, made of `cells`, with `alike`. The titles in `keys`, which tell rows of
+    one data set and recipe apart, and the columns are by their headings in the paper's file. Rows that are
+    sums instead stand beside the paper's where they are of as many basic scenes.
     """
     titles = [column.title for column in columns.values()]
     theirs = paper(name, {"dataset": DATA, **keys}, dict(zip(columns, titles, strict=True)))

@@ -129,11 +129,7 @@ class Looks:
     def make(self, scene: Scene, edit: Any, output: Path, show: Callable[[str, Path], None]) -> EditedScene:
         """Return the scene with new textures, written to a folder, which must not be there.
 
-        Args:
-            scene: as it is before.
-            edit: see `edit_of`.
-            output: folder.
-            show: is called with a part and the file of its texture on its way, which is gone in the end.
+        `show` is called with a part and the file of its texture on its way, which is gone in the end.
         """
         method = method_of(edit)
         settings, preview = method.of(edit), ThrottledPreview(show, self._scratch)

@@ -15,7 +15,6 @@ from texgs.scene.frame import Mode
 
 OfViews = Literal["truth", "difference"]
 OF_VIEWS = get_args(OfViews)  # modes that show the training view nearest to the camera
-MODES = (*get_args(Mode), *OF_VIEWS)
 LARGEST = 1 << 16  # bytes of a message; a page's own have a few hundred
 MOST_POINTS = 100
 MOST_PARTS = 1000

@@ -37,14 +37,10 @@ class Opened:
 
 
 def open_scene(path: Path, folder: Path | None = None) -> Opened:
-    """Return the scene of a path.
+    """Return the scene of a path: scene.yaml, a folder with one of these in it or below, or a model file.
 
     A scene that a job wrote is saved under another name in the current folder: jobs do not replace a folder
     that holds files of others.
-
-    Args:
-        path: scene.yaml, a folder with one of these in it or below, or a model file.
-        folder: for saving; by default that of the scene or the model, or the current one.
     """
     if path.is_dir():
         path = _only_scene(path)

@@ -22,14 +22,8 @@ def icosphere(frequency: int, radius: float, fov_y: float, width: int, height: i
     """Return cameras on a geodesic icosphere, looking at the origin: the paper's training views.
 
     From the bottom to the top (+y), and by azimuth from -180 to 180 degrees where several are at one
-    height: the order of the views published with the paper.
-
-    Args:
-        frequency: parts f that each edge of the icosahedron is split into, at least 1; 10 f^2 + 2 cameras.
-        radius: distance from the origin, world units.
-        fov_y: vertical field of view, degrees.
-        width: pixels.
-        height: pixels.
+    height: the order of the views published with the paper. There are 10 f^2 + 2 of them, `frequency` f being
+    the parts that each edge of the icosahedron is split into.
     """
     angles = [(degrees(asin(y)), degrees(atan2(-z, x))) for x, y, z in geodesic_vertices(frequency).tolist()]
     # Rounded, because heights that are equal by symmetry differ in the last bit.

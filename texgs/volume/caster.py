@@ -13,7 +13,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Collection
 from copy import copy
-from ctypes import Structure, c_float, c_int32, c_int64, c_void_p
+from ctypes import c_int32, c_int64
 from dataclasses import dataclass
 from math import hypot, inf
 from typing import Any
@@ -41,28 +41,25 @@ MOST_SAMPLES = 2**24  # along a ray; their numbers are floats
 PADDING = 3  # bytes behind the distances of bricks, which are loaded as words
 
 
-class NativeVolume(Structure):
+class NativeVolume(native.Struct):
     """`texgs_volume`."""
 
-    _fields_ = [("values", c_void_p), ("type", c_int32), ("size", c_int32 * 3), ("half", c_float * 3)]
+    _fields_ = native.fields("p values, i type, 3i size, 3f half")
 
 
-class NativeTransfer(Structure):
+class NativeTransfer(native.Struct):
     """`texgs_transfer`."""
 
-    _fields_ = [("n", c_int32), ("points", c_void_p)]
+    _fields_ = native.fields("i n, p points")
 
 
-class NativeView(Structure):
+class NativeView(native.Struct):
     """`texgs_cast_view`."""
 
-    _fields_ = [
-        *(("viewmat", c_void_p), ("K", c_void_p), ("width", c_int32), ("height", c_int32)),
-        *((name, c_float) for name in ("step", "opacity_unit")),
-        *((name, c_float * 3) for name in ("to_viewer", "to_light")),
-        *((name, c_float) for name in ("ambient", "diffuse", "specular", "shininess")),
-        *((name, c_void_p) for name in ("rgba", *OUTPUTS)),
-    ]
+    _fields_ = native.fields(
+        "p viewmat K, i width height, f step opacity_unit, 3f to_viewer to_light, "
+        "f ambient diffuse specular shininess, p rgba depth median normal"
+    )
 
 
 native.declare("texgs_volume_bricks", NativeVolume, "p", result=c_int64, stream=False)
@@ -84,8 +81,7 @@ class Cast:
 class Caster:
     """Renders one volume from any camera; the samples go to the device that casts rays.
 
-    Samples in C order and native bytes are not copied on a CPU. `missing` of them are NaN: they are
-    transparent, with the cells around them.
+    Samples in C order and native bytes are not copied on a CPU. NaN is transparent, with the cells around it.
     """
 
     local_viewer = False
@@ -99,19 +95,16 @@ class Caster:
         half = [float(side) for side in grid.aabb[1]]
         self._diagonal = 2 * hypot(*half)
         self._voxel = min(2 * side / (size - 1) for side, size in zip(half, grid.dims, strict=True))
-        self._values = bytes_of(values).to(self._device)
-        self._device = self._values.device  # with the number of the GPU, whichever is the current one later
-        self._volume = NativeVolume(
-            self._values.data_ptr(), TYPES.index(kind), (c_int32 * 3)(*grid.dims), (c_float * 3)(*half)
-        )
+        samples = bytes_of(values).to(self._device)
+        self._device = samples.device  # with the number of the GPU, whichever is the current one later
+        self._volume = NativeVolume(samples, TYPES.index(kind), grid.dims, tuple(half))
         count_bricks = native.function(native.library(self._device.type), "texgs_volume_bricks")
         bricks = count_bricks(self._volume, (c_int32 * 3)())
         require_memory(8 * bricks, "a volume's bricks", "crop it, or reduce it by dataset.volume.reduce")
         self._extremes = torch.empty(bricks, 2, device=self._device)
         missing = torch.zeros(1, dtype=torch.int64, device=self._device)
         self._call("texgs_volume_extremes", self._extremes, missing)
-        self.missing = int(missing)
-        self._prepared: tuple[TransferFunction, Tensor, Tensor] | None = None
+        self._prepared: tuple[TransferFunction, NativeTransfer, Tensor] | None = None
 
     def with_appearance(self, appearance: Appearance) -> Caster:
         """Return a caster of the same volume with another shading and sampling; nothing is read again."""
@@ -128,7 +121,7 @@ class Caster:
         height, width = camera.height, camera.width
         require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
         self._check(camera)
-        points, distance = self._prepare(tf)
+        transfer, distance = self._prepare(tf)
         matrices = [x.float().to(self._device).contiguous() for x in (camera.viewmat, camera.K)]
         shapes = {"rgba": (height, width, 4), "normal": (height, width, 3)}
         seen = {
@@ -137,13 +130,11 @@ class Caster:
         }
         look = self._appearance
         view = NativeView(
-            *(x.data_ptr() for x in matrices),
-            *(width, height, look.step * self._voxel, look.opacity_unit),
-            *((c_float * 3)(*vector) for vector in directions(camera, light)),
+            *(*matrices, width, height, look.step * self._voxel, look.opacity_unit),
+            *map(tuple, directions(camera, light)),
             *(look.ambient, look.diffuse, look.specular, look.shininess),
-            *(seen[name].data_ptr() if name in seen else None for name in ("rgba", *OUTPUTS)),
+            **seen,
         )
-        transfer = NativeTransfer(len(points), points.data_ptr())
         self._call("texgs_cast", transfer, distance, view)
         return Cast(**seen)
 
@@ -153,19 +144,18 @@ class Caster:
         samples = self._diagonal / (self._appearance.step * self._voxel)
         if samples > MOST_SAMPLES:
             raise ArgumentError(
-                f"step: expected at most {MOST_SAMPLES} samples along a ray, got up to {samples:.3g}; take a "
-                "larger one"
+                f"step: expected at most {MOST_SAMPLES} samples on a ray, got {samples:.3g}; raise it"
             )
 
-    def _prepare(self, tf: TransferFunction) -> tuple[Tensor, Tensor]:
-        """Return points of a function, and how far each brick is from one in which it shows something."""
+    def _prepare(self, tf: TransferFunction) -> tuple[NativeTransfer, Tensor]:
+        """Return a function for the library, and how far each brick is from one in which something shows."""
         prepared = self._prepared  # another thread may prepare another function
         if prepared is None or prepared[0] != tf:
             points = points_of(tf).to(self._device)
+            transfer = NativeTransfer(len(points), points)
             distance = torch.zeros(len(self._extremes) + PADDING, dtype=torch.uint8, device=self._device)
-            transfer = NativeTransfer(len(points), points.data_ptr())
             self._call("texgs_volume_distance", self._extremes, transfer, distance)
-            prepared = self._prepared = tf, points, distance
+            prepared = self._prepared = tf, transfer, distance
         return prepared[1:]
 
     def _call(self, name: str, *arguments: Any) -> None:

@@ -7,12 +7,7 @@ from texgs.core.errors import ArgumentError, first_line
 
 
 def download(url: str, sha256: str, path: Path) -> None:
-    """Download a file with a line that says so and a progress bar, unless it is there and whole.
-
-    Raises:
-        ArgumentError: if the http or https address is none or does not answer, or the file differs from its
-            hexadecimal checksum; then nothing is kept.
-    """
+    """Download a file with a line that says so and a progress bar, unless it is there and whole."""
     import pooch
 
     if not url.startswith(("http://", "https://")):
@@ -38,6 +33,4 @@ def require_whole(path: Path, sha256: str) -> None:
     import pooch
 
     if pooch.file_hash(str(path)) != sha256.lower():
-        raise ArgumentError(
-            f"{path}: expected the checksum {sha256}, got another; delete the file and run again"
-        )
+        raise ArgumentError(f"{path}: expected the checksum {sha256}, got another; delete it and run again")

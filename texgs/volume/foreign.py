@@ -37,13 +37,8 @@ def open_foreign(
 ) -> Source:
     """Open image data with its axes along the closest ones of space, so that nothing is mirrored.
 
-    Samples that are stored as in memory are read on demand, all others as a whole.
-
-    Args:
-        path: of the file, or of a folder of DICOM slices.
-        spacing: replaces that of the result.
-        origin: replaces that of the result.
-        series: of several in a folder, its number or UID.
+    Samples that are stored as in memory are read on demand, all others as a whole. Spacing and origin replace
+    those of the file; `series` is the number or UID of one of several in a folder of DICOM slices.
     """
     suffix = path.suffix.lower()
     with reading_as(_kind(path)):
@@ -101,8 +96,7 @@ def _ask(path: Path, series: str | None, is_header_only: bool) -> tuple[dict[str
             child.kill()
     if reply is None:
         raise ArgumentError(
-            f"expected {_kind(path)}, but its reader broke off; it is damaged, or claims more memory than "
-            "there is"
+            f"expected {_kind(path)}, but its reader broke off; it is damaged, or too large for memory"
         )
     if "error" in reply:
         raise (OutOfMemoryError if reply["is_memory"] else ArgumentError)(reply["error"])

@@ -34,9 +34,6 @@ class Grid:
     """Samples of a scalar field on a regular lattice.
 
     Samples are points, as in VTK: n samples span (n - 1) * spacing.
-
-    Raises:
-        ShapeError, ArgumentError: if the values, the spacing or the origin are not as said below.
     """
 
     values: np.ndarray  # [Z, Y, X], real numbers, every axis at least 2; x is the fastest axis, as in VTK
@@ -85,8 +82,7 @@ def check_lattice(dims: Dims, dtype: np.dtype, spacing: Triple = ONES, origin: T
         raise ArgumentError(f"dtype: expected integers, floats or bool, got {dtype}")
     if len(spacing) != 3 or not all(isfinite(step) and step > 0 for step in spacing):
         raise ArgumentError(
-            f"spacing: expected three finite numbers above 0 (x, y, z), got {list(spacing)}; "
-            "set the right spacing"
+            f"spacing: expected three finite numbers above 0, got {list(spacing)}; set it right"
         )
     if len(origin) != 3 or not all(isfinite(place) for place in origin):
         raise ArgumentError(f"origin: expected three finite numbers (x, y, z), got {list(origin)}")
@@ -109,8 +105,7 @@ def require_room(dims: Dims, dtype: np.dtype, beside: int = 0) -> None:
 def closest(directions: np.ndarray) -> AxisPermutation:
     """Find for each axis of space the stored axis that runs along it most nearly, and its sign.
 
-    Args:
-        directions: [3, 3], rows of unit length. Where something is not finite, axes stay as they are stored.
+    Directions [3, 3] are rows of unit length; where something is not finite, axes stay as they are stored.
     """
     if not np.isfinite(directions).all():
         return AS_STORED

@@ -98,9 +98,6 @@ def load(views: Sequence[View], reduce: int = 1) -> Images:
     """Read all images of views of one size and lens.
 
     Every block of reduce x reduce pixels becomes one, the average of premultiplied colours.
-
-    Raises:
-        ArgumentError: if the size cannot be divided.
     """
     height, width = views[0].camera.height, views[0].camera.width
     if height % reduce or width % reduce:

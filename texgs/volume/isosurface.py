@@ -52,9 +52,6 @@ def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
 
     Where an opaque middle of its range has two sides, both are surfaces; and so are the faces of the volume's
     box, where what is opaque ends there.
-
-    Raises:
-        ArgumentError: if the function stays below this opacity, or none of the volume reaches it.
     """
     least, most = float(grid.values.min()), float(grid.values.max())
     span = max(most - least, 1e-30)
@@ -91,16 +88,10 @@ def opaque_ranges(tf: TransferFunction, opacity: float) -> list[tuple[float, flo
 
 
 def visible_voxels(grid: Grid, tf: TransferFunction, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Draw samples with a probability that grows with their opacity, each moved at random within its cell.
+    """Draw `count` samples, the more likely the more opaque, each moved at random within its cell.
 
-    One slice is in memory at a time (weighted reservoir sampling: Efraimidis and Spirakis 2006).
-
-    Returns:
-        `count` points [N, 3], fewer if fewer samples are visible, in world units, and their colours [N, 3] in
-        [0, 1], float32.
-
-    Raises:
-        ArgumentError: if no sample is visible.
+    Return points [N, 3] in world units, fewer if fewer samples are visible, and colours [N, 3]. One slice is
+    in memory at a time (weighted reservoir sampling: Efraimidis and Spirakis 2006).
     """
     random = np.random.default_rng(seed)
     stride = ceil((grid.values.size / MOST) ** (1 / 3)) if grid.values.size > MOST else 1

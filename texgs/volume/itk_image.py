@@ -182,8 +182,7 @@ def slice_distance(slices: list[Slice]) -> float:
         is_like = each.sizes[:2] == first.sizes[:2] and np.allclose(each.spacing[:2], first.spacing[:2])
         if not is_like or not np.allclose(each.directions, first.directions, atol=1e-3):
             raise ArgumentError(
-                f"{each.path.name}: expected the size, spacing and orientation of {first.path.name}, got "
-                "another"
+                f"{each.path.name}: expected size, spacing and orientation of {first.path.name}"
             )
         shift = np.abs(first.directions[:2] @ (each.place - first.place)).max()
         if shift > TILT * (each.height - first.height) + ROUNDING:

@@ -66,16 +66,11 @@ def energy(vector: Tensor) -> float:
 
 
 def evolve(velocity: Tensor, viscosity: float, times: Iterable[float]) -> Iterator[Tensor]:
-    """Follow a flow that no force drives, and yield its spectrum at ascending times, from 0 on.
+    """Follow a flow [3, ...] that no force drives, and yield its spectrum at ascending times, from 0 on.
 
     dv/dt = v x curl(v) - grad(p + v^2 / 2) + viscosity laplace(v) with div v = 0.
     Products are formed on the grid and cut at 2/3 of the highest wavenumber, which keeps aliases out
     (Orszag 1971). Runge-Kutta of fourth order; the viscous term is integrated exactly.
-
-    Args:
-        velocity: divergence-free spectrum [3, ...] at time 0; it sets device and precision.
-        viscosity: kinematic, at least 0.
-        times: in units of the velocity's.
     """
     k = wavevectors(velocity)
     n, damping = velocity.shape[-2], -viscosity * (k * k).sum(0)

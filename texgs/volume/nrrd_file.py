@@ -20,11 +20,7 @@ NUMBER = re.compile(r"[-+.\deE]+")
 
 
 def open_grid(path: str | Path) -> Grid:
-    """Map a prepared volume into memory; samples are read when they are used.
-
-    Raises:
-        ArgumentError, ShapeError: if the file is missing, cut off, or not such a volume.
-    """
+    """Map a prepared volume into memory; samples are read when they are used."""
     path = Path(path)
     if not path.is_file():
         raise ArgumentError(f"{path}: no such file; prepare the volume first")

@@ -12,11 +12,7 @@ ADVICE = (
 
 
 def offscreen_opengl() -> str:
-    """Return what renders offscreen, such as the name of a GPU.
-
-    Raises:
-        DeviceError: if nothing does; says which packages to install.
-    """
+    """Return what renders offscreen, such as the name of a GPU."""
     command = [sys.executable, "-P", "-m", "texgs.volume.opengl"]
     try:
         child = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)

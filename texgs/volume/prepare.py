@@ -18,7 +18,6 @@ from texgs.volume.slabs import Source, slab_bounds
 
 Bounds = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 Progress = Callable[[Iterable[tuple[int, int]], int], Iterable[tuple[int, int]]]
-KEPT_TYPES = tuple(WORDS)
 BINS = 256
 
 
@@ -68,9 +67,6 @@ def prepare(
         nan_value: replaces NaN and infinity, before blocks are averaged.
         progress: called with the slabs and their number, yields the slabs again; for a progress bar.
 
-    Returns:
-        Lattice, range and histogram of what was written.
-
     Raises:
         ArgumentError: if an argument is out of range, samples are not finite or do not fit float32, the
             volume is constant, or fewer than two samples are left along an axis. Nothing is written then.
@@ -80,7 +76,7 @@ def prepare(
     bounds, axes = _bounds(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
     kept = "uint8" if source.dtype.kind == "b" else source.dtype.name
-    dtype = np.dtype(kept if kept in KEPT_TYPES else "float32")
+    dtype = np.dtype(kept if kept in WORDS else "float32")
     tally, ((x0, x1), (y0, y1), (z0, z1)) = _Tally(source.name), bounds
 
     def write(file: BinaryIO) -> None:
@@ -199,8 +195,7 @@ def _convert(block: np.ndarray, dtype: np.dtype, name: str) -> np.ndarray:
         converted = block.astype(dtype, copy=False)
     if not np.isfinite(converted).all():
         raise ArgumentError(
-            f"{name}: expected samples that fit float32, got magnitudes up to {np.abs(block).max():g}; "
-            "scale the field"
+            f"{name}: expected samples that fit float32, got up to {np.abs(block).max():g}; scale them"
         )
     return converted
 

@@ -41,18 +41,8 @@ class ArraySource(Source):
 class RawSource(Source):
     """Samples as they are in memory, somewhere in a file; x is the fastest axis.
 
-    It is read with plain reads, not mapped: the resident memory is that of the slabs in use.
-
-    Args:
-        path: of the file.
-        dims: number of samples along x, y, z.
-        stored: type of a sample, with byte order.
-        offset: bytes before the first sample.
-        spacing: x, y, z.
-        origin: x, y, z.
-
-    Raises:
-        ArgumentError: if the file is too short.
+    It is read with plain reads, not mapped: the resident memory is that of the slabs in use. `stored` is the
+    type of a sample with its byte order, `offset` the bytes before the first one.
     """
 
     def __init__(

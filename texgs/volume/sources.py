@@ -25,8 +25,6 @@ from texgs.volume.grid import (
 from texgs.volume.slabs import ArraySource, RawSource, Source, size_text
 from texgs.volume.tiff import open_tiff, tiffs_in
 
-__all__ = ["ArraySource", "RawSource", "Source", "open_source"]
-
 RAW_SUFFIXES = (".raw", ".bin", ".dat")
 # Tried in this order where the size of a plain file does not fit the type given.
 COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
@@ -111,15 +109,11 @@ def _open_with_header(
     if path.is_dir() and not tiffs_in(path):
         return open_foreign(path, spacing, origin, series)
     if series is not None:
-        raise ArgumentError(
-            f"series: expected a folder of DICOM slices to choose {series!r} of; leave it out"
-        )
+        raise ArgumentError(f"series: expected a folder of DICOM slices to choose {series!r} of; omit it")
     opener = open_tiff if path.is_dir() else OPENERS.get(_suffix(path))
     if opener is None:
         known = ", ".join((*RAW_SUFFIXES, *OPENERS))
-        raise ArgumentError(
-            f"unknown suffix {_suffix(path)!r}; expected {known}, or a folder of TIFF or DICOM slices"
-        )
+        raise ArgumentError(f"unknown suffix {_suffix(path)!r}; expected {known}, or a folder of slices")
     return opener(path, spacing, origin)
 
 

@@ -41,19 +41,16 @@ def suggest(
     falls, at thresholds of least variance (Otsu 1979) on the log histogram. Where values are in at most 32
     of the bins they are taken for labels, the lowest for background. Higher values are more opaque.
 
-    Args:
-        histogram: [n] counts of voxels in equal bins over [minimum, maximum], the range of the data; two of
-            them at least are not 0.
-        minimum: in data units.
-        maximum: in data units.
-        count: of functions, fewer where there are fewer values; by default what shows, at most 5.
+    The histogram counts voxels in equal bins over [minimum, maximum]; two of them are not 0. There are
+    `count` functions, fewer where there are fewer values; by default what shows, at most 5.
     """
     counts = np.asarray(histogram, dtype=np.float64)
     values = minimum + (np.arange(len(counts)) + 0.5) * (maximum - minimum) / len(counts)
     present = counts > 0
     if looks_like_labels(counts):
         values, counts = values[present], counts[present]
-        classes = _labels(counts, count)
+        # Every value but the lowest is a class; too many are grouped with their neighbours.
+        classes = _divided([(1, len(counts))], np.sqrt(counts), count or MOST)
     else:
         classes = _materials(counts, count)
     edges = np.concatenate([[minimum], (values[1:] + values[:-1]) / 2, [maximum]])
@@ -67,11 +64,6 @@ def suggest(
 def looks_like_labels(counts: Array) -> bool:
     """Return whether so few bins of a histogram hold voxels that the values are taken for labels."""
     return int(np.count_nonzero(counts)) <= FEW
-
-
-def _labels(counts: Array, count: int | None) -> list[Class]:
-    """Return every value but the lowest as a class; too many are grouped with their neighbours."""
-    return _divided([(1, len(counts))], np.sqrt(counts), count or MOST)
 
 
 def _materials(counts: Array, count: int | None) -> list[Class]:

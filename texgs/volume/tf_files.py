@@ -28,9 +28,6 @@ def read_tf(path: str | Path) -> TransferFunction:
     opacity with a midpoint or a sharpness, is sampled by VTK at 256 points or so. A preset
     without opacity gets the ramp from 0 to 1 over its range, which is ParaView's default. Presets are often
     given over [0, 1]: see `TransferFunction.scaled`.
-
-    Raises:
-        ArgumentError: if the file is missing, no JSON, of neither format, or holds a wrong point.
     """
     data = read_json(path)
     try:
@@ -68,9 +65,7 @@ def write_paraview(path: str | Path, tf: TransferFunction, name: str) -> Path:
 def _from_ours(data: dict[str, Any]) -> TransferFunction:
     """Return the function of a file of ours."""
     if data.get("version") != VERSION:
-        raise ArgumentError(
-            f"version: expected {VERSION}, got {data.get('version')!r}; update texgs to read this file"
-        )
+        raise ArgumentError(f"version: expected {VERSION}, got {data.get('version')!r}; update texgs")
     return TransferFunction.from_dict({k: v for k, v in data.items() if k not in ("format", "version")})
 
 
@@ -78,9 +73,7 @@ def _from_preset(presets: list[dict[str, Any]]) -> TransferFunction:
     """Return the function of the only preset of ParaView."""
     if len(presets) > 1:
         names = ", ".join(str(preset.get("Name")) for preset in presets[:10])
-        raise ArgumentError(
-            f"expected one preset, got {len(presets)}: {names}; export the one that you mean alone"
-        )
+        raise ArgumentError(f"expected one preset, got {len(presets)}: {names}; export one of them alone")
     (preset,) = presets
     if "RGBPoints" not in preset:
         raise ArgumentError(

@@ -25,12 +25,7 @@ PAGES = 2  # in memory at a time: one as it is decoded, and its place in the sla
 class PageSource(Source):
     """Slices that are pages of TIFF files, decoded when they are asked for.
 
-    Args:
-        path: of the file or the folder.
-        pages: file and page of every z slice.
-        shape: of each, Y and X.
-        dtype: of a sample.
-        lattice: spacing and origin.
+    `pages` are the file and the page of every z slice, `shape` Y and X of each, `lattice` spacing and origin.
     """
 
     def __init__(

@@ -41,9 +41,7 @@ class TransferFunction:
         object.__setattr__(self, "color", _points("color", self.color, "r, g, b", 1))
         low, high = self.support
         if not low < high:
-            raise ArgumentError(
-                "opacity: expected a range of values with opacity above 0, got none; raise a point"
-            )
+            raise ArgumentError("opacity: expected some values with opacity above 0, got none; raise a point")
 
     @property
     def support(self) -> tuple[float, float]:
@@ -147,13 +145,10 @@ def _points(name: str, points: Any, channels: str, least: int) -> tuple[tuple[fl
             raise ArgumentError(f"{where}: expected {channels} in [0, 1], got {row_text(row[1:])}")
         if i > 0 and row[0] < rows[i - 1][0]:
             raise ArgumentError(
-                f"{where}: expected values in ascending order, got {row[0]:.9g} after {rows[i - 1][0]:.9g}; "
-                "sort the points by value"
+                f"{where}: expected ascending values, got {row[0]:.9g} after {rows[i - 1][0]:.9g}; sort them"
             )
         if i > 1 and row[0] == rows[i - 2][0]:
-            raise ArgumentError(
-                f"{where}: expected at most two points at one value (a step), got a third at {row[0]:.9g}"
-            )
+            raise ArgumentError(f"{where}: expected at most two points at a value, got three at {row[0]:.9g}")
     return tuple(tuple(map(float, row)) for row in rows)
 
 
@@ -163,11 +158,7 @@ def row_text(row: Iterable[Any]) -> str:
 
 
 def combine(basic: Mapping[str, TransferFunction]) -> TransferFunction:
-    """Return one transfer function that shows what the basic ones show together.
-
-    Raises:
-        ArgumentError: if two of them overlap, or there is none.
-    """
+    """Return one transfer function that shows what the basic ones show together."""
     if not basic:
         raise ArgumentError("transfer functions: expected at least one, got none")
     check_disjoint(basic)
@@ -196,11 +187,7 @@ def just_above(value: float) -> float:
 
 
 def check_disjoint(basic: Mapping[str, TransferFunction]) -> None:
-    """Require that no value is visible in two basic transfer functions; ranges may touch.
-
-    Raises:
-        ArgumentError: naming two that overlap, and where each is visible.
-    """
+    """Require that no value is visible in two basic transfer functions; ranges may touch."""
     for (name, tf), (other, another) in combinations(basic.items(), 2):
         one, two = tf.support, another.support
         if max(one[0], two[0]) < min(one[1], two[1]):

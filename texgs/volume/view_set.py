@@ -54,15 +54,10 @@ def read_views(folder: str | Path) -> ViewSet:
 
     Without `w` and `h` the size is that of the first image; a frame without `light` has a headlight. So the
     sets published with the paper load as they are.
-
-    Raises:
-        ArgumentError: if a file is missing or does not hold what it should, naming file and frame.
     """
     folder = Path(folder)
     if not (folder / "transforms_train.json").is_file():
-        raise ArgumentError(
-            f"{folder}: expected a folder of views, with a file transforms_train.json; found none there"
-        )
+        raise ArgumentError(f"{folder}: expected a folder of views, found no transforms_train.json in it")
     train, metadata = _read_split(folder / "transforms_train.json")
     test_file = folder / "transforms_test.json"
     test = _read_split(test_file)[0] if test_file.is_file() else []
@@ -77,7 +72,10 @@ def write_transforms(
     All views have one size and lens; `metadata` are further keys, such as volume, tf, aabb and shading.
     """
     frames = [_frame(folder, view) for view in views]
-    values = {**_lens_values(views[0].camera), **metadata, "frames": frames}
+    width, height = views[0].camera.width, views[0].camera.height
+    (fl_x, _, cx), (_, fl_y, cy), _ = views[0].camera.K.tolist()
+    lens = (2 * atan(0.5 * width / fl_x), width, height, fl_x, fl_y, cx, cy)
+    values = {**dict(zip(LENS_KEYS, lens, strict=True)), **metadata, "frames": frames}
     return write_json(folder / f"transforms_{split}.json", values)
 
 
@@ -103,8 +101,7 @@ def _read_split(path: Path) -> tuple[list[View], dict[str, Any]]:
         images = [_image_path(path, index, frame) for index, frame in enumerate(frames)]
         if missing := [image for image in images if not image.is_file()]:
             raise ArgumentError(
-                f"{missing[0]}: no such image, of {len(missing)} missing of the {len(images)} in "
-                f"{path.name}; copy them there"
+                f"{missing[0]}: no such image; {len(missing)} of {len(images)} in {path.name} are missing"
             )
         width, height = _size(path, values, images)
         K = _lens_matrix(str(path), values, width, height)
@@ -164,9 +161,7 @@ def world_to_camera(where: str, matrix: Any) -> Tensor:
     except (TypeError, ValueError, RuntimeError) as error:
         raise ArgumentError(f"{where}: transform_matrix: expected four rows of four numbers") from error
     if rigid.shape != (4, 4):
-        raise ArgumentError(
-            f"{where}: transform_matrix: expected four rows of four numbers, got shape {list(rigid.shape)}"
-        )
+        raise ArgumentError(f"{where}: transform_matrix: expected [4, 4] numbers, got {list(rigid.shape)}")
     rigid[3] = torch.tensor([0.0, 0.0, 0.0, 1.0])
     R_wc = rigid[:3, :3]
     defect = float((R_wc.T @ R_wc - torch.eye(3, dtype=torch.float64)).abs().max())
@@ -177,13 +172,6 @@ def world_to_camera(where: str, matrix: Any) -> Tensor:
             "scaled, mirrored or not finite"
         )
     return torch.linalg.inv(rigid @ OPENCV_FROM_OPENGL)
-
-
-def _lens_values(camera: Camera) -> dict[str, float]:
-    """Return what the file says about size (pixels), focal lengths and principal point."""
-    (fl_x, _, cx), (_, fl_y, cy), _ = camera.K.tolist()
-    angle = 2 * atan(0.5 * camera.width / fl_x)
-    return dict(zip(LENS_KEYS, (angle, camera.width, camera.height, fl_x, fl_y, cx, cy), strict=True))
 
 
 def _lens_matrix(where: str, values: Mapping[str, Any], width: int, height: int) -> Tensor:

@@ -38,9 +38,7 @@ def read_vtk(path: Path) -> tuple[dict[str, Any], np.ndarray]:
         raise ArgumentError(f"expected a scalar volume, got {values.shape[1]} components per sample")
     shape = image.dimensions[::-1]
     if values.size != np.prod(shape, dtype=np.int64):
-        raise ArgumentError(
-            f"expected image data of {list(shape)}, got {values.size} samples; is it damaged?"
-        )
+        raise ArgumentError(f"expected image data of {list(shape)}, got {values.size} values; is it damaged?")
     first = [0.0, 0.0, 0.0]
     image.TransformIndexToPhysicalPoint(list(image.extent[::2]), first)
     lattice = {

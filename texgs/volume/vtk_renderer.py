@@ -33,11 +33,7 @@ TABLE = 8192  # entries that resolve the transfer function; VTK doubles it, and 
 
 
 class VtkRenderer:
-    """Renders one volume from any camera; arguments as for `Caster`.
-
-    Raises:
-        DeviceError: if there is no offscreen OpenGL; found out in a child process, where it may crash.
-    """
+    """Renders one volume from any camera; arguments as for `Caster`."""
 
     local_viewer = True
 

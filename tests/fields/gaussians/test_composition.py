@@ -46,5 +46,5 @@ def test_an_opacity_is_a_factor_and_at_most_one():
 
 
 def test_filters_that_differ_are_no_scene():
-    with pytest.raises(ArgumentError, match="expected all with the antialiased filter or none, got both"):
+    with pytest.raises(ArgumentError, match="expected all antialiased or none, got both"):
         JoinedGaussians([sample(), sample(antialiased=True)])

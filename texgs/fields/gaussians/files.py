@@ -62,9 +62,6 @@ def write_ply(path: str | Path, model: Gaussians) -> Path:
 
     It holds means, normals of zero, harmonics of degree 3 (those that the model has not are zero), and
     opacities, scales and quaternions raw. Filter and metadata are lost.
-
-    Raises:
-        ArgumentError: if a value is not finite, or the file cannot be written.
     """
     p = {name: x.detach().cpu() for name, x in model.parameters.items()}
     with located(path):

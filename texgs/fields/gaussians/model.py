@@ -78,18 +78,12 @@ class Gaussians(Splats):
 
 
 class JoinedGaussians(UnlitScene[Gaussians]):
-    """Models as one scene on one device, see `UnlitScene`: joined once, sorted and blended together.
-
-    Raises:
-        ArgumentError: if there is no model, their filters differ, or there is a segment.
-    """
+    """Models as one scene on one device, see `UnlitScene`: joined once, sorted and blended together."""
 
     def __init__(self, models: Sequence[Gaussians], segments: Sequence[Sequence[Tensor]] = ()) -> None:
         super().__init__(models, segments)
         if len({model.shading for model in models}) > 1:
-            raise ArgumentError(
-                "models: expected all with the antialiased filter or none, got both; fit them by one recipe"
-            )
+            raise ArgumentError("models: expected all antialiased or none, got both; fit them by one recipe")
         self.whole = joined(models)
 
     def _blend(
@@ -99,11 +93,7 @@ class JoinedGaussians(UnlitScene[Gaussians]):
         return self.whole.render(camera, background=background, outputs=outputs, opacity=opacity)
 
     def edited(self, edits: Sequence[PartEdit]) -> Gaussians:
-        """Return what is visible as one model, opacities as edited.
-
-        Raises:
-            ArgumentError: as `render`; or if nothing is visible.
-        """
+        """Return what is visible as one model, opacities as edited."""
         factors = self._per_gaussian(opacity_factors(edits, len(self.counts), self.kind))
         shown = factors > 0
         if not bool(shown.any()):

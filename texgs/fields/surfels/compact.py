@@ -44,18 +44,9 @@ def write_compact(
     """Create or replace a compact model file in one step; the same model gives the same bytes.
 
     Means and palette stay exact, and so does a material that all surfels share. Texels are rounded to
-    multiples of `step`, all else to half precision. The file is one line of JSON (what a model file has in
-    its header) and then, packed by xz, which also finds damage, a safetensors file.
-
-    Args:
-        path: target, by custom `model.texgs`.
-        model: any stage, on any device.
-        seen: [N] bool, surfels that keep their texture; others get one texel, the mean of it. All by default.
-        step: of texels; each is off by half of it at most.
-
-    Raises:
-        ArgumentError, ShapeError: if the model could not be read back, `seen` does not fit it, a texel is
-            beyond 2^23 steps, or the file cannot be written.
+    multiples of `step`, all else to half precision. Surfels that are not `seen` [N] bool get one texel, the
+    mean of theirs; by default all are. The file is one line of JSON (what a model file has in its header) and
+    then, packed by xz, which also finds damage, a safetensors file.
     """
     from safetensors.numpy import save
 

@@ -45,9 +45,7 @@ class Part:
 
     def __init__(self, model: Surfels, masks: Sequence[Tensor] = ()) -> None:
         if model.stage == "surfels":
-            raise ArgumentError(
-                "model: expected stage shading or texture, got surfels; fit its shading first"
-            )
+            raise ArgumentError("model: expected stage shading or texture, got surfels; fit shading first")
         p = model.parameters
         self.model, self.segments = model, len(masks)
         self.colors, self.palette = p["colors"], p.get("palette")  # offsets from a palette, if there is one
@@ -105,25 +103,14 @@ class Part:
 
 
 class Composition:
-    """Basic models as one scene on one device.
-
-    Args:
-        models: relightable, with or without texture, all with the same low-pass filter.
-        segments: of each model the masks [N] bool of its segments; by default there are none.
-
-    Raises:
-        ArgumentError, ShapeError: if there is no model, one has no shading, their filters differ, or a mask
-            is not one of its model.
-    """
+    """Relightable models as one scene on one device; `segments` are of each the masks [N] bool."""
 
     def __init__(self, models: Sequence[Surfels], segments: Sequence[Sequence[Tensor]] | None = None) -> None:
         if not models:
             raise ArgumentError("models: expected at least one, got none")
         passes = sorted({model.shading.low_pass for model in models})
         if len(passes) > 1:
-            raise ArgumentError(
-                f"models: expected one low_pass, got {' and '.join(map(str, passes))}; fit them by one recipe"
-            )
+            raise ArgumentError(f"models: expected one low_pass, got {passes}; fit them by one recipe")
         masks = [()] * len(models) if segments is None else segments
         self.parts = [Part(model, own) for model, own in zip(models, masks, strict=True)]
         self.options = models[0].shading.options

@@ -59,17 +59,11 @@ def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
     - "release": as the paper's release stores relightable surfels, so only with shading: 45 `f_rest`, and
       `diffuse_factor`, `shininess`, `ambient_factor`, `specular_factor` under its activations. It clamps the
       coloured and the white part of its shading one by one, so that it may render less light.
-
-    Raises:
-        ArgumentError: if the flavour is unknown or cannot express the model, a value is not finite, or the
-            file cannot be written.
     """
     if flavour not in FLAVOURS:
         raise ArgumentError(f"flavour: expected {', '.join(FLAVOURS)}, got {flavour!r}")
     if flavour == "release" and model.stage == "surfels":
-        raise ArgumentError(
-            f"{path}: release needs a model with shading, got stage surfels; use flavour 2dgs"
-        )
+        raise ArgumentError(f"{path}: release needs a model with shading, got stage surfels; use 2dgs")
     parameters = {name: x.detach().cpu() for name, x in model.parameters.items()}
     with located(path):
         check.finite(**parameters)

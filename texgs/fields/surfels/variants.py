@@ -33,11 +33,7 @@ def write_texture(path: str | Path, model: Surfels, metadata: Mapping[str, Any] 
 
 
 def with_texture(model: Surfels, path: str | Path) -> Surfels:
-    """Return the model with the texels and colours of a file; one without colours keeps those of the model.
-
-    Raises:
-        ArgumentError, ShapeError: if the file is missing, of another kind, or of another model.
-    """
+    """Return the model with the texels and colours of a file, which may have no colours."""
     _, texture = read_tensor_file(Path(path), FORMAT, VERSION)
     p = model.parameters
     with located(path):
@@ -77,12 +73,8 @@ def labels_of(masks: Sequence[Tensor], n: int) -> Tensor:
 def with_variants(model: Surfels, labels: Tensor, variants: Sequence[Surfels]) -> Surfels:
     """Return the model with the texture of each segment taken from its own variant of the model.
 
-    What no segment holds stays as it is. The model itself is returned where nothing changes.
-
-    Args:
-        model: textured.
-        labels: [N], see `labels_of`.
-        variants: of each segment the model with other texels and colours, laid out alike.
+    What no segment holds stays as it is. The model itself is returned where nothing changes. `variants` are
+    of each segment the model with other texels and colours, laid out alike.
     """
     p = model.parameters
     places, surfel = owners(p)

@@ -8,9 +8,7 @@ from texgs.fields.kinds.palette import FIELD
 from texgs.fit.kinds import FitSpec, FitTask, Fitted
 from texgs.fit.kinds.voxels import GridStage, VoxelKeys
 
-
-def _voxels() -> VoxelKeys:
-    return VoxelKeys(stages=[GridStage(64, 60), GridStage(128, 150), GridStage(256, 100)], degree=0)
+STAGES = (GridStage(64, 60), GridStage(128, 150), GridStage(256, 100))
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,8 @@ class PaletteKeys:
     """How networks are fitted. The defaults are meant for two cores of a CPU and some minutes."""
 
     voxels: VoxelKeys = field(
-        default_factory=_voxels, metadata={"help": "fit of a grid that says where anything is, made first"}
+        default_factory=lambda: VoxelKeys(stages=list(STAGES), degree=0),
+        metadata={"help": "fit of a grid that says where anything is, made first"},
     )
     hash: HashKeys = key(HashKeys, "lattices of the hash grids")
     seed_steps: int = key(200, "steps in which density learns that of the grid", least=0)

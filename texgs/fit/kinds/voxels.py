@@ -37,8 +37,7 @@ class Decay:
         return rate * (0.01 + 0.99 * sin(0.5 * pi * step / self.ramp))
 
 
-def _stages() -> list[GridStage]:
-    return [GridStage(64, 60), GridStage(128, 300), GridStage(256, 800)]
+STAGES = (GridStage(64, 60), GridStage(128, 300), GridStage(256, 800))
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class VoxelKeys:
     """How a grid is fitted. The defaults are meant for two cores of a CPU and a minute."""
 
     stages: list[GridStage] = field(
-        default_factory=_stages, metadata={"help": "resolutions, one after the other"}
+        default_factory=lambda: list(STAGES), metadata={"help": "resolutions, one after the other"}
     )
     degree: int = key(2, "degree of the spherical harmonics", least=0, most=2)
     half_size: float = key(1.3, "half the side of the cube that is searched", "world units", above=0)

@@ -87,11 +87,7 @@ def splat(
     *,
     options: Options = DEFAULT_OPTIONS,
 ) -> tuple[Tensor, Tensor]:
-    """Splat an image [H, W, C] back onto what shows it: the adjoint of rendering features over black.
-
-    Returns:
-        Sums [N, C] over all pixels of blending weight times image, and the sums [N] of the weights.
-    """
+    """Return sums [N, C] of blending weight times image [H, W, C], and of weights [N]; see `raster.splat`."""
     height, width, channels = image.shape
     kind = kind_of(scales)
     projected = kind.project(means, quats, scales, opacities, viewmat, K, None, (width, height), options)

@@ -64,11 +64,10 @@ def project(
 
 
 def box(homography: Tensor, rho: Tensor | float) -> tuple[Tensor, Tensor, Tensor]:
-    """Return the bounding box on screen of the disc u^2 + v^2 <= rho.
+    """Return the bounding box on screen of the disc u^2 + v^2 <= rho, and whether it is before the camera.
 
-    Returns:
-        Middle [M, 2], that of the projected mean where the disc reaches behind the camera; squared half
-        extents [M, 2], meaningless there; whether the disc lies before the camera [M].
+    The box is its middle [M, 2] and squared half extents [M, 2]. Where the disc reaches behind the camera,
+    the middle is that of the projected mean and the extents have no meaning.
     """
     level = torch.as_tensor(rho, dtype=homography.dtype, device=homography.device).expand(len(homography))
     signature = torch.stack([level, level, -torch.ones_like(level)], 1)  # [M, 3]

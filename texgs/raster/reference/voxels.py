@@ -12,27 +12,16 @@ from texgs.raster.reference.shading import harmonics
 
 
 def render_rays(
-    density: Tensor,
-    sh: Tensor,
-    lower: Sequence[float],
-    spacing: float,
-    rays: Tensor,
+    density: Tensor,  # [X, Y, Z] at the lattice points
+    sh: Tensor,  # [X, Y, Z, 1, 4 or 9, 3] coefficients
+    lower: Sequence[float],  # world position of voxel (0, 0, 0)
+    spacing: float,  # of voxels, world units
+    rays: Tensor,  # [N, 6] origin and direction
     background: Sequence[float] = (1.0, 1.0, 1.0),
-    step: float = 0.5,
-    transmittance_min: float = 1e-3,
+    step: float = 0.5,  # between samples, in spacings
+    transmittance_min: float = 1e-3,  # a ray ends with the sample that leaves less
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Return colour [N, 3] over the background, alpha [N], mean distance [N] (Fridovich-Keil et al. 2022).
-
-    Args:
-        density: [X, Y, Z] at the lattice points.
-        sh: [X, Y, Z, k, 3] coefficients, k = 1, 4 or 9.
-        lower: world position of voxel (0, 0, 0).
-        spacing: of voxels, world units.
-        rays: [N, 6] origin and direction.
-        background: behind everything.
-        step: between samples, in spacings.
-        transmittance_min: a ray ends with the sample that leaves less.
-    """
+    """Return colour [N, 3] over the background, alpha [N], mean distance [N] (Fridovich-Keil et al. 2022)."""
     direction = normalize(rays[:, 3:], dim=1)
     origin = (rays[:, :3] - rays.new_tensor(lower)) / spacing
     near, count = crossing(origin, direction, rays.new_tensor(density.shape) - 1, step)
