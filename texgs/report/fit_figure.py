@@ -141,12 +141,9 @@ def maps(model: Field, view: View, reduce: int) -> list[Cell]:
         factors = material(model.parameters, model.shading.material)
         lines = [f"{name:9} {value.item():6.3f}" for name, value in factors.items()]
         return [*cells, Cell("material of all surfels", words="\n".join(lines))]
-    size = (camera.width, camera.height)
     blended = rasterize(
         *geometry(model.parameters),
-        camera.viewmat,
-        camera.K,
-        *size,
+        *(camera.viewmat, camera.K, camera.width, camera.height),
         features=features,
         options=model.shading.options,
     ).color.cpu()

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from texgs.fit.kinds import fit_specs
-from texgs.report.metrics_files import Record, of, phases
+from texgs.report.metrics_files import Record, of
 from texgs.report.published import DATA, LABEL, beside_paper, cells, in_order, is_alike, rank
 from texgs.report.results import FitResult, MeshResult
 from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table
@@ -52,7 +52,8 @@ MESHES = {
 
 def phase_rows(records: Iterable[Record[Any]]) -> list[dict[str, Any]]:
     """Return the phases of fits that are of no sweep, by data set, label and order; unknown ones last."""
-    order = {phase: place for place, phase in enumerate(phases())}
+    phases = [phase for kind in fit_specs().values() for phase in kind.phases]
+    order = {phase: place for place, phase in enumerate(phases)}
     unswept = [record for record in of(FitResult, records) if not record.is_swept]
     unswept.sort(key=lambda each: (rank(each), each.label, order.get(each.stage, len(order))))
     rows = []

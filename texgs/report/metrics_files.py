@@ -11,7 +11,6 @@ from texgs.config.schema import NO_SWEEP
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.core.keys import MissingKey, UnknownKey, ValueMismatch, typed
-from texgs.fit.kinds import fit_specs
 from texgs.metrics.metric import metrics
 from texgs.report.results import EditMeasures, Result
 
@@ -132,11 +131,6 @@ def below(folder: str | Path) -> list[Path]:
 
     paths = Path(folder).rglob("metrics.json")
     return sorted(path for path in paths if not any(map(is_aside, path.relative_to(folder).parts)))
-
-
-def phases() -> list[str]:
-    """Return the phases of all kinds of fields, in their order."""
-    return [phase for kind in fit_specs().values() for phase in kind.phases]
 
 
 def _record(path: Path) -> Record[Any]:

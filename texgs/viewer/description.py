@@ -14,7 +14,6 @@ from texgs.core.lens import Lens
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.gaussians.model import JoinedGaussians
-from texgs.fields.kinds import Kind
 from texgs.fields.part_edit import NEEDS, PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.raster.shading import MATERIAL
@@ -25,6 +24,9 @@ LENS = Lens()
 HOME = {"azimuth": 30.0, "polar": 20.0}  # degrees, as `texgs render` has them
 STRAYS = 0.01  # part of the primitives, far from all others, that bounds leave out
 MARGIN = 1.1  # of the first view around the bounds
+# What a kind of field has to be capable of for a mode of frames; all others are for each.
+MODES = {"unshaded": "unlit", "normal": "normals", "texture": "texture", "discs": "texture"}
+MODES |= dict.fromkeys(MATERIAL, "relight")
 
 
 def describe(
@@ -48,7 +50,7 @@ def describe(
         "background": list(scene.background),
         "light": {"azimuth": light.azimuth, "polar": light.polar} if light.kind == "directional" else None,
         "models": models,
-        "modes": modes_of(kind),
+        "modes": [mode for mode in get_args(Mode) if mode not in MODES or MODES[mode] in kind.can],
         "bounds": {"center": center, "radius": radius},
         "up": [0.0, 1.0, 0.0],
         "fov_y": LENS.fov_y,
@@ -69,13 +71,6 @@ def describe_model(
         "can": can,
         "segments": segments,
     }
-
-
-def modes_of(kind: Kind) -> list[str]:
-    """Return what frames of a kind of field can show."""
-    needs = {"unshaded": "unlit", "normal": "normals", "texture": "texture", "discs": "texture"}
-    needs |= dict.fromkeys(MATERIAL, "relight")
-    return [mode for mode in get_args(Mode) if mode not in needs or needs[mode] in kind.can]
 
 
 def have_palette(composed: Composed) -> list[bool]:
