@@ -129,7 +129,10 @@ def test_directions_of_lights():
         (lambda d: d["frames"][1].pop("file_path"), "frame 1: file_path: expected the path of an image"),
         (lambda d: d["frames"][2].pop("transform_matrix"), r"frame 2 \(r_0002\): transform_matrix: expected"),
         (lambda d: d["frames"][2].update(transform_matrix=[[1, 2], [3]]), "four rows of four numbers"),
-        (lambda d: d["frames"][2].update(transform_matrix=[[1, 2]]), r"four numbers, got shape \[1, 2\]"),
+        (
+            lambda d: d["frames"][2].update(transform_matrix=[[1, 2]]),
+            r"expected \[4, 4\] numbers, got \[1, 2\]",
+        ),
         (lambda d: d["frames"][0].update(transform_matrix=[[0.0] * 4] * 4), r"frame 0 .*singular, scaled"),
         (lambda d: d["frames"][0].update(transform_matrix=np.diag([1, 1, -1, 1]).tolist()), "mirrored"),
         (lambda d: d["frames"][0]["transform_matrix"][0].__setitem__(3, float("nan")), "not finite"),
