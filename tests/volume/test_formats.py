@@ -222,7 +222,7 @@ def test_spacing_of_a_file_that_makes_no_sense_can_be_replaced(tmp_path):
     text = "NDims = 3\nDimSize = 3 2 2\nElementSpacing = 1 0 1\n"
     text += "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
     (tmp_path / "v.mha").write_bytes(text.encode() + bytes(range(12)))
-    with pytest.raises(ArgumentError, match=r"v.mha: spacing: expected .*, got \[1.0, 0.0, 1.0\]; set the"):
+    with pytest.raises(ArgumentError, match=r"v.mha: spacing: expected .*, got \[1.0, 0.0, 1.0\]; set it"):
         open_source(tmp_path / "v.mha")
     assert open_source(tmp_path / "v.mha", spacing=(1, 2, 1)).spacing == (1, 2, 1)
 
