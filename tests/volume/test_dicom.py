@@ -137,9 +137,10 @@ def test_slices_that_cannot_be_decoded_are_refused(tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_slice_that_is_cut_off_is_refused(tmp_path):
+@pytest.mark.parametrize("which", [0, 1, -1])
+def test_a_slice_that_is_cut_off_is_refused(tmp_path, which):
     write_series(tmp_path, sample_values())
-    path = next(tmp_path.iterdir())
+    path = sorted(tmp_path.iterdir())[which]
     path.write_bytes(path.read_bytes()[:-100])
-    with pytest.raises(ArgumentError):
+    with pytest.raises(ArgumentError, match=f"{path.name}: cut off or damaged"):
         open_source(tmp_path)

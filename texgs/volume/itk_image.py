@@ -30,6 +30,7 @@ NUMBER, DESCRIPTION, PLACE, ORIENTATION = "0020|0011", "0008|103e", "0020|0032",
 UNEVEN = 0.05  # of the distance of slices: how much one may differ, as places are rounded in files
 TILT = 0.01  # of the distance of the outer slices: how far one may be shifted across it
 ROUNDING = 0.01  # mm
+MAGIC, PIXELS = b"DICM", b"\xe0\x7f\x10\x00"  # of a file with 128 bytes before it; the tag of its samples
 
 
 def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarray | None]:
@@ -136,23 +137,35 @@ def read_dicom(folder: Path, series: str | None) -> tuple[dict[str, Any], np.nda
 
 def chosen_files(folder: Path, series: str | None) -> list[str]:
     """Return the files of the only series, or of the one whose number or UID is asked for."""
-    found, titles = [], []
+    chosen, titles, listed = [], [], set[str]()
     for uid in sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder)):
         files = list(sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid))
         reader = header(Path(files[0]))
         number = tag(reader, NUMBER)
         titles.append(f"{number} ({tag(reader, DESCRIPTION)}, {len(files)} files, UID {uid})")
         if series is None or series in (uid, number):
-            found.append(files)
+            chosen.append(files)
+        listed.update(Path(file).name for file in files)
+    unlisted = (path for path in sorted(folder.iterdir()) if path.name not in listed)
+    if damaged := next((path.name for path in unlisted if is_slice(path)), None):
+        raise ArgumentError(f"{damaged}: cut off or damaged; put the whole slice there, or take it away")
     if not titles:
         raise ArgumentError("expected a folder of DICOM slices or TIFFs (.tif, .tiff), found none in it")
-    if len(found) != 1:
-        what = "several series" if series is None else f"{len(found)} series for {series!r}"
+    if len(chosen) != 1:
+        what = "several series" if series is None else f"{len(chosen)} series for {series!r}"
         raise ArgumentError(
             f"expected one series of DICOM slices, got {what}; choose one by dataset.volume.series=NUMBER "
             f"or UID, of {'; '.join(titles)}"
         )
-    return found[0]
+    return chosen[0]
+
+
+def is_slice(path: Path) -> bool:
+    """Return whether a file is one of DICOM with samples; GDCM lists none that is damaged."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(132)[128:] == MAGIC and PIXELS in file.read()
 
 
 def slice_of(path: Path) -> Slice:
