@@ -106,7 +106,7 @@ typedef struct {
 typedef struct texgs_frame texgs_frame;
 
 TEXGS_API int32_t texgs_abi_version(void);
-/* Digest of the sources that the library was built from (texgs/config/native_sources.py). */
+/* Digest of the sources that the library was built from (texgs/core/native_sources.py). */
 TEXGS_API const char* texgs_sources(void);
 TEXGS_API const char* texgs_error(void);
 /* "avx512", "avx2", "portable" (CPU), or the compiled architectures (CUDA). */
