@@ -106,6 +106,7 @@ def test_has_the_numbers_of_the_paper(name):
         assert (config.volume.size,) * 3 == dims
     if config.volume.dims is not None:
         assert tuple(config.volume.dims) == dims
+    if config.volume.dtype is not None:
         assert config.volume.file.endswith(f"_{'x'.join(map(str, dims))}_{config.volume.dtype}.raw")
 
 

@@ -84,7 +84,7 @@ def test_mistakes_in_the_path(tmp_path, monkeypatch):
         ("v.dcm", None, r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .* or a folder of slices"),
         ("v.raw.gz", None, r"unknown suffix '.raw.gz'"),
         ("empty", None, r"expected a folder of DICOM slices or TIFFs \(.tif, .tiff\), found none"),
-        ("v.npy", DIMS, "this format has a header; leave them out"),
+        ("v.npy", DIMS, "dims: not for this format; leave them out"),
     ]:
         with pytest.raises(ArgumentError, match=message):
             open_source(name, dims=dims)

@@ -21,10 +21,12 @@ class Volume:
     series: str | None = key(
         None, "number or UID of the series to read, where a folder of DICOM slices has several"
     )
+    variable: str | None = key(None, "name of the variable to read, where a NetCDF file has several")
+    column: int | None = key(None, "number of the column to read, from 1, where text has several", least=1)
     url: str | None = key(None, "where the file is downloaded from when it is not there")
     sha256: str | None = key(None, "checksum of the download")
     obtain: str = key("", "how to get a file that cannot be downloaded")
-    dims: list[int] | None = key(None, "samples along x, y, z; of raw files", "samples")
+    dims: list[int] | None = key(None, "samples along x, y, z; of raw files and text", "samples")
     dtype: str | None = key(None, "type of the samples of raw files, such as uint8 or float32")
     endian: str = key("little", "byte order of raw files", choices=("little", "big"))
     skip: int = key(0, "header of raw files", "bytes", least=0)

@@ -22,10 +22,11 @@ from texgs.volume.grid import (
     dims_of,
     require_room,
 )
+from texgs.volume.netcdf import open_netcdf
 from texgs.volume.slabs import ArraySource, RawSource, Source, size_text
+from texgs.volume.text_columns import open_text
 from texgs.volume.tiff import open_tiff, tiffs_in
 
-RAW_SUFFIXES = (".raw", ".bin", ".dat")
 # Tried in this order where the size of a plain file does not fit the type given.
 COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
 
@@ -40,25 +41,29 @@ def open_source(
     spacing: Triple | None = None,
     origin: Triple | None = None,
     series: str | None = None,
+    variable: str | None = None,
+    column: int | None = None,
 ) -> Source:
     """Open a volume without reading its samples where the format allows that.
 
     Formats: .raw, .bin, .dat (plain samples, described by the arguments); .npy (an array [Z, Y, X]); .tif,
     .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs in natural order; a folder of
     DICOM slices; .nrrd, .nhdr; .mhd, .mha; .nii, .nii.gz; .mrc; .gipl; .slc; .vti and .vtk (image data, first
-    point array). x is the fastest axis throughout. Axes are permuted and flipped to the closest ones
-    of physical space where the format tells about it: R, A, S of NIfTI; L, P, S of DICOM. They are not
-    resampled where they are oblique.
+    point array); .nc (classic NetCDF); .txt, .txt.gz (a line per sample). x is the fastest axis throughout.
+    Axes are permuted and flipped to the closest ones of physical space where the format tells about it:
+    R, A, S of NIfTI; L, P, S of DICOM. They are not resampled where they are oblique.
 
     Args:
         path: file, or folder of slices.
-        dims: samples along x, y, z; plain samples only.
+        dims: samples along x, y, z; plain samples and text only.
         dtype: numpy's name of the sample type, such as "uint16"; plain samples only.
         endian: "little" or "big"; plain samples only.
         skip: bytes before the first sample; plain samples only.
         spacing: replaces the file's, x, y, z.
         origin: replaces the file's, x, y, z.
         series: number or UID of one of several series in a folder of DICOM slices.
+        variable: name of one of several variables of a NetCDF file.
+        column: number of one of several columns of text, from 1.
 
     Raises:
         ArgumentError, ShapeError: if the file is missing, cannot be read, is unknown, damaged or no scalar
@@ -66,16 +71,11 @@ def open_source(
         OutOfMemoryError: if the format is one that is read as a whole, and the samples do not fit.
     """
     path = Path(path)
+    said = {"dims": dims, "dtype": dtype, "endian": endian, "skip": skip}
+    said |= {"series": series, "variable": variable, "column": column}
     try:
         _try_to_read(path)
-        if path.is_file() and _suffix(path) in RAW_SUFFIXES:
-            return _open_raw(path, dims, dtype, endian, skip, spacing, origin)
-        if (dims, dtype, endian, skip) != (None, None, "little", 0):
-            raise ArgumentError(
-                f"dims, dtype, endian and skip describe plain samples ({', '.join(RAW_SUFFIXES)}), but this "
-                "format has a header; leave them out"
-            )
-        return _open_with_header(path, spacing, origin, series)
+        return _open(path, spacing, origin, {k: v for k, v in said.items() if v not in (None, "little", 0)})
     except TexgsError as error:
         raise type(error)(f"{path}: {error}") from error
     except FileNotFoundError as error:
@@ -102,29 +102,29 @@ def _suffix(path: Path) -> str:
     return "".join(suffixes[-2:] if suffixes[-1:] == [".gz"] else suffixes[-1:])
 
 
-def _open_with_header(
-    path: Path, spacing: Triple | None, origin: Triple | None, series: str | None
-) -> Source:
-    """Open a format that says itself how its samples are stored, or a folder of slices."""
-    if path.is_dir() and not tiffs_in(path):
-        return open_foreign(path, spacing, origin, series)
-    if series is not None:
-        raise ArgumentError(f"series: expected a folder of DICOM slices to choose {series!r} of; omit it")
-    opener = open_tiff if path.is_dir() else OPENERS.get(_suffix(path))
+def _open(path: Path, spacing: Triple | None, origin: Triple | None, said: dict[str, Any]) -> Source:
+    """Open a file by its suffix, or a folder of slices; `said` are keys that only some formats take."""
+    suffix = _suffix(path)
+    opener, takes = OPENERS.get(suffix), KEYS.get(suffix, ())
+    if path.is_dir():
+        opener, takes = (open_tiff, ()) if tiffs_in(path) else (open_foreign, ("series",))
     if opener is None:
-        known = ", ".join((*RAW_SUFFIXES, *OPENERS))
-        raise ArgumentError(f"unknown suffix {_suffix(path)!r}; expected {known}, or a folder of slices")
-    return opener(path, spacing, origin)
+        raise ArgumentError(
+            f"unknown suffix {suffix!r}; expected {', '.join(OPENERS)}, or a folder of slices"
+        )
+    if unfit := [key for key in said if key not in takes]:
+        raise ArgumentError(f"{', '.join(unfit)}: not for this format; leave them out")
+    return opener(path, spacing, origin, **said)
 
 
 def _open_raw(
     path: Path,
-    dims: Dims | None,
-    dtype: str | None,
-    endian: str,
-    skip: int,
     spacing: Triple | None,
     origin: Triple | None,
+    dims: Dims | None = None,
+    dtype: str | None = None,
+    endian: str = "little",
+    skip: int = 0,
 ) -> RawSource:
     """Open plain samples; the file's size must fit exactly, the only check there is."""
     if dims is None or dtype is None:
@@ -187,11 +187,19 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None) -> So
     return ArraySource(Grid(values.T, spacing or (dx, dy, dz), origin or first), path.name)
 
 
-# Suffix: function of the path, and of spacing and origin where they replace the file's.
-OPENERS: dict[str, Callable[[Path, Triple | None, Triple | None], Source]] = {
+# Suffix: function of the path, of spacing and origin where they replace the file's, and of further keys.
+OPENERS: dict[str, Callable[..., Source]] = {
+    **dict.fromkeys((".raw", ".bin", ".dat"), _open_raw),
     **dict.fromkeys((".tif", ".tiff"), open_tiff),
     ".npy": _open_npy,
     **dict.fromkeys((".nii", ".nii.gz"), _open_nifti),
     **dict.fromkeys((".nrrd", ".nhdr", ".mhd", ".mha", ".mrc", ".gipl"), open_foreign),  # by SimpleITK
     **dict.fromkeys((".vti", ".vtk", ".slc"), open_foreign),  # by VTK
+    ".nc": open_netcdf,
+    **dict.fromkeys((".txt", ".txt.gz"), open_text),
+}
+KEYS: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys((".raw", ".bin", ".dat"), ("dims", "dtype", "endian", "skip")),
+    ".nc": ("variable",),
+    **dict.fromkeys((".txt", ".txt.gz"), ("dims", "column")),
 }

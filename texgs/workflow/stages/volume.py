@@ -73,7 +73,8 @@ def source(volume: Volume, path: Path) -> Source:
     given = {"dims": volume.dims, "spacing": volume.spacing, "origin": volume.origin}
     said: dict[str, Any] = {name: values and tuple(values) for name, values in given.items()}
     said |= {"dtype": volume.dtype, "endian": volume.endian, "skip": volume.skip}
-    return open_source(path, series=volume.series, **said)
+    said |= {"series": volume.series, "variable": volume.variable, "column": volume.column}
+    return open_source(path, **said)
 
 
 def inputs(config: Config) -> dict[str, Path]:

@@ -1,0 +1,97 @@
+"""Text files in the layout of the contest of 2008, against NumPy arrays."""
+
+import gzip
+
+import numpy as np
+import pytest
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.prepare import prepare
+from texgs.volume.sources import open_source
+
+DIMS = (6, 5, 4)
+TABLE = np.random.default_rng(0).random((120, 10)).astype(np.float32)
+LINES = [" ".join(f"{number:.9E}" for number in row) for row in TABLE]
+
+
+def write_lines(path, lines, end="\n"):
+    """Write lines, gzipped where the name says so."""
+    text = ("\n".join(lines) + end).encode()
+    path.write_bytes(gzip.compress(text) if path.suffix == ".gz" else text)
+    return path
+
+
+@pytest.mark.parametrize("name", ["multifield.0099.txt.gz", "multifield.0099.txt"])
+@pytest.mark.parametrize("column", [1, 2, 10])
+def test_a_column_slab_by_slab_and_in_any_order(tmp_path, name, column):
+    source = open_source(write_lines(tmp_path / name, LINES), dims=DIMS, column=column, spacing=(1, 2, 3))
+    assert (source.dims, source.dtype, source.spacing, source.origin) == (
+        DIMS,
+        "float32",
+        (1, 2, 3),
+        (0, 0, 0),
+    )
+    values = TABLE[:, column - 1].reshape(4, 5, 6)
+    for start, stop in [(0, 1), (1, 3), (3, 4), (0, 4), (2, 3), (1, 2), (3, 4)]:
+        np.testing.assert_array_equal(source.slices(start, stop), values[start:stop])
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_x_changes_fastest_then_y(tmp_path, axis):
+    """The loops of the contest's page: for z, for y, for x."""
+    lines = [f"0 {(x, y, z)[axis]}" for z in range(4) for y in range(5) for x in range(6)]
+    source = open_source(write_lines(tmp_path / "v.txt", lines), dims=DIMS, column=2)
+    slopes = [np.diff(source.slices(0, 4), axis=2 - each).max() for each in range(3)]
+    assert slopes == [float(each == axis) for each in range(3)]
+
+
+def test_blanks_around_numbers_and_after_the_last_line(tmp_path):
+    lines = ["  " + line.replace(" ", " \t ") + " " for line in LINES]
+    for end in ("", "\n", "\n\n"):
+        source = open_source(write_lines(tmp_path / "v.txt", lines, end), dims=DIMS, column=3)
+        np.testing.assert_array_equal(source.slices(0, 4).ravel(), TABLE[:, 2])
+
+
+def test_a_single_column_needs_no_number(tmp_path):
+    path = write_lines(tmp_path / "v.txt", [line.split()[4] for line in LINES])
+    np.testing.assert_array_equal(open_source(path, dims=DIMS).slices(0, 4).ravel(), TABLE[:, 4])
+
+
+@pytest.mark.parametrize(
+    ("lines", "keys", "message"),
+    [
+        (LINES, {"column": 2, "dims": None}, "text has no header; set dims, and column where it has several"),
+        (LINES, {}, r"expected one column, got 10; choose one by dataset\.volume\.column=NUMBER"),
+        (LINES, {"column": 11}, "column: expected 1 to 10, the columns of the file, got 11"),
+        (LINES, {"column": 2, "dims": (6, 5)}, r"dims: expected at least 2 .* got \[6, 5\]"),
+        (LINES, {"column": 2, "dtype": "float32", "skip": 4}, "dtype, skip: not for this format; leave them"),
+        (
+            LINES[:-7],
+            {"column": 2},
+            "expected 6 x 5 x 4 = 120 lines, found 113; correct dims, or get the file",
+        ),
+        ([*LINES, LINES[0]], {"column": 2}, "expected 6 x 5 x 4 = 120 lines, found more; correct dims"),
+        (["x T", *LINES[1:]], {"column": 2}, "expected text with a line per sample .* to float: 'T'"),
+        ([], {"column": 2}, "expected text with a line per sample and a number per column, got No columns"),
+    ],
+)
+def test_mistakes(tmp_path, lines, keys, message):
+    path = write_lines(tmp_path / "v.txt", lines, end="\n" if lines else "")
+    with pytest.raises(ArgumentError, match=message) as caught:
+        open_source(path, **{"dims": DIMS, **keys}).slices(0, 4)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.9, 0.999])
+def test_a_compressed_file_that_is_cut_off_is_refused(tmp_path, share):
+    path = write_lines(tmp_path / "v.txt.gz", LINES)
+    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
+    with pytest.raises(ArgumentError, match=r"v\.txt\.gz: expected text with .* damaged or cut off\?"):
+        open_source(path, dims=DIMS, column=2).slices(0, 4)
+
+
+def test_a_line_that_is_too_short_is_named_by_its_place(tmp_path):
+    path = write_lines(tmp_path / "v.txt", [*LINES[:50], "1 2", *LINES[51:]])
+    source = open_source(path, dims=DIMS, column=4)
+    with pytest.raises(ArgumentError, match=r"got 1 that are NaN or infinite, the first at .* \(2, 3, 1\)"):
+        prepare(source, tmp_path / "v.nrrd")
