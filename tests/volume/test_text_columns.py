@@ -61,8 +61,12 @@ def test_a_single_column_needs_no_number(tmp_path):
     ("lines", "keys", "message"),
     [
         (LINES, {"column": 2, "dims": None}, "text has no header; set dims, and column where it has several"),
-        (LINES, {}, r"expected one column, got 10; choose one by dataset\.volume\.column=NUMBER"),
-        (LINES, {"column": 11}, "column: expected 1 to 10, the columns of the file, got 11"),
+        (
+            LINES,
+            {},
+            r"dataset\.volume\.column: expected a number from 1 to 10, got none",
+        ),
+        (LINES, {"column": 11}, "expected a number from 1 to 10, got 11"),
         (LINES, {"column": 2, "dims": (6, 5)}, r"dims: expected at least 2 .* got \[6, 5\]"),
         (LINES, {"column": 2, "dtype": "float32", "skip": 4}, "dtype, skip: not for this format; leave them"),
         (

@@ -22,9 +22,9 @@ from texgs.volume.grid import (
     dims_of,
     require_room,
 )
-from texgs.volume.netcdf import open_netcdf
+from texgs.volume.netcdf import VariableSource
 from texgs.volume.slabs import ArraySource, RawSource, Source, size_text
-from texgs.volume.text_columns import open_text
+from texgs.volume.text_columns import ColumnSource
 from texgs.volume.tiff import open_tiff, tiffs_in
 
 # Tried in this order where the size of a plain file does not fit the type given.
@@ -34,15 +34,9 @@ COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
 def open_source(
     path: str | Path,
     *,
-    dims: Dims | None = None,
-    dtype: str | None = None,
-    endian: str = "little",
-    skip: int = 0,
     spacing: Triple | None = None,
     origin: Triple | None = None,
-    series: str | None = None,
-    variable: str | None = None,
-    column: int | None = None,
+    **keys: Any,
 ) -> Source:
     """Open a volume without reading its samples where the format allows that.
 
@@ -55,15 +49,11 @@ def open_source(
 
     Args:
         path: file, or folder of slices.
-        dims: samples along x, y, z; plain samples and text only.
-        dtype: numpy's name of the sample type, such as "uint16"; plain samples only.
-        endian: "little" or "big"; plain samples only.
-        skip: bytes before the first sample; plain samples only.
         spacing: replaces the file's, x, y, z.
         origin: replaces the file's, x, y, z.
-        series: number or UID of one of several series in a folder of DICOM slices.
-        variable: name of one of several variables of a NetCDF file.
-        column: number of one of several columns of text, from 1.
+        keys: what only some formats take, see `KEYS`: `dims`, samples along x, y, z; `dtype`, numpy's name of
+            the sample type, such as "uint16"; `endian`, "little" or "big"; `skip`, bytes before the first
+            sample; `series`, number or UID of one of several; `variable`, its name; `column`, from 1.
 
     Raises:
         ArgumentError, ShapeError: if the file is missing, cannot be read, is unknown, damaged or no scalar
@@ -71,11 +61,10 @@ def open_source(
         OutOfMemoryError: if the format is one that is read as a whole, and the samples do not fit.
     """
     path = Path(path)
-    said = {"dims": dims, "dtype": dtype, "endian": endian, "skip": skip}
-    said |= {"series": series, "variable": variable, "column": column}
+    said = {key: value for key, value in keys.items() if value not in (None, "little", 0)}
     try:
         _try_to_read(path)
-        return _open(path, spacing, origin, {k: v for k, v in said.items() if v not in (None, "little", 0)})
+        return _open(path, spacing, origin, said)
     except TexgsError as error:
         raise type(error)(f"{path}: {error}") from error
     except FileNotFoundError as error:
@@ -195,8 +184,8 @@ OPENERS: dict[str, Callable[..., Source]] = {
     **dict.fromkeys((".nii", ".nii.gz"), _open_nifti),
     **dict.fromkeys((".nrrd", ".nhdr", ".mhd", ".mha", ".mrc", ".gipl"), open_foreign),  # by SimpleITK
     **dict.fromkeys((".vti", ".vtk", ".slc"), open_foreign),  # by VTK
-    ".nc": open_netcdf,
-    **dict.fromkeys((".txt", ".txt.gz"), open_text),
+    ".nc": VariableSource,
+    **dict.fromkeys((".txt", ".txt.gz"), ColumnSource),
 }
 KEYS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((".raw", ".bin", ".dat"), ("dims", "dtype", "endian", "skip")),

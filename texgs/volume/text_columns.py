@@ -1,10 +1,10 @@
-"""Text with a line per sample and a column per quantity, such as the contest's files of `ionization`."""
+"""Text with a line per sample and a column per quantity, read slab by slab."""
 
 from __future__ import annotations
 
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -13,79 +13,57 @@ from texgs.core.io import reading_as
 from texgs.volume.grid import ONES, ZEROS, Dims, Triple
 from texgs.volume.slabs import Source
 
-if TYPE_CHECKING:
-    from pandas.io.parsers import TextFileReader
-
 KIND = "text with a line per sample and a number per column"
 
 
-def open_text(
-    path: Path,
-    spacing: Triple | None,
-    origin: Triple | None,
-    dims: Dims | None = None,
-    column: int | None = None,
-) -> Source:
-    """Open a column, counted from 1, of a text file, gzipped or not; x changes fastest from line to line."""
-    if dims is None:
-        raise ArgumentError("text has no header; set dims, and column where it has several")
-    with reading_as(KIND), _lines(path, nrows=1) as first:
-        n_columns = first.get_chunk().shape[1]
-    if column is None and n_columns > 1:
-        raise ArgumentError(
-            f"expected one column, got {n_columns}; choose one by dataset.volume.column=NUMBER"
-        )
-    if not 1 <= (column or 1) <= n_columns:
-        raise ArgumentError(f"column: expected 1 to {n_columns}, the columns of the file, got {column}")
-    return ColumnSource(path, dims, column or 1, spacing or ONES, origin or ZEROS)
-
-
 class ColumnSource(Source):
-    """A column of a text file; it is read forwards, in the memory of a slab, so slabs are best in order."""
+    """A column, counted from 1; x changes fastest from line to line. Slabs are best asked for in order."""
 
-    def __init__(self, path: Path, dims: Dims, column: int, spacing: Triple, origin: Triple) -> None:
-        super().__init__(path.name, dims, np.dtype(np.float32), spacing, origin)
-        self._path, self._column = path, column
-        self._reader: TextFileReader | None = None
-        self._line = 0  # the next one that the reader returns
+    def __init__(
+        self,
+        path: Path,
+        spacing: Triple | None,
+        origin: Triple | None,
+        dims: Dims | None = None,
+        column: int | None = None,
+    ) -> None:
+        if dims is None:
+            raise ArgumentError("text has no header; set dims, and column where it has several")
+        super().__init__(path.name, dims, np.dtype(np.float32), spacing or ONES, origin or ZEROS)
+        with reading_as(KIND), _lines(path, nrows=1) as first:
+            n_columns = first.get_chunk().shape[1]
+        column = 1 if column is None and n_columns == 1 else column
+        if column is None or column > n_columns:
+            raise ArgumentError(
+                f"dataset.volume.column: expected a number from 1 to {n_columns}, got {column or 'none'}"
+            )
+        self._path, self._options = path, {"usecols": [column - 1], "dtype": np.float32}
+        self._reader, self._line = _lines(path, **self._options), 0  # the line that is read next
 
     def slices(self, start: int, stop: int) -> np.ndarray:
-        """Return samples [stop - start, Y, X]; with the last slice, the file has to end."""
+        """Return samples [stop - start, Y, X]; the file has to end with the last slice."""
         x, y, z = self.dims
+        first, count = start * x * y, (stop - start) * x * y
         with reading_as(KIND, where=f"{self._path}: "):
-            if self._reader is None or self._line != start * x * y:
-                self._open(start * x * y)
-            values = self._next((stop - start) * x * y)
-            is_longer = stop == z and np.isfinite(self._next(1)).any()
-        if self._line < stop * x * y or is_longer:
-            found = "more" if is_longer else f"{self._line}"
+            if self._line != first:
+                self._reader.close()
+                self._reader = _lines(self._path, skiprows=first, **self._options)
+            try:
+                values = self._reader.get_chunk(count + (stop == z)).to_numpy().ravel()
+            except StopIteration:
+                values = np.empty(0, np.float32)
+        self._line = first + len(values)
+        is_longer = not np.isnan(values[count:]).all()  # an empty line at the end is none
+        if len(values) < count or is_longer:
             raise ArgumentError(
-                f"{self._path}: expected {x} x {y} x {z} = {prod(self.dims)} lines, found {found}; "
-                "correct dims, or get the file again"
+                f"{self._path}: expected {x} x {y} x {z} = {prod(self.dims)} lines, found "
+                f"{'more' if is_longer else self._line}; correct dims, or get the file again"
             )
-        return values.reshape(stop - start, y, x)
-
-    def _open(self, line: int) -> None:
-        """Start to read at a line."""
-        if self._reader is not None:
-            self._reader.close()
-        columns = {"usecols": [self._column - 1], "dtype": np.float32}
-        self._reader, self._line = _lines(self._path, skiprows=line, **columns), line
-
-    def _next(self, count: int) -> np.ndarray:
-        """Return the numbers of the next lines; fewer where the file ends."""
-        assert self._reader is not None
-        try:
-            values = self._reader.get_chunk(count).to_numpy().ravel()
-        except StopIteration:
-            values = np.empty(0, np.float32)
-        self._line += len(values)
-        return values
+        return values[:count].reshape(stop - start, y, x)
 
 
-def _lines(path: Path, **options: object) -> TextFileReader:
-    """Return a reader of lines of numbers between blanks."""
+def _lines(path: Path, **options: Any) -> Any:
+    """Return pandas' reader of lines of numbers between blanks."""
     import pandas
 
-    fixed = {"sep": r"\s+", "header": None, "skip_blank_lines": False, "iterator": True}
-    return pandas.read_csv(path, **fixed, **options)  # type: ignore[call-overload]
+    return pandas.read_csv(path, sep=r"\s+", header=None, skip_blank_lines=False, iterator=True, **options)
