@@ -1,5 +1,6 @@
 """Measures of scenes that leave some of them undefined, and of fields that have another one's surfaces."""
 
+import sys
 from dataclasses import replace
 
 import pytest
@@ -7,6 +8,7 @@ import torch
 
 from tests.fields.surfels.test_composition import ball
 from tests.models.clips import write_clip
+from texgs.core.checksum import Checksums
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
@@ -14,12 +16,14 @@ from texgs.metrics.clip import clip_scores
 from texgs.metrics.edits import clip, consistency
 from texgs.metrics.metric import MeasuredScene
 from texgs.models.clip import Clip
+from texgs.models.weights import checksum
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.volume.cameras import spiral as path
 
 CAMERAS = path(12, 4.0, 30.0, 32, 32)
-MISSING = {"vgg16": None, "lpips_vgg": None, "none": None}
+CLIP = "clip-vit-base-patch32"
+MISSING = {"vgg16": None, "lpips_vgg": None, CLIP: None}
 
 
 @pytest.fixture
@@ -39,7 +43,7 @@ def scenes(tmp_path):
 def subject(before, after, geometry, **more):
     """What metrics look at, of scene files."""
     scenes = read_scene(before), read_scene(after)
-    some = {"cameras": CAMERAS, "some": CAMERAS[:4], "captions": ("", ""), "clip": "none"}
+    some = {"cameras": CAMERAS, "some": CAMERAS[:4], "captions": ("", ""), "clip": CLIP}
     some |= {"weights": MISSING, "styles": [], "has_normals": True, **more}
     return MeasuredScene("ball", scenes, tuple(scene.open() for scene in scenes), geometry, **some)
 
@@ -73,6 +77,23 @@ def test_surfaces_of_hidden_models_do_not_count(scenes, tmp_path):
     of_both = {name: measured(file, tmp_path / "both.yaml")["short_rmse"] for name, file in shown.items()}
     assert of_both["hidden"] == pytest.approx(expected, rel=1e-4)
     assert of_both["alone"] != pytest.approx(expected, rel=0.05)
+
+
+def test_clip_without_weights_or_without_transformers_is_not_measured_and_says_why(
+    scenes, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path))
+    monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path))
+    given = subject(*[scenes["clear"]] * 3, captions=("a beetle", "gold"))
+    assert clip.run(given)["clip_missing"].startswith(f"the weights of {CLIP} are not on this machine;")
+    (tmp_path / CLIP).mkdir()
+    for name in ("config.json", "model.safetensors", "vocab.json"):
+        (tmp_path / CLIP / name).write_text("{}")
+    monkeypatch.setitem(sys.modules, "transformers", None)
+    planned = {CLIP: checksum(CLIP, Checksums())}
+    assert clip.run(replace(given, weights=planned)) == {
+        "clip_missing": f"transformers, which reads {CLIP}, is not installed; pip install '.[models]' adds it"
+    }
 
 
 def test_clip_sees_the_edited_scene_and_the_one_before(scenes, tmp_path):

@@ -1,13 +1,15 @@
 import hashlib
+import sys
 from importlib.util import find_spec
 
 import pytest
 
 from tests.real_data import real_data
+from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError, MissingDataError
 from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
 from texgs.models.networks import read_tensors
-from texgs.models.weights import available, locate
+from texgs.models.weights import checksum, find, locate, titled, unusable
 
 CONTENT = b"weights of a model"
 CHECKSUM = hashlib.sha256(CONTENT).hexdigest()
@@ -38,19 +40,19 @@ def put(path, content=CONTENT):
 @pytest.mark.parametrize("place", ["weights", "cache/weights", "torch/hub/checkpoints"])
 @pytest.mark.parametrize("name", ["tiny.bin", "other.bin"])
 def test_a_file_is_found_where_it_may_lie_under_either_name(folder, place, name):
-    assert not available("tiny")
+    assert not find("tiny")
     path = put(folder / place / name)
     assert locate("tiny") == path
-    assert available("tiny")
+    assert find("tiny")
     first = put(folder / "weights" / name)
     assert locate("tiny") == first, "of several files"
 
 
 def test_another_file_of_that_name_is_refused_also_after_it_was_whole(folder):
     path = put(folder / "weights" / "tiny.bin")
-    assert available("tiny")
+    assert find("tiny")
     put(path, b"half of")
-    for look in (locate, available):
+    for look in (locate, find):
         with pytest.raises(ArgumentError, match=f"tiny.bin: expected .* with checksum {CHECKSUM[:12]}"):
             look("tiny")
 
@@ -70,9 +72,44 @@ def test_missing_weights_are_one_sentence_with_size_source_and_place(folder, cap
 @pytest.mark.parametrize("place", ["weights/hub", f"hub/models--texgs--none/snapshots/{'0' * 40}"])
 def test_a_folder_is_found_once_it_is_complete(folder, place):
     put(folder / place / "config.json")
-    assert not available("hub")
+    assert not find("hub")
     put(folder / place / "pytorch_model.bin")
     assert locate("hub") == folder / place
+
+
+def test_another_revision_in_the_cache_of_the_hub_is_found_and_named_and_the_pinned_one_comes_first(folder):
+    for revision in ("f" * 40, "a" * 40):
+        put(folder / "hub" / "models--texgs--none" / "snapshots" / revision / "config.json")
+    assert find("hub") is None, "both lack a file"
+    assert titled("hub") == "hub"
+    other = put(folder / "hub" / "models--texgs--none" / "snapshots" / ("f" * 40) / "model.safetensors")
+    assert locate("hub") == other.parent
+    assert titled("hub") == "hub (revision ffffffffffff, not 000000000000)"
+    of_other = checksum("hub", Checksums())
+    for name in ("config.json", "model.safetensors"):
+        put(folder / "hub" / "models--texgs--none" / "snapshots" / ("0" * 40) / name, b"pinned")
+    assert (find("hub").name, titled("hub")) == ("0" * 40, "hub")
+    assert checksum("hub", Checksums()) != of_other
+    for name in ("config.json", "model.safetensors"):
+        put(folder / "weights" / "hub" / name)
+    assert (find("hub"), titled("hub")) == (folder / "weights" / "hub", "hub"), "the folder is asked first"
+
+
+def test_weights_without_the_package_that_reads_them_are_of_no_use(folder, monkeypatch):
+    assert unusable("hub").startswith("the weights of hub are not on this machine; `texgs weights hub`")
+    for name in ("config.json", "model.safetensors"):
+        put(folder / "weights" / "hub" / name)
+    monkeypatch.setitem(sys.modules, "transformers", None)
+    assert unusable("hub") == (
+        "transformers, which reads hub, is not installed; pip install '.[models]' adds it"
+    )
+    assert checksum("hub", Checksums()) is None
+    put(folder / "weights" / "tiny.bin")
+    assert unusable("tiny") == "", "a file needs none"
+    monkeypatch.delitem(sys.modules, "transformers")
+    if find_spec("transformers"):
+        assert unusable("hub") == ""
+        assert checksum("hub", Checksums())
 
 
 def test_a_folder_that_is_missing_names_its_repository_and_an_unknown_name_those_known(folder):

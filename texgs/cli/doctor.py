@@ -202,17 +202,17 @@ def cache() -> Finding:
 def weights() -> Finding:
     """Find weights of pretrained models on this machine; edits say what works without any."""
     from texgs.models.catalogue import CATALOGUE
-    from texgs.models.weights import available
+    from texgs.models.weights import find, titled
 
     try:
-        there = [name for name in CATALOGUE if available(name)]
+        there = {name: titled(name) for name in CATALOGUE if find(name)}
     except TexgsError as error:
         return replace(told(error), state="warning")
     lacking = ", ".join(name for name in CATALOGUE if name not in there)
     where = f"optional: `texgs weights NAME`, or put them into {weights_folder()}, or set TEXGS_WEIGHTS"
     if not there:
         return Finding("missing", f"none of {lacking}", where)
-    state = f"{', '.join(there)}; not {lacking}" if lacking else ", ".join(there)
+    state = f"{', '.join(there.values())}; not {lacking}" if lacking else ", ".join(there.values())
     return Finding("ok", state, where if lacking else "")
 
 

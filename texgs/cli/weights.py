@@ -19,13 +19,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Download what is named; then list all with their sizes and places."""
     from texgs.models.catalogue import CATALOGUE
-    from texgs.models.weights import find, locate
+    from texgs.models.weights import find, locate, titled
 
     for name in arguments.names:
         locate(name)
     for name, entry in CATALOGUE.items():
         place = find(name) or f"not here; {entry.source}"
-        print(f"{name:24} {entry.megabytes:6.0f} MB  {place}")
+        print(f"{titled(name):24} {entry.megabytes:6.0f} MB  {place}")
     return 0
 
 

@@ -67,7 +67,7 @@ class MeasuredScene:
     some: Sequence[Camera]  # spread over it
     captions: tuple[str, str]  # before and after
     clip: str  # backbone of CLIP
-    weights: Mapping[str, str | None]  # digests by name; None for those that are not on this machine
+    weights: Mapping[str, str | None]  # digests by name; None for those that nothing can work with here
     styles: Sequence[StyledModel]  # of models that follow a picture; none where parts of models do
     has_normals: bool  # whether fields of this kind render normals
 

@@ -42,6 +42,7 @@ class Snapshot:
     megabytes: float
     needs: tuple[tuple[str, ...], ...]  # files of the folder, each with the names it may have
     patterns: tuple[str, ...]  # of the files that are downloaded
+    packages: tuple[str, ...] = ("transformers",)  # that read it, of the extra `models`
 
     @property
     def source(self) -> str:
@@ -118,5 +119,6 @@ CATALOGUE: dict[str, Single | Snapshot] = {
             *((file,) for file in DIFFUSION_FILES),
         ),
         (*TEXT_FILES, *DIFFUSION_FILES),
+        ("transformers", "diffusers"),
     ),
 }

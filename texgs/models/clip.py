@@ -14,7 +14,7 @@ from torch.nn import functional as F
 from texgs.core import check
 from texgs.core.errors import ArgumentError
 from texgs.models.networks import read_folder
-from texgs.models.weights import locate
+from texgs.models.weights import locate, titled
 
 MEAN = (0.48145466, 0.4578275, 0.40821073)  # that CLIP normalises images with, per channel
 DEVIATION = (0.26862954, 0.26130258, 0.27577711)
@@ -33,7 +33,7 @@ class Clip:
         """Read a model in float32, by a name of the catalogue or from a folder with its tokenizer."""
         folder = Path(weights) if Path(weights).is_dir() else locate(str(weights))
         network, tokenizer = read_folder(folder, "clip", ("CLIPModel", "AutoTokenizer"))
-        name = folder.name if Path(weights).is_dir() else str(weights)
+        name = folder.name if Path(weights).is_dir() else titled(str(weights))
         return cls(name, network.to(device), tokenizer)
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 from texgs.core.cache import cache_folder, weights_folder
@@ -30,7 +31,7 @@ def find(name: str) -> Path | None:
         raise ArgumentError(f"weights: expected one of {', '.join(CATALOGUE)}, got {name!r}")
     entry = CATALOGUE[name]
     if isinstance(entry, Snapshot):
-        folders = (weights_folder() / name, _hub_folder(entry))
+        folders = (weights_folder() / name, *_hub_folders(entry))
         return next((folder for folder in folders if _is_complete(folder, entry)), None)
     for file in entry.files:
         for folder in _file_folders():
@@ -40,15 +41,32 @@ def find(name: str) -> Path | None:
     return None
 
 
-def available(name: str) -> bool:
-    """Return whether the weights of a model are on this machine; see `find`."""
-    return find(name) is not None
+def unusable(name: str) -> str:
+    """Return why nothing can work with the weights of a model here, and what to do; empty where it can."""
+    if find(name) is None:
+        how = f"`texgs weights {name}` downloads them or says how to get them"
+        return f"the weights of {name} are not on this machine; {how}"
+    entry = CATALOGUE[name]
+    packages = entry.packages if isinstance(entry, Snapshot) else ()
+    if lacking := [package for package in packages if find_spec(package) is None]:
+        return f"{lacking[0]}, which reads {name}, is not installed; pip install '.[models]' adds it"
+    return ""
+
+
+def titled(name: str) -> str:
+    """Return the name of weights, with the revision of a snapshot that is not the one of the catalogue."""
+    entry = CATALOGUE[name]
+    if not isinstance(entry, Snapshot) or (path := find(name)) is None:
+        return name
+    if path.name in (name, entry.revision):
+        return name
+    return f"{name} (revision {path.name[:12]}, not {entry.revision[:12]})"
 
 
 def checksum(name: str, checksums: Checksums) -> str | None:
-    """Return the checksum of the weights that `find` finds, by what is known of files; None without any."""
+    """Return the checksum of the weights that `find` finds, by what is known of files; None if unusable."""
     path = find(name)
-    if path is None:
+    if path is None or unusable(name):
         return None
     entry = CATALOGUE[name]
     if isinstance(entry, Single):
@@ -65,11 +83,12 @@ def _file_folders() -> Iterator[Path]:
     yield (Path(home).expanduser() if home else Path.home() / ".cache" / "torch") / "hub" / "checkpoints"
 
 
-def _hub_folder(entry: Snapshot) -> Path:
-    """Return the folder of a snapshot in the cache of the Hugging Face hub, whether it is there or not."""
+def _hub_folders(entry: Snapshot) -> list[Path]:
+    """Return the folders of snapshots in the cache of the Hugging Face hub, first that of the catalogue."""
     home = Path(os.environ.get("HF_HOME") or Path.home() / ".cache" / "huggingface").expanduser()
     cache = Path(os.environ.get("HF_HUB_CACHE") or home / "hub").expanduser()
-    return cache / f"models--{entry.repository.replace('/', '--')}" / "snapshots" / entry.revision
+    snapshots = cache / f"models--{entry.repository.replace('/', '--')}" / "snapshots"
+    return [snapshots / entry.revision, *sorted(snapshots.glob("*"))]
 
 
 def _is_complete(folder: Path, entry: Snapshot) -> bool:

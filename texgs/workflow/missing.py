@@ -33,13 +33,11 @@ def lacking(config: Config) -> list[str]:
 
 
 def missing_weights(config: Config) -> list[str]:
-    """Return what is said of weights that an edit needs and this machine has not; nothing is downloaded."""
+    """Return what is said of weights that an edit needs and cannot work with; nothing is downloaded."""
     return [
-        f"edit {config.edit.name}: the weights of {name} are not on this machine; "
-        f"`texgs weights {name}` downloads them or says how to get them"
-        + (f", and {word} does without them" if word else "")
+        f"edit {config.edit.name}: {why}" + (f", and {word} does without them" if word else "")
         for name, word in needed(config).items()
-        if not weights.available(name)
+        if (why := weights.unusable(name))
     ]
 
 
@@ -53,7 +51,7 @@ def needed(config: Config) -> Mapping[str, str]:
 
 
 def weights_of(stage: Stage, config: Config, checksums: Checksums) -> dict[str, str | None] | None:
-    """Return checksums of all weights that a stage may work with, None for those that are not here.
+    """Return checksums of all weights that a stage may work with, None for those that it cannot.
 
     They are part of a job's settings: when weights arrive or change, what used them is made again. A stage
     that never works with weights has None.

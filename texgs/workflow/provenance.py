@@ -18,6 +18,7 @@ from typing import Any
 from texgs import __version__
 from texgs.core.memory import MIB, peak_memory
 from texgs.edit.method import NO_METHOD
+from texgs.models.weights import titled
 
 PACKAGES = (  # whose code decides results
     *("torch", "numpy", "scipy", "kornia", "opencv-python-headless", "pillow", "matplotlib", "av"),
@@ -43,7 +44,7 @@ def record(
         "git_sha": git_revision(),
         "inputs": identity["inputs"],
         "made_from": made_from,
-        "weights": settings.get("weights", {}),
+        "weights": {titled(name): sha for name, sha in settings.get("weights", {}).items()},
         "versions": versions(),
         "machine": machine(),
     }

@@ -108,7 +108,8 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     scene = task.each_part(one)
     lambda_s = recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None
     notes = {"seconds": seconds}
-    return EditedScene(scene, how(adapted, keys.clip), look.write_pictures(), lambda_s, notes, look.losses)
+    words = how(adapted, network.name if network else keys.clip)
+    return EditedScene(scene, words, look.write_pictures(), lambda_s, notes, look.losses)
 
 
 def how(recipes: Sequence[Recipe], clip: str) -> str:

@@ -18,9 +18,10 @@ def run(measured: MeasuredScene) -> dict[str, Any]:
     from texgs.core.progress import progress
     from texgs.metrics.clip import clip_scores
     from texgs.models.clip import Clip
+    from texgs.models.weights import unusable
 
     if measured.weights[measured.clip] is None:
-        return {"clip_missing": f"the weights of {measured.clip} are not on this machine"}
+        return {"clip_missing": unusable(measured.clip)}
     if not all(measured.captions):
         return {"clip_missing": "the edit has no captions"}
     clip = Clip.load(measured.clip, measured.shown.device)
