@@ -89,6 +89,12 @@ def test_looks_are_shown_side_by_side(results, capsys, monkeypatch):
     columns = ["volume", "as fitted", "glass", "gold"]
     assert shown == [(row, column) for row in ("front", "side") for column in columns]
     assert np.asarray(Image.open(folder / "gallery.png").convert("RGB")).std() > 5
+    looks = ("edits=[glass,gold]", "edit.looks=true", "dataset.looks={TF01: {}, TF02: {}}")
+    assert main(["gallery", *WORDS, *FEW, *looks, "gallery.size=32", "gallery.name=given"]) == 0
+    given = folder.with_name("given") / "gallery.png"
+    assert Image.open(given).height > 1.3 * Image.open(folder / "gallery.png").height
+    told = json.loads(given.with_name("metrics.json").read_text())["pictures"]["gallery.png"]
+    assert "what they were given" in told
     one = "gallery.grids=[{rows: [{edit: gold, changes: ['TF01.opacity=x']}], columns: [{}]}]"
     assert main(["gallery", *WORDS, *FEW, "edits=[gold]", one]) == 2
     message = "TF01.opacity=x: models.TF01.opacity: expected a factor from 0 to 1000, got 'x'"

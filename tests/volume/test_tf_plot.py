@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from texgs.core.figures import write_figure
 from texgs.volume.tf_plot import plot
 from texgs.volume.transfer import TransferFunction
 
@@ -11,6 +12,11 @@ RED = TransferFunction(((0, 0), (1, 0.5), (2, 0.5), (3, 0)), ((0, 1, 0, 0),))
 BLUE = TransferFunction(((4, 1), (6, 1)), ((0, 0, 0, 1),))
 
 
+def written(path, *values):
+    """Write the figure of some values; returns its path."""
+    return write_figure(path, plot(*values))
+
+
 def area(path, color, tolerance=60):
     """Number of pixels near a colour."""
     pixels = np.asarray(Image.open(path).convert("RGB")).astype(int)
@@ -18,20 +24,20 @@ def area(path, color, tolerance=60):
 
 
 def test_areas_are_as_large_as_opacity_times_range(tmp_path):
-    path = plot(tmp_path / "a" / "plot.png", np.ones(10), 0, 10, {"TF01": RED, "TF02": BLUE}, "engine")
+    path = written(tmp_path / "a" / "plot.png", np.ones(10), 0, 10, {"TF01": RED, "TF02": BLUE}, "engine")
     assert Image.open(path).size == (1000, 450)
     assert area(path, (255, 38, 38)) / area(path, (38, 38, 255)) == pytest.approx(1 / 2, rel=0.05)
 
 
 def test_the_histogram_is_grey_and_logarithmic(tmp_path):
     grey = (209, 209, 209)
-    small = area(plot(tmp_path / "1.png", [1e1, 1e5], 0, 1, {}), grey, 5)
-    large = area(plot(tmp_path / "2.png", [1e5, 1e5], 0, 1, {}), grey, 5)
+    small = area(written(tmp_path / "1.png", [1e1, 1e5], 0, 1, {}), grey, 5)
+    large = area(written(tmp_path / "2.png", [1e5, 1e5], 0, 1, {}), grey, 5)
     assert 0.5 < small / large < 0.75  # linear: 0.5
 
 
 def test_functions_beyond_the_data_are_in_the_picture_and_titles_are_no_mathematics(tmp_path):
-    path = plot(tmp_path / "plot.png", [1, 2, 3], 0, 1, {"$x_{$": BLUE}, "$\\frac{$ 5 $")
+    path = written(tmp_path / "plot.png", [1, 2, 3], 0, 1, {"$x_{$": BLUE}, "$\\frac{$ 5 $")
     assert area(path, (38, 38, 255)) > 5000
 
 
@@ -39,5 +45,5 @@ def test_pyplot_is_left_alone(tmp_path):
     import sys
 
     before = "matplotlib.pyplot" in sys.modules
-    plot(tmp_path / "plot.png", [1], 0, 1, {})
+    written(tmp_path / "plot.png", [1], 0, 1, {})
     assert ("matplotlib.pyplot" in sys.modules) == before

@@ -48,6 +48,23 @@ def test_each_look_is_there_once_for_each_recipe_that_its_method_takes():
     ]
 
 
+def test_a_comparison_shows_what_its_looks_were_given():
+    words = (*ENGINE, "fits=[quick,gaussians_quick]", "edit.looks=true")
+    looks = compose(ENGINE).dataset.looks
+
+    def given(*more):
+        settings = GALLERY.settings(compose((*words, *more)))
+        return settings["styles"], settings["instructions"]
+
+    styles = {name: look.style for name, look in looks.items()}
+    instructions = {name: look.instruction for name, look in looks.items()}
+    assert given("edits=[style,stylesplat]") == (styles, {})
+    assert given("edits=[text_quick,dge_quick]") == ({}, instructions)
+    assert given("edits=[dge_quick,style]") == (styles, instructions)
+    assert given("edits=[glass]", "edit.looks=false") == ({}, {}), "each edit follows its own"
+    assert given("edits=[style]", grid("[{edit: style}]")) == ({}, {}), "the experiment says what it shows"
+
+
 def test_what_a_row_and_a_column_say_counts_together_and_the_column_first():
     rows = (
         "[{title: a, light: [1, 2], edit: gold, changes: ['TF01.opacity=0.5']}, "

@@ -31,7 +31,7 @@ THRESHOLD = 0.02  # of the brightest value
 MARGIN = 4  # pixels
 
 
-def new_figure(width: float, height: float, dpi: int, layout: str | None = "constrained") -> Figure:
+def new_figure(width: float, height: float, dpi: float, layout: str | None = "constrained") -> Figure:
     """Return an empty figure of a size in inches; without a layout its axes stay where they are put."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # slow to import
     from matplotlib.figure import Figure
@@ -110,13 +110,14 @@ def write_grid(
     rows: Mapping[str, Sequence[np.ndarray | None]],
     titles: Sequence[str],
     below: Mapping[str, Sequence[str]] | None = None,
+    more: Sequence[Row] = (),
 ) -> Path:
-    """Write a PNG with rows of pictures and a title over each column.
+    """Write a PNG with rows of pictures and a title over each column, and more rows below them.
 
     Pictures [H, W, 3] are of one size, in [0, 1] or uint8, by the name of the row; a place with None stays
     empty. All show the same part of theirs, the smallest square in which one differs from its corner.
     """
-    return draw(path, grid_rows(rows, titles, below), columns=len(titles))
+    return draw(path, [*grid_rows(rows, titles, below), *more], columns=len(titles))
 
 
 def grid_rows(

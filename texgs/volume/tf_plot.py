@@ -3,36 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from texgs.core.figures import new_figure, words, write_figure
+from texgs.core.figures import new_figure, words
 from texgs.volume.transfer import TransferFunction
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-SIZE = (10.0, 4.5)  # inches at 100 dots per inch: the plot is made for 1000 x 450 pixels
+SIZE, DPI = (10.0, 4.5), 100  # inches, dots per inch: plots by themselves have 1000 x 450 pixels
 SAMPLES = 512
 
 
 def plot(
-    path: str | Path,
     histogram: ArrayLike,
     minimum: float,
     maximum: float,
     basic: Mapping[str, TransferFunction],
     title: str = "",
-) -> Path:
-    """Draw basic transfer functions over a volume's histogram [n] over [minimum, maximum], as PNG.
+    size: tuple[float, float] = SIZE,
+    dpi: float = DPI,
+) -> Figure:
+    """Return a figure of basic transfer functions over a volume's histogram [n] over [minimum, maximum].
 
     Opacity is the height of each coloured area; the grey area is the number of voxels, on a log axis.
     """
     counts = np.asarray(histogram, dtype=np.float64)
-    figure = new_figure(*SIZE, 100)
+    figure = new_figure(*size, dpi)
     opacity = figure.add_subplot()
     voxels = opacity.twinx()
     opacity.set_zorder(voxels.get_zorder() + 1)
@@ -46,7 +47,7 @@ def plot(
     margin = 0.02 * (high - low)  # so that nothing lies on the frame
     opacity.set(xlim=(low - margin, high + margin), xlabel="value", title=words(title))
     opacity.set(ylim=(0, 1.12), yticks=np.linspace(0, 1, 6), ylabel="opacity")
-    return write_figure(path, figure)
+    return figure
 
 
 def _draw(axes: Axes, name: str, tf: TransferFunction) -> None:

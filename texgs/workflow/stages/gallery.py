@@ -3,28 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from texgs.config.compose import compose
 from texgs.core.progress import progress
+from texgs.edit.method import method_of
 from texgs.report.results import GalleryResult, Shown
+from texgs.workflow.edits import looks_of
 from texgs.workflow.galleries import gallery_command, gallery_grids, gallery_inputs
 from texgs.workflow.inputs import has_scene, is_first_recipe
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import OfScene
+from texgs.workflow.stages.settings import OfScene, basic_tfs_of
 from texgs.workflow.sweep import changes
 
 if TYPE_CHECKING:
     import numpy as np
 
     from texgs.core.camera import Camera
+    from texgs.core.figures import Row
     from texgs.scene.session import Session
 
 ERRORS = (
     "Errors are those of the worst channel, four times enlarged, red where the scene is too bright and blue "
     "where it is too dark, with the PSNR of the picture."
 )
+GIVEN = "Below them what they were given: basic transfer functions, and pictures or instructions."
+
+
+def given(config: Config, follows: str) -> dict[str, str]:
+    """Return the pictures or instructions of a comparison by basic TF; none where grids say what is shown."""
+    edits = [compose((f"edit={name}",)).edit for name in config.edits if config.edit.looks]
+    own = [edit for edit in edits if method_of(edit).follows == follows and not config.gallery.grids]
+    return looks_of(replace(config, edit=replace(own[0], looks=True))) if own else {}
 
 
 @dataclass
@@ -42,7 +55,7 @@ class GalleryCell:
 
 
 @dataclass
-class Row:
+class GalleryRow:
     """Places side by side."""
 
     title: str
@@ -56,7 +69,7 @@ class Grid:
     name: str
     caption: str
     columns: list[str]
-    rows: list[Row]
+    rows: list[GalleryRow]
 
 
 @dataclass(kw_only=True)
@@ -67,6 +80,8 @@ class Settings(OfScene):
     size: int = read("gallery.size")
     command: str = read(gallery_command)
     grids: list[Grid] = read(gallery_grids)
+    styles: dict[str, str] = read(partial(given, follows="style"))
+    instructions: dict[str, str] = read(partial(given, follows="instruction"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +113,24 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             title: ["" if each.psnr is None else f"{each.psnr:.1f} dB" for each in row]
             for title, row in taken.items()
         }
-        write_grid(output / f"{grid.name}.png", pixels, grid.columns, below)
+        more = given_rows(settings, inputs)
+        write_grid(output / f"{grid.name}.png", pixels, grid.columns, below, more)
         errors = ERRORS if any(map(any, below.values())) else ""
         made_by = f"Made by: {settings.command}" if settings.command else ""
-        captions[f"{grid.name}.png"] = " ".join(filter(None, (grid.caption, errors, made_by)))
+        told = grid.caption, GIVEN if more else "", errors, made_by
+        captions[f"{grid.name}.png"] = " ".join(filter(None, told))
     return Outcome(GalleryResult(settings.section, shown), captions)
+
+
+def given_rows(settings: Settings, inputs: Mapping[str, Path]) -> list[Row]:
+    """Return the row of what looks of a comparison were given; none of other galleries."""
+    from texgs.report.given_row import given_row, plotted
+
+    if not settings.styles and not settings.instructions:
+        return []
+    volume = inputs.get("volume")
+    plot = volume and plotted(volume, basic_tfs_of(volume, settings.basic_tfs, settings.tf_values))
+    return [given_row(plot, settings.styles, settings.instructions, inputs.values())]
 
 
 def pictures(grid: Grid, renderer: GalleryRenderer, title: str) -> dict[str, list[RenderedCell]]:

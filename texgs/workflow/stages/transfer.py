@@ -34,8 +34,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `volume`, the volume.nrrd; volume.json is beside it.
     """
-    import numpy as np
-
+    from texgs.core.figures import write_figure
     from texgs.core.io import read_json
     from texgs.volume.tf_files import write_paraview
     from texgs.volume.tf_plot import plot
@@ -45,7 +44,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     summary = read_json(inputs["volume"].with_name("volume.json"))
     low, high = summary["minimum"], summary["maximum"]
     check_disjoint(basic)
-    plot(output / "transfer.png", np.array(summary["histogram"]), low, high, basic, settings.title)
+    write_figure(output / "transfer.png", plot(summary["histogram"], low, high, basic, settings.title))
     for name, tf in basic.items():
         write_paraview(output / f"{name}.paraview.json", tf, f"{settings.dataset} {name}")
     ranges = {name: list(tf.support) for name, tf in basic.items()}

@@ -1,0 +1,51 @@
+"""What the looks of a comparison were given, for a row beside their views."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PIL import Image, ImageOps
+
+from texgs.core.figures import Cell, Row, as_picture
+from texgs.core.io import read_json
+
+if TYPE_CHECKING:
+    from texgs.volume.transfer import TransferFunction
+
+SIDE, INCHES = 512, 3.2  # of a picture; letters are as large as for so many inches
+LETTERS = 18  # of a line of words
+
+
+def given_row(
+    plot: np.ndarray | None,
+    styles: Mapping[str, str],
+    instructions: Mapping[str, str],
+    scenes: Collection[Path],
+) -> Row:
+    """Return a row with a plot of transfer functions, and pictures and instructions by basic TF.
+
+    Pictures are in the files that edits have written beside their scenes.
+    """
+    cells = [] if plot is None else [Cell("transfer functions", plot)]
+    for name, style in styles.items():
+        files = [scene.with_name(file) for scene in scenes for file in (f"style-{name}.png", "style.png")]
+        with Image.open(next(file for file in files if file.is_file())) as picture:
+            square = ImageOps.pad(picture.convert("RGB"), (SIDE, SIDE), color="white")
+        cells.append(Cell(f"{name}: {Path(style).stem}", np.asarray(square)))
+    cells += [Cell(name, words=fill(f"“{text}”", LETTERS)) for name, text in instructions.items()]
+    return Row("given", cells)
+
+
+def plotted(volume: Path, basic: Mapping[str, TransferFunction]) -> np.ndarray:
+    """Return a square plot [S, S, 3] of transfer functions over the histogram of volume.nrrd."""
+    from texgs.volume.tf_plot import plot
+
+    summary = read_json(volume.with_name("volume.json"))
+    bounds = summary["minimum"], summary["maximum"]
+    figure = plot(summary["histogram"], *bounds, basic, size=(INCHES, INCHES), dpi=SIDE / INCHES)
+    figure.axes[1].set_axis_off()  # the number of voxels
+    return np.asarray(as_picture(figure).convert("RGB"))
