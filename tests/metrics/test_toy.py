@@ -37,7 +37,7 @@ def test_a_metric_of_one_file_is_measured_and_has_its_columns(tmp_path, scenes):
     assert 0.9 < values["brightness"] <= 1, "the scene is faint, on white"
     (folder := tmp_path / "results").mkdir()
     for facts in ({}, {"sweep": "mine", "variant": "a"}):
-        edit = EditResult("gold", "text", "how", 6.0, follows="instruction")
+        edit = EditResult("gold", "text", "how", 6.0, follows="instruction", is_compared=True)
         write_metrics(folder, "edit_text", edit, **facts)
         write_metrics(folder, "edit_metrics", EditMeasures("gold", "text", values=values), **facts)
     for table in (looks(records(folder)), text_driven(records(folder)), sweep(records(folder), "mine")):

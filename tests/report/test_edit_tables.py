@@ -20,9 +20,11 @@ TABLES = [  # table, file of the paper, what edits follow
 VALUES = {"frame_mean_ms": 4.0, "frame_max_ms": 5.0, "primitives": 9, "megabytes": 1.0, "geometry_kept": True}
 
 
-def edit(folder, name, values, *, follows, method="text", kept=True, **facts):
+def edit(folder, name, values, *, follows, method="text", how="how", pixels=512, **facts):
     """Metrics of an edit and of its measures, by the headings of the paper's files; returns their paths."""
-    result = EditResult(name, method, "how", 60 * values.get("editing_min", 1.0), follows=follows)
+    kept, is_compared = facts.pop("kept", True), facts.pop("compared", True)
+    told = {"follows": follows, "is_compared": is_compared}
+    result = EditResult(name, method, how, 60 * values.get("editing_min", 1.0), **told)
     measured = {
         "frame_mean_ms": values.get("render_mean_ms", 4.0),
         "frame_max_ms": values.get("render_max_ms", 5.0),
@@ -33,7 +35,7 @@ def edit(folder, name, values, *, follows, method="text", kept=True, **facts):
         "direction": values.get("clip_directional_similarity"),
         "clip": "B/32",
     }
-    measures = EditMeasures(name, method, 512, 512, measured)
+    measures = EditMeasures(name, method, pixels, pixels, measured)
     paths = [metrics(folder, f"edit_{method}", result, **facts)]
     return [*paths, metrics(folder, "edit_metrics", measures, **facts)]
 
@@ -64,14 +66,50 @@ def test_means_over_four_data_sets_are_the_papers_rows(tmp_path, make, name, fol
         assert means[line["method"]]["geometry kept"] == "bit for bit"
 
 
+@pytest.mark.parametrize(("make", "name", "follows"), TABLES)
+def test_columns_are_in_the_papers_order(tmp_path, make, name, follows):
+    edit(tmp_path, "mine", {}, follows=follows)
+    table = make(records(tmp_path))
+    titles = [column.title for column in table.columns]
+    assert titles[:5] == ["data set", "recipe", "edit", "method", "pixels"]
+    theirs = [OWN[heading] for heading in lines(name)[0] if heading in OWN]
+    assert titles[5 : 5 + len(theirs)] == theirs
+    assert "RMSE, near" in titles
+
+
+def test_means_are_of_one_size_and_one_recipe_whatever_it_has_adapted_to(tmp_path):
+    for dataset, pixels, how, minutes in (
+        ("a", 512, "VGG-16 + patches", 1.0),
+        ("b", 512, "VGG-16", 3.0),
+        ("c", 800, "VGG-16", 50.0),
+        ("d", 800, "VGG-16", 70.0),
+    ):
+        options = {"follows": "style", "method": "image", "how": how, "pixels": pixels}
+        edit(tmp_path, "style", {"editing_min": minutes}, dataset=dataset, **options)
+    late = EditResult("style", "image", "VGG-16", 6000.0, follows="style", is_compared=True)
+    metrics(tmp_path, "edit_image", late, dataset="e")
+    entries = rows(image_driven(records(tmp_path)))
+    means = [row for row in entries if row["data set"].startswith("mean") and row["recipe"] == "quick"]
+    assert [(row["data set"], row["pixels"], row["method"], row["minutes"]) for row in means] == [
+        ("mean of 2", "512x512", "adapts", 2.0),
+        ("mean of 2", "800x800", "image: VGG-16", 60.0),
+    ], "of an edit that was not measured no size is known"
+
+
 def test_each_kind_of_edit_has_its_own_table(tmp_path):
-    edit(tmp_path, "painted", {}, follows="style", method="image")
-    edit(tmp_path, "gold", {}, follows="instruction")
+    edit(tmp_path, "style", {}, follows="style", method="image")
+    edit(tmp_path, "painted", {}, follows="style", method="image", compared=False)
+    edit(tmp_path, "text", {}, follows="instruction")
+    edit(tmp_path, "gold", {}, follows="instruction", compared=False)
     edit(tmp_path, "lambda", {}, follows="style", method="image", sweep="lambda_s", variant="0")
     metrics(tmp_path, "edit_segment", EditResult("pick", "segment", "grabcut", 6.0))
-    of_images, of_texts = (rows(make(records(tmp_path)))[0:1] for make in (image_driven, text_driven))
-    assert [row["edit"] for row in of_images] == ["painted"]
-    assert [row["edit"] for row in of_texts] == ["gold"]
+    of_images, of_texts, of_all = (
+        [row for row in rows(make(records(tmp_path))) if row["recipe"] != "the paper"]
+        for make in (image_driven, text_driven, looks)
+    )
+    assert [row["edit"] for row in of_images] == ["style"]
+    assert [row["edit"] for row in of_texts] == ["text"]
+    assert [row["edit"] for row in of_all] == ["style", "painted", "text", "gold", "pick"]
     assert "CLIP similarity" not in of_images[0], "the paper measures it of texts"
     assert text_driven_frozen(records(tmp_path)).is_empty
 
@@ -93,7 +131,8 @@ def test_pictures_that_keep_geometry_are_not_frozen(tmp_path):
 
 def test_a_row_leads_to_the_edit_and_its_measures(tmp_path):
     paths = edit(tmp_path, "gold", {"clip_similarity": 0.3}, follows="instruction")
-    metrics(tmp_path, "edit_text", EditResult("late", "text", "how", 6.0, follows="instruction"))
+    late = EditResult("late", "text", "how", 6.0, follows="instruction", is_compared=True)
+    metrics(tmp_path, "edit_text", late)
     table = text_driven(records(tmp_path))
     gold, late = rows(table)[:2]
     assert sources(table)[0] == paths

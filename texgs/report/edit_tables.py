@@ -1,4 +1,4 @@
-"""Tables of edits: `image_driven`, `text_driven` and `text_driven_frozen` as in the paper, and `looks`."""
+"""Tables of edits: the paper's comparisons, of those with the key `compared`, and `looks`, which has all."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from texgs.fields.kinds import kinds
 from texgs.metrics.metric import Measure, metrics
 from texgs.report.metrics_files import Record, of
-from texgs.report.published import DATA, LABEL, THEIRS, cells, in_order, mean_rows, paper
+from texgs.report.published import DATA, LABEL, THEIRS, cells, in_order, mean_rows, paper, paper_file
 from texgs.report.results import EditMeasures, EditResult
 from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table
 
@@ -24,47 +24,55 @@ CONSISTENCY = (
 )
 CAPTION = (
     "Sizes are those of the paper's tables of edits, with 100 bytes for each surfel beside its texels. "
-    f"{CONSISTENCY} Mean rows count no stand-ins."
+    f"{CONSISTENCY} Mean rows count no stand-ins. Edits of no comparison are in the table of all edits."
 )
 NOT_ALIKE = (
     "The paper's rows are means over four data sets on an RTX 4090. It publishes neither its pictures nor "
     "its instructions nor its transfer functions, so they stand by themselves."
 )
+ADAPTS = "adapts"  # in mean rows, of methods that do not work with the same on all data sets
 FOLLOWED = ("style", "instruction", "")  # what edits follow, in the order of the table of all edits
 Edit = Record[EditResult]
 Rows = list[dict[str, Any]]
 
 
-def measures(is_paper: bool = False, without: str = "") -> list[Measure]:
-    """Return what is measured of edits, in the order of columns; all, or what the paper's tables have."""
-    listed = [
-        (metric.order, measure)
-        for metric in metrics().values()
-        if metric.name != without and (metric.is_in_paper or not is_paper)
-        for measure in metric.measures
-    ]
+def measures() -> list[Measure]:
+    """Return what is measured of edits, in the order of columns."""
+    listed = [(metric.order, measure) for metric in metrics().values() for measure in metric.measures]
     return [measure for _, measure in sorted([*listed, (20, MINUTES)], key=lambda each: each[0])]
 
 
+def paper_measures(follows: str) -> list[Measure]:
+    """Return the columns of one of the paper's tables in its order, then those that it has nowhere."""
+    by_heading = {measure.published: measure for measure in measures()}
+    own = [by_heading[heading] for heading in paper_file(PAPER[follows][0]) if heading in by_heading]
+    more = [each for metric in metrics().values() if metric.is_in_paper for each in metric.measures]
+    return [*own, *(measure for measure in more if not measure.published)]
+
+
 def image_driven(records: Iterable[Record[Any]]) -> Table:
-    """Return the table of all edits by pictures, of which the paper measures no CLIP scores."""
-    rows = [row for row in rows_of(records) if row["kind"] == "style"]
-    return table("style", rows, measures(is_paper=True, without="clip"))
+    """Return the comparison of edits by pictures, of which the paper measures no CLIP scores."""
+    return table("style", compared(records, "style"), paper_measures("style"))
 
 
 def text_driven(records: Iterable[Record[Any]]) -> Table:
-    """Return the table of all edits by instructions, but for other methods with frozen geometry."""
-    rows = [row for row in rows_of(records) if row["kind"] == "instruction"]
+    """Return the comparison of edits by instructions, but for other methods with frozen geometry."""
+    rows = compared(records, "instruction")
     free = [row for row in rows if row["has_texture"] or not row["is_kept"]]
-    return table("instruction", free, measures(is_paper=True))
+    return table("instruction", free, paper_measures("instruction"))
 
 
 def text_driven_frozen(records: Iterable[Record[Any]]) -> Table:
-    """Return all edits by instructions that keep geometry; none where only those do that always do."""
-    rows = [row for row in rows_of(records) if row["kind"] == "instruction"]
+    """Return the comparison of edits that keep geometry; none where only those do that always do."""
+    rows = compared(records, "instruction")
     kept = [row for row in rows if row["has_texture"] or row["is_kept"]]
     is_chosen = not all(row["has_texture"] for row in kept)
-    return table("", kept if is_chosen else [], measures(is_paper=True))
+    return table("", kept if is_chosen else [], paper_measures("instruction"))
+
+
+def compared(records: Iterable[Record[Any]], follows: str) -> Rows:
+    """Return the rows of the edits of a comparison."""
+    return [row for row in rows_of(records) if row["is_compared"] and row["kind"] == follows]
 
 
 def looks(records: Iterable[Record[Any]]) -> Table:
@@ -76,15 +84,15 @@ def looks(records: Iterable[Record[Any]]) -> Table:
     rows = sorted(rows_of(records), key=lambda row: FOLLOWED.index(row["kind"]))
     labels = [*LABELS[:4], Column("follows"), Column("lambda_s", 2, "-")]
     columns = [Column(measure.title, measure.digits) for measure in measures()]
-    shown = [{**row, "method": row["how"]} for row in rows]
-    return Table(" ".join([caption, *notes(rows)]), [*labels, *columns], shown)
+    return Table(" ".join([caption, *notes(rows)]), [*labels, *columns], rows)
 
 
 def table(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
-    """Return rows of edits, their means, and the paper's rows of edits that follow the same."""
+    """Return rows of edits, means of those of one size, and the paper's rows of its own."""
     titles = [measure.title for measure in listed]
     columns = [Column(measure.title, measure.digits) for measure in listed]
-    means = mean_rows(rows, (LABEL, "edit", "method"), ["pixels", *titles])
+    means = mean_rows(rows, (LABEL, "edit", "pixels"), ["method", *titles])
+    means = [{**row, "method": row["method"] or ADAPTS} for row in means]
     theirs = published(follows, listed) if rows and follows else []
     sentences = [CAPTION, NOT_ALIKE] if theirs else [CAPTION]
     if set(titles) >= {measure.title for measure in metrics()["clip"].measures}:
@@ -110,9 +118,10 @@ def pairs_of(records: Sequence[Record[Any]]) -> list[tuple[Edit, Record[EditMeas
 def row_of(edit: Edit, measured: Record[EditMeasures] | None) -> dict[str, Any]:
     """Return the row of one edit of one scene, for all tables."""
     made, seen, field = edit.result, measured.result if measured else None, kinds().get(edit.field)
-    names = cells(edit, edit=made.edit, method=made.method, how=made.how, counts=not edit.stand_in)
+    names = cells(edit, edit=made.edit, method=f"{made.method}: {made.how}", kind=made.follows)
     return names | {
-        "kind": made.follows,
+        "is_compared": made.is_compared,
+        "counts": bool(seen and seen.width and not edit.stand_in),
         "follows": words_of(made.followed),
         "lambda_s": made.lambda_s,
         "pixels": f"{seen.width}x{seen.height}" if seen and seen.width else None,

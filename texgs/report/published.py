@@ -29,13 +29,17 @@ SCENES = Column("basic scenes", 0)
 Rows = Sequence[Mapping[str, Any]]
 
 
-def paper(name: str, keys: Mapping[str, str], numbers: Mapping[str, str]) -> DataFrame:
-    """Read the paper's names and numbers of a table, each with titles by their headings in its file."""
+def paper_file(name: str) -> DataFrame:
+    """Read one of the paper's tables as words, by the headings of its file."""
     import pandas as pd  # slow to import
 
     with files("texgs.report").joinpath("paper", f"{name}.csv").open() as file:
-        frame = pd.read_csv(file, comment="#", dtype=str)
-    frame = frame.reindex(columns=[*keys, *numbers]).rename(columns={**keys, **numbers})
+        return pd.read_csv(file, comment="#", dtype=str)
+
+
+def paper(name: str, keys: Mapping[str, str], numbers: Mapping[str, str]) -> DataFrame:
+    """Read the paper's names and numbers of a table, each with titles by their headings in its file."""
+    frame = paper_file(name).reindex(columns=[*keys, *numbers]).rename(columns={**keys, **numbers})
     return frame.astype(dict.fromkeys(numbers.values(), float))
 
 

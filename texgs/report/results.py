@@ -198,6 +198,7 @@ class EditResult(Result, section="parts"):
     followed: dict[str, str] = field(default_factory=dict)  # the picture or the words, by model
     iterations: int = 0  # of the method, for each part
     losses: dict[str, list[float]] = field(default_factory=dict)  # over them, by part and term
+    is_compared: bool = False  # see `edit.compared`
 
 
 @dataclass(frozen=True)

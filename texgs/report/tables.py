@@ -26,8 +26,8 @@ class TableSpec:
     section: str  # of the report, a key of `texgs.report.sections.SECTIONS`
     places: tuple[str, ...]  # of the jobs that it reads, names of rules of the workflow
     make: Callable[[Sequence[Record[Any]]], Table] | None  # None: whoever writes the tables hands it in
-    number: int | None = None  # among the paper's tables; none for ours
-    paper: str = ""  # where the paper has it
+    number: str = ""  # in the paper, with A in its appendix; none for tables that it does not have
+    paper: str = ""  # what else it has of this
 
     @property
     def heading(self) -> str:
@@ -48,6 +48,7 @@ class TableSpec:
 
 
 EDITED = ("edit", "edit_metrics")
+VARIED = "Training and test views after the last phase, means over basic scenes; minutes of all phases."
 PAPERS = (
     TableSpec(
         "datasets",
@@ -56,8 +57,8 @@ PAPERS = (
         "data",
         ("volume", "views", "sheet"),
         datasets,
-        1,
-        "Table 1, and Table 3 of the appendix for the last four data sets",
+        "1",
+        "Table 1, and Table A3 for the last four data sets",
     ),
     TableSpec(
         "image_driven",
@@ -66,8 +67,7 @@ PAPERS = (
         "image",
         EDITED,
         image_driven,
-        2,
-        "Table 2",
+        "2",
     ),
     TableSpec(
         "text_driven",
@@ -77,9 +77,47 @@ PAPERS = (
         "text",
         EDITED,
         text_driven,
-        3,
-        "Table 3",
+        "3",
     ),
+    TableSpec(
+        "views",
+        "Numbers of training views",
+        VARIED,
+        "ablations",
+        ("phase",),
+        partial(ablation, sweep="views"),
+        "A1",
+    ),
+    TableSpec(
+        "resolution",
+        "Sizes of training images",
+        VARIED,
+        "ablations",
+        ("phase",),
+        partial(ablation, sweep="resolution"),
+        "A2",
+    ),
+    TableSpec(
+        "model_size",
+        "Model size",
+        "Sums over the basic scenes of a data set, 32 bits a value; 16 for harmonics of voxels.",
+        "sizes",
+        ("phase",),
+        model_size,
+        "A4",
+    ),
+    TableSpec(
+        "fitting",
+        "Fitting, phase by phase",
+        "Test views after each phase, means over the basic scenes; minutes of the phase itself.",
+        "fitting",
+        ("phase",),
+        fitting,
+        "A5",
+    ),
+)
+STUDY = TableSpec("user_study", "User study", "", "study", EDITED, None, "A6")
+OURS = (
     TableSpec(
         "text_driven_frozen",
         "Text-driven editing, geometry frozen",
@@ -89,46 +127,7 @@ PAPERS = (
         text_driven_frozen,
         paper="a figure of the appendix, without numbers",
     ),
-    TableSpec(
-        "fitting",
-        "Fitting, phase by phase",
-        "Test views after each phase, means over the basic scenes; minutes of the phase itself.",
-        "fitting",
-        ("phase",),
-        fitting,
-        4,
-        "Table 5 of the appendix",
-    ),
-    TableSpec(
-        "views",
-        "Numbers of training views",
-        "Training and test views after the last phase, means over basic scenes; minutes of all phases.",
-        "ablations",
-        ("phase",),
-        partial(ablation, sweep="views"),
-        5,
-        "Table 1 of the appendix",
-    ),
-    TableSpec(
-        "resolution",
-        "Sizes of training images",
-        "Training and test views after the last phase, means over basic scenes; minutes of all phases.",
-        "ablations",
-        ("phase",),
-        partial(ablation, sweep="resolution"),
-        6,
-        "Table 2 of the appendix",
-    ),
-    TableSpec(
-        "model_size",
-        "Model size",
-        "Sums over the basic scenes of a data set, 32 bits a value; 16 for harmonics of voxels.",
-        "sizes",
-        ("phase",),
-        model_size,
-        7,
-        "Table 4 of the appendix",
-    ),
+    TableSpec("fits", "Fits of basic transfer functions", "", "fitting", ("phase",), fits),
     TableSpec(
         "rendering",
         "Rendering",
@@ -136,15 +135,8 @@ PAPERS = (
         "rendering",
         ("timing",),
         rendering,
-        8,
-        "columns of Tables 1 to 3, of edited scenes on an RTX 4090; its volumes are rendered by ParaView",
+        paper="columns of Tables 1 to 3: edited scenes on an RTX 4090, and volumes by ParaView",
     ),
-)
-
-
-STUDY = TableSpec("user_study", "User study", "", "study", EDITED, None, 9, "Table 6 of the appendix")
-OURS = (
-    TableSpec("fits", "Fits of basic transfer functions", "", "fitting", ("phase",), fits),
     TableSpec(
         "edits",
         "Edits by numbers against the volume",

@@ -81,7 +81,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         pictures["convergence.png"] = "How the loss of the edit fell, term by term."
     result = EditResult(
         *(task.edit.name, method.name, edited.how, seconds, edited.lambda_s, dict(edited.notes)),
-        *(method.follows, followed(task), *fallen(edited.losses)),
+        *(method.follows, followed(task), *fallen(edited.losses), task.edit.compared),
     )
     return Outcome(result, pictures)
 
