@@ -30,7 +30,7 @@ def quick(monkeypatch, tmp_path_factory):
     monkeypatch.setattr("texgs.viewer.looks.LENS", Lens().square(96))
     monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path_factory.mktemp("none")))
     monkeypatch.setenv("TEXGS_CACHE", str(tmp_path_factory.mktemp("cache")))
-    monkeypatch.setattr("texgs.viewer.looks.available", lambda name: False)
+    monkeypatch.setattr("texgs.viewer.looks.unusable", lambda name: "they are missing")
 
 
 async def picture(browser, **view):

@@ -31,7 +31,7 @@ from texgs.edit.style_picture import read_style
 from texgs.edit.task import EditedScene, Task
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import write_texture
-from texgs.models.weights import available
+from texgs.models.weights import unusable
 from texgs.scene.scene import Scene
 from texgs.viewer.messages import Look
 from texgs.volume.cameras import icosphere_of
@@ -198,4 +198,4 @@ def edit_with(parts: Sequence[str], choice: dict[str, Any]) -> Any:
 
 def has_weights(edit: Any) -> bool:
     """Return whether all that an edit needs is on this machine."""
-    return all(map(available, method_of(edit).of(edit).weights()))
+    return not any(map(unusable, method_of(edit).of(edit).weights()))

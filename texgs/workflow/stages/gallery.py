@@ -128,8 +128,9 @@ def given_rows(settings: Settings, inputs: Mapping[str, Path]) -> list[Row]:
 
     if not settings.styles and not settings.instructions:
         return []
-    volume = inputs.get("volume")
-    plot = volume and plotted(volume, basic_tfs_of(volume, settings.basic_tfs, settings.tf_values))
+    plot = None
+    if volume := inputs.get("volume"):
+        plot = plotted(volume, basic_tfs_of(volume, settings.basic_tfs, settings.tf_values))
     return [given_row(plot, settings.styles, settings.instructions, inputs.values())]
 
 
