@@ -94,7 +94,7 @@ def random_surfels(seed, count, spread, size):
 
 def phase(iterations=60, densify=None, losses=None, rates=None, **options):
     """A phase that densifies at 20, 30 and 40 and resets opacities at 25 and 50."""
-    densify = densify or Densify(start=10, stop=50, every=10, threshold=1e-5, cap=150, reset_every=25)
+    densify = densify or Densify(start=10, stop=50, every=10, threshold=1e-5, cap=150, resets=[25, 50])
     return Phase(
         iterations=iterations, densify=densify, losses=losses or Losses(), rates=rates or Rates(), **options
     )

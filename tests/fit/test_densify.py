@@ -136,7 +136,7 @@ def test_statistics_start_again_after_a_step():
 
 def test_opacities_are_reset_to_a_hundredth_at_most():
     optimizer = surfels([SMALL] * 3, [0.9, 0.02, 0.006])
-    step(optimizer, [0.0] * 3, iteration=25, reset_every=25)
+    step(optimizer, [0.0] * 3, iteration=25, resets=[5, 25])
     opacities = optimizer.parameters["opacities"].sigmoid()
     torch.testing.assert_close(opacities, torch.tensor([RESET_OPACITY, RESET_OPACITY, 0.006]))
 

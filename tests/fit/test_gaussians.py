@@ -15,7 +15,7 @@ from texgs.volume.view_set import ViewSet
 
 from .scenes import SIZE, assert_same, ball_images, is_finite, quality, run
 
-SEEDS = Seeds(kind="hull", count=80, opacity=0.1, half_size=0.4)
+SEEDS = Seeds(kind="hull", count=80, opacity=0.1, half_size=0.8)
 DENSIFY = Densify(start=20, stop=120, every=20, cap=150)  # no resets, after which images are pale
 HARMONICS = (1, 4, 9, 16)
 

@@ -137,7 +137,7 @@ def test_a_model_without_surfels_goes_on_and_stays_empty():
 
 def seeded(images, view_set, count):
     """A fit of surfels that start where views say."""
-    parameters, colors = seed_surfels(images, view_set, Seeds(count=count, half_size=0.55), 0)
+    parameters, colors = seed_surfels(images, view_set, Seeds(count=count, half_size=1.1), 0)
     start = {**parameters, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
     return run(new_fit(images=images, parameters=start, iterations=150, densify=DENSIFY))
 

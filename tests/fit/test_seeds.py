@@ -80,7 +80,7 @@ def test_views_that_show_nothing_are_an_error():
     with pytest.raises(ArgumentError, match="visual hull"):
         seeds(images=empty)
     parameters, colors = seeds(images=empty, kind="random")
-    assert torch.equal(colors, torch.zeros(300, 3))
+    assert torch.equal(colors, torch.full((300, 3), 0.5))
     assert is_finite(parameters)
 
 
@@ -201,10 +201,10 @@ def test_mistakes_in_points_are_named(tmp_path, columns, end, message):
     ("metadata", "half_size", "low", "high"),
     [
         ({"aabb": [[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]}, None, (-0.52, -0.27, -0.02), (0.52, 0.27, 0.12)),
-        # The release has random points within 1.3 of the middle of data from -1 to 1.
-        ({"aabb": [[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]}, 1.3, (-0.65, -0.65, -0.6), (0.65, 0.65, 0.7)),
+        # The release has random points within 1.3 of the middle of data from -0.5 to 0.5.
+        ({"aabb": [[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]}, 2.6, (-1.3, -1.3, -1.25), (1.3, 1.3, 1.35)),
+        ({}, 2.6, (-1.3,) * 3, (1.3,) * 3),
         ({}, None, (-0.55,) * 3, (0.55,) * 3),
-        ({}, 0.7, (-0.7,) * 3, (0.7,) * 3),
     ],
 )
 def test_the_box_is_that_of_the_data_with_a_margin_or_a_cube(metadata, half_size, low, high):
@@ -236,7 +236,7 @@ def test_arguments_out_of_range_are_named():
 def test_points_published_with_the_paper_are_near_what_its_views_show():
     views = read_views(real_data("vortex/TF01"))
     images = load(views.train[:3], 8)
-    parameters, colors = seed_surfels(images, views, Seeds(count=1, half_size=0.55), 0)
+    parameters, colors = seed_surfels(images, views, Seeds(count=1, half_size=1.1), 0)
     assert len(parameters["means"]) == len(colors) > 9000
     assert (mean_colors(images, parameters["means"]) - colors).abs().mean() < 0.15
 

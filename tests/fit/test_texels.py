@@ -4,6 +4,8 @@ import math
 
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 from torch.testing import assert_close
 
 from tests.fit.scenes import (
@@ -44,20 +46,32 @@ def sight(largest, pixel):
     return Sight(torch.tensor(largest), torch.tensor(pixel), torch.ones(len(largest)))
 
 
-def test_sizes_follow_the_formula():
-    scales = torch.tensor([[0.1, 0.2], [0.05, 0.01], [1e-6, 1e-6]])
-    edge = math.sqrt(36 * (0.1 * 0.2 + 0.05 * 0.01 + 1e-12) / 1000)
-    expected = [[math.ceil(6 * u / edge), math.ceil(6 * v / edge)] for u, v in scales.tolist()]
-    assert sizes_for_budget(scales, 1000).tolist() == expected
-    assert expected[2] == [1, 1]
+def test_sizes_follow_the_formula_with_the_smallest_edge_that_keeps_the_budget():
+    scales = [[0.1, 0.2], [0.05, 0.01], [1e-6, 1e-6]]
+
+    def sizes(edge):
+        return [[math.ceil(6 * u / edge), math.ceil(6 * v / edge)] for u, v in scales]
+
+    edges = (1e-3 * k for k in range(10, 1000))
+    edge = next(edge for edge in edges if sum(u * v for u, v in sizes(edge)) <= 1000)
+    assert sizes_for_budget(torch.tensor(scales), 1000).tolist() == sizes(edge)
+    assert sizes(edge)[2] == [1, 1]
 
 
-@pytest.mark.parametrize("budget", [1000, 20_000, 300_000])
-def test_budget_is_met_but_for_rounding_up(budget):
-    scales = torch.rand(50, 2) * 0.1 + 0.02
-    count = total(sizes_for_budget(scales, budget))
-    perimeter = math.sqrt(budget * 50) * 4  # one more row and column each, of at most six times longer sides
-    assert budget <= count <= budget + perimeter + 50
+@given(st.integers(60, 300_000), st.integers(0, 5))
+def test_a_budget_is_never_exceeded_and_used_to_a_row_of_a_surfel(budget, seed):
+    scales = torch.rand(50, 2, generator=torch.Generator().manual_seed(seed)) * 0.1 + 0.02
+    sizes = sizes_for_budget(scales, budget)
+    assert budget - int(sizes.max()) <= total(sizes) <= budget
+
+
+def test_ten_million_texels_are_met_to_a_thousandth_as_in_the_release():
+    scales = torch.rand(50_000, 2, generator=torch.Generator().manual_seed(0)) * 0.01 + 1e-4
+    assert 10_000_000 * 0.999 <= total(sizes_for_budget(scales, 10_000_000)) <= 10_000_000
+
+
+def test_each_surfel_has_a_texel_whatever_the_budget():
+    assert sizes_for_budget(torch.rand(50, 2), 7).tolist() == [[1, 1]] * 50
 
 
 def test_a_texel_is_a_pixel_where_a_surfel_is_fully_seen():

@@ -85,18 +85,27 @@ def chosen(files: CachingConfigRepository, choices: Words) -> list[tuple[str, st
     What a recipe or an edit consists of does not depend on other choices, unless its files override them:
     a run, which needs all combinations, finds each once.
     """
+    plain = listed(files, "config")
     alone: dict[str, list[tuple[str, str]]] = {}
-    for override in map(parsed, choices):
-        group = override.key_or_group
-        if group in ALONE and override.type is OverrideType.CHANGE:
-            alone[group] = listed(files, f"{group}/{override.value()}")
-    if any(package != group for group, own in alone.items() for _, package in own):
-        return listed(files, "config", choices)
-    together = listed(files, "config", tuple(x for x in choices if parsed(x).key_or_group not in alone))
+    dependent: Words = ()
+    for word in choices:
+        group = parsed(word).key_or_group
+        if group in ALONE and parsed(word).type is OverrideType.CHANGE:
+            own = listed(files, "config", (word,))
+            if apart(own, group) == apart(plain, group):
+                alone[group] = [each for each in own if each[1] == group]
+                continue
+        dependent = (*dependent, word)
+    together = listed(files, "config", dependent)
     for group, own in alone.items():
         at = next(index for index, (_, package) in enumerate(together) if package == group)
-        together = [*together[:at], *own, *(each for each in together[at:] if each[1] != group)]
+        together = [*together[:at], *own, *apart(together[at:], group)]
     return together
+
+
+def apart(listing: list[tuple[str, str]], group: str) -> list[tuple[str, str]]:
+    """Return the files that are not of a group."""
+    return [each for each in listing if each[1] != group]
 
 
 @lru_cache(maxsize=4096)

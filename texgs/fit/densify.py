@@ -47,18 +47,18 @@ class DensityControl:
         if iteration > s.stop:
             return
         if iteration > s.start and iteration % s.every == 0:
-            self._densify(optimizer, generator)
-        if s.reset_every and iteration % s.reset_every == 0:
+            self._densify(iteration, optimizer, generator)
+        if iteration in s.resets:
             raw = optimizer.parameters["opacities"].detach()
             optimizer.reset("opacities", raw.clamp_max(torch.logit(torch.tensor(RESET_OPACITY)).item()))
 
-    def _densify(self, optimizer: Optimizer, generator: torch.Generator) -> None:
+    def _densify(self, iteration: int, optimizer: Optimizer, generator: torch.Generator) -> None:
         p = {name: x.detach() for name, x in optimizer.parameters.items()}
         n = len(p["means"])
         largest = p["scales"].exp().amax(dim=1)
-        alive = (p["opacities"].sigmoid() >= self.settings.prune_opacity) & (
-            largest <= self.settings.prune_size * self.extent
-        )
+        alive = p["opacities"].sigmoid() >= self.settings.prune_opacity
+        if iteration > self.settings.prune_size_from:
+            alive &= largest <= self.settings.prune_size * self.extent
         chosen = self._chosen(alive)
         is_split = chosen & (largest > self.settings.size * self.extent)
         rows = {name: x for name, x in p.items() if len(x) == n and not is_shared(name, x)}
@@ -72,7 +72,8 @@ class DensityControl:
         """Choose surfels [N] bool with the largest mean gradients above the threshold, up to the cap."""
         mean = self.gradients / self.counts.clamp_min(1)
         mean = torch.where(alive & (mean > self.settings.threshold), mean, 0.0)
-        room = max(0, self.settings.cap - int(alive.sum()))
+        cap = self.settings.cap
+        room = len(mean) if cap is None else max(0, cap - int(alive.sum()))
         chosen = torch.zeros_like(alive)
         best = mean.topk(min(room, len(mean))).indices
         chosen[best[mean[best] > 0]] = True

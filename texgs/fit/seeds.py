@@ -27,7 +27,9 @@ from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
 
 MARGIN = 0.02  # of the box around the data, relative to its longest side
-HALF_SIZE = 0.55  # of the cube around the origin where nothing else is known, world units
+HALF_SIZE = 1.1  # of the cube around the origin where nothing else is known, in halves of the longest side
+SIDE = 1.0  # the longest side of data where views do not say, world units
+GREY = 0.5  # the colour of random seeds
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
 SMALLEST = 1e-4  # scale, world units
 # A quick fit finds what is seen of more surfels than are kept.
@@ -49,8 +51,8 @@ def seed_surfels(
     "points" are all in the folder's points3d.ply; "hull", points that no view sees through; "visible", those
     of them that a quick fit finds to be seen, as hidden ones never show and still count under the cap of
     density control; "voxels", the same from the volume's samples that the views' transfer function shows;
-    "random" in the box; "auto", points if there are any, else visible. Opacity is that before the quick fit.
-    The half size is one of the box of the data, or in world units where views have none.
+    "random", grey ones in the box; "auto", points if there are any, else visible. Opacity is that before the
+    quick fit. Of the half size see `box_of`.
     """
     kind, count, half_size = seeds.kind, seeds.count, seeds.half_size
     if not 0 < seeds.opacity < 1:
@@ -66,6 +68,7 @@ def seed_surfels(
         points, colors = shown_voxels(volume, views, CANDIDATES * count, seed)
     elif kind == "random":
         points = random_points(box_of(views, half_size), count, generator)
+        colors = torch.full_like(points, GREY)
     else:
         candidates = CANDIDATES * count if kind == "visible" else count
         points = hull_points(images, box_of(views, half_size), candidates, generator)
@@ -105,10 +108,14 @@ def shown_voxels(volume: Grid | None, views: ViewSet, count: int, seed: int) -> 
 
 
 def box_of(views: ViewSet, half_size: float | None) -> Box:
-    """Return the box of the data with a margin, or a cube around its middle, see `seed_surfels`."""
+    """Return the box of the data with a margin, or a cube around its middle.
+
+    Half the side of the cube is in halves of the data's longest side. Views that do not tell the box show
+    data around the origin with a longest side of 1, as published ones do.
+    """
     aabb = views.metadata.get("aabb")
     if aabb is None:
-        corner = torch.full((3,), float(half_size or HALF_SIZE))
+        corner = torch.full((3,), (half_size or HALF_SIZE) * SIDE / 2)
         return -corner, corner
     try:
         low, high = torch.tensor(aabb, dtype=torch.float32).reshape(2, 3)

@@ -52,10 +52,11 @@ class Densify:
         2e-4, "mean screen-space gradient, half image widths, that clones or splits", least=0
     )
     size: float = key(0.01, "scale, in extents, above which one is split, not cloned", least=0)
-    cap: int = key(30000, "surfels or Gaussians at most", least=1)
+    cap: int | None = key(30000, "surfels or Gaussians at most; null: as many as it takes", least=1)
     prune_opacity: float = key(0.005, "what has less opacity is removed", least=0)
     prune_size: float = key(0.1, "what has a larger scale, in extents, is removed", least=0)
-    reset_every: int = key(0, "iterations between opacity resets; 0: never", least=0)
+    prune_size_from: int = key(0, "iteration after which what is too large is removed", least=0)
+    resets: list[int] = key(list, "iterations after which no opacity is above 0.01", least=1)
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,8 @@ class Seeds:
     opacity: float = key(0.1, "opacity of each seed", least=0)
     half_size: float | None = key(
         None,
-        "half the side of the cube of seeds, in halves of the data's longest side; default its box",
+        "half the side of the cube of seeds, in halves of the data's longest side, which is 1 world unit where "
+        "views do not say; default the box of the data",
         above=0,
     )
 

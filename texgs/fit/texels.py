@@ -18,6 +18,8 @@ from texgs.raster import Texture, rasterize
 from texgs.raster.arguments import MOST_TEXELS
 from texgs.volume.images import Images
 
+HALVINGS = 40  # of the interval that the edge of texels is searched in
+
 
 def texturize(
     model: Surfels, images: Images, keys: TextureKeys, seed: int = 0, title: str = "texture"
@@ -122,15 +124,24 @@ def look(model: Surfels, images: Images, title: str) -> Sight:
 
 
 def sizes_for_budget(scales: Tensor, texels: int) -> Tensor:
-    """Choose texels along u and v [N, 2], int32, of the same edge for all surfels, about `texels` in all.
+    """Choose texels along u and v [N, 2], int32, of the same edge for all surfels, `texels` in all at most.
 
-    edge = sqrt(36 sum(s_u s_v) / texels), U = ceil(6 s_u / edge), V likewise, for standard deviations [N, 2]
-    in world units. Rounding up adds a few, and a surfel has one at least.
+    U = ceil(6 s_u / edge), V likewise, for standard deviations [N, 2] in world units. The paper's edge,
+    sqrt(36 sum(s_u s_v) / texels), exceeds the budget, as sizes are rounded up: this is the smallest one that
+    keeps it. A surfel has one texel at least.
     """
     if texels < 1:
         raise ArgumentError(f"texels: expected at least 1, got {texels}")
-    edge = (EXTENT**2 * scales.prod(dim=1).sum(dtype=torch.float64) / texels).sqrt().to(scales)
-    return _sizes(scales, edge.expand(len(scales)))
+    if not len(scales):
+        return _sizes(scales, scales.new_ones(0))
+    extents = EXTENT * scales.double()
+    low, high = float((extents.prod(dim=1).sum() / texels).sqrt()), float(extents.max())
+    for _ in range(HALVINGS):
+        edge = (low + high) / 2
+        fits = (extents / edge).ceil().clamp_min(1).prod(dim=1).sum() <= texels
+        low, high = (low, edge) if fits else (edge, high)
+    edges = torch.full((len(scales),), high, dtype=torch.float64, device=scales.device)
+    return _sizes(scales.double(), edges)
 
 
 def sizes_where_seen(scales: Tensor, sight: Sight) -> Tensor:

@@ -95,7 +95,11 @@ class Graph:
             folders.append(job.output.as_posix())
             known = self.jobs.setdefault(folders[-1], job)
             if known != job:
-                raise ConfigError(f"{job.output}: two variants go there; give one another name")
+                differing = [key for key in job.settings if job.settings[key] != known.settings.get(key)]
+                raise ConfigError(
+                    f"{job.output}: two jobs go there, which differ in {', '.join(differing) or 'their inputs'}; "
+                    "give both the same, such as views=paper, or one another name, such as fit.name=mine"
+                )
             self.jobs[folders[-1]] = replace(known, swept=dict(known.swept.items() & job.swept.items()))
             self.configs.setdefault(folders[-1], each)
         return folders
