@@ -31,6 +31,20 @@ def test_a_word_beats_the_experiment():
     assert (config.views.train.frequency, config.tracking.uri) == (4, None)
 
 
+@pytest.mark.parametrize(
+    ("words", "frequency"),
+    [
+        (("fit=quick",), 3),
+        (("fit=paper",), 4),
+        (("fit=paper_short", "edit=glass"), 4),
+        (("fit=paper", "views=small"), 2),
+        (("experiment=texture", "fit=paper"), 4),
+    ],
+)
+def test_the_paper_s_recipe_takes_its_162_views_unless_others_are_named(words, frequency):
+    assert compose(words).views.train.frequency == frequency
+
+
 def test_a_copied_file_does_not_take_the_place_of_its_original(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "conf" / "fit").mkdir(parents=True)

@@ -102,6 +102,15 @@ def test_faint_and_huge_surfels_are_removed_and_not_cloned():
     assert step(optimizer, [0.0, 1.0, 1.0, 0.0]) == [0, 3]
 
 
+def test_huge_surfels_stay_until_the_iteration_from_which_sizes_count():
+    for iteration, left in ((10, [0, 1]), (20, [0, 1]), (30, [0])):
+        assert step(surfels([SMALL, 0.3]), [0.0, 0.0], iteration, prune_size_from=20) == left
+
+
+def test_without_a_cap_all_above_the_threshold_are_cloned():
+    assert step(surfels([SMALL] * 3), [4e-4, 1e-4, 3e-4], cap=None) == [0, 1, 2, 0, 2]
+
+
 def test_the_cap_takes_the_largest_gradients():
     assert step(surfels([SMALL] * 4), [4e-4, 9e-4, 3e-4, 8e-4], cap=6) == [0, 1, 2, 3, 1, 3]
     assert sorted(step(surfels([LARGE] * 4), [4e-4, 9e-4, 3e-4, 8e-4], cap=5)) == [0, 1, 1, 2, 3]

@@ -119,10 +119,10 @@ def test_a_step_of_the_attribute_by_hand(device):
     attribute[:, 6:] = 0.25
     alpha[3:6, 4:8] = 1  # away from the border; the step lies between columns 5 and 6
     value = bilateral_smoothness(attribute.to(device), guide.to(device), alpha.to(device))
-    assert value.item() == pytest.approx(3 * 2 * 4 * 0.25 / (9 * 12), rel=1e-6)
+    assert value.item() == pytest.approx(3 * 2 * 0.5 * 0.25 / (9 * 12), rel=1e-6)
     guide[:, 6:] = 0.75  # the same step in the guide
     value = bilateral_smoothness(attribute.to(device), guide.to(device), alpha.to(device))
-    assert value.item() == pytest.approx(3 * 2 * 4 * 0.25 * math.exp(-4 * 0.25) / (9 * 12), rel=1e-6)
+    assert value.item() == pytest.approx(3 * 2 * 0.5 * 0.25 * math.exp(-0.5 * 0.25) / (9 * 12), rel=1e-6)
 
 
 def test_a_constant_attribute_inside_costs_nothing(device):

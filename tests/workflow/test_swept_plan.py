@@ -83,7 +83,7 @@ def test_every_gpu_that_some_configuration_needs_is_asked_for(planned):
 def test_two_variants_of_one_folder_are_refused(planned):
     given = {"a": ["views.name=views-b", "views.width=16"], "b": ["views.width=32"]}
     words = " ".join(f'"+sweep.variants.{name}={listed}"' for name, listed in given.items())
-    with pytest.raises(ConfigError, match="two variants go there; give one another name"):
+    with pytest.raises(ConfigError, match=r"two jobs go there, which differ in .*; give both the same"):
         planned(f"sweep.name=x {words}")
 
 

@@ -86,8 +86,7 @@ class Seeds:
     opacity: float = key(0.1, "opacity of each seed", least=0)
     half_size: float | None = key(
         None,
-        "half the side of the cube of seeds, in halves of the data's longest side, which is 1 world unit where "
-        "views do not say; default the box of the data",
+        "half the side of the cube of seeds, in halves of the data's longest side; default the data's box",
         above=0,
     )
 

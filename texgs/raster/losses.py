@@ -81,9 +81,10 @@ def _axes(image: Tensor) -> str:
 def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Tensor:
     """Return the bilateral smoothness of attribute maps: mean of alpha * exp(-g(grey)) * g(attribute).
 
-    g = |Sobel x| + |Sobel y|, 3 x 3 and not normalised, zeros outside the image; grey is the mean of the
-    guide's channels. An attribute may change where the guide does (Gao et al. 2024; the paper's L_b). Linear
-    in the scale of the attribute: an exponent of 0 to 50 counts fifty times as much as a factor of 0 to 1.
+    g = |d/dx| + |d/dy| of each pixel by Sobel's 3 x 3 kernels, zeros outside the image; grey is the mean of
+    the guide's channels. An attribute may change where the guide does (Gao et al. 2024; the paper's L_b).
+    Linear in the scale of the attribute: an exponent of 0 to 50 counts fifty times as much as a factor of 0
+    to 1.
     Differentiable in `attribute`.
 
     Args:

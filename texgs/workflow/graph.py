@@ -97,7 +97,7 @@ class Graph:
             if known != job:
                 differing = [key for key in job.settings if job.settings[key] != known.settings.get(key)]
                 raise ConfigError(
-                    f"{job.output}: two jobs go there, which differ in {', '.join(differing) or 'their inputs'}; "
+                    f"{job.output}: two jobs go there, which differ in {', '.join(differing) or 'inputs'}; "
                     "give both the same, such as views=paper, or one another name, such as fit.name=mine"
                 )
             self.jobs[folders[-1]] = replace(known, swept=dict(known.swept.items() & job.swept.items()))

@@ -54,9 +54,9 @@ def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Ten
 
 
 def edges(planes: Tensor) -> Tensor:
-    """Return |Sobel x| + |Sobel y| of [C, H, W], zeros outside the image."""
+    """Return |d/dx| + |d/dy| of [C, H, W] by Sobel's kernels, zeros outside the image."""
     from kornia.filters import spatial_gradient
 
-    gradient = spatial_gradient(pad(planes[None], (1, 1, 1, 1)), normalized=False)[0]  # [C, 2, H + 2, W + 2]
+    gradient = spatial_gradient(pad(planes[None], (1, 1, 1, 1)))[0]  # [C, 2, H + 2, W + 2]
     size: Tensor = gradient[..., 1:-1, 1:-1].abs().sum(1)
     return size

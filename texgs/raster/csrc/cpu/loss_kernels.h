@@ -10,6 +10,7 @@ namespace texgs {
 // Image losses work on tiles of this size at most. It is fixed, so that sums do not depend on the number of threads.
 constexpr int kLossTileWidth = 256;
 constexpr int kLossTileHeight = 144;
+constexpr float kSobelSum = 8.0f;  // what the sums of Sobel's kernels are of a derivative
 
 // Columns [x0, x1) and rows [y0, y1) of one plane.
 struct LossTile {

@@ -135,7 +135,7 @@ int32_t texgs_bilateral_smoothness(const float* attribute, const float* guide, c
     return guarded([&] {
         check_image(channels, height, width);
         const LossKernels& kernels = loss_kernels();
-        const double n = static_cast<double>(channels) * height * width;
+        const double n = kSobelSum * static_cast<double>(channels) * height * width;
         const SmoothnessJob job{attribute, guide, alpha, channels, height, width, static_cast<float>(1.0 / n),
                                 gradient};
         const std::vector<LossTile> tiles = cut_tiles(1, height, width);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bilateral smoothness of one tile of an attribute map, with its gradient:
-//     alpha exp(-g(grey)) g(attribute),  g = |sobel_x| + |sobel_y|, 3x3 and not normalised, zeros outside the image.
+//     alpha exp(-g(grey)) g(attribute),  g = |d/dx| + |d/dy| by Sobel's 3x3 kernels, zeros outside the image.
 #include "loss_kernels.h"
 #include "simd.h"
 
@@ -39,7 +39,7 @@ void for_pixels(const Band& b, const Body& body) {
     }
 }
 
-// Sobel derivatives at column c of the row between rows[0] and rows[2].
+// Sobel's sums at column c of the row between rows[0] and rows[2], kSobelSum times the derivatives.
 TEXGS_INLINE void sobel(const float (*rows)[kRow], int c, vf& x, vf& y) {
     const auto smooth_row = [&](const float* p) { return fma(2.0f, load(p), load(p - 1) + load(p + 1)); };
     const auto smooth_column = [&](int k) {
@@ -63,7 +63,7 @@ void find_weights(Band& b) {
         for (int c = kStart - kLanes; c < kStart + b.x1 - b.x0 + kLanes; c += kLanes) {
             vf x, y;
             sobel(b.values + row - 1, c, x, y);
-            store(b.weight[row] + c, load(b.weight[row] + c) * exp2_or_nan(vf(-1.44269504f) * (abs(x) + abs(y))));
+            store(b.weight[row] + c, load(b.weight[row] + c) * exp2_or_nan(vf(-1.44269504f / kSobelSum) * (abs(x) + abs(y))));
         }
     }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bilateral smoothness of an attribute map, with its gradient:
-//     alpha exp(-g(grey)) g(attribute),  g = |sobel_x| + |sobel_y|, 3x3 and not normalised, zeros outside the image.
+//     alpha exp(-g(grey)) g(attribute),  g = |d/dx| + |d/dy| by Sobel's 3x3 kernels, zeros outside the image.
 //
 // One block per tile. The gradient of a pixel needs the edges of its neighbours, and those the values of theirs: shared
 // planes hold two more rows and columns on every side.
@@ -13,6 +13,7 @@ namespace texgs::cuda {
 namespace {
 
 constexpr int kBlock = 256;
+constexpr float kSobelSum = 8.0f;  // what the sums of Sobel's kernels are of a derivative
 constexpr int kWidth = 32, kHeight = 16, kHalo = 2;
 constexpr int kColumns = kWidth + 2 * kHalo, kRows = kHeight + 2 * kHalo;
 using Plane = float[kRows][kColumns];
@@ -46,6 +47,7 @@ struct Edge {
     float x, y;
     __device__ float size() const { return abs(x) + abs(y); }
 };
+// Sobel's sums, kSobelSum times the derivatives.
 __device__ inline Edge sobel(const Plane& p, int row, int c) {
     const auto across = [&](int k) { return fma(2.0f, p[row][k], p[row - 1][k] + p[row + 1][k]); };
     const auto along = [&](int k) { return fma(2.0f, p[k][c], p[k][c - 1] + p[k][c + 1]); };
@@ -63,7 +65,7 @@ __global__ __launch_bounds__(kBlock) void smoothness_kernel(const Job job) {
     });
     __syncthreads();
     for_places(job, 1, [&](int row, int c, int64_t i, bool inside) {
-        weight[row][c] = inside ? job.alpha[i] * exp2f(-1.44269504f * sobel(values, row, c).size()) : 0.0f;
+        weight[row][c] = inside ? job.alpha[i] * exp2f(-1.44269504f / kSobelSum * sobel(values, row, c).size()) : 0.0f;
     });
     double total = 0.0;
     for (int channel = 0; channel < job.channels; ++channel) {
@@ -99,7 +101,7 @@ int32_t texgs_bilateral_smoothness(const float* attribute, const float* guide, c
                                    int32_t height, int32_t width, float* value, float* gradient, void* on) {
     return with_workspace(attribute, on, [&](Workspace& workspace, cudaStream_t stream) {
         check_image(channels, height, width);
-        const double n = static_cast<double>(channels) * height * width;
+        const double n = kSobelSum * static_cast<double>(channels) * height * width;
         const int64_t blocks = blocks_for(width, kWidth) * blocks_for(height, kHeight);
         double* sums = workspace.sums.ensure<double>(blocks);
         launch(smoothness_kernel, blocks, kBlock, stream,
