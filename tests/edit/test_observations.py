@@ -69,6 +69,17 @@ def observed(model, edited=None, light=None, opacities=(1.0,), surfels=None):
     return views, observe(model, views, images, light, opacities, surfels)
 
 
+def cover(observation):
+    """Share of the surfels that change, where all else is white."""
+    return 1 - observation.rest[..., 0]
+
+
+def with_opacity(model, factor):
+    """The model with its opacities times a factor."""
+    opacities = (model.parameters["opacities"].sigmoid() * factor).clamp(1e-7, 1 - 1e-7).logit()
+    return Surfels({**model.parameters, "opacities": opacities}, model.shading)
+
+
 def pasted(observation, part, size=48):
     """A part of an image in its place."""
     left, top = (round(24 - float(x)) for x in (observation.camera.K[0, 2], observation.camera.K[1, 2]))
@@ -83,7 +94,7 @@ def test_views_that_are_not_edited_are_solved_by_the_colours_they_have(model, li
     image = first.image(bare_colors(model))
     alpha = views.alphas[0][..., None]
     assert_close(pasted(first, image) + 1 - alpha, views.images[0], atol=2e-5, rtol=0)
-    is_solid = first.cover > 0.9
+    is_solid = cover(first) > 0.9
     assert_close(first.wanted[is_solid], image.detach()[is_solid], atol=0.01, rtol=0)
 
 
@@ -91,26 +102,42 @@ def test_views_that_are_not_edited_are_solved_by_the_colours_they_have(model, li
 def test_at_another_opacity_the_same_colour_is_wanted_at_its_alpha(model, factor):
     color = torch.tensor([0.3, 0.5, 0.9])
     _, ((first, *_),) = observed(model, lambda v: 1 - v.alphas[..., None] * (1 - color), opacities=(factor,))
-    expected = first.cover[..., None] * color.expand(*first.cover.shape, 3)
-    assert_close(first.wanted, expected, atol=2e-3, rtol=0)
-    opacities = (model.parameters["opacities"].sigmoid() * factor).clamp(1e-7, 1 - 1e-7).logit()
-    scaled = Surfels({**model.parameters, "opacities": opacities}, model.shading)
-    assert_close(first.cover, scaled.render(first.camera).alpha, atol=1e-5, rtol=0)
+    assert_close(first.wanted, cover(first)[..., None] * color, atol=2e-3, rtol=0)
+    alpha = with_opacity(model, factor).render(first.camera).alpha
+    assert_close(cover(first), alpha, atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("light", [None, HEADLIGHT])
+@pytest.mark.parametrize("share", ["all", "some"])
+def test_as_in_the_paper_the_edited_image_itself_is_wanted_at_every_opacity(model, share, light):
+    """What surfels should add, and what else there is, make it; what they add now makes the view."""
+    upper = None if share == "all" else model.parameters["means"][:, 1] > 0
+    views = render_views(model, around(2), light)
+    edited = torch.rand(views.images.shape, generator=torch.Generator().manual_seed(3))
+    rows = observe(model, views, edited, light, (2.0, 0.5), upper, target="images")
+    for factor, row in zip((2.0, 0.5), rows, strict=True):
+        now = render_views(with_opacity(model, factor), around(2), light).images
+        for observation, wanted, shown in zip(row, edited, now, strict=True):
+            inside = pasted(observation, torch.ones(observation.rest.shape[:2])) > 0
+            whole = observation.wanted + observation.rest
+            assert_close(pasted(observation, whole)[inside], wanted[inside], atol=1e-6, rtol=0)
+            image = observation.image(bare_colors(model)) + observation.rest
+            assert_close(pasted(observation, image).clamp(0, 1)[inside], shown[inside], atol=2e-5, rtol=0)
 
 
 def test_surfels_that_may_not_change_are_black_and_not_wanted(model):
     upper = model.parameters["means"][:, 1] > 0
     rows = [observed(model, surfels=mask)[1][0] for mask in (upper, ~upper, None)]
     for each in zip(*rows, strict=True):
-        for part in (lambda e: e.image(bare_colors(model)), lambda e: e.cover, lambda e: e.wanted):
+        for part in (lambda e: e.image(bare_colors(model)), cover, lambda e: e.wanted):
             top, bottom, both = (pasted(e, part(e)) for e in each)
             assert_close(top + bottom, both, atol=1e-5, rtol=0)
 
 
 def test_crops_hold_all_content():
-    cover = torch.zeros(60, 80)
-    cover[20:30, 40:41] = 0.1
-    assert content(cover) == (29, 9, 52, 41)
+    covered = torch.zeros(60, 80)
+    covered[20:30, 40:41] = 0.1
+    assert content(covered) == (29, 9, 52, 41)
     assert content(torch.zeros(5, 6)) == (0, 0, 1, 1)
 
 

@@ -3,21 +3,24 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.edit.scenes import ball, plain_style, views
+from tests.edit.scenes import ball, plain_style, task, views
 from tests.models.networks import random_weights
 from texgs.core.errors import ArgumentError, FitError, ShapeError
+from texgs.edit.methods.image import ImageKeys, run
 from texgs.edit.pictures import picture
 from texgs.edit.recipe import PRESETS, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_start import pixel_side, start_colors
-from texgs.edit.stylize import stylize
+from texgs.edit.stylize import Stylized, stylize
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.splats import GEOMETRY
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texels import owners
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.texels import lean, owners
 from texgs.models.vgg import Vgg
 from texgs.raster.shading import MATERIAL
+from texgs.scene.scene import Scene, SceneModel
 
 CHANGED = {"texels", "colors"}
 
@@ -106,17 +109,20 @@ def test_an_edit_is_the_same_with_the_same_seed_and_another_with_another(vgg, st
     assert not torch.equal(runs[0], runs[2])
 
 
-def test_surfels_that_are_not_chosen_stay_as_they_are(vgg, style):
+@pytest.mark.parametrize("is_textured", [True, False])
+def test_surfels_that_are_not_chosen_stay_as_they_are(vgg, style, is_textured):
     model = ball()
     chosen = model.parameters["means"][:, 0] > 0
-    done = styled(style, short(), model, vgg=vgg, surfels=chosen).model.parameters
+    recipe = short(is_textured=is_textured)
+    done = styled(style, recipe, model, vgg=vgg, surfels=chosen).model.parameters
     before = model.parameters
     places, surfel = owners(before)
     kept = places[~chosen[surfel]]
     assert torch.equal(done["texels"][kept], before["texels"][kept])
     assert torch.equal(done["colors"][~chosen], before["colors"][~chosen])
-    changed = (done["texels"] != before["texels"]).any(dim=1)
-    assert changed[places[chosen[surfel]]].float().mean() > 0.9
+    name, mine = ("texels", places[chosen[surfel]]) if is_textured else ("colors", chosen)
+    changed = (done[name] != before[name]).any(dim=1)
+    assert changed[mine].float().mean() > 0.9
 
 
 def test_the_palette_of_a_styled_model_can_still_be_changed(style):
@@ -137,6 +143,7 @@ def test_without_texture_each_surfel_has_one_colour_that_learns(style):
     done = styled(style, short("patches", is_textured=False)).model
     for model in (start, done):
         assert model.parameters["texels"].abs().max() < 1e-6, "the colour is that of the surfel"
+        assert len(lean(model).parameters["texels"]) == len(model)
     assert (done.parameters["colors"] - start.parameters["colors"]).abs().max() > 0.01
 
 
@@ -233,6 +240,24 @@ def test_a_loss_that_is_not_finite_stops_the_edit(style):
     recipe = short(lambda_s=0.0, patches=0.0)
     with pytest.raises(FitError, match="style: the loss is not finite in iteration 1"):
         styled(style, recipe, clip=lambda image: image.mean() / 0)
+
+
+@pytest.mark.parametrize(("recipe", "dtype"), [("paper", torch.float32), ("default", torch.bfloat16)])
+def test_the_paper_computes_features_in_single_precision_on_any_machine(tmp_path, monkeypatch, recipe, dtype):
+    """The others as fast as it can: here as if it had bfloat16."""
+    torch.save(random_weights(last=14), tmp_path / "vgg.pth")
+    monkeypatch.setattr("texgs.models.vgg.locate", lambda name: tmp_path / "vgg.pth")
+    monkeypatch.setattr("texgs.models.vgg.fast_dtype", lambda device: torch.bfloat16)
+    seen = []
+
+    def only_look(model, cameras, lights, picture, recipe, *, vgg, **options):
+        seen.append(vgg.dtype)
+        return Stylized(model, recipe, {}, {})
+
+    monkeypatch.setattr("texgs.edit.stylize.stylize", only_look)
+    scene = Scene({"ball": SceneModel(write_model(tmp_path / "ball", ball()))})
+    run(replace(task(scene, tmp_path), settings=ImageKeys(recipe=recipe, lambda_s=1.0)))
+    assert seen == [dtype]
 
 
 @pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])

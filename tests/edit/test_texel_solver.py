@@ -5,13 +5,19 @@ import torch
 from torch.testing import assert_close
 
 from tests.edit.scenes import around, shell
-from texgs.core.light import Light
+from texgs.core.camera import orbit
+from texgs.core.light import HEADLIGHT, Light
 from texgs.edit.observations import observe, render_views
-from texgs.edit.texel_solver import back_project, fill_unseen, learn, seen_texels, solve
+from texgs.edit.texel_solver import back_project, fill_unseen, image_loss, learn, seen_texels, solve
 from texgs.fields.optimizer import Rate
+from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import material
 from texgs.fields.surfels.texels import bare_colors, owners, recolored
+from texgs.raster import Texture, reference
 from texgs.raster.losses import l1_dssim
+from texgs.raster.reference.losses import l1_dssim as l1_dssim_by_definition
+from texgs.raster.reference.shading import blinn_phong_texture
 
 STRIPES = 9.0  # for each world unit
 
@@ -70,8 +76,8 @@ def test_sums_are_those_of_the_dense_matrix(few):
     model, observations, _ = few
     A, wanted = dense(observations, model)
     sums = back_project(observations, model)
-    pixels = [e.cover.numel() for e in observations]
-    shows = torch.cat([e.cover.flatten() for e in observations]).double() > 1e-4
+    pixels = [e.rest.numel() for e in observations]
+    shows = torch.cat([1 - e.rest.flatten() for e in observations]).double() > 1e-4
     assert_close(sums.weights.double(), A[shows].sum(dim=0), atol=1e-3, rtol=1e-4)
     gains = A.sum(dim=1, keepdim=True)
     means = (A.T @ (wanted / gains.clamp_min(1e-4)).clamp(0, 1)) / A.sum(dim=0)[:, None]
@@ -125,6 +131,45 @@ def by_adam(rows, model, steps):
     generator = torch.Generator().manual_seed(0)
     start, rate = bare_colors(model), Rate(0.025, 0.1)
     return learn(rows, start, rate=rate, steps=steps, generator=generator, title="")
+
+
+@pytest.mark.parametrize("share", ["all", "some"])
+@pytest.mark.parametrize("opacity", [2.0, 0.5])
+def test_the_papers_gradient_is_that_of_the_whole_image_by_definition(opacity, share):
+    """The edited image as it is, L1 + D-SSIM over all of it: float64, every surfel at every pixel."""
+    model, camera = shell(count=24, texels=3, opacity=0.5), orbit(20, 30, 2.5, 60, 96, 80)
+    changing = model.parameters["means"][:, 1] > (-9 if share == "all" else 0)
+    edited = torch.rand(1, 80, 96, 3, generator=torch.Generator().manual_seed(4))
+    views = render_views(model, [camera], HEADLIGHT)
+    rows = observe(model, views, edited, HEADLIGHT, (opacity,), changing, target="images")
+    colors = bare_colors(model).requires_grad_()
+    image_loss(rows[0][0], colors).backward()
+    exact = colors.detach().double().requires_grad_()
+    image = by_definition(model, camera, exact, opacity)
+    (l1_dssim_by_definition(image, edited[0].double()) * 80 * 96).backward()
+    place, surfel = owners(model.parameters)
+    mine = place[changing[surfel]]
+    scale = float(exact.grad.abs().max())
+    assert rows[0][0].wanted[..., 0].numel() < 0.7 * 80 * 96, "a part of the view"
+    assert_close(colors.grad[mine].double(), exact.grad[mine], atol=1e-4 * scale, rtol=1e-3)
+    assert colors.grad[place[~changing[surfel]]].abs().sum() == 0
+
+
+def by_definition(model, camera, colors, opacity):
+    """The view of bare colours [T, 3] under a headlight, over white, in float64."""
+    p = {name: x.double() if x.is_floating_point() else x for name, x in model.parameters.items()}
+    *splats, opacities = geometry(p)
+    factors = material(p, model.shading.material).values()
+    lit = blinn_phong_texture(
+        torch.zeros_like(p["means"]), *factors, p["means"], p["quats"], camera.position.double(), facing=True
+    )
+    return reference.rasterize(
+        *(*splats, (opacity * opacities).clamp_max(1)),
+        *(camera.viewmat.double(), camera.K.double(), camera.width, camera.height),
+        texture=Texture(*lit, colors, p["sizes"], p["offsets"]),
+        background=torch.ones(3).double(),
+        options=model.shading.options,
+    ).color
 
 
 class Rows(list):

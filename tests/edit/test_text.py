@@ -16,11 +16,15 @@ from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
-from texgs.edit.observations import render_views
+from texgs.edit.canvas import rasterized
+from texgs.edit.observations import observe, render_views
+from texgs.edit.texel_solver import image_loss
 from texgs.edit.text import RECIPES, TextRecipe, axis_cameras, edit_by_text, nearest_to_axes
 from texgs.fields.surfels.composition import Composition
-from texgs.fields.surfels.texels import bare_colors, owners, recolored
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import bare_colors, lean, owners, recolored, spread, untextured
 from texgs.models.filters import ProceduralFilters
+from texgs.raster import Texture
 from texgs.volume.cameras import icosphere
 
 BLUE, RED = (0.2, 0.3, 0.8), (0.9, 0.1, 0.1)
@@ -150,6 +154,97 @@ def test_share_of_texels_seen(model):
 def test_unseen_sides_have_the_new_colour(model):
     back = seen(edit_by_text(model, around(1), Tint(BLUE), "x", QUICK).model)
     assert (back.images[back.alphas > 0.95] - torch.tensor(BLUE)).abs().max() < 0.1
+
+
+def test_texels_that_no_view_shows_stay_as_they_are_in_the_papers_recipe(model):
+    """Surfels bit for bit; of those that are cut by the border of the view the colour, even beyond white."""
+    p = model.parameters
+    model = Surfels({**p, "texels": p["texels"] + 0.5}, model.shading, model.metadata)
+    recipe, camera = replace(RECIPES["paper"], views="all", iterations=20), around(1)[0].crop(0, 0, 20, 48)
+    done, filled = (
+        edit_by_text(model, [camera], Tint(BLUE), "x", replace(recipe, fills=fills)).model
+        for fills in (False, True)
+    )
+    shown = sum(shares(model, camera, opacity) for opacity in recipe.opacities)
+    place, surfel = owners(p)
+    of_surfel = torch.zeros(len(model)).index_add_(0, surfel, shown[place])
+    hidden = of_surfel == 0
+    for name, whole in (("colors", hidden), ("texels", torch.empty_like(shown > 0))):
+        if name == "texels":
+            whole[place] = hidden[surfel]
+        before, after, made_up = (m.parameters[name][whole] for m in (model, done, filled))
+        assert len(before) > 20
+        assert torch.equal(before, after)
+        assert (made_up - before).abs().amax(dim=1).min() > 0
+    before, after, made_up = (bare_colors(m) for m in (model, done, filled))
+    assert before.max() > 1
+    assert_close(after[shown == 0], before[shown == 0], atol=1e-6, rtol=0)
+    assert (made_up - before)[shown == 0].abs().mean() > 0.1
+    assert (after - before)[shown > 0].abs().mean() > 0.1
+
+
+def shares(model, camera, opacity):
+    """How much of the view each texel makes up [T]: the gradient of the sum of all pixels."""
+    p = model.parameters
+    texels = torch.ones_like(p["texels"]).requires_grad_()
+    plain = torch.zeros_like(p["means"]), torch.ones_like(p["opacities"])
+    texture = Texture(*plain, texels, p["sizes"], p["offsets"])
+    image = rasterized(model, camera, opacity, texture=texture).color
+    return torch.autograd.grad(image.sum(), texels)[0].sum(dim=1)
+
+
+def stripes(views):
+    """Dark and light stripes on the surface, over white."""
+    is_dark = (views.points[..., 1:2] * 9) % 1 < 0.5
+    alpha = views.alphas[..., None]
+    return torch.where(is_dark, 0.2, 0.6) * alpha.expand(-1, -1, -1, 3) + 1 - alpha
+
+
+def squared(observation, colors):
+    """What the solver makes small."""
+    return (observation.image(colors) - observation.wanted).square().sum()
+
+
+@pytest.mark.parametrize("target", ["colors", "images"])
+@pytest.mark.parametrize(("recipe", "loss"), [(QUICK, squared), (ADAM, image_loss)], ids=["solve", "adam"])
+def test_without_texture_each_surfel_learns_one_colour(model, recipe, loss, target):
+    """It has a lower loss than the mean of the texels that would fit the edited views."""
+    recipe, guidance = replace(recipe, target=target), Returns(stripes)
+    done = edited(model, guidance, replace(recipe, is_textured=False))
+    texels = done.parameters["texels"]
+    assert texels.shape == model.parameters["texels"].shape, "it can be saved as a texture of the model"
+    assert len(lean(done).parameters["texels"]) == len(model)
+    views = render_views(model, around(6), HEADLIGHT)
+    rows = observe(model, views, stripes(views), HEADLIGHT, recipe.opacities, target=target)
+    averaged = bare_colors(edited(model, guidance, recipe))
+    averaged = spread(bare_colors(untextured(recolored(model, averaged))), untextured(model), model)
+    losses = [
+        sum(float(loss(observation, colors)) for row in rows for observation in row)
+        for colors in (bare_colors(done), averaged, bare_colors(model))
+    ]
+    assert losses[0] < 0.99 * losses[1] < losses[2]
+
+
+def test_without_texture_surfels_that_are_not_chosen_keep_theirs(model):
+    upper = model.parameters["means"][:, 1] > 0
+    done = edited(model, Tint(BLUE), replace(QUICK, is_textured=False), surfels=upper)
+    place, surfel = owners(model.parameters)
+    for name, kept in (("colors", ~upper), ("texels", place[~upper[surfel]])):
+        assert torch.equal(model.parameters[name][kept], done.parameters[name][kept])
+    assert_close(bare_colors(done)[place[upper[surfel]]].mean(dim=0), torch.tensor(BLUE), atol=0.03, rtol=0)
+
+
+def test_at_half_the_opacity_the_papers_recipe_looks_like_the_edited_views():
+    """The other one keeps the colours of the edit, which are paler then."""
+    model, recipe = shell(opacity=0.5), TextRecipe("all", opacities=(0.5,), iterations=150, rate=0.05)
+    wanted = render_views(recolored(model, torch.full_like(model.parameters["texels"], 0.4)), around(6), None)
+    error = {}
+    for target in ("colors", "images"):
+        done = edited(model, Returns(wanted.images), replace(recipe, target=target))
+        opacities = (done.parameters["opacities"].sigmoid() / 2).logit()
+        half = Surfels({**done.parameters, "opacities": opacities}, done.shading)
+        error[target] = float((render_views(half, around(6), HEADLIGHT).images - wanted.images).abs().mean())
+    assert error["images"] < 0.5 * error["colors"]
 
 
 def test_six_views_of_the_size_asked_for_in_the_aspect_of_the_first(model):

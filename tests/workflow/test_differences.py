@@ -61,6 +61,14 @@ def test_values_of_the_paper_make_no_rows_and_others_do(tmp_path, monkeypatch):
         # c_ind starts from the zeroth harmonic and keeps the rate that it has in 2DGS, as in the release.
         (["paper"], [], {("fit.shading.rates.colors", "0.01", "0.0007", "paper")}),
         ([], ["style_paper", "text_paper", "lobe_paper"], set()),
+        (
+            [],
+            ["style_paper_untextured", "text_paper_untextured"],
+            {
+                ("edit.image.recipe.is_textured", "true", "false", "style_paper_untextured"),
+                ("edit.text.textured", "true", "false", "text_paper_untextured"),
+            },
+        ),
         (["gaussians", "quick-variant"], ["none", "arf", "of-the-user"], set()),  # nothing to compare
     ],
 )
@@ -77,6 +85,9 @@ def test_rows_are_what_differs(recipes, edits, expected):
         ([], ["style", "style_untextured"], ("edit.image.recipe.iterations", "3000", "100", STYLES)),
         ([], ["style", "style_untextured"], ("edit.image.recipe.lambda_s", "0.9", "1", STYLES)),
         ([], ["text_quick"], ("edit.text.recipe.views", "nearest", "axes", "text_quick")),
+        ([], ["style"], ("edit.image.recipe.single_precision", "true", "false", "style")),
+        ([], ["text", "text_paper"], ("edit.text.recipe.target", "images", "colors", "text")),
+        ([], ["text", "text_paper"], ("edit.text.recipe.fills", "false", "true", "text")),
         ([], ["text_quick"], ("edit.text.guidance", "instruct_pix2pix", "filters", "text_quick")),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -25,6 +26,7 @@ MARGIN = 11  # pixels around content: a window of SSIM
 SOFT = 0.05  # alpha below which colours are rather those of the neighbourhood
 NEAR, FAR = 9, 65  # pixels, windows of that neighbourhood
 FEW = 0.02  # mean alpha of a window below which it rather has the colour of the larger one
+Target = Literal["colors", "images"]
 
 
 def edit_views(
@@ -95,7 +97,7 @@ class LinearObservation:
     opacity: float  # factor on the opacities of surfels
     texture: Texture  # highlights and gains, both 0 for surfels that do not change
     camera: Camera  # of the part of the view that shows anything
-    cover: Tensor  # [h, w] share of the surfels that change
+    rest: Tensor  # [h, w, 1 or 3] what is in the image beside surfels that change
     wanted: Tensor  # [h, w, 3] what they should add to the image
 
     @property
@@ -121,11 +123,15 @@ def observe(
     light: Light | None,
     opacities: Sequence[float],
     surfels: Tensor | None = None,
+    *,
+    target: Target = "colors",
 ) -> list[list[LinearObservation]]:
     """Return for each opacity the equations of all views.
 
     An edited view says which colours surfels should have where they are seen. At another opacity the same
-    colours are wanted, at the alpha of that opacity, so that nothing gets darker or paler to make up for it.
+    colours are wanted, at the alpha of that opacity, so that nothing gets darker or paler to make up for it;
+    the rest is white. With the target `images` the edited view itself is wanted at each opacity, as in the
+    paper; the rest is white and surfels that stay.
 
     Views are as the guidance saw them, with this light or bare colours, and [V, H, W, 3] over white as it
     edited them. Opacities are factors on those of the textured model, of which all surfels [N] may change,
@@ -133,29 +139,42 @@ def observe(
     """
     own = model.parameters["opacities"]
     changing = torch.ones_like(own) if surfels is None else surfels.to(own)
-    straight = [straight_colors(image, alpha) for image, alpha in zip(edited, views.alphas, strict=True)]
+    bare = bare_colors(model) if target == "images" else None
+    goals = edited if target == "images" else map(straight_colors, edited, views.alphas)
+    wanted = list(zip(views.cameras, goals, strict=True))
     return [
-        [
-            _observation(model, opacity, changing, camera, light, color)
-            for camera, color in zip(views.cameras, straight, strict=True)
-        ]
+        [_observation(model, opacity, changing, camera, light, goal, bare) for camera, goal in wanted]
         for opacity in opacities
     ]
 
 
 @torch.no_grad()
 def _observation(
-    model: Surfels, opacity: float, changing: Tensor, camera: Camera, light: Light | None, color: Tensor
+    model: Surfels,
+    opacity: float,
+    changing: Tensor,
+    camera: Camera,
+    light: Light | None,
+    goal: Tensor,
+    bare: Tensor | None,
 ) -> LinearObservation:
+    """Return what colours [H, W, 3] ask for, or with the bare colours [T, 3] of the model a whole image."""
     p = model.parameters
     highlight, gain = light_on(model, camera, light)
     lit = highlight * changing[:, None], gain * changing
     texture = Texture(*lit, p["texels"], p["sizes"], p["offsets"])
-    cover = rasterized(model, camera, opacity, features=changing[:, None]).color[..., 0]
-    left, top, right, bottom = content(cover)
-    part = cover[top:bottom, left:right].clone()
-    wanted = planar(color[top:bottom, left:right] * part[..., None])
-    return LinearObservation(model, opacity, texture, camera.crop(left, top, right, bottom), part, wanted)
+    cover = rasterized(model, camera, opacity, features=changing[:, None]).color
+    if bare is None:
+        rest, wanted = 1 - cover, goal * cover
+    else:
+        stay, white = 1 - changing, torch.ones_like(goal[0, 0])
+        others = replace(texture, base=highlight * stay[:, None], gain=gain * stay, texels=bare)
+        rest = rasterized(model, camera, opacity, texture=others, background=white).color
+        wanted = goal - rest
+    left, top, right, bottom = content(cover[..., 0])
+    rest, wanted = (planar(x[top:bottom, left:right]) for x in (rest, wanted))
+    crop = camera.crop(left, top, right, bottom)
+    return LinearObservation(model, opacity, texture, crop, rest, wanted)
 
 
 def planar(image: Tensor) -> Tensor:

@@ -19,7 +19,7 @@ from texgs.edit.style_loop import Painting, Stopwatch, learn_style
 from texgs.edit.style_picture import StylePicture, mirrored_crop
 from texgs.edit.style_start import pixel_side, start_colors
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texels import mean_texels, owners, recolored
+from texgs.fields.surfels.texels import owners, recolored, spread, untextured
 from texgs.models.vgg import Vgg
 
 
@@ -91,9 +91,12 @@ class SurfelPainting:
         clip: FeatureTerm | None,
         surfels: Tensor | None,
     ) -> None:
-        p = model.parameters
+        self.whole = model
         if recipe.adapts:
             recipe = recipe.adapted(mean_alpha(model, cameras))
+        if not recipe.is_textured:
+            model = untextured(model, surfels)
+        p = model.parameters
         self.cameras, self.lights, self.recipe, self.surfels = cameras, lights, recipe, surfels
         width, height = cameras[0].width, cameras[0].height
         scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height))
@@ -101,16 +104,14 @@ class SurfelPainting:
         self.objective = Objective.of(recipe, self.style, recipe.reduction(width, height), vgg, clip)
         colors = -p["palette"].expand_as(p["colors"])
         places, surfel = owners(p)
-        self.owner = torch.empty_like(surfel).index_copy_(0, places, surfel)  # [T] surfel of each texel
-        moving = None if surfels is None else surfels[self.owner]
+        owner = torch.empty_like(surfel).index_copy_(0, places, surfel)  # [T] surfel of each texel
+        moving = None if surfels is None else surfels[owner]
         pixel = pixel_side(model, cameras)
         texels = start_colors(recipe.start, model, self.style, pixel, recipe.seed, moving)
-        if not recipe.is_textured:
-            texels = mean_texels({**p, "texels": texels}).to(texels)[self.owner]
         self.fixed: Tensor | None = None  # [F] indices of texels that stay
         if surfels is not None:
             colors = torch.where(surfels[:, None], colors, p["colors"])
-            self.fixed = (~surfels[self.owner]).nonzero()[:, 0]
+            self.fixed = (~surfels[owner]).nonzero()[:, 0]
             texels[self.fixed] = p["texels"][self.fixed]
         # The colours of surfels are taken out where they change: texels [T, 3] have all of the colour.
         self.model = Surfels({**p, "colors": colors.contiguous()}, model.shading, model.metadata)
@@ -137,9 +138,6 @@ class SurfelPainting:
         """Take a step of Adam, after which colours are in [0, 1] again."""
         recipe = self.recipe
         self.adam.param_groups[0]["lr"] = recipe.rate * recipe.last_rate ** (iteration / recipe.iterations)
-        if not recipe.is_textured:  # equal gradients keep equal what starts equal
-            p = {**self.model.parameters, "texels": self.texels.grad}
-            self.texels.grad = mean_texels(p).to(self.texels)[self.owner]  # type: ignore[arg-type]
         self.adam.step()
         self.adam.zero_grad(set_to_none=True)
         self.texels.clamp_(0, 1)
@@ -148,4 +146,6 @@ class SurfelPainting:
 
     def result(self) -> Surfels:
         """Return the model with the texels as they are now."""
-        return recolored(self.model, self.texels.detach(), self.surfels)
+        texels = self.texels.detach()
+        colors = texels if self.recipe.is_textured else spread(texels, self.model, self.whole)
+        return recolored(self.whole, colors, self.surfels)

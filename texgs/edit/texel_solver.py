@@ -136,6 +136,17 @@ def solve(
     return colors.detach()
 
 
+def image_loss(observation: LinearObservation, colors: Tensor) -> Tensor:
+    """Return L1 + D-SSIM [] between the image that bare colours [T, 3] make and the one that is wanted.
+
+    It is a sum over pixels, as outside of what an observation shows nothing changes: so the views that it
+    shows less of do not count more.
+    """
+    image = observation.image(colors) + observation.rest
+    wanted = planar(observation.wanted + observation.rest)
+    return l1_dssim(image, wanted, DSSIM) * image[..., 0].numel()
+
+
 def learn(
     observations: Sequence[Sequence[LinearObservation]],
     start: Tensor,
@@ -154,12 +165,9 @@ def learn(
     for step in progress(range(steps), title=title, unit="iteration"):
         row = observations[step * len(observations) // steps]
         observation = row[int(torch.randint(len(row), (), generator=generator))]
-        beyond = (1 - observation.cover)[..., None]  # white, in image and target alike
-        wanted = planar(observation.wanted + beyond)
-        image = observation.image(texels) + beyond
         adam.param_groups[0]["lr"] = rate.at(step / steps)
         adam.zero_grad(set_to_none=True)
-        l1_dssim(image, wanted, DSSIM).backward()
+        image_loss(observation, texels).backward()
         adam.step()
         with torch.no_grad():
             texels.clamp_(0, 1)

@@ -15,17 +15,17 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.memory import require_memory
 from texgs.edit.canvas import require_editable
-from texgs.edit.observations import LinearObservation, observe, render_views
+from texgs.edit.observations import LinearObservation, Target, observe, render_views
 from texgs.edit.texel_solver import back_project, fill_unseen, learn, seen_texels, solve
 from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texels import bare_colors, owners, recolored
+from texgs.fields.surfels.texels import bare_colors, owners, recolored, spread, untextured
 from texgs.models.guidance import EditViews, Guidance, require_edited
 from texgs.models.instruction import require_instruction
 
 SIZE = 512  # pixels along the longer side of the views: what InstructPix2Pix was trained on
-PIXEL = 112  # bytes of memory for a pixel of a view: what the guidance sees, returns, and texels follow
-SURFEL = 28  # and for a surfel in a view at one opacity
+PIXEL = 64  # bytes of memory for a pixel of a view: what the guidance sees, returns, and the colours there
+FOLLOWED, SURFEL = 24, 28  # for a pixel and a surfel in a view at one opacity, which texels follow
 # Azimuth and polar angle of cameras at the front (+z), back, left, right, top and bottom, degrees.
 AXES = ((-90, 0), (90, 0), (180, 0), (0, 0), (-90, 90), (-90, -90))
 ANY_FOV = 45.0  # degrees, of cameras that only their directions are needed of
@@ -43,13 +43,23 @@ class TextRecipe:
     iterations: int = 0  # of Adam, over which opacities follow each other; 0: solve
     rate: float = 0.025  # of Adam at the start
     final: float = 0.1  # at the end, relative to that
+    target: Target = "colors"  # what is wanted at each opacity: colours that edited views show, or the images
+    fills: bool = True  # whether texels that no view shows take colours of those nearest to them, or stay
+    is_textured: bool = True  # whether each texel follows, or each surfel one colour: the paper's ablation
 
 
 RECIPES = {
     # One edit of six views; texels are the solution of a linear problem.
     "default": TextRecipe(),
     # One edit of six training views; texels by 1,500 iterations while the opacity falls, as in the paper.
-    "paper": TextRecipe("nearest", opacities=(2.0, 1.5, 1.0, 0.75, 0.5), iterations=1500, final=1.0),
+    "paper": TextRecipe(
+        "nearest",
+        opacities=(2.0, 1.5, 1.0, 0.75, 0.5),
+        iterations=1500,
+        final=1.0,
+        target="images",
+        fills=False,
+    ),
 }
 
 
@@ -59,7 +69,7 @@ class Edited(NamedTuple):
     model: Surfels  # with new texels and offsets of surfels; the rest stays as it was, bit for bit
     views: EditViews  # as the guidance saw them
     images: Tensor  # [V, H, W, 3] as the guidance edited them
-    seen: float  # share of the texels that may change that edited views show; others are made up
+    seen: float  # share of the texels that may change that edited views show; others are made up, or stay
 
 
 def edit_by_text(
@@ -100,14 +110,17 @@ def edit_by_text(
     changing, shine = changing.to(model.device), light if guidance.lit else None
     generator = torch.Generator().manual_seed(seed)
     cameras = edited_cameras(recipe, cameras, model.parameters["means"], size)
-    pixels = cameras[0].width * cameras[0].height
-    needed = len(cameras) * (PIXEL * pixels + SURFEL * len(recipe.opacities) * len(model))
+    pixels, opacities = cameras[0].width * cameras[0].height, recipe.opacities
+    needed = len(cameras) * (PIXEL * pixels + len(opacities) * (FOLLOWED * pixels + SURFEL * len(model)))
     require_memory(needed, f"{len(cameras)} views that are edited", "edit fewer views, or smaller ones")
     views = render_views(model, cameras, shine)
     edited = require_edited(guidance(views, instruction, generator), views, guidance.name)
-    rows = observe(model, views, edited, shine, recipe.opacities, changing)
-    colors, weights = _follow(rows, model, recipe, generator, title)
-    share = _seen_share(weights, model, changing)
+    own = model if recipe.is_textured else untextured(model, changing)
+    rows = observe(own, views, edited, shine, opacities, changing, target=recipe.target)
+    colors, weights = _follow(rows, own, recipe, generator, title)
+    share = _seen_share(weights, own, changing)
+    colors = colors if recipe.is_textured else spread(colors, own, model)
+    changing = changing if recipe.fills else changing & _shown(weights, own)
     return Edited(recolored(model, colors, changing), views, edited, share)
 
 
@@ -189,18 +202,26 @@ def _follow(
     generator: torch.Generator,
     title: str,
 ) -> tuple[Tensor, Tensor]:
-    """Return bare colours [T, 3], made up where nothing is seen, and how much each texel is seen [T]."""
+    """Return bare colours [T, 3], as the recipe says where nothing is seen, and how much each is seen [T]."""
     observations = [observation for row in rows for observation in row]
     sums = back_project(observations, model)
     if recipe.iterations:
         rate, start = Rate(recipe.rate, recipe.final), bare_colors(model).clamp(0, 1)
         steps = recipe.iterations
-        learned = learn(rows, start, rate=rate, steps=steps, generator=generator, title=title)
-        return fill_unseen(learned, sums.weights, model), sums.weights
-    start = fill_unseen(sums.colors, sums.weights, model)
-    sweeps = recipe.sweeps
-    colors = solve(observations, sums.curvature, start, sweeps=sweeps, generator=generator, title=title)
+        colors = learn(rows, start, rate=rate, steps=steps, generator=generator, title=title)
+        colors = fill_unseen(colors, sums.weights, model) if recipe.fills else colors
+    else:
+        start, sweeps = fill_unseen(sums.colors, sums.weights, model), recipe.sweeps
+        colors = solve(observations, sums.curvature, start, sweeps=sweeps, generator=generator, title=title)
+    if not recipe.fills:
+        colors = torch.where(sums.weights[:, None] > 0, colors, bare_colors(model))
     return colors, sums.weights
+
+
+def _shown(weights: Tensor, model: Surfels) -> Tensor:
+    """Return which surfels [N] have a texel that is seen at all, by how much each one is [T]."""
+    place, surfel = owners(model.parameters)
+    return weights.new_zeros(len(model)).index_add_(0, surfel, weights[place]) > 0
 
 
 def _seen_share(weights: Tensor, model: Surfels, changing: Tensor) -> float:

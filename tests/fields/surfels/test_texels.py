@@ -1,12 +1,14 @@
 """Texels of surfels: their shares, their means, and models with no more of them than they need."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.samples import sample
 from texgs.core.camera import orbit
-from texgs.fields.surfels.texels import footprint, lean, owners, untextured
+from texgs.fields.surfels.texels import footprint, lean, owners, spread, untextured
 
 CAMERA = orbit(30, 20, 4, 40, 48, 48)
 
@@ -20,21 +22,27 @@ def test_shares_are_those_of_the_gaussian_over_six_deviations():
 
 def test_without_texture_each_surfel_has_the_mean_under_its_gaussian():
     model = sample("texture", n=20)
-    p, plain = model.parameters, untextured(model).parameters["texels"]
+    p, plain = model.parameters, untextured(model)
+    assert len(plain.parameters["texels"]) == 20
+    spread_out = spread(plain.parameters["texels"], plain, model)
     place, surfel = owners(p)
     for index in range(20):
         own = place[surfel == index]
         weights = footprint(p["sizes"][index : index + 1]).double()
         mean = (weights[:, None] * p["texels"][own].double()).sum(0)
-        torch.testing.assert_close(plain[own].double(), mean.expand(len(own), 3), atol=1e-6, rtol=0)
+        torch.testing.assert_close(spread_out[own].double(), mean.expand(len(own), 3), atol=1e-6, rtol=0)
 
 
 def test_a_lean_model_looks_the_same_with_a_texel_for_each_plain_surfel():
     model = sample("texture", n=60)
     plain = torch.arange(60) % 3 > 0
-    mixed = untextured(model, plain)
-    small = lean(mixed)
-    counts = model.parameters["sizes"].long().prod(1)
+    p, small = model.parameters, untextured(model, plain)
+    place, surfel = owners(p)
+    texels = spread(small.parameters["texels"], small, model)
+    texels[place] = torch.where(plain[surfel, None], texels[place], p["texels"][place])
+    mixed = replace(model, parameters={**p, "texels": texels})
+    assert torch.equal(lean(mixed).parameters["texels"], small.parameters["texels"])
+    counts = p["sizes"].long().prod(1)
     assert len(small.parameters["texels"]) == int(torch.where(plain, 1, counts).sum())
     torch.testing.assert_close(small.render(CAMERA).color, mixed.render(CAMERA).color, atol=1e-6, rtol=0)
     assert small.sizes()["files_mib"] < mixed.sizes()["files_mib"]

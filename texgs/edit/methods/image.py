@@ -29,7 +29,8 @@ class ImageKeys(StyleKeys):
 
     recipe: str = key(
         "default",
-        "default; patches, which needs no weights; preview, the picture laid onto the surface; paper",
+        "default; patches, which needs no weights; preview, the picture laid onto the surface; paper, NNFM and "
+        "CLIP from random colours",
         choices=("default", "patches", "preview", "paper"),
     )
     iterations: int | None = key(None, "steps, of one view each; default the recipe's", least=0)
@@ -74,6 +75,8 @@ class ImageKeys(StyleKeys):
 
 def run(task: Task[ImageKeys]) -> EditedScene:
     """Give the parts the style; write style.png."""
+    import torch
+
     from texgs.edit.objective import ClipLoss
     from texgs.edit.stylize import stylize
     from texgs.edit.task import EditedScene
@@ -82,7 +85,8 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     from texgs.volume.images import smaller
 
     keys, recipe = task.settings, task.settings.recipe_of(task.edit.seed)
-    look = Look(task, Vgg.load(device=task.device) if recipe.needs_vgg else None)
+    dtype = torch.float32 if recipe.single_precision else None
+    look = Look(task, Vgg.load(device=task.device, dtype=dtype) if recipe.needs_vgg else None)
     network = Clip.load(keys.clip, task.device) if recipe.needs_clip else None
     seconds: dict[str, dict[str, float]] = {}
     adapted: list[Recipe] = []

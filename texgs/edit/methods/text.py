@@ -25,7 +25,10 @@ class TextKeys(InstructionKeys):
     """What to do, what edits the views, and how texels follow."""
 
     recipe: str = key(
-        "default", "how texels follow: solved, or as in the paper", choices=("default", "paper")
+        "default",
+        "how texels follow: solved for the colours of edited views; or as in the paper, by iterations to the "
+        "edited images themselves",
+        choices=("default", "paper"),
     )
     views: str | None = key(
         None,
@@ -33,14 +36,14 @@ class TextKeys(InstructionKeys):
         "nearest to the axes, as in the paper; or all training views; default the recipe's",
         choices=("axes", "nearest", "all"),
     )
-    textured: bool = key(True, "each texel follows, or each surfel has one colour: the paper's comparison")
+    textured: bool = key(True, "each texel follows, or each surfel's one colour: the paper's ablation")
     size: int = key(512, "longer side of the six views", "pixels", least=64)
 
     def recipe_of(self) -> TextRecipe:
-        """Return the recipe, with the views that the configuration chooses."""
+        """Return the recipe, with what the configuration changes about it."""
         from texgs.edit.text import RECIPES
 
-        recipe = RECIPES[self.recipe]
+        recipe = replace(RECIPES[self.recipe], is_textured=self.textured)
         return replace(recipe, views=self.views) if self.views else recipe  # type: ignore[arg-type]
 
     def numbers(self) -> dict[str, Any]:
@@ -52,7 +55,6 @@ def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
-    from texgs.fields.surfels.texels import untextured
     from texgs.volume.images import smaller
 
     settings, guidance = task.settings, task.settings.opened(task.device)
@@ -73,7 +75,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
         seen[name] = result.seen
         rows[f"{name} before"] = [image.cpu().numpy() for image in result.views.images[:SHOWN]]
         rows[f"{name} edited"] = [image.cpu().numpy() for image in result.images[:SHOWN]]
-        return result.model if settings.textured else untextured(result.model, surfels)
+        return result.model
 
     scene = task.each_part(one)
     return EditedScene(

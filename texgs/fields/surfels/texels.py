@@ -49,14 +49,24 @@ def footprint(sizes: Tensor) -> Tensor:
 
 
 def untextured(model: Surfels, surfels: Tensor | None = None) -> Surfels:
-    """Return the model with mean colours under their Gaussians for some surfels [N] bool, or for all."""
+    """Return the model with one texel, the mean under its Gaussian, for some surfels [N] bool, or for all."""
     p = model.parameters
     place, surfel = owners(p)
     texels, weights = p["texels"].clone(), footprint(p["sizes"])[:, None]
     means = torch.zeros_like(p["colors"]).index_add_(0, surfel, weights * texels[place])
-    mine = torch.ones_like(surfel, dtype=torch.bool) if surfels is None else surfels[surfel]
-    texels[place[mine]] = means[surfel[mine]]
-    return replace(model, parameters={**p, "texels": texels})
+    whole = torch.zeros_like(p["opacities"], dtype=torch.bool) if surfels is None else ~surfels
+    texels[place] = torch.where(whole[surfel, None], texels[place], means[surfel])
+    return with_first_texels(replace(model, parameters={**p, "texels": texels}), whole)
+
+
+def spread(colors: Tensor, plain: Surfels, model: Surfels) -> Tensor:
+    """Return colours of a model's texels [T, 3], in their places, from one colour for each surfel.
+
+    Colours are in places of the texels of the plain model: the same surfels, of which the first texel counts.
+    """
+    place, surfel = owners(model.parameters)
+    texels = torch.zeros_like(model.parameters["texels"])
+    return texels.index_copy_(0, place, colors[plain.parameters["offsets"][surfel]])
 
 
 def lean(field: Field) -> Field:
