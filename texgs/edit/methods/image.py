@@ -29,8 +29,8 @@ class ImageKeys(StyleKeys):
 
     recipe: str = key(
         "default",
-        "default; patches, which needs no weights; preview, the picture laid onto the surface; paper, NNFM and "
-        "CLIP from random colours",
+        "default; patches, which needs no weights; preview, the picture laid onto the surface; paper, NNFM "
+        "and CLIP from random colours",
         choices=("default", "patches", "preview", "paper"),
     )
     iterations: int | None = key(None, "steps, of one view each; default the recipe's", least=0)
