@@ -19,6 +19,8 @@ from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_release_texture import release_run
 from tests.study.test_ballots import STUDY, ballot
+from tests.volume.test_netcdf import FIELD, write_netcdf
+from tests.volume.test_text_columns import LINES, write_lines
 from tests.volume.test_tf_files import RAMP, TENT, preset
 from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.camera import orbit
@@ -65,9 +67,9 @@ def volume(name: str, folder: Path) -> Path:
     return folder / name
 
 
-def read_volume(path: Path) -> None:
+def read_volume(path: Path, **keys: Any) -> None:
     """All of it, as `texgs volume` does."""
-    prepare(open_source(path), path.parent / "out.nrrd", nan_value=0.0)
+    prepare(open_source(path, **keys), path.parent / "out.nrrd", nan_value=0.0)
 
 
 def slc(compression: int, folder: Path) -> Path:
@@ -78,6 +80,10 @@ def slc(compression: int, folder: Path) -> Path:
         text += f"{len(runs)} X".encode() + runs if compression else plane.tobytes()
     (folder / "v.slc").write_bytes(text)
     return folder / "v.slc"
+
+
+def text(name: str, folder: Path) -> Path:
+    return write_lines(folder / name, LINES)
 
 
 def slices(folder: Path) -> Path:
@@ -176,6 +182,11 @@ READERS: dict[str, Reader] = {
     ),
     "plain.slc": Reader(partial(slc, 0), read_volume),
     "packed.slc": Reader(partial(slc, 1), read_volume),
+    "netcdf": Reader(lambda folder: write_netcdf(folder / "v.nc", {"t": FIELD}), read_volume),
+    **{
+        name: Reader(partial(text, name), partial(read_volume, dims=(6, 5, 4), column=2))
+        for name in ("v.txt", "v.txt.gz")
+    },
     "slices": Reader(slices, read_volume, "slices/0.tif"),
     "tf ours": Reader(tf_ours, read_function),
     "tf ParaView": Reader(lambda folder: preset(folder, ColorSpace="Diverging", Points=RAMP), read_function),
