@@ -39,6 +39,7 @@ def test_one_picture_for_all_is_shown_for_each(tmp_path):
     Image.new("RGB", (4, 4), "red").save(tmp_path / "style.png")
     row = given_row(None, dict.fromkeys(("TF01", "TF02"), "waves"), {}, [tmp_path / "scene.yaml"])
     assert all((cell.pixels == (255, 0, 0)).all() for cell in row.cells)
+    assert not given_row(None, {"TF01": "waves"}, {}, [tmp_path / "other" / "scene.yaml"]).cells
 
 
 def test_instructions_are_words_in_short_lines():

@@ -33,9 +33,10 @@ def given_row(
     cells = [] if plot is None else [Cell("transfer functions", plot)]
     for name, style in styles.items():
         files = [scene.with_name(file) for scene in scenes for file in (f"style-{name}.png", "style.png")]
-        with Image.open(next(file for file in files if file.is_file())) as picture:
-            square = ImageOps.pad(picture.convert("RGB"), (SIDE, SIDE), color="white")
-        cells.append(Cell(f"{name}: {Path(style).stem}", np.asarray(square)))
+        for file in [file for file in files if file.is_file()][:1]:  # none of methods with several pictures
+            with Image.open(file) as picture:
+                square = ImageOps.pad(picture.convert("RGB"), (SIDE, SIDE), color="white")
+            cells.append(Cell(f"{name}: {Path(style).stem}", np.asarray(square)))
     cells += [Cell(name, words=fill(f"“{text}”", LETTERS)) for name, text in instructions.items()]
     return Row("given", cells)
 
