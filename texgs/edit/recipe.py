@@ -40,7 +40,7 @@ class Recipe:
     adapts: bool = True  # whether opacity, chroma and weights follow how translucent the scene is
     is_textured: bool = True  # whether each texel learns, or each surfel one colour: the paper's ablation
     is_lit: bool = True  # whether the losses see the light of the views, or colours without any
-    single_precision: bool = False  # of features, whatever numbers the machine is fastest with
+    single_precision: bool = False  # whether features are computed so, or as fast as the machine can
     seed: int = 0
 
     @property
