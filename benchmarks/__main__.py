@@ -6,13 +6,11 @@ import json
 import sys
 from dataclasses import asdict
 from importlib import import_module
-from pathlib import Path
 
 from benchmarks import machine, report
+from benchmarks.results import RESULTS, note
 from benchmarks.settings import SECTIONS, Settings, parse
 from texgs.core.errors import TexgsError
-
-RESULTS = Path(__file__).parent / "results"
 
 
 def main() -> int:
@@ -28,6 +26,7 @@ def main() -> int:
     except TexgsError as error:
         print(error, file=sys.stderr)
         return 1
+    note(path, " ".join(f"benchmarks.{name}" for name in settings.sections))
     print(f"\nWrote {path}")
     return 0
 

@@ -55,4 +55,4 @@ def seconds_of(*words: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    call(main)
+    call(main, "benchmarks.main_job volume views surfels shading texture compose image text edit_metrics")

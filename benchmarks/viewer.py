@@ -87,4 +87,4 @@ def _side(frame: bytes) -> int:
 
 
 if __name__ == "__main__":
-    call(main)
+    call(main, "benchmarks.viewer texgs.viewer.server")

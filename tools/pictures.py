@@ -1,87 +1,215 @@
-"""Make the pictures of the README from the results of the demo.
+"""Make the pictures of README.md and docs, from runs of texgs and from results under benchmarks.
 
-`make demo && .venv/bin/python tools/pictures.py` writes hero.png, views.png, edits.png and looks.png in docs.
+`python -m tools.pictures NAME...` makes these, without names all of them, and enters them in
+benchmarks/results/index.csv. Runs go on in build/pictures where they stopped; TEXGS_DATA names the folder of
+the paper's views, without which three pictures cannot be made, and VGG-16 and a browser are needed for some.
 """
 
 from __future__ import annotations
 
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+import pandas as pd
+from PIL import Image
 
+from benchmarks.results import RESULTS, ROOT, add
 from texgs.core.camera import Camera, orbit
-from texgs.core.figures import content, write_grid
+from texgs.core.figures import Cell, Row, as_picture, content, grid_rows, lay_out, new_figure, words
 from texgs.core.lens import Lens
-from texgs.core.progress import progress
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
 
-RESULTS, DOCS = Path("results/orbital"), Path("docs")
-SCENES = RESULTS / "scene" / "demo"
-LOOKS = {  # title: scene file below SCENES
+DOCS, RUNS = ROOT / "docs", ROOT / "build" / "pictures"
+PROGRAM = Path(sys.executable).with_name("texgs")
+STYLES = ("strokes", "glass", "marble", "weave", "dots", "waves")
+RUN = {  # words of `texgs run`, by the folder of its results
+    "demo": "experiment=demo",
+    "fields": "experiment=fields comparisons",
+    "image": "experiment=paper_image_quick dataset=engine edits",
+    "text": "experiment=paper_text_quick dataset=engine edits",
+    "styles": "datasets=[vortex,engine] dataset.vortex.fit.reduce=2 dataset.engine.views.width=400"
+    " dataset.engine.views.height=400 fit=quick edit=style edit.image.recipe=preview,default"
+    f" edit.image.style={','.join(STYLES)} edits",
+    "engine": "dataset=engine fit=quick scenes",
+}
+LOOKS = {  # title: scene file below the scenes of the demo
     "as fitted": "compose/scene.yaml",
     "recoloured": "pse/pse-2.yaml",
-    "relit": "pse/pse-4.yaml",
+    "relit": "pse/relight-5.yaml",
     "stained glass": "edits/glass/scene.yaml",
     "gold": "edits/gold/scene.yaml",
     "painted": "edits/painted/scene.yaml",
     "one lobe in crimson": "edits/crimson/scene.yaml",
 }
-HERO = list(LOOKS)[:6]
-COLUMNS, PANEL, LABEL = 3, 533, 34  # panels side by side, pixels of a panel and of its label
+SIDES = ((30, 20), (-150, 20), (120, 0), (-60, 60))  # azimuths and polar angles
+EDITED = ("TF02.palette=#2a9d8f", "light=-120,35")
+BROWSER = "chromium"
 
 
-def shown(title: str, camera: Camera) -> np.ndarray:
-    """A scene [H, W, 3], uint8, under its own light."""
-    scene = read_scene(SCENES / LOOKS[title])
+def shown(scene_file: Path, camera: Camera) -> np.ndarray:
+    """Return a scene [H, W, 3], uint8, under its own light."""
+    scene = read_scene(scene_file)
     return frame(scene.open(), camera, scene.light, scene.edits, background=scene.background)
 
 
-def write_hero(path: Path) -> None:
-    """Six looks of one scene, a label below each."""
-    camera = orbit(30, 20, *Lens().square(2 * PANEL))
-    pictures = [shown(title, camera) for title in progress(HERO, title=path.name, unit="look")]
+def hero(run: Path) -> Image.Image:
+    """Draw six looks of one scene, a label below each."""
+    camera, titles = orbit(30, 20, *Lens().square(1066)), list(LOOKS)[:6]
+    pictures = [shown(run / "orbital/scene/demo" / LOOKS[title], camera) for title in titles]
     box = content(pictures)
-    sheet = Image.new("RGB", (COLUMNS * PANEL, len(HERO) // COLUMNS * (PANEL + LABEL)), "white")
-    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(24)
-    for index, (title, picture) in enumerate(zip(HERO, pictures, strict=True)):
-        left, top = index % COLUMNS * PANEL, index // COLUMNS * (PANEL + LABEL)
-        panel = Image.fromarray(np.ascontiguousarray(picture[box]))
-        sheet.paste(panel.resize((PANEL, PANEL), Image.Resampling.LANCZOS), (left, top))
-        draw.text((left + PANEL // 2, top + PANEL + LABEL // 2), title, "black", font, anchor="mm")
-    small(sheet, path)
+    cells = [Cell("", each[box], title) for each, title in zip(pictures, titles, strict=True)]
+    return as_picture(lay_out([Row("", cells[:3]), Row("", cells[3:])]))
 
 
-def write_looks(path: Path) -> None:
-    """Each edit from two sides."""
+def looks(run: Path) -> Image.Image:
+    """Draw each edit of the demo from two sides."""
     titles = [title for title in LOOKS if title not in ("recoloured", "relit")]
-    lens = Lens().square(512)
-    sides = {"front": orbit(30, 20, *lens), "from above": orbit(150, 50, *lens)}
-    rows = {side: [shown(title, camera) for title in titles] for side, camera in sides.items()}
-    small(Image.open(write_grid(path, rows, titles)), path)
+    scenes = [run / "orbital/scene/demo" / LOOKS[title] for title in titles]
+    sides = {"front": (30, 20), "from above": (150, 50)}
+    cameras = {side: orbit(*angles, *Lens().square(512)) for side, angles in sides.items()}
+    return grid({side: [shown(scene, each) for scene in scenes] for side, each in cameras.items()}, titles)
 
 
-def write_views(path: Path) -> None:
-    """The contact sheets of both basic transfer functions, one below the other."""
-    sheets = [Image.open(RESULTS / tf / "sheet" / "sheet.png") for tf in ("TF01", "TF02")]
-    size = max(sheet.width for sheet in sheets), sum(sheet.height for sheet in sheets)
-    both = Image.new("RGB", size, "white")
+def views(run: Path) -> Image.Image:
+    """Draw the contact sheets of both basic transfer functions, one below the other."""
+    sheets = [Image.open(run / "orbital" / tf / "sheet/sheet.png") for tf in ("TF01", "TF02")]
+    both = Image.new("RGB", (max(x.width for x in sheets), sum(x.height for x in sheets)), "white")
     for index, sheet in enumerate(sheets):
-        both.paste(sheet, ((size[0] - sheet.width) // 2, index * sheets[0].height))
-    small(both, path)
+        both.paste(sheet, ((both.width - sheet.width) // 2, index * sheets[0].height))
+    return both
 
 
-def small(picture: Image.Image, path: Path) -> None:
-    """Write a PNG with values rounded to multiples of 4, which halves the file."""
+def methods(run: Path) -> Image.Image:
+    """Draw the engine as fitted and after each edit, from four sides."""
+    scenes = run / "engine/scene"
+    edited = {path.parent.name: path for path in sorted(scenes.glob("*/edits/*/scene.yaml"))}
+    cameras = [orbit(*side, *Lens().square(400)) for side in SIDES]
+    rows = {"before": scenes / "quick/compose/scene.yaml"} | edited
+    return grid({name: [shown(scene, each) for each in cameras] for name, scene in rows.items()}, [""] * 4)
+
+
+def styles(run: Path) -> Image.Image:
+    """Draw each picture, and two scenes with it laid onto their surfaces and after the edit."""
+    camera, rows = orbit(30, 20, *Lens().square(512)), {}
+    for style in STYLES:
+        picture = np.asarray(Image.open(ROOT / f"texgs/edit/pictures/{style}.png").convert("RGB"))
+        edits = [f"{name}/scene/quick/edits/style-{style}" for name in ("vortex", "engine")]
+        files = [run / f"{edit}-{recipe}/scene.yaml" for edit in edits for recipe in ("preview", "default")]
+        rows[style] = [picture, *(shown(file, camera) for file in files)]
+    return grid(rows, ["picture", *(("laid onto it", "edited") * 2)])
+
+
+def grid(rows: dict[str, list[np.ndarray]], titles: Sequence[str]) -> Image.Image:
+    """Draw rows of pictures with a title over each column."""
+    return as_picture(lay_out(grid_rows(rows, titles), columns=len(titles)))
+
+
+def viewer(run: Path) -> Image.Image:
+    """Show an edited engine in the viewer, in a browser without a window."""
+    from playwright.sync_api import expect, sync_playwright
+
+    scene, edited = run / "engine/scene/quick/compose/scene.yaml", run / "edited.yaml"
+    subprocess.run([PROGRAM, "edit", scene, *EDITED, "--output", edited], check=True)
+    start = [PROGRAM, "view", edited, "--no-browser"]
+    with subprocess.Popen(start, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as player:
+        page = player.chromium.launch(channel=BROWSER).new_page(viewport={"width": 1280, "height": 800})
+        page.goto(
+            f"{server.stdout.readline().strip()}#azimuth=-60&polar=20&distance=3.2&fov_y=30&target=0,0,0"
+        )
+        expect(page.locator("#pace")).to_contain_text("ms", timeout=60_000)
+        page.screenshot(path=run / "viewer.png")
+        server.terminate()
+    return Image.open(run / "viewer.png")
+
+
+def quality_over_time(table: Path) -> Image.Image:
+    """Draw PSNR over seconds, a line for each recipe; phases end in dots."""
+    figure = new_figure(8, 4, 120)
+    axes = figure.subplots()
+    for index, (recipe, rows) in enumerate(pd.read_csv(table).groupby("recipe", sort=False)):
+        ends = rows[rows.is_final]
+        axes.plot(rows.seconds, rows.psnr, color=f"C{index}", label=recipe)
+        axes.plot(ends.seconds, ends.psnr, "o", color=f"C{index}")
+        for row in ends.itertuples():
+            place = (row.seconds, row.psnr)
+            axes.annotate(row.phase, place, (4, -10), textcoords="offset points", fontsize=7)
+    axes.set(xlabel="seconds of fitting", ylabel="PSNR of test views, dB", xscale="log")
+    axes.margins(x=0.1)  # of which labels beside the dots need some
+    axes.grid(which="both", alpha=0.2)
+    axes.legend()
+    return as_picture(figure)
+
+
+def disagreement(table: Path) -> Image.Image:
+    """Draw consistency and sharpness over seconds, a line for each method."""
+    figure, rows = new_figure(10, 4.4, 120), pd.read_csv(table)
+    labels = {"far": "RMSE of views seven apart", "sharpness": "sharpness against the guidance's"}
+    names = list(rows.method.unique())
+    for axes, (column, label) in zip(figure.subplots(1, 2), labels.items(), strict=True):
+        for name, own in rows.groupby("method", sort=False):
+            style = f"{'*' if 'one-shot' in name else 'o'}{'--' if 'frozen' in name else '-'}"
+            color = f"C{names.index(name.removesuffix(', frozen'))}"
+            axes.plot(own.seconds, own[column], style, color=color, label=words(name))
+        axes.set(xlabel="seconds", ylabel=label, xscale="log", ylim=(0, None))
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
+    return as_picture(figure)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """How a picture is made."""
+
+    draw: Callable[[Path], Image.Image]
+    source: str  # a run, or a file of results
+    code: str = ""  # what its run shows, see benchmarks/results.py
+
+
+FIT = "volume views surfels shading texture"
+PICTURES = {
+    "hero": Picture(hero, "demo", f"{FIT} compose pse image text"),
+    "views": Picture(views, "demo", "volume views sheet"),
+    "edits": Picture(lambda run: Image.open(run / "orbital/scene/demo/pse/pse.png"), "demo", f"{FIT} pse"),
+    "looks": Picture(looks, "demo", f"{FIT} compose image text segment"),
+    "fields": Picture(
+        lambda run: Image.open(next(run.glob("vortex/TF04_400/comparison/*/comparison.png"))),
+        "fields",
+        f"{FIT} gaussians voxels comparison",
+    ),
+    "image_methods": Picture(methods, "image", f"{FIT} gaussians voxels image stylesplat arf"),
+    "text_methods": Picture(methods, "text", f"{FIT} gaussians voxels text in2n igs2gs dge"),
+    "styles": Picture(styles, "styles", f"{FIT} image"),
+    "viewer": Picture(viewer, "engine", f"{FIT} compose texgs.viewer.server"),
+    "quality_over_time": Picture(quality_over_time, "2026-11-23-quality-over-time-xeon.csv"),
+    "disagreement": Picture(disagreement, "2026-11-21-disagreement.csv"),
+}
+
+
+def small(picture: Image.Image) -> Image.Image:
+    """Return it with values rounded to multiples of 4, which halves the file."""
     pixels = np.asarray(picture.convert("RGB")).astype(int)
-    rounded = ((pixels + 2) // 4 * 4).clip(0, 255).astype(np.uint8)
-    Image.fromarray(rounded).save(path, optimize=True)
-    print(f"{path}: {picture.width} x {picture.height}, {path.stat().st_size / 1024:.0f} KiB")
+    return Image.fromarray(((pixels + 2) // 4 * 4).clip(0, 255).astype(np.uint8))
+
+
+def make(name: str) -> None:
+    """Run what a picture shows, unless that is there; draw, write and enter it."""
+    picture, path = PICTURES[name], DOCS / f"{name}.png"
+    source = RESULTS / picture.source
+    if run := RUN.get(picture.source):
+        source = RUNS / picture.source
+        subprocess.run([PROGRAM, "run", *shlex.split(run), f"results={source}", "tracking=none"], check=True)
+    small(picture.draw(source)).save(path, optimize=True)
+    add(path, f"python -m tools.pictures {name}", picture.code or picture.source)
+    print(f"{path}: {path.stat().st_size / 1024:.0f} KiB")
 
 
 if __name__ == "__main__":
-    write_hero(DOCS / "hero.png")
-    write_views(DOCS / "views.png")
-    small(Image.open(SCENES / "pse" / "pse.png"), DOCS / "edits.png")
-    write_looks(DOCS / "looks.png")
+    if unknown := set(sys.argv[1:]) - PICTURES.keys():
+        sys.exit(f"{', '.join(sorted(unknown))}: expected names of {', '.join(PICTURES)}")
+    for each in sys.argv[1:] or PICTURES:
+        make(each)

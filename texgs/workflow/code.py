@@ -9,7 +9,7 @@ has these in it.
 import ast
 import hashlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -18,7 +18,10 @@ from texgs.core.checksum import digest, sha256
 from texgs.core.native_sources import library_sources
 
 ROOT = Path(__file__).parents[2]
-PACKAGE = "texgs"
+PACKAGES = (
+    "texgs",
+    "benchmarks",
+)  # benchmarks measures texgs with code of its own, which texgs never imports
 STAGES = "texgs.workflow.stages."
 ENGINE = "texgs.workflow."  # what else is there decides settings and inputs, which jobs are known by anyway
 NATIVE = "texgs.raster.native"  # the module that calls the native library
@@ -67,7 +70,7 @@ def imports(tree: ast.AST) -> Iterator[str]:
             names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
         else:
             continue
-        yield from (name for name in names if name.split(".")[0] == PACKAGE)
+        yield from (name for name in names if name.split(".")[0] in PACKAGES)
 
 
 class WithoutWords(ast.NodeTransformer):
@@ -84,6 +87,9 @@ class WithoutWords(ast.NodeTransformer):
                 node.body = node.body[1:] or [ast.Pass()]
         elif is_planning(node):
             return ast.Pass()
+        elif isinstance(node, ast.JoinedStr | ast.FormattedValue):  # Pythons quote these differently
+            conversion = ast.Constant(getattr(node, "conversion", None))
+            return ast.Call(ast.Name("f-string"), [*ast.iter_child_nodes(node), conversion], [])
         elif isinstance(node, ast.Call):
             node.keywords = [word for word in node.keywords if word.arg not in ("help", "description")]
             if isinstance(node.func, ast.Name) and node.func.id == "key":
@@ -108,25 +114,34 @@ SOURCES = Sources()
 @cache
 def code_digest(module: str) -> str:
     """Return the digest of a module such as ``texgs.volume.render`` and what it imports from texgs."""
+    return digest("\n".join(f"{name}\n{each}" for name, each in sorted(code_of([module]).items())))
+
+
+def code_of(modules: Iterable[str], root: Path | None = None) -> dict[str, str]:
+    """Return the digests of modules and of what they import from texgs, by name, and of native sources.
+
+    `root` is the folder of another source tree, such as that of an earlier revision.
+    """
+    root = root or ROOT
     seen: dict[str, str] = {}
-    waiting = [module]
+    waiting = list(modules)
     while waiting:
         name = waiting.pop()
         is_engine = name.startswith(ENGINE) and not name.startswith(STAGES)
-        if name in seen or is_engine or (read := essence(name)) is None:
+        if name in seen or is_engine or (read := essence(name, root)) is None:
             continue
         seen[name], imported = read
         waiting += imported
     SOURCES.save()
-    parts = [f"{name}\n{seen[name]}" for name in sorted(seen)]
-    parts += [library_sources(ROOT / "texgs" / "raster")] if NATIVE in seen else []
-    return digest("\n".join(parts))
+    return seen | (
+        {"texgs.raster.csrc": library_sources(root / "texgs" / "raster")} if NATIVE in seen else {}
+    )
 
 
 @cache
-def essence(module: str) -> tuple[str, tuple[str, ...]] | None:
+def essence(module: str, root: Path) -> tuple[str, tuple[str, ...]] | None:
     """Return the digest of what counts of a module, and what it imports; None where there is none."""
-    path = source(module)
+    path = source(module, root)
     if path is None:
         return None
     text = path.read_bytes()
@@ -140,8 +155,8 @@ def data_beside(path: Path) -> str:
     return "".join(f"{each.name}\n{sha256(each)}\n" for each in files)
 
 
-def source(module: str) -> Path | None:
+def source(module: str, root: Path) -> Path | None:
     """Return the file of a module of texgs; None for a name that is no module."""
-    path = ROOT.joinpath(*module.split("."))
+    path = root.joinpath(*module.split("."))
     candidates = (path.with_suffix(".py"), path / "__init__.py")
     return next((candidate for candidate in candidates if candidate.is_file()), None)

@@ -1,0 +1,149 @@
+"""Where each committed result comes from, and which are of older code than this source tree.
+
+`python -m benchmarks.results` lists those of older code; given files, it names the modules that have changed
+since then. `--mark` puts a dagger behind each link to one in README.md and docs. Results of
+`python -m benchmarks` and pictures of `tools.pictures` enter themselves. Any other result is entered by
+
+    python -m benchmarks.results FILE --command "texgs run ..." --code "views surfels shading texture"
+
+right after it was measured; `--revision` names the commit if the code has changed in the meantime.
+
+`benchmarks/results/index.csv` has a row for each. Its column `code` names what was measured: stages, kinds of
+field and methods of editing by their names, other modules by their whole names; or the result that a picture
+is drawn from. A row without a digest was measured with code of another layout, or not of one commit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shlex
+import subprocess
+import sys
+import tarfile
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+
+import pandas as pd
+
+from texgs.core.checksum import digest
+from texgs.workflow.code import code_of, source
+
+ROOT = Path(__file__).parents[1]
+RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"
+INDEX = RESULTS / "index.csv"
+PLACES = ("workflow.stages", "fit.kinds", "fields.kinds", "edit.methods", "metrics.edits")  # of short names
+ABOUT = "accuracy.md"  # explains the mark
+LINK = re.compile(r"(\]\((?:[^)\s]*/)?([\w.-]+)\))(?:†|\[†\]\([^)]*\))?")
+
+
+def index() -> pd.DataFrame:
+    """Return the rows of the index, by their files."""
+    return pd.read_csv(INDEX, index_col="file", dtype=str, keep_default_na=False)
+
+
+def parts(code: str, root: Path = ROOT) -> dict[str, str]:
+    """Return the digests of all modules that the names in a column `code` lead to."""
+    names = {name if "." in name else f"texgs.{place}.{name}" for name in code.split() for place in PLACES}
+    return code_of([name for name in names if source(name, root)], root)
+
+
+@cache
+def digest_of(code: str, root: Path = ROOT) -> str:
+    """Return one digest of all of it; nothing where a name leads to no module."""
+    if not all(parts(name, root) for name in code.split()):
+        return ""
+    return digest("\n".join(f"{name} {each}" for name, each in sorted(parts(code, root).items())))
+
+
+def older(rows: pd.DataFrame) -> list[str]:
+    """Return the results of other code than this source tree, and the pictures drawn from one of them."""
+    results = rows[~rows.code.isin(rows.index)]  # the others are pictures of one of these
+    found = {file for file, row in results.iterrows() if not row.digest or row.digest != digest_of(row.code)}
+    return sorted(file for file in rows.index if found & {file, rows.code[file]})
+
+
+@contextmanager
+def tree_of(revision: str) -> Iterator[Path]:
+    """Give a folder with the sources of a commit; it is empty where this clone lacks it."""
+    words = ("git", "archive", revision.removeprefix("before ").removesuffix("-dirty"), "texgs", "benchmarks")
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, check=False)
+    with tempfile.TemporaryDirectory() as folder:
+        if done.returncode == 0:
+            with tarfile.open(fileobj=BytesIO(done.stdout)) as archive:
+                archive.extractall(folder, filter="data")
+        yield Path(folder)
+
+
+def changed(code: str, revision: str) -> list[str]:
+    """Return the names of the modules that have changed since a commit."""
+    with tree_of(revision) as tree:
+        before, after = parts(code, tree), parts(code)
+    return sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))
+
+
+def add(path: Path, command: str, code: str, revision: str = "") -> None:
+    """Enter a result or a picture, in place of the row that it has; by default it is of this source tree."""
+    from benchmarks import machine  # loads torch
+
+    rows = index()
+    if wrong := [name for name in code.split() if code not in rows.index and not parts(name)]:
+        sys.exit(f"--code: expected stages, kinds of field, methods, modules or a result, got {wrong[0]!r}")
+    commit = revision or machine.revision().removesuffix("-dirty")
+    with tree_of(commit) as tree:
+        committed = digest_of(code, tree)
+    if revision and not committed:
+        sys.exit(f"--revision: expected a commit of this clone that has {code}, got {revision}")
+    found = committed if revision else digest_of(code)
+    commit += "-dirty" if found != committed else ""
+    rows.loc[path.name] = [command, machine.processor(), commit, code, found]
+    rows.sort_index().to_csv(INDEX, lineterminator="\n")
+
+
+def note(path: str | Path, code: str) -> None:
+    """Enter a result of the program that runs, if it was written to the folder of results."""
+    if Path(path).resolve().parent == RESULTS:
+        program = sys.modules["__main__"].__spec__.name.removesuffix(".__main__")  # type: ignore[union-attr]
+        add(Path(path), f"python -m {shlex.join([program, *sys.argv[1:]])}", code)
+
+
+def marked(page: Path, names: list[str]) -> str:
+    """Return the text of a page with a dagger behind each link to one of these files, and no other."""
+    there = ABOUT if page.parent == DOCS else f"docs/{ABOUT}"
+    dagger = "†" if page.name == ABOUT else f"[†]({there})"
+    return LINK.sub(lambda link: link[1] + dagger * (link[2] in names), page.read_text(encoding="utf-8"))
+
+
+def pages() -> list[Path]:
+    """Return the README and the pages of docs."""
+    return [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+
+
+def main() -> None:
+    """List, mark or enter results."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("files", nargs="*", type=Path, help="results whose changed modules are named")
+    parser.add_argument("--mark", action="store_true", help="mark results of older code in the documentation")
+    parser.add_argument("--command", default="not kept", help="that made the result to enter")
+    parser.add_argument("--code", help="what it measures, see above; enters it")
+    parser.add_argument("--revision", default="", help="commit of it; default: this source tree")
+    given = parser.parse_args()
+    for path in given.files if given.code else ():
+        add(path, given.command, given.code, given.revision)
+    rows, names = index(), [path.name for path in given.files]
+    if unknown := sorted(set(names) - set(rows.index)):
+        parser.error(f"expected files of {INDEX.name}, got {', '.join(unknown)}")
+    if given.mark:
+        for page in pages():
+            page.write_text(marked(page, older(rows)), encoding="utf-8")
+    for name in names or older(rows):
+        print(name, rows.revision[name], *(changed(rows.code[name], rows.revision[name]) if names else ()))
+    print(f"{len(older(rows))} of {len(rows)} results and pictures are of older code")
+
+
+if __name__ == "__main__":
+    main()
