@@ -22,10 +22,8 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache
 from io import BytesIO
+from itertools import chain
 from pathlib import Path
 
 import pandas as pd
@@ -46,44 +44,44 @@ def index() -> pd.DataFrame:
     return pd.read_csv(INDEX, index_col="file", dtype=str, keep_default_na=False)
 
 
-def parts(code: str, root: Path = ROOT) -> dict[str, str]:
-    """Return the digests of all modules that the names in a column `code` lead to."""
-    names = {name if "." in name else f"texgs.{place}.{name}" for name in code.split() for place in PLACES}
-    return code_of([name for name in names if source(name, root)], root)
+def parts(code: str, root: Path | None = None) -> dict[str, str]:
+    """Return the digests of the modules that a column `code` leads to; none where a name leads nowhere."""
+    root = root or ROOT
+    names = [[f"texgs.{place}.{name}" for place in PLACES] + [name] for name in code.split()]
+    found = [[each for each in some if source(each, root)] for some in names]
+    return code_of(chain.from_iterable(found), root) if all(found) else {}
 
 
-@cache
-def digest_of(code: str, root: Path = ROOT) -> str:
-    """Return one digest of all of it; nothing where a name leads to no module."""
-    if not all(parts(name, root) for name in code.split()):
-        return ""
-    return digest("\n".join(f"{name} {each}" for name, each in sorted(parts(code, root).items())))
-
-
-def older(rows: pd.DataFrame) -> list[str]:
-    """Return the results of other code than this source tree, and the pictures drawn from one of them."""
-    results = rows[~rows.code.isin(rows.index)]  # the others are pictures of one of these
-    found = {file for file, row in results.iterrows() if not row.digest or row.digest != digest_of(row.code)}
-    return sorted(file for file in rows.index if found & {file, rows.code[file]})
-
-
-@contextmanager
-def tree_of(revision: str) -> Iterator[Path]:
-    """Give a folder with the sources of a commit; it is empty where this clone lacks it."""
+def parts_at(code: str, revision: str) -> dict[str, str]:
+    """Return those of a commit; none where this clone lacks it."""
     words = ("git", "archive", revision.removeprefix("before ").removesuffix("-dirty"), "texgs", "benchmarks")
     done = subprocess.run(words, cwd=ROOT, capture_output=True, check=False)
     with tempfile.TemporaryDirectory() as folder:
         if done.returncode == 0:
             with tarfile.open(fileobj=BytesIO(done.stdout)) as archive:
                 archive.extractall(folder, filter="data")
-        yield Path(folder)
+        return parts(code, Path(folder))
+
+
+def digest_of(found: dict[str, str]) -> str:
+    """Return one digest of all; nothing where there is none."""
+    return digest("\n".join(f"{name} {each}" for name, each in sorted(found.items()))) if found else ""
+
+
+def older(rows: pd.DataFrame) -> list[str]:
+    """Return the results of other code than this source tree, and the pictures drawn from one of them."""
+    results = rows[~rows.code.isin(rows.index)]  # the others are pictures of one of these
+    found = {
+        file for file, row in results.iterrows() if not row.digest or row.digest != digest_of(parts(row.code))
+    }
+    return sorted(file for file in rows.index if found & {file, rows.code[file]})
 
 
 def changed(code: str, revision: str) -> list[str]:
     """Return the names of the modules that have changed since a commit."""
-    with tree_of(revision) as tree:
-        before, after = parts(code, tree), parts(code)
-    return sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))
+    before, after = parts_at(code, revision), parts(code)
+    names = sorted(name for name in before.keys() | after.keys() if before.get(name) != after.get(name))
+    return names if before else ["(the code had another layout, or this clone lacks the commit)"]
 
 
 def add(path: Path, command: str, code: str, revision: str = "") -> None:
@@ -91,14 +89,13 @@ def add(path: Path, command: str, code: str, revision: str = "") -> None:
     from benchmarks import machine  # loads torch
 
     rows = index()
-    if wrong := [name for name in code.split() if code not in rows.index and not parts(name)]:
-        sys.exit(f"--code: expected stages, kinds of field, methods, modules or a result, got {wrong[0]!r}")
+    if code not in rows.index and not parts(code):
+        sys.exit(f"--code: expected stages, kinds of field, methods, modules or a result, got {code!r}")
     commit = revision or machine.revision().removesuffix("-dirty")
-    with tree_of(commit) as tree:
-        committed = digest_of(code, tree)
+    committed = digest_of(parts_at(code, commit))
     if revision and not committed:
         sys.exit(f"--revision: expected a commit of this clone that has {code}, got {revision}")
-    found = committed if revision else digest_of(code)
+    found = committed if revision else digest_of(parts(code))
     commit += "-dirty" if found != committed else ""
     rows.loc[path.name] = [command, machine.processor(), commit, code, found]
     rows.sort_index().to_csv(INDEX, lineterminator="\n")

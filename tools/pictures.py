@@ -8,11 +8,12 @@ the paper's views, without which three pictures cannot be made, and VGG-16 and a
 from __future__ import annotations
 
 import shlex
+import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -34,8 +35,8 @@ RUN = {  # words of `texgs run`, by the folder of its results
     "image": "experiment=paper_image_quick dataset=engine edits",
     "text": "experiment=paper_text_quick dataset=engine edits",
     "styles": "datasets=[vortex,engine] dataset.vortex.fit.reduce=2 dataset.engine.views.width=400"
-    " dataset.engine.views.height=400 fit=quick edit=style edit.image.recipe=preview,default"
-    f" edit.image.style={','.join(STYLES)} edits",
+    f" dataset.engine.views.height=400 fit=quick edit=style edit.image.style={','.join(STYLES)}"
+    " edit.image.recipe=preview,default",
     "engine": "dataset=engine fit=quick scenes",
 }
 LOOKS = {  # title: scene file below the scenes of the demo
@@ -48,8 +49,6 @@ LOOKS = {  # title: scene file below the scenes of the demo
     "one lobe in crimson": "edits/crimson/scene.yaml",
 }
 SIDES = ((30, 20), (-150, 20), (120, 0), (-60, 60))  # azimuths and polar angles
-EDITED = ("TF02.palette=#2a9d8f", "light=-120,35")
-BROWSER = "chromium"
 
 
 def shown(scene_file: Path, camera: Camera) -> np.ndarray:
@@ -60,10 +59,10 @@ def shown(scene_file: Path, camera: Camera) -> np.ndarray:
 
 def hero(run: Path) -> Image.Image:
     """Draw six looks of one scene, a label below each."""
-    camera, titles = orbit(30, 20, *Lens().square(1066)), list(LOOKS)[:6]
-    pictures = [shown(run / "orbital/scene/demo" / LOOKS[title], camera) for title in titles]
-    box = content(pictures)
-    cells = [Cell("", each[box], title) for each, title in zip(pictures, titles, strict=True)]
+    camera, scenes = orbit(30, 20, *Lens().square(1066)), run / "orbital/scene/demo"
+    pictures = {title: shown(scenes / LOOKS[title], camera) for title in list(LOOKS)[:6]}
+    box = content(list(pictures.values()))
+    cells = [Cell("", each[box], title) for title, each in pictures.items()]
     return as_picture(lay_out([Row("", cells[:3]), Row("", cells[3:])]))
 
 
@@ -73,7 +72,8 @@ def looks(run: Path) -> Image.Image:
     scenes = [run / "orbital/scene/demo" / LOOKS[title] for title in titles]
     sides = {"front": (30, 20), "from above": (150, 50)}
     cameras = {side: orbit(*angles, *Lens().square(512)) for side, angles in sides.items()}
-    return grid({side: [shown(scene, each) for scene in scenes] for side, each in cameras.items()}, titles)
+    rows = {side: [shown(scene, each) for scene in scenes] for side, each in cameras.items()}
+    return as_picture(lay_out(grid_rows(rows, titles)))
 
 
 def views(run: Path) -> Image.Image:
@@ -90,8 +90,9 @@ def methods(run: Path) -> Image.Image:
     scenes = run / "engine/scene"
     edited = {path.parent.name: path for path in sorted(scenes.glob("*/edits/*/scene.yaml"))}
     cameras = [orbit(*side, *Lens().square(400)) for side in SIDES]
-    rows = {"before": scenes / "quick/compose/scene.yaml"} | edited
-    return grid({name: [shown(scene, each) for each in cameras] for name, scene in rows.items()}, [""] * 4)
+    files = {"before": scenes / "quick/compose/scene.yaml"} | edited
+    rows = {name: [shown(file, each) for each in cameras] for name, file in files.items()}
+    return as_picture(lay_out(grid_rows(rows, [""] * 4)))
 
 
 def styles(run: Path) -> Image.Image:
@@ -102,12 +103,7 @@ def styles(run: Path) -> Image.Image:
         edits = [f"{name}/scene/quick/edits/style-{style}" for name in ("vortex", "engine")]
         files = [run / f"{edit}-{recipe}/scene.yaml" for edit in edits for recipe in ("preview", "default")]
         rows[style] = [picture, *(shown(file, camera) for file in files)]
-    return grid(rows, ["picture", *(("laid onto it", "edited") * 2)])
-
-
-def grid(rows: dict[str, list[np.ndarray]], titles: Sequence[str]) -> Image.Image:
-    """Draw rows of pictures with a title over each column."""
-    return as_picture(lay_out(grid_rows(rows, titles), columns=len(titles)))
+    return as_picture(lay_out(grid_rows(rows, ["picture", *(("laid onto it", "edited") * 2)])))
 
 
 def viewer(run: Path) -> Image.Image:
@@ -115,12 +111,14 @@ def viewer(run: Path) -> Image.Image:
     from playwright.sync_api import expect, sync_playwright
 
     scene, edited = run / "engine/scene/quick/compose/scene.yaml", run / "edited.yaml"
-    subprocess.run([PROGRAM, "edit", scene, *EDITED, "--output", edited], check=True)
-    start = [PROGRAM, "view", edited, "--no-browser"]
-    with subprocess.Popen(start, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as player:
-        page = player.chromium.launch(channel=BROWSER).new_page(viewport={"width": 1280, "height": 800})
+    changes = ("TF02.palette=#2a9d8f", "light=-120,35")
+    subprocess.run([PROGRAM, "edit", scene, *changes, "--output", edited], check=True)
+    words = [PROGRAM, "view", edited, "--no-browser"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as player:
+        browser = player.chromium.launch(executable_path=shutil.which("chromium"))
+        page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.goto(
-            f"{server.stdout.readline().strip()}#azimuth=-60&polar=20&distance=3.2&fov_y=30&target=0,0,0"
+            server.stdout.readline().strip() + "#azimuth=-60&polar=20&distance=3.2&fov_y=30&target=0,0,0"
         )
         expect(page.locator("#pace")).to_contain_text("ms", timeout=60_000)
         page.screenshot(path=run / "viewer.png")
@@ -161,8 +159,7 @@ def disagreement(table: Path) -> Image.Image:
     return as_picture(figure)
 
 
-@dataclass(frozen=True)
-class Picture:
+class Picture(NamedTuple):
     """How a picture is made."""
 
     draw: Callable[[Path], Image.Image]

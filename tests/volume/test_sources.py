@@ -117,12 +117,12 @@ def test_a_folder_without_permission_is_one_sentence(tmp_path, monkeypatch, func
 
 
 def test_what_the_other_process_runs_counts_as_code_of_a_job():
-    from texgs.workflow.code import essence
+    from texgs.workflow.code import ROOT, essence
 
     seen, waiting = set(), ["texgs.workflow.stages.volume"]
     while waiting:
         name = waiting.pop()
-        read = essence(name)
+        read = essence(name, ROOT)
         if name not in seen and read is not None:
             seen.add(name)
             waiting += read[1]

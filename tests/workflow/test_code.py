@@ -16,7 +16,8 @@ FILES = {
     "volume/unused": "X = 1\n",
     "core/__init__": "",
     "core/deep": "LIMIT = 3\nsize: int = key(64, 'samples', 'voxels', least=16)\n"
-    "parser.add_argument('--size', help='samples', default=64)\nX = field(metadata={'help': 'samples'})\n",
+    "parser.add_argument('--size', help='samples', default=64)\nX = field(metadata={'help': 'samples'})\n"
+    'X = f"{LIMIT}"\n',
 }
 
 
@@ -63,6 +64,9 @@ def tree(tmp_path, monkeypatch):
         ("volume/__init__", "Volumes", "Grids", False),
         ("volume/stage", "STAGE = 3", "STAGE = 4", False),  # what it is to the workflow
         ("volume/unused", "1", "2", False),  # imported for types alone
+        ("core/deep", 'f"{LIMIT}"', "f'{LIMIT}'", False),
+        ("core/deep", "{LIMIT}", "{LIMIT!r}", True),
+        ("core/deep", "{LIMIT}", "{LIMIT:3}", True),
     ],
 )
 def test_what_can_change_a_result_counts(tree, name, old, new, counts):
@@ -74,7 +78,7 @@ def test_stages_exist_and_differ():
     digests = {code.code_digest(stage.module) for stage in STAGES.values()}
     assert len(digests) == len({stage.module for stage in STAGES.values()})
     for stage in STAGES.values():
-        assert code.source(stage.module) is not None, stage.module
+        assert code.source(stage.module, code.ROOT) is not None, stage.module
 
 
 @pytest.mark.parametrize(
@@ -92,7 +96,7 @@ def test_what_settings_name_counts(monkeypatch, changed, stages):
     settings = {name: STAGES[name].settings(config) for name in names}
     before = {name: STAGES[name].code(settings[name]) for name in names}
     real = code.essence.__wrapped__
-    other = lambda module: ("changed", ()) if module == changed else real(module)  # noqa: E731
+    other = lambda module, root: ("changed", ()) if module == changed else real(module, root)  # noqa: E731
     monkeypatch.setattr(code, "essence", other)
     code.code_digest.cache_clear()
     assert {name for name in names if STAGES[name].code(settings[name]) != before[name]} == stages
