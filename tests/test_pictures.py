@@ -18,8 +18,8 @@ from tools.pictures import PICTURES, RUN
 OF_RESULTS = sorted(name for name, picture in PICTURES.items() if picture.source not in RUN)
 OF_RUNS = sorted(PICTURES.keys() - {"viewer", *OF_RESULTS})
 SCENES = ("scene.yaml", "pse-2.yaml", "relight-5.yaml")
-SHEETS = ("sheet.png", "pse.png", "comparison.png")
-PANELS = {"hero": 6, "looks": 10, "image_methods": 20, "text_methods": 24, "styles": 30}
+SHEETS = ("sheet.png", "pse.png", "comparison.png", "gallery.png")
+PANELS = {"hero": 6, "looks": 10, "styles": 30}
 
 
 def test_each_picture_has_a_function_and_tells_its_code():
@@ -50,7 +50,7 @@ def runs(tmp_path_factory):
         patch.setenv("TEXGS_DATA", str(folder / "data"))
         jobs = [job for name in {PICTURES[each].source for each in OF_RUNS} for job in planned(name)]
     for place in map(folder.joinpath, jobs):
-        if {"edits", "comparison"} & {place.parent.name} or place.name in ("compose", "pse", "sheet"):
+        if {place.name, place.parent.name} & {"edits", "comparison", "gallery", "compose", "pse", "sheet"}:
             shutil.copytree(balls.parent, place)
             for other in SCENES:
                 shutil.copy(balls, place / other)

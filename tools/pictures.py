@@ -32,8 +32,8 @@ STYLES = ("strokes", "glass", "marble", "weave", "dots", "waves")
 RUN = {  # words of `texgs run`, by the folder of its results
     "demo": "experiment=demo",
     "fields": "experiment=fields comparisons",
-    "image": "experiment=paper_image_quick dataset=engine edits",
-    "text": "experiment=paper_text_quick dataset=engine edits",
+    "image": "experiment=paper_image_quick dataset=engine galleries",
+    "text": "experiment=paper_text_quick dataset=engine galleries",
     "styles": "datasets=[vortex,engine] dataset.vortex.fit.reduce=2 dataset.engine.views.width=400"
     f" dataset.engine.views.height=400 fit=quick edit=style edit.image.style={','.join(STYLES)}"
     " edit.image.recipe=preview,default",
@@ -48,7 +48,6 @@ LOOKS = {  # title: scene file below the scenes of the demo
     "painted": "edits/painted/scene.yaml",
     "one lobe in crimson": "edits/crimson/scene.yaml",
 }
-SIDES = ((30, 20), (-150, 20), (120, 0), (-60, 60))  # azimuths and polar angles
 
 
 def shown(scene_file: Path, camera: Camera) -> np.ndarray:
@@ -85,16 +84,6 @@ def views(run: Path) -> Image.Image:
     return both
 
 
-def methods(run: Path) -> Image.Image:
-    """Draw the engine as fitted and after each edit, from four sides."""
-    scenes = run / "engine/scene"
-    edited = {path.parent.name: path for path in sorted(scenes.glob("*/edits/*/scene.yaml"))}
-    cameras = [orbit(*side, *Lens().square(400)) for side in SIDES]
-    files = {"before": scenes / "quick/compose/scene.yaml"} | edited
-    rows = {name: [shown(file, each) for each in cameras] for name, file in files.items()}
-    return as_picture(lay_out(grid_rows(rows, [""] * 4)))
-
-
 def styles(run: Path) -> Image.Image:
     """Draw each picture, and two scenes with it laid onto their surfaces and after the edit."""
     camera, rows = orbit(30, 20, *Lens().square(512)), {}
@@ -104,6 +93,11 @@ def styles(run: Path) -> Image.Image:
         files = [run / f"{edit}-{recipe}/scene.yaml" for edit in edits for recipe in ("preview", "default")]
         rows[style] = [picture, *(shown(file, camera) for file in files)]
     return as_picture(lay_out(grid_rows(rows, ["picture", *(("laid onto it", "edited") * 2)])))
+
+
+def copy(pattern: str) -> Callable[[Path], Image.Image]:
+    """Take a picture that the run itself makes."""
+    return lambda run: Image.open(next(run.glob(pattern)))
 
 
 def viewer(run: Path) -> Image.Image:
@@ -167,19 +161,20 @@ class Picture(NamedTuple):
     code: str = ""  # what its run shows, see benchmarks/results.py
 
 
+GALLERY = "engine/gallery/*/gallery.png"
 FIT = "volume views surfels shading texture"
 PICTURES = {
     "hero": Picture(hero, "demo", f"{FIT} compose pse image text"),
     "views": Picture(views, "demo", "volume views sheet"),
-    "edits": Picture(lambda run: Image.open(run / "orbital/scene/demo/pse/pse.png"), "demo", f"{FIT} pse"),
+    "edits": Picture(copy("orbital/scene/demo/pse/pse.png"), "demo", f"{FIT} pse"),
     "looks": Picture(looks, "demo", f"{FIT} compose image text segment"),
     "fields": Picture(
-        lambda run: Image.open(next(run.glob("vortex/TF04_400/comparison/*/comparison.png"))),
-        "fields",
-        f"{FIT} gaussians voxels comparison",
+        copy("vortex/TF04_400/comparison/*/*.png"), "fields", f"{FIT} gaussians voxels comparison"
     ),
-    "image_methods": Picture(methods, "image", f"{FIT} gaussians voxels image stylesplat arf"),
-    "text_methods": Picture(methods, "text", f"{FIT} gaussians voxels text in2n igs2gs dge"),
+    "image_methods": Picture(
+        copy(GALLERY), "image", f"{FIT} gaussians voxels palette image stylesplat arf stylerf gallery"
+    ),
+    "text_methods": Picture(copy(GALLERY), "text", f"{FIT} gaussians voxels text in2n igs2gs dge gallery"),
     "styles": Picture(styles, "styles", f"{FIT} image"),
     "viewer": Picture(viewer, "engine", f"{FIT} compose texgs.viewer.server"),
     "quality_over_time": Picture(quality_over_time, "2026-11-23-quality-over-time-xeon.csv"),
