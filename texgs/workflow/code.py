@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from texgs.core.cache import cache_folder, keep, recall
 from texgs.core.checksum import digest, sha256
@@ -89,7 +90,8 @@ class WithoutWords(ast.NodeTransformer):
             return ast.Pass()
         elif isinstance(node, ast.JoinedStr | ast.FormattedValue):  # Pythons quote these differently
             conversion = ast.Constant(getattr(node, "conversion", None))
-            return ast.Call(ast.Name("f-string"), [*ast.iter_child_nodes(node), conversion], [])
+            values: list[Any] = [*ast.iter_child_nodes(node), conversion]
+            return ast.Call(ast.Name("f-string"), values, [])
         elif isinstance(node, ast.Call):
             node.keywords = [word for word in node.keywords if word.arg not in ("help", "description")]
             if isinstance(node.func, ast.Name) and node.func.id == "key":
