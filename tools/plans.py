@@ -18,14 +18,14 @@ import yaml
 from texgs.config.project import ROOT, members
 from texgs.workflow.plan import planned, words_of
 
-VIEWS = {"vortex": ("TF01", "TF02", "TF03", "TF04", "TF05")}  # data sets that start from views, and their TFs
+VIEWS = {"vortex": ("TF01", "TF02", "TF03", "TF04")}  # data sets that start from views, and their TFs
 RUNS = {  # beside the experiments: what people type
     "engine": "dataset=engine fit=quick edits=[glass,gold] views.width=200 views.height=200",
     "seeds": "dataset=sphere fit=quick fit.low_pass=2,6 fit.seed=0,1",
     "recipes": "dataset=orbital fits=[quick,gaussians_quick] edits=[style,crimson] edit.seed=3",
     "edit_sweep": "dataset=engine sweep=lambda_s edit=style",
     "aimed": "experiment=paper_quick dataset.engine.views.width=99",
-    "chained": "dataset=engine edits=[plate,wooden_plate,lobe]",
+    "chained": "dataset=engine edits=[part,wooden_part,lobe]",
 }
 
 
@@ -67,6 +67,7 @@ def main() -> None:
         data.mkdir()
         stand_in(data)
         os.environ["TEXGS_DATA"] = str(data)
+        os.environ["TEXGS_WEIGHTS"] = str(data)
         os.chdir(temporary)
         runs = {name: {"experiment": name, "overrides": "on_missing=stop"} for name in members("experiment")}
         runs |= {name: {"overrides": words} for name, words in RUNS.items()}

@@ -137,7 +137,7 @@ from texgs.edit.method import methods
 from texgs.workflow.stage import Stage
 print(*({'torch', 'kornia', 'numpy', 'mlflow', 'pyvista', 'vtkmodules'} & {*sys.modules}))
 for name in {*members('edit')} - {'none'}:
-    edit = compose((f'edit={name}',)).edit
+    edit = compose(('dataset=engine', f'edit={name}')).edit  # a part of which has clicks
     methods()[edit.method].of(edit).check()
 print('torch' in sys.modules)
 """

@@ -9,6 +9,7 @@ from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
 from texgs.workflow.stage_table import STAGES
+from texgs.workflow.sweep import changes
 
 GALLERY = STAGES["gallery"]
 ENGINE = ("dataset=engine", "fit=quick")
@@ -188,10 +189,14 @@ def shown():
 
 
 @pytest.mark.parametrize(("experiment", "dataset"), shown())
-def test_every_experiment_with_a_gallery_is_named_like_it_and_shows_scenes_of_its_own(experiment, dataset):
-    words = (f"experiment={experiment}", f"dataset={dataset}")
+def test_every_experiment_with_a_gallery_is_named_like_it_and_shows_scenes_of_its_own(
+    experiment, dataset, tmp_path
+):
+    (tmp_path / "vortex" / "TF01").mkdir(parents=True)
+    (tmp_path / "vortex" / "TF01" / "transforms_train.json").write_text("{}")
+    words = (f"experiment={experiment}", f"dataset={dataset}", f"data_folder={tmp_path}")
     config = compose(words)
-    variant = next(iter(config.sweep.variants), "")
+    variant = next(iter(changes(config)), "")
     config = compose((*words, f"variant={variant}", *(f"fit={name}" for name in config.fits[:1])))
     assert config.gallery.name == experiment
     assert GALLERY.applies(config)

@@ -121,7 +121,7 @@ def ensure(
     checksums = Checksums.load()
     job = Job.of(stage, config, checksums)
     if stage.place == "edit" and (force or not job.is_done()):
-        for name in needed(config):
+        for name in needed(config.edit):
             locate(name)
         job = Job.of(stage, config, checksums)  # with what was downloaded
     has_run = execute(job, Tracking(config.tracking.uri, config.tracking.experiment), force=force)

@@ -60,6 +60,16 @@ class LookKeys:
 
 
 @dataclass(frozen=True)
+class PartKeys:
+    """A part of a basic scene, by clicks on a view of it; the edit `part` makes it a segment."""
+
+    model: str = key("", "basic TF that it is a part of")
+    view: list[float] = key([30.0, 20.0], "azimuth and polar angle of the view clicked on", "degrees")
+    points: list[Any] = key([], "clicks on it: right and down, as shares of the view's sides")
+    alone: list[str] = key([], "changes that hide the other basic scenes, such as TF01.visible=false")
+
+
+@dataclass(frozen=True)
 class Dataset:
     """A volume with its basic transfer functions, or a folder of views."""
 
@@ -83,6 +93,7 @@ class Dataset:
         default_factory=dict,
         metadata={"help": "what edits with edit.looks make of each basic TF"},
     )
+    part: PartKeys = key(PartKeys, "what the edit `part` makes a segment of")
 
 
 @dataclass(frozen=True)

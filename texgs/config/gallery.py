@@ -62,6 +62,7 @@ class GalleryKeys:
         "name of its folder, and that of fits side by side; as its file in conf/experiment",
     )
     section: str = key("more", "section of the report in which it stands", choices=SECTIONS)
+    note: str = key("", "words behind the captions of all pictures, such as what stands in for what")
     size: int = key(400, "width and height of each picture", "pixels", least=16)
     grids: list[GridKeys] = field(
         default_factory=list,

@@ -79,6 +79,15 @@ class Sweep:
 
 
 @dataclass(frozen=True)
+class StandIns:
+    """What an experiment takes in place of data sets and edits. What is taken may have a stand-in itself."""
+
+    taken: str = key("missing", "where data or weights are missing, or always", choices=("missing", "always"))
+    datasets: dict[str, str] = key(dict, "data sets by the names of those that they stand in for")
+    edits: dict[str, str] = key(dict, "edits by the names of those that they stand in for")
+
+
+@dataclass(frozen=True)
 class Config:
     """Everything."""
 
@@ -94,6 +103,7 @@ class Config:
     on_missing: str = key(
         "stop", "what a run does without data or weights that it needs", choices=("stop", "skip")
     )
+    stand_ins: StandIns = key(StandIns, "what is taken in place of the data sets and edits of an experiment")
     tf: str | None = key(None, "basic TF to work on; default each of the data set")
     views: ViewKeys = key(ViewKeys, "training and test views")
     fit: Fit = key(Fit, "recipe of the fit")

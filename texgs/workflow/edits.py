@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -96,11 +96,19 @@ def added_parts(edit: EditKeys, models: Sequence[str]) -> Sequence[str]:
     return method_of(edit).of(edit).adds(models)
 
 
-def ancestry(name: str) -> list[EditKeys]:
-    """Return an edit of conf/edit and those that it starts from, the first one first."""
-    edit = compose((f"edit={name}",)).edit
+def chain(table: Mapping[str, str], name: str) -> list[str]:
+    """Return a name and what stands in for it by a table, one after another."""
+    listed = [name]
+    while (following := table.get(listed[-1], name)) not in listed:
+        listed.append(following)
+    return listed
+
+
+def ancestry(name: str, *words: str) -> list[EditKeys]:
+    """Return an edit of conf/edit and those that it starts from, the first one first, with some words."""
+    edit = compose((*words, f"edit={name}")).edit
     is_first = edit.base is None or is_scene_file(edit.base) or edit.base not in members("edit")
-    return [edit] if is_first else [*ancestry(edit.base), edit]
+    return [edit] if is_first else [*ancestry(edit.base, *words), edit]
 
 
 def edit_keys(config: Config) -> dict[str, Any]:

@@ -10,13 +10,14 @@ from dataclasses import dataclass, field, fields
 from texgs.config.compose import compose
 from texgs.config.dataset import Dataset
 from texgs.config.project import Words, members
-from texgs.config.schema import Config
+from texgs.config.schema import Config, StandIns
 from texgs.core.errors import ConfigError
 from texgs.core.names import close
 from texgs.edit.method import method_of
 from texgs.workflow.edits import edits
 from texgs.workflow.stage import edit_folder
 from texgs.workflow.stage_table import STAGES
+from texgs.workflow.stand_ins import Taken, data_set, edit
 from texgs.workflow.sweep import changes, is_of_edits, variants
 
 OF_A_UNION = (
@@ -41,7 +42,8 @@ class LeftOut:
 class Selection:
     """The configurations of a run."""
 
-    lacking: Callable[[Config], Sequence[str]]  # sentences for which a configuration is left out
+    lacking: Callable[[Config], Sequence[str]]  # sentences on what a configuration lacks
+    skips: bool  # whether what lacks something is left out
     by_sweep: dict[str, list[Config]] = field(default_factory=lambda: defaultdict(list))  # "": of none
     left_out: dict[LeftOut, dict[str, None]] = field(default_factory=dict)  # with the places of its jobs
 
@@ -52,11 +54,23 @@ class Selection:
 
     def takes(self, config: Config, what: str) -> bool:
         """Return whether a configuration is run; what is left out is noted."""
-        reasons = self.lacking(config)
+        reasons = self.lacking(config) if self.skips else ()
         for why in reasons:
             places = self.left_out.setdefault(LeftOut(what, why.removeprefix(f"{what}: ")), {})
             places.update(dict.fromkeys(stage.place for stage in STAGES.values() if stage.applies(config)))
         return not reasons
+
+    def replaced(self, datasets: Sequence[Taken], edits: Sequence[Taken]) -> Words:
+        """Note what lacks something and is replaced; return words for edits, and captions that tell it."""
+        from texgs.config.composition import quoted
+
+        for each in (*datasets, *edits):
+            for why in each.lacks:
+                told = f"{why.removeprefix(f'{each.what}: ').rstrip('. ')}; `{each.name}` stands in for it"
+                self.left_out.setdefault(LeftOut(each.what, told), {})
+        own = (f"edits=[{','.join(dict.fromkeys(each.name for each in edits))}]",) if edits else ()
+        captions = " ".join(filter(None, (each.caption for each in (*datasets, *edits))))
+        return (*own, f"gallery.note={quoted(captions)}") if captions else own
 
     def add(self, words: Words, several: bool) -> None:
         """Add one data set with one recipe: its fits and its edits, or those of each variant of its sweep.
@@ -67,8 +81,10 @@ class Selection:
         if not self.takes(config, f"data set {config.dataset.name}"):
             return
         listed = self.by_sweep[config.sweep.name if changes(config) else ""]
-        for each in variants(words):
-            edited, left = self.edited(each, several)
+        made = [(each, *self.edited(each, several)) for each in variants(words)]
+        if len({len(edited) for _, edited, _ in made}) > 1:
+            return  # some variants alone compare nothing, and a gallery shows all
+        for each, edited, left in made:
             if is_of_edits(config) and not edited:
                 continue  # the fits alone are no variant of it
             own: Words = ()
@@ -98,11 +114,15 @@ def selected(words: Words, lacking: Callable[[Config], Sequence[str]]) -> Select
     plain, aimed = apart(words)
     base = compose(plain)
     is_asked_for = any(word.startswith("on_missing=") for word in plain) or not named(plain)
-    selection = Selection(lacking if base.on_missing == "skip" and is_asked_for else lambda config: ())
+    selection = Selection(lacking, base.on_missing == "skip" and is_asked_for)
     reached: set[str] = set()
     of_union = base.per_dataset if base.experiments else {}
     for part in parts(plain, base):
-        reached |= add_part(part, joined(of_union, aimed), selection)
+        reached |= add_part(part, named(plain), joined(of_union, aimed), selection)
+    if not reached:
+        raise ConfigError(
+            f"dataset: expected data sets of {', '.join(base.experiments)}, got {', '.join(named(plain))}"
+        )
     if beside := next((name for name in aimed if name not in reached), None):
         raise ConfigError(
             f"dataset.{beside}: expected one of the data sets of this run, {', '.join(sorted(reached))}; "
@@ -111,25 +131,49 @@ def selected(words: Words, lacking: Callable[[Config], Sequence[str]]) -> Select
     return selection
 
 
-def add_part(words: Words, aimed: Mapping[str, Words], selection: Selection) -> set[str]:
-    """Add one experiment, and return the names of its data sets."""
-    base, chosen = compose(words), named(words)
-    for key, listed in (("datasets", base.datasets), ("fits", base.fits)):
-        if repeated := [name for name in listed if listed.count(name) > 1]:
-            raise ConfigError(f"{key}: expected different names, got {repeated[0]} twice")
-    aimed = joined(base.per_dataset, aimed)
-    names = chosen or base.datasets
-    for name in names or [base.dataset.name]:
+def add_part(words: Words, wanted: list[str], aimed: Mapping[str, Words], selection: Selection) -> set[str]:
+    """Add one experiment, and return the names of its data sets, of a union those that are wanted."""
+    base = compose(words)
+    check_listed(base)
+    aimed, names = joined(base.per_dataset, aimed), named(words) or base.datasets
+
+    def lacks(name: str) -> Sequence[str]:
+        return selection.lacking(compose((*words, f"dataset={name}", *aimed.get(name, ()), "edit=none")))
+
+    def taken(name: str) -> Taken:
+        return data_set(StandIns() if name in wanted else base.stand_ins, name, lacks)
+
+    datasets: dict[str, list[Taken]] = defaultdict(list)  # what they stand in for, by their names
+    for each in map(taken, names or [base.dataset.name]):
+        if not wanted or each.name in wanted:
+            datasets[each.name].append(each)
+    is_named = any(word.startswith("edits=") for word in words)
+    edits = [] if is_named else [edit(base.stand_ins, name, words) for name in base.edits]
+    for name, own in datasets.items():
         of_set = (*words, *((f"dataset={name}",) if names else ()), *aimed.get(name, ()))
-        for each in [(*of_set, f"fit={fit}") for fit in base.fits] or [of_set]:
-            selection.add(each, len(base.fits) > 1)
+        of_set = (*of_set, *selection.replaced(own, edits))
+        for fitted in [(*of_set, f"fit={fit}") for fit in base.fits] or [of_set]:
+            selection.add(fitted, len(base.fits) > 1)
     # Where the words name data sets and no sweeps, those of other data sets are not run.
-    is_of_all = not chosen or any(word.startswith("sweeps") for word in words)
-    of_sweeps = {sweep: name for sweep, name in base.sweeps.items() if is_of_all or name in chosen}
+    is_of_all = datasets and (not wanted or any(word.startswith("sweeps") for word in words))
+    by_sweep = {sweep: taken(name).name for sweep, name in base.sweeps.items()}
+    of_sweeps = {sweep: name for sweep, name in by_sweep.items() if is_of_all or name in datasets}
     beside = (*without(words, "sweep.name", "sweep.over"), "edit=none", "edits=[]")
     for sweep, name in of_sweeps.items():
         selection.add((*beside, f"dataset={name}", *aimed.get(name, ()), f"sweep={sweep}"), False)
-    return {*(names or [base.dataset.name]), *of_sweeps.values()}
+    return {*datasets, *of_sweeps.values()}
+
+
+def check_listed(base: Config) -> None:
+    """Require of lists that they name nothing twice, and of stand-ins that there are files of them."""
+    for key, listed in (("datasets", base.datasets), ("fits", base.fits)):
+        if repeated := [name for name in listed if listed.count(name) > 1]:
+            raise ConfigError(f"{key}: expected different names, got {repeated[0]} twice")
+    for group, table in (("dataset", base.stand_ins.datasets), ("edit", base.stand_ins.edits)):
+        known = members(group) if table else []
+        if unknown := [name for name in (*table, *table.values()) if name not in known]:
+            hint = close(unknown[0], known)
+            raise ConfigError(f"stand_ins.{group}s: expected files of conf/{group}, got {unknown[0]}{hint}")
 
 
 def joined(aimed: Mapping[str, Sequence[str]], later: Mapping[str, Sequence[str]]) -> dict[str, Words]:
@@ -154,22 +198,11 @@ def parts(words: Words, base: Config) -> list[Words]:
                 f"{key}: an experiment with `experiments` sets {', '.join(OF_A_UNION)} alone; put {key} "
                 "into the experiments that it names"
             )
-    wanted, made = named(words), []
-    of_all = without(rest, "dataset", "datasets")
+    made, of_all = [], without(rest, "dataset", "datasets")
     for name in base.experiments:
-        own = f"experiment={name}", *base.common_overrides
-        part = compose((*own, *of_all))
-        if part.experiments:
+        made.append((f"experiment={name}", *base.common_overrides, *of_all))
+        if compose(made[-1]).experiments:
             raise ConfigError(f"experiments: expected single experiments, got {name}, which has several")
-        chosen = [each for each in part.datasets or [part.dataset.name] if each in wanted]
-        if not wanted:
-            made.append((*own, *rest))
-        elif chosen:
-            made.append((*own, *of_all, f"datasets=[{','.join(chosen)}]"))
-    if not made:
-        raise ConfigError(
-            f"dataset: expected data sets of {', '.join(base.experiments)}, got {', '.join(wanted)}"
-        )
     return made
 
 

@@ -12,7 +12,7 @@ from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.core.names import close
 from texgs.edit.method import method_of
-from texgs.workflow.edits import added_parts, ancestry
+from texgs.workflow.edits import added_parts, ancestry, chain
 from texgs.workflow.inputs import prepared_volume, sibling, with_recipe
 from texgs.workflow.locate import tf_names
 from texgs.workflow.stage import edit_folder, fit_folder, made
@@ -52,7 +52,8 @@ def gallery_grids(config: Config) -> list[dict[str, Any]]:
             for row, line in zip(grid.rows, places, strict=True)
         ]
         titles = [column.title for column in grid.columns]
-        shown.append({"name": grid.name, "caption": grid.caption, "columns": titles, "rows": rows})
+        caption = " ".join(filter(None, (grid.caption, config.gallery.note)))
+        shown.append({"name": grid.name, "caption": caption, "columns": titles, "rows": rows})
     return shown
 
 
@@ -120,7 +121,9 @@ def together(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys:
 
 
 def place_of(config: Config, shot: ShotKeys, where: str) -> Place:
-    """Return a place with the file of its scene, which it is required to have."""
+    """Return a place with the file of its scene, which it is required to have, or of one that stands in."""
+    known, instead = known_edits(config), chain(config.stand_ins.edits, str(shot.edit))
+    shot = replace(shot, edit=next((name for name in instead if name in known), shot.edit))
     for name, given in (("view", shot.view), ("light", shot.light)):
         if len(given) not in (0, 2):
             raise ConfigError(f"{where}.{name}: expected azimuth and polar angle, got {given}")
@@ -169,8 +172,7 @@ def takers(config: Config, edit: str, where: str) -> list[str]:
     recipes = recipes_of(config)
     if edit == AS_FITTED:
         return recipes
-    known = list(dict.fromkeys(each.name for name in config.edits for each in ancestry(name)))
-    if edit not in known:
+    if edit not in (known := known_edits(config)):
         expected = ", ".join([AS_FITTED, *known])
         raise ConfigError(f"{where}.edit: expected one of {expected}, got {edit}{close(edit, known)}")
     method = method_of(compose((f"edit={edit}",)).edit)
@@ -179,10 +181,16 @@ def takers(config: Config, edit: str, where: str) -> list[str]:
     return [name for name in recipes if method.takes(compose((f"fit={name}",)).fit.field)]
 
 
+def known_edits(config: Config) -> list[str]:
+    """Return the edits of an experiment, and those that they start from."""
+    return list(dict.fromkeys(each.name for name in config.edits for each in ancestry(name)))
+
+
 def check_changes(config: Config, shot: ShotKeys, where: str) -> None:
     """Require of changes that the parts are there which they change."""
     parts = models = tf_names(config)
-    for edit in ancestry(str(shot.edit)) if shot.edit != AS_FITTED else ():
+    clicked = f"dataset.part.model='{config.dataset.part.model}'"
+    for edit in ancestry(str(shot.edit), clicked) if shot.edit != AS_FITTED else ():
         parts = [*parts, *added_parts(edit, models)]
     for change in shot.changes:
         name, is_change, _ = change.partition("=")

@@ -13,6 +13,7 @@ from texgs.workflow.stage_table import jobs
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config
+    from texgs.edit.keys import EditKeys
     from texgs.workflow.stage import Stage
 
 SHOWN = 12  # digits of checksums in settings
@@ -36,17 +37,17 @@ def missing_weights(config: Config) -> list[str]:
     """Return what is said of weights that an edit needs and cannot work with; nothing is downloaded."""
     return [
         f"edit {config.edit.name}: {why}" + (f", and {word} does without them" if word else "")
-        for name, word in needed(config).items()
+        for name, word in needed(config.edit).items()
         if (why := weights.unusable(name))
     ]
 
 
-def needed(config: Config) -> Mapping[str, str]:
+def needed(edit: EditKeys) -> Mapping[str, str]:
     """Return names of the weights that an edit needs, each with the word that does without."""
-    if config.edit.method == NO_METHOD:
+    if edit.method == NO_METHOD:
         return {}
-    method = method_of(config.edit)
-    words = method.of(config.edit).weights()
+    method = method_of(edit)
+    words = method.of(edit).weights()
     return {name: word and f"edit.{method.name}.{word}" for name, word in words.items()}
 
 
@@ -59,7 +60,7 @@ def weights_of(stage: Stage, config: Config, checksums: Checksums) -> dict[str, 
     if stage.name == "edit_metrics":
         names = ["vgg16", "lpips_vgg", config.metric.clip]
     elif stage.place == "edit":
-        names = list(needed(config))
+        names = list(needed(config.edit))
     else:
         return None
     return {name: _short(name, checksums) for name in names}
