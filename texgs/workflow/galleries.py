@@ -122,8 +122,9 @@ def together(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys:
 
 def place_of(config: Config, shot: ShotKeys, where: str) -> Place:
     """Return a place with the file of its scene, which it is required to have, or of one that stands in."""
-    known, instead = known_edits(config), chain(config.stand_ins.edits, str(shot.edit))
-    shot = replace(shot, edit=next((name for name in instead if name in known), shot.edit))
+    if len(instead := chain(config.stand_ins.edits, str(shot.edit))) > 1:
+        known = known_edits(config)
+        shot = replace(shot, edit=next((name for name in instead if name in known), shot.edit))
     for name, given in (("view", shot.view), ("light", shot.light)):
         if len(given) not in (0, 2):
             raise ConfigError(f"{where}.{name}: expected azimuth and polar angle, got {given}")
@@ -172,7 +173,7 @@ def takers(config: Config, edit: str, where: str) -> list[str]:
     recipes = recipes_of(config)
     if edit == AS_FITTED:
         return recipes
-    if edit not in (known := known_edits(config)):
+    if edit not in config.edits and edit not in (known := known_edits(config)):
         expected = ", ".join([AS_FITTED, *known])
         raise ConfigError(f"{where}.edit: expected one of {expected}, got {edit}{close(edit, known)}")
     method = method_of(compose((f"edit={edit}",)).edit)
