@@ -36,7 +36,7 @@ def test_a_word_beats_the_experiment():
     [
         (("fit=quick",), 3),
         (("fit=paper",), 4),
-        (("fit=paper_short", "edit=glass"), 4),
+        (("fit=paper_quarter", "edit=glass"), 4),
         (("fit=paper", "views=small"), 2),
         (("experiment=texture", "fit=paper"), 4),
     ],
@@ -152,7 +152,7 @@ print('torch' in sys.modules)
         ("experiment=demo", "fit=quick"),
         ("dataset=engine", "edit=text_untextured", "++edit.seed=3", "device=cuda"),
         ("experiment=lambda_s", "edit=wooden_mosaic"),
-        ("edit=style_paper", "fit=paper_short", "dataset=fuel"),
+        ("edit=style_paper", "fit=paper_quarter", "dataset=fuel"),
         ("experiment=paper_scenes", "++views.lights=[{kind: directional}]", "++fit.texture={sweeps: 7}"),
         ("experiment=failures", "tracking=none"),
         ("++views.width=7", "++views.width=8", "++views.width=7"),
