@@ -89,6 +89,8 @@ def add(path: Path, command: str, code: str, revision: str = "") -> None:
     from benchmarks import machine  # loads torch
 
     rows = index()
+    if not path.is_file():
+        sys.exit(f"expected a file of results or a picture, got {path}")
     if code not in rows.index and not parts(code):
         sys.exit(f"--code: expected stages, kinds of field, methods, modules or a result, got {code!r}")
     commit = revision or machine.revision().removesuffix("-dirty")
@@ -134,12 +136,12 @@ def main() -> None:
     rows, names = index(), [path.name for path in given.files]
     if unknown := sorted(set(names) - set(rows.index)):
         parser.error(f"expected files of {INDEX.name}, got {', '.join(unknown)}")
-    if given.mark:
-        for page in pages():
-            page.write_text(marked(page, older(rows)), encoding="utf-8")
-    for name in names or older(rows):
+    found = older(rows)
+    for page in pages() if given.mark else ():
+        page.write_text(marked(page, found), encoding="utf-8")
+    for name in names or found:
         print(name, rows.revision[name], *(changed(rows.code[name], rows.revision[name]) if names else ()))
-    print(f"{len(older(rows))} of {len(rows)} results and pictures are of older code")
+    print(f"{len(found)} of {len(rows)} results and pictures are of older code")
 
 
 if __name__ == "__main__":

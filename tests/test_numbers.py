@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 from benchmarks.results import DOCS, RESULTS, pages
+from texgs.models.catalogue import CATALOGUE
 
 SCALES = {  # of what files hold, by the units of the pages
     "s": (1, 60, 1e-3),  # minutes, milliseconds
@@ -129,6 +130,16 @@ def test_numbers_of_a_page_are_in_files_that_it_links(page):
 def test_numbers_from_elsewhere_are_on_their_page(page):
     written = {f"{number} {unit}" for number, unit, _ in claims(page, page_text(page))}
     assert written >= ELSEWHERE[page]
+
+
+def test_sizes_of_weights_are_those_of_the_catalogue():
+    rows = re.findall(
+        r"^\| `([\w-]+)` \| ([\d.]+) (kB|MB|GB) \|", (DOCS / "looks.md").read_text(), re.MULTILINE
+    )
+    assert {name for name, _, _ in rows} == CATALOGUE.keys()
+    for name, size, unit in rows:
+        scale = {"kB": 1e3, "MB": 1, "GB": 1e-3}[unit]
+        assert is_known(size, (scale,), [CATALOGUE[name].megabytes]), name
 
 
 @pytest.mark.parametrize(

@@ -121,15 +121,25 @@ def test_a_result_of_an_earlier_commit_has_its_digest(clone, monkeypatch, capsys
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("file", "words", "message"),
     [
-        ("shade", "--code: expected stages, kinds of field, methods, modules or a result, got 'shade'"),
-        ("shading --revision 0", "--revision: expected a commit of this clone that has shading, got 0"),
+        (
+            "a.csv",
+            "shade",
+            "--code: expected stages, kinds of field, methods, modules or a result, got 'shade'",
+        ),
+        (
+            "a.csv",
+            "shading --revision 0",
+            "--revision: expected a commit of this clone that has shading, got 0",
+        ),
+        ("b.csv", "shading", "expected a file of results or a picture, got b.csv"),
     ],
 )
-def test_mistakes_are_one_sentence(clone, monkeypatch, capsys, words, message):
+def test_mistakes_are_one_sentence(clone, monkeypatch, capsys, file, words, message):
+    monkeypatch.chdir(clone / "benchmarks/results")
     with pytest.raises(SystemExit, match=f"^{re.escape(message)}$"):
-        called(monkeypatch, capsys, clone / "benchmarks/results/a.csv", "--code", *words.split())
+        called(monkeypatch, capsys, file, "--code", *words.split())
     assert results.index().empty
 
 
