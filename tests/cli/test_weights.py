@@ -1,8 +1,11 @@
 """Weights belong to the settings of the jobs that use them; the verb lists and downloads them."""
 
+import re
+
 import pytest
 
 from tests.cli.conftest import hide_weights
+from texgs.cli.doctor import weights as weights_of_this_machine
 from texgs.cli.main import main
 from texgs.config.compose import compose
 from texgs.core.checksum import Checksums
@@ -10,6 +13,7 @@ from texgs.core.errors import MissingDataError
 from texgs.models import weights
 from texgs.workflow.job import settings_digest
 from texgs.workflow.missing import missing_weights, require_same, weights_of
+from texgs.workflow.provenance import record
 from texgs.workflow.stage_table import STAGES
 
 CLIP = "clip-vit-base-patch32"
@@ -89,6 +93,23 @@ def test_the_papers_share_of_clip_is_refused_without_its_weights(there):
         assert f"edit {name}: {of_clip}" in lines
     (line,) = missing_weights(compose(("dataset=orbital", "edit=style_paper", "edit.image.lambda_s=1")))
     assert "vgg16" in line
+
+
+def test_another_revision_in_the_cache_of_the_hub_is_named_in_lists_and_in_results(
+    there, monkeypatch, tmp_path, capsys
+):
+    monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path))
+    folder = tmp_path / "models--openai--clip-vit-base-patch32" / "snapshots" / ("ab" * 20)
+    folder.mkdir(parents=True)
+    for name in ("config.json", "model.safetensors", "tokenizer.json"):
+        (folder / name).write_text("{}")
+    named = f"{CLIP} (revision abababababab, not 3d74acf9a28c)"
+    assert main(["weights"]) == 0
+    assert re.search(rf"^{re.escape(named)} +605 MB +{folder}$", capsys.readouterr().out, re.MULTILINE)
+    assert named in weights_of_this_machine().found
+    settings = {"stage": "edit_metrics", "dataset": "orbital", "weights": {CLIP: "0123", "vgg16": None}}
+    facts = record(settings, {"settings": "a", "code": "b", "inputs": {}}, {}, 1.0)
+    assert facts["weights"] == {named: "0123", "vgg16": None}
 
 
 def test_the_verb_lists_all_and_refuses_unknown_names(there, capsys):
