@@ -25,6 +25,7 @@ from texgs.core.figures import Cell, Row, as_picture, content, grid_rows, lay_ou
 from texgs.core.lens import Lens
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
+from tools import workflow_picture
 
 DOCS, RUNS = ROOT / "docs", ROOT / "build" / "pictures"
 PROGRAM = Path(sys.executable).with_name("texgs")
@@ -164,6 +165,7 @@ class Picture(NamedTuple):
 GALLERY = "engine/gallery/*/gallery.png"
 FIT = "volume views surfels shading texture"
 PICTURES = {
+    "workflow": Picture(workflow_picture.draw, "demo", f"{FIT} compose pse image text segment edit_metrics"),
     "hero": Picture(hero, "demo", f"{FIT} compose pse image text"),
     "views": Picture(views, "demo", "volume views sheet"),
     "edits": Picture(copy("orbital/scene/demo/pse/pse.png"), "demo", f"{FIT} pse"),
