@@ -26,10 +26,7 @@ def given_row(
     instructions: Mapping[str, str],
     scenes: Collection[Path],
 ) -> Row:
-    """Return a row with a plot of transfer functions, and pictures and instructions by basic TF.
-
-    Pictures are in the files that edits have written beside their scenes.
-    """
+    """Return a row of a plot, of pictures, which are files beside edited scenes, and of instructions."""
     cells = [] if plot is None else [Cell("transfer functions", plot)]
     for name, style in styles.items():
         files = [scene.with_name(file) for scene in scenes for file in (f"style-{name}.png", "style.png")]
