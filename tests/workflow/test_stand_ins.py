@@ -48,7 +48,7 @@ QUICK = {
     "pse": ({"engine", "jets"}, set()),
     "partial": ({"engine", "jets"}, {"part", "wooden_part"}),
     "texture": (
-        {"turbulence", "engine"},
+        {"jets", "engine"},
         {"painted", "painted_untextured", "text_quick", "text_untextured_quick"},
     ),
     "flexibility": ({"isosurface", "turbulence", "sphere"}, {"painted"}),
