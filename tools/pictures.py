@@ -50,6 +50,13 @@ LOOKS = {  # title: scene file below the scenes of the demo
     "one lobe in crimson": "edits/crimson/scene.yaml",
 }
 
+RECIPES = {  # variants of recipe `paper`, by the names that curves have
+    "O": "of 20 November",
+    "Y": "of 21 November",
+    "F": "now",
+}
+LEAST = 30.0  # dB: just after a reset of opacities there is nothing to see
+
 
 def shown(scene_file: Path, camera: Camera) -> np.ndarray:
     """Return a scene [H, W, 3], uint8, under its own light."""
@@ -139,6 +146,19 @@ def quality_over_time(table: Path) -> Image.Image:
     return as_picture(figure)
 
 
+def paper_recipe(table: Path) -> Image.Image:
+    """Draw PSNR over the iterations of the shading phase, of recipe `paper` and of earlier ones."""
+    figure, rows = new_figure(8, 4, 120), pd.read_csv(table)
+    axes = figure.subplots()
+    for variant, title in RECIPES.items():
+        own = rows[(rows.phase == "shading") & (rows.psnr > LEAST) & (rows.variant == variant)]
+        axes.plot(own.iteration, own.psnr, "o-", label=title, markersize=3)
+    axes.set(xlabel="iterations of the shading phase", ylabel="PSNR of every eighth test view, dB")
+    axes.grid(alpha=0.2)
+    axes.legend(fontsize=8)
+    return as_picture(figure)
+
+
 def disagreement(table: Path) -> Image.Image:
     """Draw consistency and sharpness over seconds, a line for each method."""
     figure, rows = new_figure(10, 4.4, 120), pd.read_csv(table)
@@ -180,6 +200,7 @@ PICTURES = {
     "styles": Picture(styles, "styles", f"{FIT} image"),
     "viewer": Picture(viewer, "engine", f"{FIT} compose texgs.viewer.server"),
     "quality_over_time": Picture(quality_over_time, "2026-11-23-quality-over-time-xeon.csv"),
+    "paper_recipe": Picture(paper_recipe, "2026-11-24-paper-curves-TF01-400.csv"),
     "disagreement": Picture(disagreement, "2026-11-21-disagreement.csv"),
 }
 
