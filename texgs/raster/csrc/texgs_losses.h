@@ -29,8 +29,9 @@ TEXGS_API int32_t texgs_normal_consistency(const float* normal, const float* dep
                                            const float* viewmat, const float* K, int32_t height, int32_t width,
                                            float* value, float* grad_normal, float* grad_depth, void* stream);
 
-/* value = mean over [C, H, W] of alpha * exp(-g(grey guide)) * g(attribute), g = |d/dx| + |d/dy| by Sobel's kernels, zeros
- * outside the image; grey is the mean of the three planes of `guide`. `gradient`: [C, H, W] of the attribute, or NULL. */
+/* value = mean over [C, H, W] of alpha * exp(-g(grey guide)) * g(attribute), g = |d/dx| + |d/dy| by Sobel's kernels,
+ * zeros outside the image; grey is the mean of the three planes of `guide`. `gradient`: [C, H, W] of the attribute, or
+ * NULL. */
 TEXGS_API int32_t texgs_bilateral_smoothness(const float* attribute, const float* guide, const float* alpha,
                                              int32_t channels, int32_t height, int32_t width, float* value,
                                              float* gradient, void* stream);

@@ -63,7 +63,8 @@ void find_weights(Band& b) {
         for (int c = kStart - kLanes; c < kStart + b.x1 - b.x0 + kLanes; c += kLanes) {
             vf x, y;
             sobel(b.values + row - 1, c, x, y);
-            store(b.weight[row] + c, load(b.weight[row] + c) * exp2_or_nan(vf(-1.44269504f / kSobelSum) * (abs(x) + abs(y))));
+            store(b.weight[row] + c,
+                  load(b.weight[row] + c) * exp2_or_nan(vf(-1.44269504f / kSobelSum) * (abs(x) + abs(y))));
         }
     }
 }
