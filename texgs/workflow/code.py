@@ -19,10 +19,7 @@ from texgs.core.checksum import digest, sha256
 from texgs.core.native_sources import library_sources
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = (
-    "texgs",
-    "benchmarks",
-)  # benchmarks measures texgs with code of its own, which texgs never imports
+PACKAGES = ("texgs", "benchmarks")  # the second measures the first, which never imports it
 STAGES = "texgs.workflow.stages."
 ENGINE = "texgs.workflow."  # what else is there decides settings and inputs, which jobs are known by anyway
 NATIVE = "texgs.raster.native"  # the module that calls the native library
