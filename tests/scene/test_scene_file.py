@@ -8,6 +8,7 @@ from safetensors.torch import load_file, save_file
 
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import CAMERA, ball
+from texgs.core.cuts import Box, Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
@@ -36,7 +37,8 @@ def scene_in(folder):
     edit, style = PartEdit(palette=(0.1, 0.2, 0.3), opacity=0.5), folder / "a" / "style.safetensors"
     first = SceneModel(folder / "a" / "model.safetensors", edit, style)
     second = SceneModel(folder / "b" / "model.safetensors", PartEdit(visible=False))
-    return Scene({"TF01": first, "TF02": second}, Light("directional", 30, -10), (0.0, 0.5, 1.0))
+    cuts = Cuts([Plane([3.0, 0.0, 4.0], 0.5)], Box([-0.5, -0.5, -0.5], [0.1, 0.2, 0.3]), "unlit")
+    return Scene({"TF01": first, "TF02": second}, Light("directional", 30, -10), (0.0, 0.5, 1.0), cuts)
 
 
 def resolved(scene):
@@ -80,6 +82,12 @@ def test_a_variant_replaces_texels(folder):
         ({"light": {"azimuth": 10**400, "polar": 0}}, "light: expected headlight"),
         ({"background": [0, 0]}, "background: expected three numbers from 0 to 1"),
         ({"background": [[[0]]] * 9}, "background: expected three numbers"),
+        ({"cuts": []}, "cuts: expected keys with values, got a list"),
+        ({"cuts": {"plane": []}}, "cuts.plane: no such key, did you mean planes"),
+        ({"cuts": {"planes": [{"offset": 1}]}}, "cuts.planes.0.normal: expected a value, got none"),
+        ({"cuts": {"planes": [{"normal": [0, 0, 0]}]}}, "cuts: normal: expected three numbers that are not"),
+        ({"cuts": {"box": {"low": [1e9, 0, 0], "high": [1, 1, 1]}}}, "cuts.box.low: expected at most 1e"),
+        ({"cuts": {"faces": "dark"}}, "cuts.faces: expected one of shaded, unlit, got dark"),
         ({"models": []}, r"models: expected a table of keys and values, got \[\]"),
         ({"models": {}}, "models: expected at least one, got none"),
         ({"models": {"a\x1b[2J": {"file": "x"}}}, "models: expected a name of 1 to 100"),

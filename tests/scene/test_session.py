@@ -5,10 +5,12 @@ import pytest
 import torch
 
 from tests.fields.surfels.test_composition import CAMERA, ball
+from texgs.core.cuts import Box, Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
+from texgs.scene.changes import apply_all
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment
@@ -99,6 +101,7 @@ def test_a_new_segment_looks_as_its_model_does_and_an_earlier_scene_as_it_was(se
         (lambda s: s.set("left", "opacity", -1), "models.left.opacity: expected a factor from 0 to 1000"),
         (lambda s: s.set_background("red"), "background: expected three numbers"),
         (lambda s: s.set_of_scene("light", "up"), "light: expected headlight, or azimuth and polar"),
+        (lambda s: s.set_of_scene("cuts", {"plane": []}), "cuts.plane: no such key, did you mean planes"),
         (lambda s: s.set_of_scene("models", 1), "the scene: no such key 'models'"),
         (lambda s: s.set_texture("left", s.scene.models["left"].file), "models.left: .*texgs-texture"),
         (lambda s: s.add_segment("left/a.b", s.scene.models["left"].file), "expected a name without"),
@@ -195,4 +198,36 @@ def test_a_name_that_cannot_be_leaves_the_scene(session, tmp_path, part, name, m
     before = session.scene
     with pytest.raises(ArgumentError, match=message):
         session.rename_segment(part, name)
+    assert session.scene is before
+
+
+def test_words_cut_a_scene(session):
+    apply_all(
+        session, ["cut=x,0.25", "cut=-y,-0.5", "cut=0,3,4,1", "cut.faces=unlit", "cut.box=-1,-1,-1,1,1,1"]
+    )
+    planes = [Plane([1.0, 0.0, 0.0], 0.25), Plane([0.0, -1.0, 0.0], 0.5), Plane([0.0, 0.6, 0.8], 0.2)]
+    assert session.scene.cuts == Cuts(planes, Box([-1.0] * 3, [1.0] * 3), "unlit")
+    apply_all(session, ["cut.2=z,0", "cut.1=", "cut.box=", "cut.faces="])
+    assert session.scene.cuts == Cuts([Plane([0.0, 0.0, 1.0], 0.0), planes[2]])
+    apply_all(session, ["cut="])
+    assert not session.scene.cuts
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("cut=w,0.1", "cut=w,0.1: expected AXIS,POSITION with x, -x, .*, or NX,NY,NZ,OFFSET, in world units"),
+        ("cut=x,up", "cut=x,up: expected AXIS,POSITION"),
+        ("cut=1,2,3", "cut=1,2,3: expected AXIS,POSITION"),
+        ("cut=0,0,0,1", "normal: expected three numbers that are not all 0"),
+        ("cut.2=x,0", "expected cut, cut.box, cut.faces or cut.1, got cut.2"),
+        ("cut.box=1,2,3", "expected X0,Y0,Z0,X1,Y1,Z1, in world units, got 1,2,3"),
+        ("cut.faces=dark", "faces: expected one of shaded, unlit, got dark"),
+    ],
+)
+def test_a_word_that_cannot_cut_leaves_the_scene(session, word, message):
+    apply_all(session, ["cut=x,0.25"])
+    before = session.scene
+    with pytest.raises(ArgumentError, match=message):
+        apply_all(session, [word])
     assert session.scene is before

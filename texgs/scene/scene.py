@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.light import Light
 from texgs.fields.field import Composed, Field
@@ -84,11 +85,12 @@ class SceneModel:
 
 @dataclass(frozen=True)
 class Scene:
-    """Models by name in the order in which they were added, one light for all, and a background."""
+    """Models by name in the order in which they were added; a light, a background and cuts hold for all."""
 
     models: Mapping[str, SceneModel]
     light: Light = field(default_factory=lambda: Light("headlight"))
     background: tuple[float, float, float] = WHITE
+    cuts: Cuts = NO_CUTS
 
     def __post_init__(self) -> None:
         if not self.models:

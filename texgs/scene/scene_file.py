@@ -10,8 +10,10 @@ from typing import Any
 
 import yaml
 
+from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading, write_bytes
+from texgs.core.keys import ValueMismatch, typed
 from texgs.core.light import Light
 from texgs.core.names import close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
@@ -20,7 +22,7 @@ from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment
 
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
-KEYS = ("texgs-scene", "light", "background", "models")
+KEYS = ("texgs-scene", "light", "background", "cuts", "models")
 EDITS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDITS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
@@ -54,7 +56,8 @@ def _scene(values: Any, folder: Path) -> Scene:
         label("models", name): _model(f"models.{name}", x, folder) for name, x in values["models"].items()
     }
     background = color("background", values.get("background", WHITE))
-    return Scene(models, light_of(values.get("light", "headlight")), background)
+    light, cuts = light_of(values.get("light", "headlight")), cuts_of(values.get("cuts", {}))
+    return Scene(models, light, background, cuts)
 
 
 def write_scene(path: str | Path, scene: Scene) -> Path:
@@ -71,7 +74,9 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
     light: Any = "headlight"
     if scene.light.kind == "directional":
         light = {"azimuth": scene.light.azimuth, "polar": scene.light.polar}
-    values = {"texgs-scene": VERSION, "light": light, "background": list(scene.background), "models": models}
+    cuts = {"cuts": plain_cuts(scene.cuts)} if scene.cuts != NO_CUTS else {}
+    of_scene = {"light": light, "background": list(scene.background), **cuts}
+    values = {"texgs-scene": VERSION, **of_scene, "models": models}
     text = yaml.safe_dump(values, sort_keys=False, allow_unicode=True, default_flow_style=None)
     return write_bytes(path, text.encode())
 
@@ -118,6 +123,22 @@ def light_of(value: Any) -> Light:
     if isinstance(value, dict) and set(value) <= {"azimuth", "polar"} and all(map(is_number, value.values())):
         return Light("directional", **{key: float(angle) for key, angle in value.items()})
     raise ArgumentError(f"light: expected headlight, or azimuth and polar in degrees, got {value!r}")
+
+
+def cuts_of(value: Any) -> Cuts:
+    """Return the cuts that a value of a scene file stands for."""
+    try:
+        return typed(Cuts, value, "cuts")
+    except ValueMismatch as error:
+        raise ArgumentError(str(error)) from error
+    except ArgumentError as error:
+        raise ArgumentError(f"cuts: {error}") from error
+
+
+def plain_cuts(cuts: Cuts) -> dict[str, Any]:
+    """Return cuts as a scene file has them."""
+    unedited = asdict(NO_CUTS)
+    return {key: value for key, value in asdict(cuts).items() if value != unedited[key]}
 
 
 def known(values: Any, keys: Collection[str] | None, where: str) -> None:

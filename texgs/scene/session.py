@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.cuts import Cuts
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.names import require_name
@@ -23,10 +24,14 @@ from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.scene.frame import Mode, frame
 from texgs.scene.parts import entry_of, key_path, replaced, require_new, split, with_textures
 from texgs.scene.scene import WHITE, Scene, SceneSegment
-from texgs.scene.scene_file import EDITS, known, light_of, read_scene, write_scene
+from texgs.scene.scene_file import EDITS, cuts_of, known, light_of, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 
-SCENE_KEYS = {"light": "headlight", "background": WHITE}  # what is edited of a whole scene, and without edits
+SCENE_KEYS = {
+    "light": "headlight",
+    "background": WHITE,
+    "cuts": {},
+}  # what is edited of a whole scene, and without edits
 KEPT = 3  # compositions of files as they are: pages may show others in turn, as before an edit and after it
 
 
@@ -107,10 +112,20 @@ class Session:
         """Put another colour behind the scene."""
         self._push(replace(self.scene, background=color("background", value)))
 
+    def set_cuts(self, cuts: Cuts) -> None:
+        """Cut the scene; cuts of before are gone."""
+        self._push(replace(self.scene, cuts=cuts))
+
     def set_of_scene(self, key: str, value: Any) -> None:
-        """Set the light or the background, as a scene file has it; see `SCENE_KEYS`."""
+        """Set the light, the background or the cuts, as a scene file has them; see `SCENE_KEYS`."""
         known({key: value}, SCENE_KEYS, "the scene")
-        self.set_light(light_of(value)) if key == "light" else self.set_background(value)
+        match key:
+            case "light":
+                self.set_light(light_of(value))
+            case "cuts":
+                self.set_cuts(cuts_of(value))
+            case _:
+                self.set_background(value)
 
     def add_segment(self, part: str, file: Path) -> None:
         """Make surfels of a model, those of a file of `write_segment`, a part of their own.

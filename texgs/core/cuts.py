@@ -1,0 +1,83 @@
+"""Cuts of a scene: planes and a box that take away what is beyond them, in world units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import product
+from math import hypot
+
+from texgs.core.errors import ArgumentError
+from texgs.core.keys import REQUIRED, key
+
+AXES = "xyz"
+FACES = ("shaded", "unlit")
+MOST_PLANES = 6
+UNIT = 1e-9  # difference of a length to 1 that is left alone: a plane that is read again is the same
+FAR = 1e6  # world units; single precision holds such coordinates
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Keeps the points x with normal . x <= offset; the normal is made a unit vector."""
+
+    normal: list[float] = key(REQUIRED, "[3], points to what is taken away", least=-FAR, most=FAR)
+    offset: float = key(0.0, "from the origin along the normal", "world units", least=-FAR, most=FAR)
+
+    def __post_init__(self) -> None:
+        length = hypot(*self.normal)
+        if len(self.normal) != 3 or length < 1 / FAR:
+            raise ArgumentError(f"normal: expected three numbers that are not all 0, got {self.normal}")
+        if abs(length - 1) > UNIT:
+            object.__setattr__(self, "normal", [each / length for each in self.normal])
+            object.__setattr__(self, "offset", self.offset / length)
+
+
+@dataclass(frozen=True)
+class Box:
+    """Keeps the points between two corners; its sides are along the axes of the world."""
+
+    low: list[float] = key(REQUIRED, "corner [3]", "world units", least=-FAR, most=FAR)
+    high: list[float] = key(REQUIRED, "corner [3]", "world units", least=-FAR, most=FAR)
+
+    def __post_init__(self) -> None:
+        is_box = len(self.low) == len(self.high) == 3
+        if not is_box or not all(low < high for low, high in zip(self.low, self.high, strict=True)):
+            raise ArgumentError(
+                f"box: expected two corners of three numbers, low below high, got {self.low} and {self.high}"
+            )
+
+    @property
+    def planes(self) -> list[Plane]:
+        """Return those of the six sides."""
+        sides = product(range(3), ((1.0, self.high), (-1.0, self.low)))
+        return [Plane(along(axis, sign), sign * corner[axis]) for axis, (sign, corner) in sides]
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """What is shown of a scene: what all planes and the box keep."""
+
+    planes: list[Plane] = field(default_factory=list)
+    box: Box | None = None
+    faces: str = key("shaded", "by the normal of the plane, or unlit", choices=FACES)
+
+    def __post_init__(self) -> None:
+        if len(self.planes) > MOST_PLANES:
+            raise ArgumentError(f"planes: expected at most {MOST_PLANES}, got {len(self.planes)}")
+
+    def __bool__(self) -> bool:
+        """Return whether anything may be taken away."""
+        return bool(self.planes or self.box)
+
+    @property
+    def half_spaces(self) -> list[Plane]:
+        """Return all planes, those of the box behind the others."""
+        return [*self.planes, *(self.box.planes if self.box else ())]
+
+
+NO_CUTS = Cuts()
+
+
+def along(axis: int, sign: float = 1.0) -> list[float]:
+    """Return the unit vector of an axis, 0 to 2, or with sign -1 the one against it."""
+    return [sign * (axis == each) for each in range(3)]
