@@ -239,10 +239,10 @@ def resolve(values: dict[str, Any]) -> dict[str, Any]:
 
     Those with resolvers, such as ${oc.env:HOME}, are left to OmegaConf.
     """
-    found = list(_texts(values, ()))
-    if any("${" in REFERENCE.sub("", text) for _, _, _, text in found):
+    texts = list(_texts(values, ()))
+    if any("${" in REFERENCE.sub("", text) for _, _, _, text in texts):
         return cast(dict[str, Any], OmegaConf.to_container(OmegaConf.create(values), resolve=True))
-    for table, name, path, text in found:
+    for table, name, path, text in texts:
         table[name] = _value(values, text, path, DEEPEST)
     return values
 
@@ -263,12 +263,12 @@ def _value(values: dict[str, Any], text: str, path: Words, left: int) -> Any:
     def target(match: re.Match[str]) -> Any:
         dots, name = match.groups()
         at = (*(path[: len(path) - len(dots)] if dots else ()), *name.split("."))
-        found: Any = values
+        value: Any = values
         for part in at:
-            if not isinstance(found, dict) or part not in found:
+            if not isinstance(value, dict) or part not in value:
                 raise ConfigError(f"{'.'.join(path)}: {match[0]} refers to {'.'.join(at)}, which is no key")
-            found = found[part]
-        return _value(values, found, at, left - 1) if isinstance(found, str) and "${" in found else found
+            value = value[part]
+        return _value(values, value, at, left - 1) if isinstance(value, str) and "${" in value else value
 
     if not left:
         raise ConfigError(f"{'.'.join(path)}: {text} refers to itself; write a value")

@@ -37,10 +37,10 @@ class VariableSource(Source):
         fields = [name for name, shape in shapes.items() if len(shape) == 3]
         self._variable = variable or (fields[0] if len(fields) == 1 else "")
         if self._variable not in fields:
-            found = " x ".join(f"{axis} {n}" for axis, n in shapes.get(self._variable, []))
+            dimensions = " x ".join(f"{axis} {n}" for axis, n in shapes.get(self._variable, []))
             raise ArgumentError(
                 "dataset.volume.variable: expected one with three dimensions, got "
-                f"{found or variable or 'none'}; choose one of {', '.join(fields) or 'another file'}, "
+                f"{dimensions or variable or 'none'}; choose one of {', '.join(fields) or 'another file'}, "
                 "or cut out a step of time: ncks -d time,0 OLD.nc NEW.nc"
             )
         stored = self._file.variables[self._variable]  # not kept: SciPy warns of one that outlives its file
