@@ -1,6 +1,7 @@
 """Compose, edit and time a scene of two basic models, from the volume on, by hand."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ from PIL import Image
 
 from tests.cli.conftest import ORBITAL, numbers
 from texgs.cli.main import main
+from texgs.core.image import read_rgba, to_pillow
 from texgs.scene.scene_file import read_scene
+from texgs.scene.twin import Twin
+from texgs.volume.view_set import read_views
 
 
 @pytest.fixture(scope="module")
@@ -24,6 +28,15 @@ def test_the_scene_has_all_models_and_a_picture(results):
     assert len(scene.open()) == numbers(results / "compose")["primitives"]
     picture = np.asarray(Image.open(results / "compose" / "scene.png"))
     assert picture.min() < 200, "there is something to see"
+
+
+def test_the_twin_of_the_scene_is_what_the_views_show(results):
+    scene = read_scene(results / "compose" / "scene.yaml")
+    views = read_views(results.parents[1] / "TF02" / "views").test
+    alone = replace(scene, models={"TF02": scene.models["TF02"]}, background=(0.0, 0.0, 0.0))
+    for view in views:
+        seen = Twin(alone).render(view.camera, replace(alone, light=view.light), [()])
+        assert np.array_equal(to_pillow(seen.color, seen.alpha), read_rgba(view.path))
 
 
 def test_fits_tell_which_views_they_are_of_and_what_their_data_stand_in_for(results):

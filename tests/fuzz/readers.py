@@ -40,14 +40,20 @@ from texgs.models.networks import read_tensors
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
+from texgs.scene.twin import SceneVolume, Twin
 from texgs.study.ballots import read_ballot
 from texgs.study.questions import read_key, write_key
+from texgs.volume.generate import sphere
 from texgs.volume.prepare import prepare
+from texgs.volume.slabs import ArraySource
 from texgs.volume.sources import open_source
 from texgs.volume.tf_files import read_tf
+from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import View, read_views, write_transforms
 
 PICTURES = ("png", "jpg", "gif", "webp")
+RISE = TransferFunction(((0.1, 0.2), (0.3, 0.9)), ((0.1, 0.5, 0.4, 0.3),))
+FALL = TransferFunction(((0.3, 0.5), (0.3, 0.4), (0.9, 0)), ((0.3, 1, 0.4, 0.3), (0.9, 0, 0, 1)))
 Pack = Callable[[bytes], bytes]
 
 
@@ -146,12 +152,14 @@ def scene(folder: Path) -> Path:
     mask = write_segment(folder / "s.safetensors", sample(), torch.arange(7) < 3)
     texture = write_texture(folder / "t.safetensors", sample())
     entry = SceneModel(file, texture=texture, segments={"part": SceneSegment(mask)})
-    return write_scene(folder / "scene.yaml", Scene({"TF01": entry, "TF02": SceneModel(file)}))
+    prepare(ArraySource(sphere(8), "sphere"), folder / "volume.nrrd")
+    volume = SceneVolume(folder / "volume.nrrd", {"TF01": RISE, "TF02": FALL})
+    return write_scene(folder / "scene.yaml", Scene({"TF01": entry, "TF02": SceneModel(file)}, volume=volume))
 
 
 def read_whole_scene(path: Path) -> None:
     opened = read_scene(path)
-    opened.open()
+    Twin(opened).render(orbit(40, 10, 4, 30, 4, 4), opened, opened.open().palettes)
     write_scene(path.with_name("again.yaml"), opened)
 
 

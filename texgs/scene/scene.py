@@ -20,6 +20,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import lean
 from texgs.fields.surfels.variants import labels_of, with_texture, with_variants
 from texgs.scene.segment_file import read_segment
+from texgs.scene.twin import SceneVolume
 
 WHITE = (1.0, 1.0, 1.0)
 
@@ -91,6 +92,7 @@ class Scene:
     light: Light = field(default_factory=lambda: Light("headlight"))
     background: tuple[float, float, float] = WHITE
     cuts: Cuts = NO_CUTS
+    volume: SceneVolume | None = None  # that it was made from, see `Twin`
 
     def __post_init__(self) -> None:
         if not self.models:

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from texgs.core.cuts import NO_CUTS, Cuts
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading, write_bytes
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.light import Light
@@ -19,13 +19,18 @@ from texgs.core.names import close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
 from texgs.fields.part_edit import PartEdit, color
 from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment
+from texgs.scene.twin import SceneVolume
+from texgs.volume.render import Appearance
+from texgs.volume.transfer import TransferFunction
 
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
-KEYS = ("texgs-scene", "light", "background", "cuts", "models")
+KEYS = ("texgs-scene", "light", "background", "cuts", "models", "volume")
 EDITS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDITS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
+LOOK = tuple(each.name for each in fields(Appearance))
+VOLUME_KEYS = ("file", *LOOK, "tfs")
 
 
 def read_scene(path: str | Path) -> Scene:
@@ -57,7 +62,8 @@ def _scene(values: Any, folder: Path) -> Scene:
     }
     background = color("background", values.get("background", WHITE))
     light, cuts = light_of(values.get("light", "headlight")), cuts_of(values.get("cuts", {}))
-    return Scene(models, light, background, cuts)
+    volume = volume_of(values["volume"], folder) if "volume" in values else None
+    return Scene(models, light, background, cuts, volume)
 
 
 def write_scene(path: str | Path, scene: Scene) -> Path:
@@ -77,6 +83,10 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
     cuts = {"cuts": plain_cuts(scene.cuts)} if scene.cuts != NO_CUTS else {}
     of_scene = {"light": light, "background": list(scene.background), **cuts}
     values = {"texgs-scene": VERSION, **of_scene, "models": models}
+    if scene.volume is not None:
+        tfs = {name: tf.to_dict() for name, tf in scene.volume.tfs.items()}
+        look = asdict(scene.volume.appearance)
+        values["volume"] = {"file": relative(scene.volume.file), **look, "tfs": tfs}
     text = yaml.safe_dump(values, sort_keys=False, allow_unicode=True, default_flow_style=None)
     return write_bytes(path, text.encode())
 
@@ -114,6 +124,22 @@ def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, Part
     except ArgumentError as error:
         raise ArgumentError(f"{where}.{error}") from error
     return file, edit, texture
+
+
+def volume_of(values: Any, folder: Path) -> SceneVolume:
+    """Return the volume of the plain values of a scene file."""
+    known(values, VOLUME_KEYS, "volume")
+    file, tfs = named_file("volume.file", folder, values.get("file"), "a volume"), values.get("tfs")
+    known(tfs, None, "volume.tfs")
+    functions = {}
+    for name, points in tfs.items():
+        with located(f"volume.tfs.{label('volume.tfs', name)}"):
+            functions[str(name)] = TransferFunction.from_dict(points)
+    try:
+        look = Appearance(**{key: value for key, value in values.items() if key in LOOK})
+    except ArgumentError as error:
+        raise ArgumentError(f"volume.{error}") from error
+    return SceneVolume(file, functions, look)
 
 
 def light_of(value: Any) -> Light:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -13,9 +13,11 @@ import torch
 from numpy.typing import NDArray
 
 from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
 from texgs.core.io import read_json, write_json
 from texgs.core.light import Light
+from texgs.core.names import is_number
 from texgs.core.progress import progress
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import View
@@ -31,6 +33,13 @@ class Appearance:
     shininess: float = 20.0
     step: float = 0.25  # sample distance, voxels of the finest axis
     opacity_unit: float = 0.005  # length over which a transfer function's opacity applies, world units
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value, is_length = getattr(self, each.name), each.name in ("step", "opacity_unit")
+            if not is_number(value) or value < 0 or (is_length and value == 0):
+                bound = "above 0" if is_length else "from 0"
+                raise ArgumentError(f"{each.name}: expected a number {bound}, got {value!r:.100}")
 
 
 class VolumeRenderer(Protocol):

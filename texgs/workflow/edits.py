@@ -178,6 +178,8 @@ def files_of_scene(scene: Path) -> dict[str, Path]:
     while named:
         table = named.pop()
         for key, value in table.items() if isinstance(table, dict) else ():
+            if key == "volume":  # no edit reads it
+                continue
             if key in ("file", "texture") and (path := scene.parent / str(value)).is_file():
                 files[f"of_scene.{len(files)}"] = path
             named.append(value)

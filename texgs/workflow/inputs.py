@@ -17,6 +17,8 @@ from texgs.workflow.locate import tf_names, views_folder
 from texgs.workflow.stage import edit_folder, folder_of, made, plain
 from texgs.workflow.sweep import changes, fit_variant
 
+MODEL = "model."  # before the names of models among inputs
+
 
 def is_fit(config: Config) -> bool:
     """Return whether a configuration is of views and fits, not of an edit."""
@@ -69,22 +71,23 @@ def last_phase(config: Config) -> str:
     return fit_specs()[config.fit.field].phases[-1]
 
 
-def all_models(config: Config) -> dict[str, Path]:
-    """Return the models of all basic TFs after the last phase, by name."""
+def models_of_scene(config: Config) -> dict[str, Path]:
+    """Return the models of all basic TFs after the last phase, which a scene names."""
     if config.tf is not None:
         raise ConfigError(f"tf: a scene has all basic TFs of its data set; leave out tf={config.tf}")
-    return {name: made("phase", config, last_phase(config), name) for name in tf_names(config)}
+    phase = last_phase(config)
+    return {f"{MODEL}{name}": made("phase", config, phase, name) for name in tf_names(config)}
 
 
-def models_of_scene(config: Config) -> dict[str, Path]:
-    """Return the models that a scene names, as inputs beside it."""
-    return {f"model.{name}": path for name, path in all_models(config).items()}
+def models_and_volume(config: Config) -> dict[str, Path]:
+    """Return the models that a scene names, and the prepared volume where there is one."""
+    models = models_of_scene(config)
+    return models if config.dataset.views_folder is not None else {**models, **prepared_volume(config)}
 
 
 def scene_and_volume(config: Config) -> dict[str, Path]:
-    """Return the scene with its models, and the prepared volume where there is one."""
-    scene = {"scene": made("compose", config), **models_of_scene(config)}
-    return scene if config.dataset.views_folder is not None else {**scene, **prepared_volume(config)}
+    """Return the scene with all that it names."""
+    return {"scene": made("compose", config), **models_and_volume(config)}
 
 
 def scene_before(config: Config) -> Path:

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from texgs.config.views import Shading
 from texgs.report.results import SceneResult
-from texgs.workflow.inputs import all_models, has_scene
+from texgs.workflow.inputs import MODEL, has_scene, models_and_volume
 from texgs.workflow.stage import Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import Distance, FitLabel, OfDataset
+from texgs.workflow.stages.settings import Distance, FitLabel, OfVolume, basic_tfs_of
+
+if TYPE_CHECKING:
+    from texgs.scene.twin import SceneVolume
 
 AZIMUTH, POLAR = -60.0, 20.0  # of the picture, degrees
 
 
 @dataclass(kw_only=True)
-class Settings(OfDataset):
+class Settings(OfVolume):
     """What the stage reads of the configuration."""
 
+    shading: Shading = read("views.shading")
+    step: float = read("views.step")
+    opacity_unit: float = read("views.opacity_unit")
     image: int = read("dataset.image")
     lens: Distance
     fit: FitLabel
@@ -25,7 +33,7 @@ class Settings(OfDataset):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write scene.yaml, in which nothing is edited, and scene.png.
 
-    It reads model.safetensors of each basic TF, by its name.
+    It reads model.safetensors of each basic TF, and `volume`, the volume.nrrd, where there is one.
     """
     from texgs.core.camera import orbit
     from texgs.core.check import torch_device
@@ -34,13 +42,26 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.scene.scene import Scene, SceneModel
     from texgs.scene.scene_file import write_scene
 
-    scene = Scene({name: SceneModel(path) for name, path in inputs.items()})
+    models = {
+        name.removeprefix(MODEL): SceneModel(path) for name, path in inputs.items() if name.startswith(MODEL)
+    }
+    scene = Scene(models, volume=volume_of(settings, inputs["volume"]) if "volume" in inputs else None)
     write_scene(output / "scene.yaml", scene)
     composition = scene.open(torch_device(settings.fit.device))
     camera = orbit(AZIMUTH, POLAR, *settings.lens.lens.square(settings.image))
     picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
     write_frames(output / "scene.png", [picture])
     return Outcome(SceneResult(len(scene.models), len(composition)))
+
+
+def volume_of(settings: Settings, volume: Path) -> SceneVolume:
+    """Return the volume with its basic TFs as views show it."""
+    from texgs.scene.twin import SceneVolume
+    from texgs.volume.render import Appearance
+
+    tfs = basic_tfs_of(volume, settings.basic_tfs, settings.tf_values)
+    look = Appearance(**asdict(settings.shading), step=settings.step, opacity_unit=settings.opacity_unit)
+    return SceneVolume(volume, tfs, look)
 
 
 STAGE = Stage(
@@ -56,7 +77,7 @@ STAGE = Stage(
         shown={"scene.png": "The basic models as one scene, rendered from their primitives."},
     ),
     schema=Settings,
-    inputs=all_models,
+    inputs=models_and_volume,
     work=work,
     applies=has_scene,
 )

@@ -16,7 +16,7 @@ from texgs.workflow.edits import looks_of
 from texgs.workflow.galleries import gallery_command, gallery_grids, gallery_inputs
 from texgs.workflow.inputs import has_scene, is_first_recipe
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import OfScene, basic_tfs_of
+from texgs.workflow.stages.settings import OfScene, OfVolume, basic_tfs_of
 from texgs.workflow.sweep import changes
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from texgs.core.camera import Camera
     from texgs.core.figures import Row
     from texgs.scene.session import Session
+    from texgs.scene.twin import Twin
 
 ERRORS = (
     "Errors are those of the worst channel, four times enlarged, red where the scene is too bright and blue "
@@ -73,7 +74,7 @@ class Grid:
 
 
 @dataclass(kw_only=True)
-class Settings(OfScene):
+class Settings(OfScene, OfVolume):
     """What the stage reads of the configuration."""
 
     section: str = read("gallery.section")
@@ -150,18 +151,17 @@ class GalleryRenderer:
 
     Args:
         settings: of a job that shows scenes and their volume.
-        inputs: scene files by name, and `volume` where one is shown.
+        inputs: scene files by name.
         size: pixels of each side of a picture.
     """
 
     def __init__(self, settings: OfScene, inputs: Mapping[str, Path], size: int) -> None:
         from texgs.core.check import torch_device
-        from texgs.workflow.stages.volume_scene import VolumeScene
 
         self._device, self._lens = torch_device(settings.fit.device), settings.views.lens
         self._inputs, self._size = inputs, size
-        self._volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
         self._open: tuple[str, Session] | None = None
+        self._twin: Twin | None = None  # of the scene that is open
 
     def render(self, cell: GalleryCell) -> RenderedCell:
         """Return one picture."""
@@ -196,13 +196,15 @@ class GalleryRenderer:
         from texgs.scene.session import Session
 
         if self._open is None or self._open[0] != name:
-            self._open = (name, Session(read_scene(self._inputs[name]), self._device))
+            self._open, self._twin = (name, Session(read_scene(self._inputs[name]), self._device)), None
         return self._open[1]
 
     def _volume_frame(self, session: Session, camera: Camera) -> np.ndarray:
-        assert self._volume is not None, "an input where a place shows it"
-        over = self._volume.over_background(camera, session.scene, session.composition.palettes)
-        return over.clip(0, 1)
+        from texgs.scene.twin import Twin
+
+        self._twin = self._twin or Twin(session.scene, self._device)
+        seen = self._twin.render(camera, session.scene, session.composition.palettes)
+        return seen.color.clamp(0, 1).numpy()
 
     def _camera(self, cell: GalleryCell) -> Camera:
         """Return the camera of the whole view."""
@@ -238,7 +240,7 @@ STAGE = Stage(
     "gallery",
     order=170,
     help="show all looks of a data set side by side",
-    rule=Rule("gallery", "{dataset}/gallery/{gallery}", target="galleries", gpu=("views", "fit")),
+    rule=Rule("gallery", "{dataset}/gallery/{gallery}", target="galleries", gpu=("fit",)),
     schema=Settings,
     inputs=gallery_inputs,
     work=work,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from texgs.core.camera import Camera
     from texgs.fields.field import Composed
     from texgs.scene.scene import Scene
-    from texgs.workflow.stages.volume_scene import VolumeScene
+    from texgs.scene.twin import Twin
 
 PICTURES = {
     "pse.png": "Edits of opacity, colour and light, each on top of those before it",
@@ -37,17 +37,17 @@ SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in th
 def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write a scene file for each edit, pse.png and relight.png.
 
-    It reads `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
+    It reads `scene`, the scene.yaml, with what it names.
     """
     from texgs.core.check import torch_device
     from texgs.core.figures import write_grid
     from texgs.scene.scene_file import read_scene, write_scene
+    from texgs.scene.twin import Twin
     from texgs.volume.cameras import orbit_path
-    from texgs.workflow.stages.volume_scene import VolumeScene
 
     scene = read_scene(inputs["scene"])
-    composition = scene.open(torch_device(settings.fit.device))
-    volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
+    device = torch_device(settings.fit.device)
+    composition, twin = scene.open(device), None if scene.volume is None else Twin(scene, device)
     cameras = orbit_path(COMPARED, POLAR, *settings.views.lens)
     can = kinds()[settings.fit.field].can
     groups = {"pse": chain(scene, composition.palettes, can), "relight": light_sweep(scene)}
@@ -57,12 +57,12 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
         steps = progress(scenes.items(), len(scenes), title=f"{settings.dataset}: {group}", unit="edit")
         for title, changed in steps:
             write_scene(output / f"{group}-{len(done[group])}.yaml", changed)
-            comparison, shown = compared(title, changed, composition, volume, cameras)
+            comparison, shown = compared(title, changed, composition, twin, cameras)
             done[group].append(comparison)
             for name, image in shown.items():
                 rows.setdefault(name, []).append(image)
         write_grid(output / f"{group}.png", rows, [caption(entry) for entry in done[group]])
-    end = BELOW if volume else "."
+    end = BELOW if twin else "."
     return Outcome(PseResult(COMPARED, **done), {name: words + end for name, words in PICTURES.items()})
 
 
@@ -111,7 +111,7 @@ def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
 
 
 def compared(
-    title: str, scene: Scene, composition: Composed, volume: VolumeScene | None, cameras: Sequence[Camera]
+    title: str, scene: Scene, composition: Composed, twin: Twin | None, cameras: Sequence[Camera]
 ) -> tuple[Comparison, dict[str, np.ndarray]]:
     """Return PSNR and SSIM against the volume over some views, and all pictures [H, W, 3] of the first."""
     import torch
@@ -122,12 +122,12 @@ def compared(
     scores: dict[str, list[float]] = {"psnr": [], "ssim": []}
     shown: dict[str, np.ndarray] = {}
     background = torch.tensor(scene.background, device=composition.device)
-    for camera in cameras if volume else cameras[:1]:
+    for camera in cameras if twin else cameras[:1]:
         here = camera.to(background.device)
         image = composition.render(here, scene.light, scene.edits, background=background).color.cpu()
         shown.setdefault("scene", image.clamp(0, 1).numpy())
-        if volume is not None:
-            truth = torch.from_numpy(volume.over_background(camera, scene, composition.palettes))
+        if twin is not None:
+            truth = twin.render(camera, scene, composition.palettes).color
             shown.setdefault("volume", truth.clamp(0, 1).numpy())
             shown.setdefault("error", ERROR(signed_error(image, truth)).numpy())
             scores["psnr"].append(psnr(image, truth))
@@ -151,7 +151,7 @@ STAGE = Stage(
         "{dataset}/scene/{fit}/pse",
         ("pse.png", "relight.png"),
         target="scenes",
-        gpu=("views", "fit"),
+        gpu=("fit",),
         shown={name: f"{words}." for name, words in PICTURES.items()},
     ),
     schema=OfScene,

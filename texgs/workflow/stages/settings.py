@@ -73,11 +73,17 @@ class Distance:
 
 
 @dataclass(kw_only=True)
-class OfScene(OfDataset):
-    """A job that compares a scene with its volume."""
+class OfVolume(OfDataset):
+    """A job that shows basic TFs of a volume, where there is one."""
 
     tf_values: str = read("dataset.tf_values")
     basic_tfs: dict[str, BasicTF] = read(shown_tfs)
+
+
+@dataclass(kw_only=True)
+class OfScene(OfDataset):
+    """A job that compares a scene with its volume."""
+
     views: ViewKeys = read(view_settings)
     fit: FitLabel
 

@@ -18,19 +18,20 @@ VOLUME_FRAMES = 12  # spread over the path: they take long
 def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     """Measure; nothing but the numbers is written.
 
-    It reads `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
+    It reads `scene`, the scene.yaml, with what it names.
     """
     import torch
 
     from texgs.core.check import torch_device
     from texgs.metrics.edits.frame_times import FRAMES, milliseconds
     from texgs.scene.scene_file import read_scene
+    from texgs.scene.twin import Twin
     from texgs.volume.cameras import spiral, spread
-    from texgs.workflow.stages.volume_scene import VolumeScene
 
     scene, views = read_scene(inputs["scene"]), settings.views
     path = spiral(max(2, views.test.count), *views.lens)
-    composition = scene.open(torch_device(settings.fit.device))
+    device = torch_device(settings.fit.device)
+    composition = scene.open(device)
     title = f"{settings.dataset}: timing"
     times = milliseconds(
         lambda camera: composition.render(camera.to(composition.device), scene.light, scene.edits),
@@ -39,10 +40,9 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     )
     conditions = len(composition), views.width, views.height, torch.get_num_threads()
     result = TimingResult(fmean(times), max(times), median(times), *conditions)
-    if "volume" in inputs:
-        volume, few = VolumeScene(settings, inputs["volume"]), spread(path, VOLUME_FRAMES)
-        render = partial(volume.render, scene=scene, palettes=composition.palettes)
-        times = milliseconds(render, few, f"{title}, volume")
+    if scene.volume is not None:
+        render = partial(Twin(scene, device).render, scene=scene, palettes=composition.palettes)
+        times = milliseconds(render, spread(path, VOLUME_FRAMES), f"{title}, volume")
         result = replace(result, volume_mean_ms=fmean(times), volume_max_ms=max(times))
     return Outcome(result)
 
@@ -56,7 +56,7 @@ STAGE = Stage(
         "{dataset}/scene/{fit}/timing",
         target="scenes",
         threads=EVERY,  # other jobs would be measured with it
-        gpu=("views", "fit"),
+        gpu=("fit",),
     ),
     schema=OfScene,
     inputs=scene_and_volume,

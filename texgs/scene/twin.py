@@ -1,0 +1,114 @@
+"""The twin of a scene: the volume that it was made from, under the scene's light and with its edits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError, located
+from texgs.fields.part_edit import PartEdit
+from texgs.raster import Render
+from texgs.raster.shading import MATERIAL
+from texgs.volume.caster import Caster
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.render import Appearance
+from texgs.volume.transfer import TransferFunction, combine
+
+if TYPE_CHECKING:
+    from texgs.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class SceneVolume:
+    """The volume that a scene was made from, as the views of its models show it."""
+
+    file: Path  # volume.nrrd, prepared
+    tfs: Mapping[str, TransferFunction]  # basic ones, by the names of models
+    appearance: Appearance = field(default_factory=Appearance)
+
+
+class Twin:
+    """Casts the volume of a scene as the views were cast that its models were fitted to.
+
+    Args:
+        scene: names its volume; of any edits.
+        device: that casts rays.
+
+    Raises:
+        ArgumentError: if the scene names no volume, or the volume cannot be read.
+    """
+
+    def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
+        if scene.volume is None:
+            raise ArgumentError(
+                "volume: expected the volume that the scene was made from, got none; make the scene again by "
+                "texgs compose"
+            )
+        self._volume = scene.volume
+        with located("volume"):
+            self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
+
+    def render(self, camera: Camera, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> Render:
+        """Return what a scene's visible models show of the volume, over the scene's background.
+
+        A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
+        of light hold for the whole volume: those of the first visible model. A volume has no segments and no
+        looks.
+
+        Args:
+            camera: from where.
+            scene: of this volume, with any edits.
+            palettes: of its models, as fitted: `Composed.palettes`.
+        """
+        shown, factors = {}, list[dict[str, float]]()
+        look = self._volume.appearance
+        for (name, model), palette in zip(scene.models.items(), palettes, strict=True):
+            if model.edit.visible and model.edit.opacity > 0:
+                shown[name] = edited(self._tf(name), model.edit, palette)
+                factors.append({key: getattr(look, key) * getattr(model.edit, key) for key in MATERIAL})
+        behind = torch.tensor(scene.background)
+        if not shown:
+            alpha = torch.zeros(camera.height, camera.width)
+            return Render(behind.expand(*alpha.shape, 3), alpha)
+        caster = self._caster = self._caster.with_appearance(replace(look, **factors[0]))
+        rgba = caster.cast(combine(shown), camera, scene.light).rgba.cpu()
+        return Render(rgba[..., :3] + (1 - rgba[..., 3:]) * behind, rgba[..., 3])
+
+    def _tf(self, name: str) -> TransferFunction:
+        """Return the basic TF of a model."""
+        if name not in self._volume.tfs:
+            known = ", ".join(self._volume.tfs) or "none"
+            raise ArgumentError(f"volume.tfs: expected the basic TF of model {name}, got {known}; add it")
+        return self._volume.tfs[name]
+
+
+def edited(tf: TransferFunction, edit: PartEdit, palette: Sequence[float]) -> TransferFunction:
+    """Return a basic TF with an edit's colour and opacity, cut off at 0 and 1 at every value."""
+    opacity = clipped([(value, alpha * edit.opacity) for value, alpha in tf.opacity])
+    if edit.palette is None:
+        return TransferFunction(opacity, tf.color)
+    moved = np.subtract(edit.palette, palette)
+    return TransferFunction(opacity, clipped([(value, *np.add(rgb, moved)) for value, *rgb in tf.color]))
+
+
+def clipped(points: Sequence[tuple[float, ...]]) -> Any:
+    """Return the points of a piecewise linear function cut off at 0 and 1, with those where that begins."""
+    made = [points[0]]
+    for before, after in pairwise(points):
+        places = {
+            (bound - one) / (other - one)
+            for one, other in zip(before[1:], after[1:], strict=True)
+            for bound in (0, 1)
+            if min(one, other) < bound < max(one, other) and before[0] < after[0]
+        }
+        for t in sorted(places):
+            made.append(tuple((1 - t) * one + t * other for one, other in zip(before, after, strict=True)))
+        made.append(after)
+    return tuple((value, *np.clip(channels, 0, 1).tolist()) for value, *channels in made)
