@@ -9,8 +9,10 @@ from PIL import Image
 
 from tests.cli.conftest import ORBITAL, numbers
 from texgs.cli.main import main
+from texgs.core.camera import orbit
 from texgs.core.image import read_rgba, to_pillow
-from texgs.scene.scene_file import read_scene
+from texgs.metrics.quality import compare
+from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import Twin
 from texgs.volume.view_set import read_views
 
@@ -39,6 +41,31 @@ def test_the_twin_of_the_scene_is_what_the_views_show(results):
         assert np.array_equal(to_pillow(seen.color, seen.alpha), read_rgba(view.path))
 
 
+def test_a_view_beside_its_volume(results, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    path, size = results / "compose" / "scene.yaml", ["--width", "48", "--radius", "2.5", "--azimuth", "10"]
+    assert main(["render", str(path), "--compare", "--gain", "8", *size, "--output", "c.png"]) == 0
+    scene = read_scene(path)
+    told = compare(*Twin(scene).beside(orbit(10, 20, 2.5, 30, 48, 48), scene, scene.open()))
+    assert f"PSNR {told['psnr']:.2f} dB, SSIM {told['ssim']:.4f}, object: {told['object_psnr']:.2f} dB" in (
+        capsys.readouterr().out
+    )
+    height, width, _ = np.asarray(Image.open("c.png")).shape
+    assert width > 2 * height
+    film = [*size, "--path", "orbit", "--frames", "2", "--output", "film.gif"]
+    assert main(["render", str(path), "--compare", *film]) == 0
+    for words, message in (
+        (["--mode", "normal"], "--compare: expected --mode shaded, got normal"),
+        (["--gain", "17"], "--gain: expected 1 to 16, got 17"),
+    ):
+        assert main(["render", str(path), "--compare", *words]) == 2
+        assert message in capsys.readouterr().err
+    old = write_scene("old.yaml", replace(scene, volume=None))
+    assert main(["render", str(old), "--compare", "--output", "none.png"]) == 2
+    assert "old.yaml: volume: expected the volume that the scene was made from" in capsys.readouterr().err
+    assert not (tmp_path / "none.png").exists()
+
+
 def test_fits_tell_which_views_they_are_of_and_what_their_data_stand_in_for(results):
     phases = [results.parents[1] / "TF01" / "demo" / phase for phase in ("shading", "texture")]
     for folder in (*phases, results / "pse"):
@@ -54,6 +81,7 @@ def test_edits_are_compared_with_the_volume(results):
     assert titles[:3] == ["as fitted", "+ opacity of TF01 x 0.4", "+ other colours"]
     assert titles[3:] == ["+ k_a x 0.7, k_d x 1.2, k_s x 2", "+ light from the left"]
     assert len(metrics["relight"]) == 6
+    assert all(step["object_psnr"] < step["psnr"] - 3 for step in metrics["pse"])
     assert all(step["psnr"] > 12 for step in (*metrics["pse"], *metrics["relight"]))
     assert metrics["pse"][0]["psnr"] > 16
     for name in ("pse.png", "relight.png"):

@@ -2,6 +2,8 @@
 
 import math
 import threading
+from math import log10
+from statistics import fmean
 
 import pytest
 import torch
@@ -11,7 +13,8 @@ from texgs.core.image import write_png
 from texgs.core.light import Light
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import raw_material
-from texgs.metrics.quality import evaluate, mean, psnr, read_ahead, ssim
+from texgs.metrics.quality import compare, evaluate, mean, psnr, read_ahead, ssim
+from texgs.raster import Render
 from texgs.raster.reference.losses import ssim as reference_ssim
 from texgs.volume.view_set import View
 
@@ -43,8 +46,35 @@ def test_a_model_is_almost_its_own_pictures(tmp_path):
     assert len(scores["psnr"]) == 3
     assert mean(scores)["psnr"] > 48, "only rounding to 8 bits is between them"
     assert mean(scores)["ssim"] > 0.999
+    visible = fmean([float((view.load()[..., 3] > 2).float().mean()) for view in views])
+    assert visible < 0.3
+    assert mean(scores)["object_psnr"] == pytest.approx(mean(scores)["psnr"] + 10 * log10(visible), abs=0.3)
     halved = evaluate(model, views, reduce=2)
     assert 15 < mean(halved)["psnr"] < 48
+
+
+def test_views_without_alpha_have_no_object(tmp_path):
+    model, camera, light = ball(), orbit(20, 20, 4, 20, 32, 24), Light("headlight")
+    write_png(tmp_path / "0.png", model.render(camera, light).color)
+    assert evaluate(model, [View(camera, tmp_path / "0.png", light)])["object_psnr"] == []
+
+
+def test_the_object_is_what_one_of_two_images_shows():
+    """Errors elsewhere do not count; with none elsewhere, the squared error is on a share of the pixels."""
+    generator = torch.Generator().manual_seed(2)
+    target = torch.rand(40, 40, 3, generator=generator)
+    image, alpha, other = target.clone(), torch.zeros(40, 40), torch.zeros(40, 40)
+    alpha[:20, :20], other[:20, 20:] = 0.02, 1.0
+    image[:20] += 0.1 * (torch.rand(20, 40, 3, generator=generator) - 0.5)
+    scores = compare(Render(image, alpha), Render(target, other))
+    assert scores["object_psnr"] == pytest.approx(scores["psnr"] - 10 * log10(2), abs=0.05)
+    assert scores["object_ssim"] < scores["ssim"] < 1
+    image[25:] += 0.3
+    worse = compare(Render(image, alpha), Render(target, other))
+    assert worse["psnr"] < scores["psnr"] - 3
+    assert worse["object_psnr"] == scores["object_psnr"]
+    assert worse["object_ssim"] == pytest.approx(scores["object_ssim"], abs=1e-6), "windows are not reached"
+    assert set(compare(Render(image, 0 * alpha), Render(target, 0 * other))) == {"psnr", "ssim"}
 
 
 def test_mean():

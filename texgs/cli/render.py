@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from texgs.cli.options import add_device, add_lens, lens_of, option
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, located
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from texgs.core.camera import Camera
     from texgs.core.light import Light
+    from texgs.scene.scene import Scene
 
 MOST_FRAMES = 100_000  # an hour of film
+MOST_GAIN = 16.0
 PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61}  # frames by default
 
 
@@ -38,6 +44,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, "--azimuth", 30.0, azimuth)
     option(parser, "--polar", 20.0, "angle above the horizon, not for path test, degrees")
     option(parser, "--fps", 25.0, "frames per second")
+    parser.add_argument(
+        "--compare", action="store_true", help="show scene, volume, and difference, with PSNR and SSIM"
+    )
+    option(parser, "--gain", 4.0, f"factor on differences, 1 to {MOST_GAIN:g}")
     add_device(parser)
 
 
@@ -56,13 +66,43 @@ def run(arguments: argparse.Namespace) -> int:
     shots = shots_of(arguments, scene.light, count)
     suffix = ".png" if count == 1 else ".mp4"
     output = arguments.output or Path(f"{arguments.scene.stem}{suffix}")
-    composition = scene.open(torch_device(arguments.device))
-    frames = (
-        frame(composition, camera, light, scene.edits, arguments.mode, scene.background)
-        for camera, light in progress(shots, count, title=str(output), unit="frame")
-    )
+    shots = progress(shots, count, title=str(output), unit="frame")
+    if arguments.compare:
+        frames = compared(arguments, scene, shots)
+    else:
+        composition = scene.open(torch_device(arguments.device))
+        frames = (
+            frame(composition, camera, light, scene.edits, arguments.mode, scene.background)
+            for camera, light in shots
+        )
     print(write_frames(output, frames, arguments.fps))
     return 0
+
+
+def compared(
+    arguments: argparse.Namespace, scene: Scene, shots: Iterable[tuple[Camera, Light]]
+) -> Iterator[np.ndarray]:
+    """Yield frames of a scene beside its volume; their mean scores are printed at the end."""
+    from texgs.core.check import torch_device
+    from texgs.metrics.quality import mean
+    from texgs.report.beside_volume import beside_volume, in_words
+    from texgs.scene.twin import Twin
+
+    if arguments.mode != "shaded":
+        raise ArgumentError(f"--compare: expected --mode shaded, got {arguments.mode}; leave one of them out")
+    if not 1 <= arguments.gain <= MOST_GAIN:
+        raise ArgumentError(f"--gain: expected 1 to {MOST_GAIN:g}, got {arguments.gain:g}")
+    device = torch_device(arguments.device)
+    with located(arguments.scene):
+        twin, composition = Twin(scene, device), scene.open(device)
+    measured = defaultdict[str, list[float]](list)
+    for camera, light in shots:
+        seen = twin.beside(camera, replace(scene, light=light), composition)
+        picture, scores = beside_volume(*seen, arguments.gain)
+        for name, value in scores.items():
+            measured[name].append(value)
+        yield picture
+    print(", ".join(in_words(mean(measured))))
 
 
 def frames_of(arguments: argparse.Namespace) -> int:

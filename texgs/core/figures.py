@@ -72,7 +72,7 @@ class Scale:
         from matplotlib import colormaps  # slow to import
 
         shares = ((values - self.low) / (self.high - self.low)).clamp(0, 1)
-        return torch.from_numpy(colormaps[self.colormap](shares.numpy())[..., :3]).float()
+        return torch.from_numpy(colormaps[self.colormap](shares.cpu().numpy())[..., :3]).float()
 
 
 @dataclass(frozen=True, eq=False)

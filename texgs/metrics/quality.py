@@ -13,11 +13,14 @@ from torch import Tensor
 
 from texgs.core.progress import progress
 from texgs.fields.field import Field
+from texgs.raster import Render
 from texgs.raster.losses import ssim as structural_similarity
+from texgs.raster.reference.losses import similarities
 from texgs.volume.images import over_white, smaller
 from texgs.volume.view_set import View
 
 BEST = 100.0  # dB, of equal images
+VISIBLE = 0.01  # alpha; pixels of an object have more in one of two images
 Item = TypeVar("Item")
 Read = TypeVar("Read")
 
@@ -34,22 +37,41 @@ def ssim(image: Tensor, target: Tensor) -> float:
     return structural_similarity(image.clamp(0, 1), target).item()
 
 
+def compare(image: Render, target: Render) -> dict[str, float]:
+    """Return PSNR in dB and SSIM of two images: full frame, and on the object, where one shows something."""
+    shown = image.color.clamp(0, 1)
+    scores = {"psnr": psnr(shown, target.color), "ssim": ssim(shown, target.color)}
+    if bool((seen := object_of(image, target)).any()):
+        scores["object_psnr"] = psnr(shown[seen], target.color[seen])
+        scores["object_ssim"] = similarities(shown, target.color)[seen].mean().item()
+    return scores
+
+
+def object_of(image: Render, target: Render) -> Tensor:
+    """Return the pixels [H, W] in which one of two images shows something."""
+    return (image.alpha > VISIBLE) | (target.alpha > VISIBLE)
+
+
 @torch.no_grad()
 def evaluate(
     model: Field, views: Sequence[View], reduce: int = 1, title: str = "evaluate"
 ) -> dict[str, list[float]]:
     """Return PSNR in dB and SSIM of each view over white, full frame, against the exact image.
 
-    The images are reduced as in `images.load`.
+    The images are reduced as in `images.load`. Views with alpha have the PSNR on the object, too.
     """
-    measured: dict[str, list[float]] = {"psnr": [], "ssim": []}
+    measured: dict[str, list[float]] = {"psnr": [], "ssim": [], "object_psnr": []}
     device = model.device
     read = partial(over_white, reduce=reduce)
     for view, planes in progress(read_ahead(read, views), len(views), title=title, unit="view"):
-        target = planes[:3].permute(1, 2, 0).to(device)
-        image = model.render(smaller(view.camera, reduce).to(device), view.light).color
-        measured["psnr"].append(psnr(image, target))
-        measured["ssim"].append(ssim(image, target))
+        planes = planes.to(device)
+        target = Render(planes[:3].permute(1, 2, 0), planes[3])
+        image = model.render(smaller(view.camera, reduce).to(device), view.light)
+        measured["psnr"].append(psnr(image.color, target.color))
+        measured["ssim"].append(ssim(image.color, target.color))
+        seen = object_of(image, target)
+        if bool(seen.any()) and bool((target.alpha < 1).any()):
+            measured["object_psnr"].append(psnr(image.color[seen], target.color[seen]))
     return measured
 
 

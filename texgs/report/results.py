@@ -79,6 +79,7 @@ class FitResult(Result, section="fitting"):
     iterations: int = 0
     losses: list[float] = field(default_factory=list)  # that were looked at
     psnr: float | None = None  # of test views, dB
+    object_psnr: float | None = None  # the same on the object
     ssim: float | None = None
     train_psnr: float | None = None
     train_ssim: float | None = None
@@ -148,6 +149,8 @@ class Comparison:
     title: str
     psnr: float | None = None  # means over views, dB
     ssim: float | None = None
+    object_psnr: float | None = None
+    object_ssim: float | None = None
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,13 @@ RENDERING = (
     Column("volume / scene", 1),
     Column("volume, ms (paper)", 1, UNPUBLISHED),
 )
-EDITS = (*map(Column, (DATA, LABEL, "edit")), Column("views", 0), Column("PSNR", 2), Column("SSIM", 4))
+CLOSENESS = {
+    "psnr": Column("PSNR", 2),
+    "ssim": Column("SSIM", 4),
+    "object_psnr": Column("PSNR on the object", 2),
+    "object_ssim": Column("SSIM on the object", 4),
+}
+EDITS = (*map(Column, (DATA, LABEL, "edit")), Column("views", 0), *CLOSENESS.values())
 
 
 def datasets(records: Iterable[Record[Any]]) -> Table:
@@ -147,7 +153,8 @@ def published_time(driven: str, pixels: str) -> dict[str, Any]:
 def edits(records: Iterable[Record[Any]]) -> Table:
     """Return edited scenes against the volume with the same edits."""
     rows = [
-        cells(record, edit=step.title, views=record.result.views, PSNR=step.psnr, SSIM=step.ssim)
+        cells(record, edit=step.title, views=record.result.views)
+        | {column.title: getattr(step, key) for key, column in CLOSENESS.items()}
         for record in in_order(of(PseResult, records))
         if not record.is_swept
         for step in (*record.result.pse, *record.result.relight)

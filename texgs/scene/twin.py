@@ -13,6 +13,7 @@ import torch
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, located
+from texgs.fields.field import Composed
 from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
 from texgs.raster.shading import MATERIAL
@@ -51,12 +52,12 @@ class Twin:
                 "volume: expected the volume that the scene was made from, got none; make the scene again by "
                 "texgs compose"
             )
-        self._volume = scene.volume
+        self._volume, self._device = scene.volume, torch.device(device)
         with located("volume"):
             self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
 
     def render(self, camera: Camera, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> Render:
-        """Return what a scene's visible models show of the volume, over the scene's background.
+        """Return what a scene's visible models show of the volume, on the device that casts.
 
         A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
         of light hold for the whole volume: those of the first visible model. A volume has no segments and no
@@ -73,13 +74,20 @@ class Twin:
             if model.edit.visible and model.edit.opacity > 0:
                 shown[name] = edited(self._tf(name), model.edit, palette)
                 factors.append({key: getattr(look, key) * getattr(model.edit, key) for key in MATERIAL})
-        behind = torch.tensor(scene.background)
+        behind = torch.tensor(scene.background, device=self._device)
         if not shown:
-            alpha = torch.zeros(camera.height, camera.width)
+            alpha = torch.zeros(camera.height, camera.width, device=self._device)
             return Render(behind.expand(*alpha.shape, 3), alpha)
         caster = self._caster = self._caster.with_appearance(replace(look, **factors[0]))
-        rgba = caster.cast(combine(shown), camera, scene.light).rgba.cpu()
+        rgba = caster.cast(combine(shown), camera, scene.light).rgba
         return Render(rgba[..., :3] + (1 - rgba[..., 3:]) * behind, rgba[..., 3])
+
+    def beside(self, camera: Camera, scene: Scene, composition: Composed) -> tuple[Render, Render]:
+        """Return a view of a scene, with its models as they are composed, and the same view of its volume."""
+        behind = torch.tensor(scene.background, device=composition.device)
+        here = camera.to(composition.device)
+        image = composition.render(here, scene.light, scene.edits, background=behind)
+        return image, self.render(camera, scene, composition.palettes)
 
     def _tf(self, name: str) -> TransferFunction:
         """Return the basic TF of a model."""

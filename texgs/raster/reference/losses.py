@@ -9,12 +9,17 @@ from torch.nn.functional import normalize, pad
 WINDOW = 11  # pixels each way, weighted by a Gaussian of standard deviation 1.5
 
 
-def ssim(image: Tensor, target: Tensor) -> Tensor:
-    """Return the mean structural similarity of [H, W, C] images; see `texgs.raster.losses`."""
-    from kornia.metrics import ssim as similarities
+def similarities(image: Tensor, target: Tensor) -> Tensor:
+    """Return the structural similarity around each pixel of [H, W, C] images; see `texgs.raster.losses`."""
+    from kornia.metrics import ssim
 
     x, y = (pad(each.permute(2, 0, 1)[None], (WINDOW // 2,) * 4) for each in (image, target))
-    return similarities(x, y, WINDOW, eps=0.0, padding="valid").mean()
+    return ssim(x, y, WINDOW, eps=0.0, padding="valid")[0].permute(1, 2, 0)
+
+
+def ssim(image: Tensor, target: Tensor) -> Tensor:
+    """Return their mean."""
+    return similarities(image, target).mean()
 
 
 def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float = 0.2) -> Tensor:

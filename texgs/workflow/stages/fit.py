@@ -120,7 +120,7 @@ class FitJob:
         if not views:
             return {}
         scores = mean(evaluate(field, views, self.fit.reduce, f"{self.title}: {words} views"))
-        return scores if split == "test" else {f"train_{name}": value for name, value in scores.items()}
+        return scores if split == "test" else {f"train_{name}": scores[name] for name in ("psnr", "ssim")}
 
 
 @dataclass(kw_only=True)

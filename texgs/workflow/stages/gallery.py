@@ -204,7 +204,7 @@ class GalleryRenderer:
 
         self._twin = self._twin or Twin(session.scene, self._device)
         seen = self._twin.render(camera, session.scene, session.composition.palettes)
-        return seen.color.clamp(0, 1).numpy()
+        return seen.color.cpu().clamp(0, 1).numpy()
 
     def _camera(self, cell: GalleryCell) -> Camera:
         """Return the camera of the whole view."""

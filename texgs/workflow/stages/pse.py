@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from texgs.workflow.stages.settings import OfScene
 
 if TYPE_CHECKING:
     import numpy as np
+    from torch import Tensor
 
     from texgs.core.camera import Camera
     from texgs.fields.field import Composed
@@ -114,26 +116,23 @@ def compared(
     title: str, scene: Scene, composition: Composed, twin: Twin | None, cameras: Sequence[Camera]
 ) -> tuple[Comparison, dict[str, np.ndarray]]:
     """Return PSNR and SSIM against the volume over some views, and all pictures [H, W, 3] of the first."""
-    import torch
-
-    from texgs.metrics.quality import psnr, ssim
+    from texgs.metrics.quality import compare
     from texgs.report.fit_figure import ERROR, signed_error
+    from texgs.scene.frame import frame
 
-    scores: dict[str, list[float]] = {"psnr": [], "ssim": []}
-    shown: dict[str, np.ndarray] = {}
-    background = torch.tensor(scene.background, device=composition.device)
-    for camera in cameras if twin else cameras[:1]:
-        here = camera.to(background.device)
-        image = composition.render(here, scene.light, scene.edits, background=background).color.cpu()
-        shown.setdefault("scene", image.clamp(0, 1).numpy())
-        if twin is not None:
-            truth = twin.render(camera, scene, composition.palettes).color
-            shown.setdefault("volume", truth.clamp(0, 1).numpy())
-            shown.setdefault("error", ERROR(signed_error(image, truth)).numpy())
-            scores["psnr"].append(psnr(image, truth))
-            scores["ssim"].append(ssim(image, truth))
-    means = {name: fmean(values) for name, values in scores.items() if values}
-    return Comparison(title, **means), shown
+    scores = defaultdict[str, list[float]](list)
+    if twin is None:
+        picture = frame(composition, cameras[0], scene.light, scene.edits, background=scene.background)
+        return Comparison(title), {"scene": picture}
+    shown: dict[str, Tensor] = {}
+    for camera in cameras:
+        image, truth = twin.beside(camera, scene, composition)
+        error = ERROR(signed_error(image.color, truth.color))
+        shown = shown or {"scene": image.color, "volume": truth.color, "error": error}
+        for name, value in compare(image, truth).items():
+            scores[name].append(value)
+    means = {name: fmean(values) for name, values in scores.items()}
+    return Comparison(title, **means), {name: x.cpu().clamp(0, 1).numpy() for name, x in shown.items()}
 
 
 def caption(entry: Comparison) -> str:
