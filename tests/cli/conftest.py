@@ -14,6 +14,7 @@ VIEWS = [
     "views.height=48",
     "views.train.frequency=1",
     "views.test.count=3",
+    "views.relit=3",
     "views.turntable=2",
     "views.radius=2.5",
     "tracking=none",

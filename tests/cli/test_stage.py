@@ -7,6 +7,7 @@ from tests.cli.conftest import SPHERE, numbers
 from texgs.cli.main import main
 from texgs.config.compose import compose
 from texgs.core.errors import DeviceError
+from texgs.core.light import HEADLIGHT, Light, random_lights
 from texgs.volume.view_set import read_views
 from texgs.workflow.job import settings_file
 from texgs.workflow.result import METRICS
@@ -14,6 +15,7 @@ from texgs.workflow.stage_table import STAGES
 from texgs.workflow.stages import views as views_stage
 
 TINY = [*SPHERE, "dataset.volume.size=24", "views.height=32", "views.step=0.5", "views.radius=4.0311"]
+TINY.append("views.relit=0")
 
 
 class Blank:
@@ -76,11 +78,29 @@ def test_geometry_of_the_test_views(folder):
     assert normal[16, 24] @ [1, 0, 0] > 0.9, "test view 1 of 3 is on the +x axis"
 
 
-def test_test_views_may_have_lights_of_their_own(folder):
-    main(["views", *TINY, "views.test_lights=[{kind: directional, azimuth: 60, polar: 20}]"])
+def test_lights_take_turns_and_test_views_have_their_own(folder):
+    lights = "views.lights=[{kind: headlight}, {kind: random}, {kind: directional, azimuth: 9}]"
+    main(["views", *TINY, lights, "views.test_lights=[{kind: directional, azimuth: 60, polar: 20}]"])
     views = read_views(next(folder.glob("*/views")))
-    assert {view.light.kind for view in views.train} == {"headlight"}
+    drawn = random_lights(12, 0, 0)
+    assert [view.light for view in views.train[:6]] == [
+        *(HEADLIGHT, drawn[1], Light("directional", 9.0)),
+        *(HEADLIGHT, drawn[4], Light("directional", 9.0)),
+    ]
     assert {(view.light.kind, view.light.azimuth) for view in views.test} == {("directional", 60.0)}
+
+
+def test_more_test_views_are_under_lights_that_no_training_view_has(folder):
+    main(["views", *TINY, "views.relit=4"])
+    views = read_views(next(folder.glob("*/views")))
+    assert [view.light for view in views.train] == random_lights(12, 0, 0)
+    assert {view.light for view in views.test} == {HEADLIGHT}
+    assert [view.light for view in views.relit] == random_lights(4, 0, 2)
+    assert not {view.light for view in views.train} & {view.light for view in views.relit}
+    main(["views", *TINY, "views.relit=0", "views.seed=1"])
+    views = read_views(views.folder)
+    assert (views.relit, (views.folder / "relit").exists()) == ([], False)
+    assert [view.light for view in views.train] == random_lights(12, 1, 0)
 
 
 @pytest.mark.parametrize("works", [True, False])
@@ -153,6 +173,7 @@ def test_a_job_of_the_workflow(folder, capsys):
         (["dataset.volume.generator=null", "dataset.volume.file=no.nrrd"], "no.nrrd is not there"),
         (["tf=TF09"], "tf: expected a basic TF of data set sphere"),
         (["views.lights=[]"], "views.lights: expected at least one light"),
+        (["views.test_lights=[]"], "views.test_lights: expected at least one light"),
         (
             ["dataset.basic_tfs.TF01.opacity=[[5,0],[6,1]]", "dataset.tf_values=data"],
             "expected a range within",

@@ -74,11 +74,13 @@ def test_a_copied_file_does_not_take_the_place_of_its_original(tmp_path, monkeyp
         ("tracking=http://x", "an address goes to tracking.uri"),
         ("views.renderer=gpuu", "views.renderer: expected one of cpu, gpu, vtk, got gpuu, did you mean gpu?"),
         ("dataset=turbulnce", "turbulnce, did you mean turbulence?"),
-        ("views=hugge", "views: expected one of default, paper, relight, small, unseen, got hugge"),
+        ("views=hugge", "views: expected one of default, headlight, paper, relight, small, got hugge"),
         (
             "views.lights=[{kind: sun}]",
-            "views.lights.0.kind: expected one of headlight, directional, got sun",
+            "views.lights.0.kind: expected one of headlight, directional, random, got sun",
         ),
+        ("views.relit=-1", "views.relit: expected at least 0, got -1"),
+        ("views.seed=-1", "views.seed: expected at least 0, got -1"),
         ("views.train.kind=ico", "views.train.kind: expected one of icosphere, spiral, orbit, got ico"),
         ("a=b=c", "a=b=c: expected key=value"),
         ("views", "views: expected key=value"),
@@ -204,3 +206,15 @@ def test_references_stand_in_texts_and_behind_a_backslash_for_themselves():
 def test_a_plus_adds_a_name():
     assert compose(("+sweeps.lambda=engine",)).sweeps == {"lambda": "engine"}
     assert compose(("views.lights.0.azimuth=3",)).views.lights[0].azimuth == 3
+
+
+def test_random_lights_are_headlights_for_fields_that_cannot_be_relit():
+    def views(*words):
+        views = compose(words).views
+        return views.name, [light.kind for light in views.lights], views.relit
+
+    assert views() == ("views", ["random"], 24)
+    assert views("fit=gaussians") == ("views-one-light", ["headlight"], 0)
+    mixed = "views.lights=[{kind: directional}, {kind: random}]"
+    assert views("fit=plenoxels", mixed) == ("views-one-light", ["directional", "headlight"], 0)
+    assert views("fit=gaussians", "views=paper") == ("views", ["headlight"], 24)

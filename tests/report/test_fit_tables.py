@@ -121,6 +121,13 @@ def test_fits_are_listed_one_by_one_but_for_those_of_sweeps(tmp_path):
     assert all("42" not in row["recipe"] for row in rows(fitting(records(tmp_path))))
 
 
+def test_fits_show_how_they_look_under_unseen_lights(tmp_path):
+    metrics(tmp_path, "texture", FitResult(60.0, 10, psnr=30.0, relit_psnr=29.5), tf="TF01")
+    metrics(tmp_path, "gaussians", FitResult(60.0, 10, psnr=30.0), tf="TF01", field="gaussians")
+    shown = [row["PSNR under unseen lights"] for row in rows(fits(records(tmp_path)))]
+    assert sorted(shown, key=str) == [29.5, None]
+
+
 def write_fit(folder, line, sweep="views", factor=1.0, tf="TF01", name="", **facts):
     """Metrics of a fit, whose measures are some multiple of the paper's; its phases share the minutes."""
     variant = int(line[VARIANTS[sweep]])

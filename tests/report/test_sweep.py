@@ -55,6 +55,16 @@ def test_means_and_spread_over_seeds(tmp_path):
     assert "PSNR (paper)" not in [c.title for c in table.columns]
 
 
+def test_unseen_lights_have_a_column_where_a_fit_was_measured_under_them(tmp_path):
+    title = "PSNR under unseen lights"
+    before = run(tmp_path, "a", 0)
+    assert title not in [each.title for each in sweep(read(before), "mine").columns]
+    result = FitResult(60.0, 1000, psnr=30.0, relit_psnr=28.0)
+    lit = metrics(tmp_path, "texture", result, tf="TF01", variant="b", sweep="mine", seed=0)
+    paths = [*before, *run(tmp_path, "b", 0, phases=PHASES[:2]), lit]
+    assert column(sweep(read(paths), "mine"), title) == [None, 28.0]
+
+
 def test_a_sweep_of_edits_has_their_measures(tmp_path):
     first = edit(tmp_path, "0", 0, 0.7)
     table = sweep(read([*edit(tmp_path, "0.5", 0, 0.4), *edit(tmp_path, "0.5", 1, 0.6), *first]), "mine")

@@ -54,6 +54,12 @@ def test_what_is_written_is_read(folder):
         torch.testing.assert_close(ours.camera.viewmat, theirs.camera.viewmat, rtol=0, atol=2e-7)
         assert torch.equal(ours.camera.K, theirs.camera.K)
     assert views.test[0].path == folder / "test" / "r_0000.png"
+    assert views.relit == []
+    write_transforms(folder, "relit", make_views(folder, "relit", count=2), {})
+    assert [(view.path.name, view.light) for view in read_views(folder).relit] == [
+        ("r_0000.png", LIGHTS[0]),
+        ("r_0001.png", LIGHTS[1]),
+    ]
 
 
 def test_an_off_centre_lens_with_oblong_pixels_survives(tmp_path):

@@ -5,15 +5,19 @@ Hydra, which takes 0.3 s, is loaded with the first one: jobs that read their set
 
 import os
 import re
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
 from texgs.config.project import LONGEST, Words, check_name, folders, is_scene_file
 from texgs.config.schema import Config
+from texgs.config.views import LightKeys
 from texgs.core.errors import ConfigError
 from texgs.core.keys import mismatch, typed
 from texgs.core.names import close
+from texgs.fields.kinds import kinds
 
+ONE_LIGHT = "-one-light"  # end of the names of folders of views for fields that cannot be relit
 NAMED = ("dataset", "fit", "edit")  # groups whose files have names, which folders of results get
 
 
@@ -40,11 +44,23 @@ def _composed(overrides: Words, places: tuple[Path, ...], _data_folder: str | No
     if not places[-1].is_dir():
         raise ConfigError(f"{places[-1]}: no configuration there; install texgs again")
     with told():
-        config = typed(Config, composition(overrides, places))
+        config = lit(typed(Config, composition(overrides, places)))
     check_names(config)
     check_meshes(config)
     check_chosen(overrides, config)
     return config
+
+
+def lit(config: Config) -> Config:
+    """Return a configuration whose views have headlights for random lights where its field cannot be relit.
+
+    Such views have a folder of their own, for an experiment may have fits of both kinds.
+    """
+    views = config.views
+    lights = [LightKeys() if light.kind == "random" else light for light in views.lights]
+    if lights == views.lights or "relight" in kinds()[config.fit.field].can:
+        return config
+    return replace(config, views=replace(views, name=views.name + ONE_LIGHT, lights=lights, relit=0))
 
 
 def check_names(config: Config) -> None:

@@ -20,9 +20,9 @@ class CameraPath:
 
 @dataclass(frozen=True)
 class LightKeys:
-    """A light: at the camera, or from a direction given as for cameras on the test path."""
+    """A light: at the camera, from a direction (given as for cameras on the test path), or a random one."""
 
-    kind: str = key("headlight", "kind of light", choices=("headlight", "directional"))
+    kind: str = key("headlight", "kind of light", choices=("headlight", "directional", "random"))
     azimuth: float = key(0.0, "azimuth of a directional light", "degrees")
     polar: float = key(0.0, "polar angle of a directional light", "degrees")
 
@@ -51,13 +51,18 @@ class ViewKeys:
         LENS.radius, "distance of cameras; the volume's longest side is 1", "world units", above=0
     )
     lights: list[LightKeys] = field(
-        default_factory=lambda: [LightKeys()],
-        metadata={"help": "view i is lit by light i modulo their number"},
+        default_factory=lambda: [LightKeys("random")],
+        metadata={
+            "help": "training view i is lit by light i modulo their number; a random one is from another "
+            "direction in each view, and a headlight where the field that is fitted cannot be relit"
+        },
     )
     test_lights: list[LightKeys] = field(
-        default_factory=list,
-        metadata={"help": "test view i is lit by light i modulo their number; default those of `lights`"},
+        default_factory=lambda: [LightKeys()],
+        metadata={"help": "test view i is lit by light i modulo their number"},
     )
+    relit: int = key(24, "number of further test views, on a spiral, each under a random light", least=0)
+    seed: int = key(0, "seed of random lights", least=0)
     shading: Shading = key(Shading, "material of the volume")
     step: float = key(0.25, "sample distance along rays", "voxels", above=0)
     opacity_unit: float = key(0.005, "length over which a TF's opacity applies", "world units", above=0)

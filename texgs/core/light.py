@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 from torch import Tensor
 
 from texgs.core.camera import Camera, orbit_direction
@@ -32,3 +33,13 @@ class Light:
 
 
 HEADLIGHT = Light("headlight")
+
+
+def random_lights(count: int, *seed: int) -> list[Light]:
+    """Return lights from random directions, all alike likely; more of the same seed begin with the same ones.
+
+    The height of a point that is uniform on the sphere is uniform itself (Archimedes).
+    """
+    turns, heights = np.random.default_rng(seed).random((count, 2)).T
+    angles = zip(360 * turns - 180, np.degrees(np.arcsin(2 * heights - 1)), strict=True)
+    return [Light("directional", float(azimuth), float(polar)) for azimuth, polar in angles]

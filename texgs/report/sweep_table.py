@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.errors import ArgumentError
 from texgs.metrics.metric import Measure
 from texgs.report.edit_tables import measured_cells, measures, pairs_of
-from texgs.report.fit_tables import Run, measures_of, runs_of
+from texgs.report.fit_tables import RELIT, Run, measures_of, runs_of
 from texgs.report.metrics_files import Record
 from texgs.report.published import DATA, LABEL
 from texgs.report.table import SOURCES, Column, Table, data_frame
@@ -59,7 +59,7 @@ def sweep_runs(records: Iterable[Record[Any]], name: str) -> DataFrame:
         raise ArgumentError(f"sweep {name}: no fit or edit of it among the metrics files; run it first")
     runs.sort(key=lambda run: natural(run["variant"]))
     runs.sort(key=lambda run: (run[DATA], bool(run["edit"]), *(run[key] for key in SERIES[1:])))
-    numbers = [*OF_FITS, *MATERIAL, *(measure.title for measure in edit_measures())]
+    numbers = [*OF_FITS, RELIT.title, *MATERIAL, *(measure.title for measure in edit_measures())]
     return data_frame(runs, [*SERIES, "variant", "series", "is_done", SOURCES, *dict.fromkeys(numbers)])
 
 
@@ -94,7 +94,8 @@ def edit_measures() -> list[Measure]:
 
 def measured(runs: DataFrame) -> dict[str, int]:
     """Return the digits of what is measured of fits, where there are some, and of edits, by titles."""
-    of_fits = {**OF_FITS, **dict.fromkeys(MATERIAL, 2)} if (runs["edit"] == "").any() else {}
+    relit = {RELIT.title: 2} if runs[RELIT.title].notna().any() else {}
+    of_fits = {**OF_FITS, **relit, **dict.fromkeys(MATERIAL, 2)} if (runs["edit"] == "").any() else {}
     of_edits = {measure.title: measure.digits or 0 for measure in edit_measures()}
     return of_fits | ({"minutes": 2, **of_edits} if runs["edit"].any() else {})
 

@@ -13,10 +13,12 @@ import cv2
 import numpy as np
 from torch.nn.functional import normalize
 
+from texgs.config.compose import ONE_LIGHT
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import read_json
 from texgs.core.names import is_number
+from texgs.fields.files import kind_of
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer.messages import OF_VIEWS, View
@@ -25,7 +27,7 @@ from texgs.volume.view_set import read_views
 
 log = logging.getLogger("texgs.viewer")
 NEAR = 5  # folders above a model in which its views are looked for
-VIEWS, VOLUME = "views/transforms_train.json", "volume/volume.json"
+VIEWS, VOLUME = ("views", f"views{ONE_LIGHT}"), "volume/volume.json"
 BINS = 256  # of a histogram that a page shows, at most
 GAIN = 4.0  # of differences, so that they are seen
 SAME = 1e-3  # by which elements of two cameras may differ
@@ -133,7 +135,9 @@ def origins_of(scene: Scene) -> list[Origin]:
     """Return what is there of the models of a scene; what is damaged is said in the log."""
     whole = []
     for name, entry in scene.models.items():
-        if file := find_upwards(entry.file, VIEWS):
+        folders = VIEWS if "relight" in kind_of(entry.file).can else VIEWS[::-1]
+        found = (find_upwards(entry.file, f"{folder}/transforms_train.json") for folder in folders)
+        if file := next(filter(None, found), None):
             origin = Origin(name, file)
             try:
                 whole.append((origin, origin.images, origin.transfer)[0])

@@ -6,7 +6,7 @@ Files have OpenGL camera-to-world matrices, and one lens for all frames.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import atan, pi, tan
 from pathlib import Path
 from typing import Any, Literal
@@ -21,6 +21,7 @@ from texgs.core.io import read_json, reading_as, write_json
 from texgs.core.light import Light
 from texgs.core.names import is_number, named_file
 
+Split = Literal["train", "test", "relit"]
 LENS_KEYS = ("camera_angle_x", "w", "h", "fl_x", "fl_y", "cx", "cy")
 OPENCV_FROM_OPENGL = torch.diag(torch.tensor([1.0, -1.0, -1.0, 1.0], dtype=torch.float64))  # its own inverse
 RIGID = 1e-4  # entries of R^T R may differ from the identity by this much
@@ -47,10 +48,11 @@ class ViewSet:
     train: list[View]
     test: list[View]  # empty where the folder has no transforms_test.json
     metadata: dict[str, Any]  # what transforms_train.json says beside lens and frames: volume, tf, aabb ...
+    relit: list[View] = field(default_factory=list)  # more test views, under other lights; of a volume alone
 
 
 def read_views(folder: str | Path) -> ViewSet:
-    """Read a folder of views: all of the two JSON files, and of the images the sizes.
+    """Read a folder of views: all of the JSON files, and of the images the sizes.
 
     Without `w` and `h` the size is that of the first image; a frame without `light` has a headlight. So the
     sets published with the paper load as they are.
@@ -59,15 +61,13 @@ def read_views(folder: str | Path) -> ViewSet:
     if not (folder / "transforms_train.json").is_file():
         raise ArgumentError(f"{folder}: expected a folder of views, found no transforms_train.json in it")
     train, metadata = _read_split(folder / "transforms_train.json")
-    test_file = folder / "transforms_test.json"
-    test = _read_split(test_file)[0] if test_file.is_file() else []
-    return ViewSet(folder, train, test, metadata)
+    files = [folder / f"transforms_{split}.json" for split in ("test", "relit")]
+    test, relit = (_read_split(file)[0] if file.is_file() else [] for file in files)
+    return ViewSet(folder, train, test, metadata, relit)
 
 
-def write_transforms(
-    folder: Path, split: Literal["train", "test"], views: Sequence[View], metadata: Mapping[str, Any]
-) -> Path:
-    """Write transforms_train.json or transforms_test.json for PNG files in `folder`; they may come later.
+def write_transforms(folder: Path, split: Split, views: Sequence[View], metadata: Mapping[str, Any]) -> Path:
+    """Write the transforms_*.json of a split for PNG files in `folder`; they may come later.
 
     All views have one size and lens; `metadata` are further keys, such as volume, tf, aabb and shading.
     """

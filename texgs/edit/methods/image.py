@@ -96,7 +96,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
         result = stylize(
             model,
             [smaller(view.camera, task.reduce) for view in views],
-            [view.light for view in views],
+            [task.scene.light] * len(views),
             picture,
             recipe,
             vgg=look.vgg,

@@ -66,7 +66,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
             model,
             [smaller(view.camera, task.reduce).to(task.device) for view in views],
             *(guidance, task.settings_for(name).instruction, settings.recipe_of()),
-            light=views[0].light,
+            light=task.scene.light,
             surfels=surfels,
             size=settings.size,
             seed=task.edit.seed,

@@ -95,7 +95,7 @@ class FitJob:
         measured: Sequence[str] = ("test",),
         **more: Any,
     ) -> Outcome:
-        """Return the result, with the quality on `test` and `train` views; the checkpoint goes."""
+        """Return the result, with the quality on views of some splits; the checkpoint goes."""
         import torch
 
         from texgs.fit import checkpoint
@@ -113,14 +113,13 @@ class FitJob:
         return Outcome(FitResult(seconds, len(field), iterations, list(losses), **told))
 
     def quality(self, field: Field, split: str) -> dict[str, float]:
-        """Return PSNR and SSIM on `test` or `train` views, where there are some, as the result names them."""
+        """Return PSNR and SSIM on views of a split, where there are some, as the result names them."""
         from texgs.metrics.quality import evaluate, mean
 
-        views, words = (self.views.test, "test") if split == "test" else (self.views.train, "training")
-        if not views:
+        if not (views := getattr(self.views, split)):
             return {}
-        scores = mean(evaluate(field, views, self.fit.reduce, f"{self.title}: {words} views"))
-        return scores if split == "test" else {f"train_{name}": scores[name] for name in ("psnr", "ssim")}
+        scores = mean(evaluate(field, views, self.fit.reduce, f"{self.title}: {split} views"))
+        return scores if split == "test" else {f"{split}_{name}": scores[name] for name in ("psnr", "ssim")}
 
 
 @dataclass(kw_only=True)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from texgs.config.compose import ONE_LIGHT
 from texgs.report.results import SheetResult
-from texgs.workflow.inputs import is_fit, view_set
-from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.inputs import is_first_recipe, is_fit, view_set
+from texgs.workflow.stage import Config, Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfTF
 
 if TYPE_CHECKING:
@@ -43,6 +44,12 @@ def common_box(pictures: list[Image]) -> tuple[int, int, int, int]:
     return min(lefts), min(tops), max(rights), max(bottoms)
 
 
+def applies(config: Config) -> bool:
+    """Return whether these are the views of the first recipe, and of no sweep."""
+    is_own = config.views.name.removesuffix(ONE_LIGHT) == "views"
+    return is_fit(config) and is_own and is_first_recipe(config)
+
+
 STAGE = Stage(
     "sheet",
     order=40,
@@ -58,5 +65,5 @@ STAGE = Stage(
     schema=OfTF,
     inputs=view_set,
     work=work,
-    applies=lambda config: is_fit(config) and config.views.name == "views",  # of those of a sweep none
+    applies=applies,
 )

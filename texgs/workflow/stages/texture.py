@@ -34,7 +34,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     seconds = time.monotonic() - start
     write_model(output / "model.safetensors", model)
     notes = {"texels": len(model.parameters["texels"])}
-    return job.outcome(model, seconds, measured=("test", "train"), sizes=model.sizes(), notes=notes)
+    return job.outcome(model, seconds, measured=("test", "train", "relit"), sizes=model.sizes(), notes=notes)
 
 
 STAGE = Stage(

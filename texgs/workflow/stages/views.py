@@ -9,10 +9,10 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from statistics import mean, median
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from texgs.config.dataset import BasicTF
-from texgs.config.views import CameraPath, ViewKeys
+from texgs.config.views import CameraPath, LightKeys, ViewKeys
 from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.io import write_atomic
 from texgs.core.lens import Lens
@@ -26,13 +26,13 @@ from texgs.workflow.stages.settings import OfTF, basic_tfs_of
 
 if TYPE_CHECKING:
     from texgs.core.camera import Camera
+    from texgs.core.light import Light
     from texgs.volume.caster import Caster
     from texgs.volume.grid import Grid
     from texgs.volume.render import Appearance, Times, VolumeRenderer
     from texgs.volume.transfer import TransferFunction
-    from texgs.volume.view_set import View
+    from texgs.volume.view_set import Split, View
 
-SPLITS: tuple[Literal["train", "test"], ...] = ("train", "test")
 TURNTABLE = 320  # pixels of its longer side
 
 
@@ -47,7 +47,7 @@ class Settings(OfTF):
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
-    """Write the folder of views: train/, test/, transforms_*.json, turntable.png, and times.json.
+    """Write the folder of views: train/, test/, relit/, transforms_*.json, turntable.png, and times.json.
 
     Views that are in the folder already, from an interrupted run of the same job, are kept, and so are
     their times.
@@ -65,7 +65,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     appearance = appearance_of(views)
     renderer = renderer_for(views.renderer, grid, appearance)
     times, coverages = Times(output / TIMES), []
-    shots = {split: views_of(views, split, output) for split in SPLITS}
+    shots = views_of(views, output)
     for split, shot in shots.items():
         render_views(renderer, tf, shot, f"{title}: {split} views", times)
         coverages += [float((view.load()[..., 3] > 0).float().mean()) for view in shot]
@@ -133,20 +133,37 @@ def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
     return orbit_path(path.count, path.polar, *lens)
 
 
-def views_of(views: ViewKeys, split: Literal["train", "test"], output: Path) -> list[View]:
-    """Return cameras, lights and files of the training or the test views."""
-    from texgs.core.light import Light
+def views_of(views: ViewKeys, output: Path) -> dict[Split, list[View]]:
+    """Return cameras, lights and files of the training and the test views, by split; no split is empty."""
     from texgs.volume.view_set import View
 
-    path, chosen = views.train, views.lights
-    if split == "test":
-        path, chosen = views.test, views.test_lights or views.lights
-    lights = [Light(**asdict(light)) for light in chosen]
-    if not lights:
-        raise ArgumentError("views.lights: expected at least one light, got none")
+    for name in ("lights", "test_lights"):
+        if not getattr(views, name):
+            raise ArgumentError(f"views.{name}: expected at least one light, got none")
+    splits: dict[Split, tuple[CameraPath, Sequence[LightKeys]]] = {
+        "train": (views.train, views.lights),
+        "test": (views.test, views.test_lights),
+    }
+    if views.relit:
+        splits["relit"] = CameraPath("spiral", count=views.relit), [LightKeys("random")]
+    shots = {}
+    for place, (split, (path, lights)) in enumerate(splits.items()):
+        placed = cameras(path, views.lens)
+        files = [output / split / f"r_{index:04}.png" for index in range(len(placed))]
+        lit = lights_of(lights, len(placed), views.seed, place)
+        shots[split] = [View(*each) for each in zip(placed, files, lit, strict=True)]
+    return shots
+
+
+def lights_of(lights: Sequence[LightKeys], count: int, *seed: int) -> list[Light]:
+    """Return the lights of so many views, which take turns; random ones are others in each view."""
+    from texgs.core.light import Light, random_lights
+
+    turns = [lights[index % len(lights)] for index in range(count)]
+    drawn = random_lights(count, *seed)
     return [
-        View(camera, output / split / f"r_{index:04}.png", lights[index % len(lights)])
-        for index, camera in enumerate(cameras(path, views.lens))
+        other if light.kind == "random" else Light(**asdict(light))
+        for light, other in zip(turns, drawn, strict=True)
     ]
 
 
