@@ -213,8 +213,8 @@ def test_random_lights_are_headlights_for_fields_that_cannot_be_relit():
         views = compose(words).views
         return views.name, [light.kind for light in views.lights], views.relit
 
-    assert views() == ("views", ["random"], 24)
-    assert views("fit=gaussians") == ("views-one-light", ["headlight"], 0)
+    assert views() == ("views", ["headlight", "random", "random"], 24)
+    assert views("fit=gaussians") == ("views-one-light", ["headlight"] * 3, 0)
     mixed = "views.lights=[{kind: directional}, {kind: random}]"
     assert views("fit=plenoxels", mixed) == ("views-one-light", ["directional", "headlight"], 0)
     assert views("fit=gaussians", "views=paper") == ("views", ["headlight"], 24)

@@ -51,7 +51,7 @@ class ViewKeys:
         LENS.radius, "distance of cameras; the volume's longest side is 1", "world units", above=0
     )
     lights: list[LightKeys] = field(
-        default_factory=lambda: [LightKeys("random")],
+        default_factory=lambda: [LightKeys(), LightKeys("random"), LightKeys("random")],
         metadata={
             "help": "training view i is lit by light i modulo their number; a random one is from another "
             "direction in each view, and a headlight where the field that is fitted cannot be relit"
