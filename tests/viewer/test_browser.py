@@ -181,6 +181,43 @@ def test_a_movement_is_one_step(chromium, scene_file):
         assert still(page) == rendered(scene_file.parent / "moved.yaml", page)
 
 
+def test_planes_cut_move_and_tilt(chromium, scene_file):
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("button", name="Add a plane").click()
+        arrow = page.get_by_role("slider", name="Plane 1: arrow keys move it")
+        line, tip = page.locator(".plane .reach"), page.locator(".plane .tip")
+        seen = line.bounding_box()
+        drag(page, line, (0.5, 0.5), (-0.5, 0.5))  # along +x, to the left and nearer
+        expect(page.get_by_role("listitem")).to_have_count(2)
+        moved = float(arrow.get_attribute("aria-valuenow"))
+        assert moved > 0.05
+        assert line.bounding_box()["x"] < seen["x"] - seen["width"] / 3, "the arrow follows the pointer"
+        arrow.press("ArrowRight")
+        assert float(arrow.get_attribute("aria-valuenow")) == pytest.approx(moved + 0.01, abs=1e-3)
+        drag(page, tip, (0.5, 0.5), (0.5, -1.5))
+        tilted = page.get_by_role("spinbutton", name="Polar of the normal of plane 1, degrees, as a number")
+        assert 10 < float(tilted.input_value()) < 80
+        page.get_by_role("button", name="Snap to y: plane 1").click()
+        expect(tilted).to_have_value("90")
+        page.get_by_role("checkbox", name="Box").check()
+        page.get_by_role("spinbutton", name="Highest x of the box, as a number").fill("0.25")
+        page.keyboard.press("Tab")
+        page.get_by_role("button", name="Flip plane 1").click()
+        save_as(page, "cut.yaml")
+        cuts = read_scene(scene_file.parent / "cut.yaml").cuts
+        assert cuts.planes[0].normal == [0, -1, 0]
+        assert cuts.box.high[0] == 0.25
+        page.get_by_role("checkbox", name="Plane 1").uncheck()
+        expect(page.get_by_role("listitem").last).to_have_text("cuts box")
+        expect(arrow).to_be_hidden()
+        page.get_by_role("checkbox", name="Plane 1").check()
+        save_as(page, "again.yaml")
+        assert read_scene(scene_file.parent / "again.yaml").cuts == cuts, "what is off is kept in the page"
+        page.get_by_role("button", name="Remove plane 1").click()
+        page.get_by_role("button", name="Undo").click()
+        expect(page.get_by_role("checkbox", name="Plane 1")).to_be_checked()
+
+
 def test_a_click_makes_a_segment(chromium, tmp_path):
     file = write_model(tmp_path / "balls.safetensors", two_balls()[0])
     scene_file = write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(file)}))

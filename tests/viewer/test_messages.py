@@ -47,6 +47,11 @@ def test_messages_are_read():
         ("TF01", "palette", None, "TF01 palette reset"),
         ("", "light", "headlight", "light headlight"),
         ("", "light", {"polar": 12.4}, "light polar 12°"),
+        ("", "cuts", {"planes": [{}], "box": None, "faces": "unlit"}, "cuts 1 plane, unlit"),
+        ("", "cuts", {"planes": [{}, {}], "box": {}, "faces": "shaded"}, "cuts 2 planes"),
+        ("", "cuts", {"box": {"low": [0, 0, 0]}}, "cuts box"),
+        ("", "cuts", {"planes": [], "faces": "unlit"}, "cuts none"),
+        ("", "cuts", None, "cuts reset"),
     ],
 )
 def test_edits_have_titles(part, key, value, title):

@@ -11,8 +11,10 @@ from PIL import Image
 from tests.viewer.pages import TOKEN, WAIT, on_page, origin, page
 from tests.viewer.test_messages import CAMERA, VIEW
 from texgs.cli.main import main
+from texgs.core.cuts import NO_CUTS
 from texgs.scene.scene_file import read_scene
 from texgs.viewer import guard
+from texgs.viewer.segments import isolated
 
 # ---- Who may talk to it -----------------------------------------------------
 
@@ -180,6 +182,18 @@ async def test_pages_share_edits_and_their_history(browser, client):
 
 
 @on_page
+async def test_pages_cut_the_scene(browser, client):
+    up = {"normal": [0, 2, 0], "offset": 0.5}
+    await browser.send(type="edit", part="", key="cuts", value={"planes": [up]}, step=1)
+    await browser.send(type="edit", part="", key="cuts", value={"planes": [up, up], "faces": "unlit"}, step=1)
+    cuts = (await browser.past("cuts 2 planes, unlit"))["scene"]["cuts"]
+    assert cuts == {"planes": 2 * [{"normal": [0, 1, 0], "offset": 0.25}], "box": None, "faces": "unlit"}
+    assert isolated(client.server_side.edits.scene, "TF01").cuts == NO_CUTS, "clicks select what is whole"
+    await browser.send(type="undo")
+    assert (await browser.past())["scene"]["cuts"] == {"planes": [], "box": None, "faces": "shaded"}
+
+
+@on_page
 async def test_edits_of_one_movement_are_one_step(browser):
     for value in (0.9, 0.5, -1, 0.2):
         await browser.send(type="edit", part="TF01", key="opacity", value=value, step=1)
@@ -197,6 +211,9 @@ async def test_edits_of_one_movement_are_one_step(browser):
         ({"part": "TF03", "key": "opacity", "value": 1}, "a model of the scene (TF01, TF02), got TF03"),
         ({"part": "TF01", "key": "palette", "value": {"a": 1}}, "expected three numbers from 0 to 1"),
         ({"part": "", "key": "light", "value": "up"}, "expected headlight, or azimuth and polar"),
+        ({"part": "", "key": "cuts", "value": {"planes": 3}}, "cuts.planes: expected"),
+        ({"part": "", "key": "cuts", "value": [1]}, "cuts: expected"),
+        ({"part": "", "key": "cuts", "value": {"planes": [{"normal": [0, 0, 0]}]}}, "that are not all 0"),
     ],
 )
 @on_page

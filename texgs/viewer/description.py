@@ -49,6 +49,7 @@ def describe(
         "name": name,
         "background": list(scene.background),
         "light": {"azimuth": light.azimuth, "polar": light.polar} if light.kind == "directional" else None,
+        "cuts": asdict(scene.cuts),
         "models": models,
         "modes": [mode for mode in get_args(Mode) if mode not in MODES or MODES[mode] in kind.can],
         "bounds": {"center": center, "radius": radius},

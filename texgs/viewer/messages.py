@@ -67,7 +67,7 @@ class Edit:
     """Change one value of a part, or of the scene where the part is empty."""
 
     part: str  # MODEL or MODEL/SEGMENT
-    key: str  # of a `PartEdit`; "light" or "background" of the scene
+    key: str  # of a `PartEdit`; "light", "background" or "cuts" of the scene
     value: Any = None  # as in a scene file; None takes the edit back
     step: Number = 0  # edits of one number in a row are one step of the history, such as those of a slider
     type: Literal["edit"] = tag("edit")
@@ -75,7 +75,9 @@ class Edit:
     @property
     def title(self) -> str:
         """Return what the list of steps calls it, once it has been made."""
-        return f"{self.part} {self.key} {title_of_value(self.value)}".strip()
+        are_cuts = self.key == "cuts" and self.value is not None
+        value = title_of_cuts(self.value) if are_cuts else title_of_value(self.value)
+        return f"{self.part} {self.key} {value}".strip()
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -215,3 +217,14 @@ def title_of_value(value: Any) -> str:
     if isinstance(value, list):
         return "#" + "".join(f"{round(255 * x):02x}" for x in value)
     return value if isinstance(value, str) else f"{value:.4g}"
+
+
+def title_of_cuts(cuts: Mapping[str, Any]) -> str:
+    """Return cuts as a scene file has them in few words."""
+    count = len(cuts.get("planes", ()))
+    words = [f"{count} planes" if count > 1 else "1 plane"] if count else []
+    if cuts.get("box"):
+        words.append("box")
+    if words and cuts.get("faces") == "unlit":
+        words.append("unlit")
+    return ", ".join(words) or "none"

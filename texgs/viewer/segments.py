@@ -13,6 +13,7 @@ import torch
 from PIL import Image
 from torch import Tensor
 
+from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import TexgsError
 from texgs.core.lens import Lens
 from texgs.edit.clicks import Clicks, places_of
@@ -98,7 +99,7 @@ def isolated(scene: Scene, name: str) -> Scene:
         edit = PartEdit(visible=each == name)
         segments = {key: replace(segment, edit=edit) for key, segment in entry.segments.items()}
         models[each] = replace(entry, edit=edit, segments=segments)
-    return replace(scene, models=models)
+    return replace(scene, models=models, cuts=NO_CUTS)
 
 
 def picture_of(mask: Tensor) -> str:

@@ -201,7 +201,7 @@ class Server:
     def scene_message(self) -> dict[str, Any]:
         """Return what changes of the scene, and its history, for all pages."""
         scene = self._describe(self.edits.scene)
-        changing = {key: scene[key] for key in ("name", "background", "light", "models")}
+        changing = {key: scene[key] for key in ("name", "background", "light", "cuts", "models")}
         return {"type": "scene", "scene": changing, **self.edits.state()}
 
     def greeting(self) -> dict[str, Any]:

@@ -130,7 +130,6 @@ class SharedEdits:
             title = f"{asked.part} removed"
             session.remove_segment(asked.part)
         else:
-            title = asked.title
             step = (author, asked.step, asked.part, asked.key) if asked.step else None
             goes_on = step is not None and step == self._latest and session.undo()
             try:
@@ -139,6 +138,7 @@ class SharedEdits:
                 if goes_on:
                     session.redo()
                 raise
+            title = asked.title
         if title and self.scene is not before:
             session.name_step(title)
         self._latest = step

@@ -27,7 +27,7 @@ export function wrapped(angle) {
 
 const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
 export class OrbitCamera {
   /** @param {object} scene - a description, whose first view is the camera's */
@@ -82,6 +82,13 @@ export class OrbitCamera {
     const { right, down, forward } = this.axes();
     const position = this.target.map((t, i) => t - this.distance * forward[i]);
     return [right, down, forward].map((axis) => [...axis, -dot(axis, position)]);
+  }
+
+  /** Where a point is in a picture of this size, and how many pixels one of its units has; behind: less than 0. */
+  project(point, width, height) {
+    const [x, y, z] = this.viewmat().map((row) => dot(row, point) + row[3]);
+    const scale = height / 2 / Math.tan(this.fov_y / 2 * DEGREE) / z;
+    return { x: width / 2 + scale * x, y: height / 2 + scale * y, scale };
   }
 
   /** As a renderer of frames needs it. */

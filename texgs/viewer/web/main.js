@@ -1,6 +1,7 @@
 // The page of `texgs view`: a camera, the shared state of the scene, and the server's renderer.
 
 import { Connection } from "./connection.js";
+import { Cuts } from "./cuts.js";
 import { ask, save } from "./inputs.js";
 import { Job } from "./job.js";
 import { LookTool } from "./look.js";
@@ -36,12 +37,18 @@ class Page extends ScenePage {
       { models: get("models"), background: get("background"), steps: get("steps") },
       { segment: (model) => this.#segment(model), look: (part) => this.beginLook(part),
         rename: (part) => this.#rename(part), remove: (part) => this.state.remove(part) });
+    this.cuts = new Cuts(this);
     this.toolbar = new Toolbar(this, choices);
     get("transfer-section").hidden = !scene.transfer;
     if (scene.transfer) new TransferPanel(get("transfer"), scene.transfer, (only) => this.#single(only));
     get("look-start").onclick = () => this.beginLook();
     get("look-start").disabled = !scene.models.some((model) => model.can.includes("look"));
     this.follow();
+  }
+
+  draw(moving) {
+    super.draw(moving);
+    this.cuts?.draw();
   }
 
   /** Show one model alone, or all, unless a segment is being made of one. */

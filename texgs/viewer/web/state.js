@@ -1,17 +1,17 @@
 // A scene that is edited: its description, and the history of its edits. It knows no server.
-// Edits are {part, key, value}: part is "TF01" or "TF01/segment", or "" for the light and the background of the
-// scene; value null takes an edit back.
+// Edits are {part, key, value}: part is "TF01" or "TF01/segment", or "" for the light, the background and the cuts
+// of the scene; value null takes an edit back.
 
 import { toHex } from "./inputs.js";
 
 const UNEDITED = {
   visible: true, palette: null, opacity: 1, ambient: 1, diffuse: 1, specular: 1, shininess: 1,
 };
-const WHITE = [1, 1, 1];
+const OF_SCENE = { light: null, background: [1, 1, 1], cuts: { planes: [], box: null, faces: "shaded" } };
 
 /** Another description, with an edit made. */
 export function edited(scene, { part, key, value }) {
-  if (part === "") return { ...scene, [key]: key === "background" ? value ?? WHITE : value };
+  if (part === "") return { ...scene, [key]: value ?? OF_SCENE[key] };
   const change = (each) => ({ ...each, edit: { ...each.edit, [key]: value ?? UNEDITED[key] } });
   const inModel = (model) => ({
     ...model,
@@ -23,7 +23,7 @@ export function edited(scene, { part, key, value }) {
 /** The edits that make one description another, as far as it has the same parts. */
 export function difference(from, to) {
   const edits = [], same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
-  for (const key of ["light", "background"]) {
+  for (const key of Object.keys(OF_SCENE)) {
     if (!same(from[key], to[key])) edits.push({ part: "", key, value: to[key] });
   }
   const parts = partsOf(from);
