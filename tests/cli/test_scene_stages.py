@@ -86,6 +86,9 @@ def test_edits_are_compared_with_the_volume(results):
     assert metrics["pse"][0]["psnr"] > 16
     for name in ("pse.png", "relight.png"):
         assert (results / "pse" / name).stat().st_size > 5000
+    checked, told = metrics["check"], json.loads((results / "pse" / "metrics.json").read_text())
+    assert checked["psnr"]["worst"] <= checked["psnr"]["floor"] <= checked["psnr"]["mean"]
+    assert "in 95 of 100 such views" in told["pictures"]["check.png"]
     last = read_scene(results / "pse" / "pse-4.yaml")
     edit = last.models["TF01"].edit
     assert (edit.opacity, edit.ambient, last.light.azimuth) == (0.4, 0.7, -150.0), (

@@ -30,6 +30,7 @@ VERBS = {
     "segment": "segment a model of a scene by clicks, to edit a part of it",
     "view": "look at a scene and edit it in the browser",
     "render": "render a scene to PNG, GIF or MP4",
+    "check": "check how far a scene is from its volume",
     "export": "export a scene or a model as Gaussians, points, a mesh or a compact file",
     "tables": "write the tables that metrics files hold",
     "report": "write one HTML file with the pictures, tables and provenance of all jobs",

@@ -156,12 +156,26 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class CheckResult:
+    """How close views from anywhere, with lights and edits at random, are to those of the volume."""
+
+    sentence: str  # what holds for further views; each of its two numbers by itself
+    views: int
+    seed: int
+    width: int  # of the views, pixels
+    height: int
+    psnr: dict[str, float]  # mean, percentile_5, worst and floor, dB
+    object_psnr: dict[str, float]
+
+
+@dataclass(frozen=True)
 class PseResult(Result, section="pse"):
     """Edits by numbers, and a light that moves."""
 
     views: int
     pse: list[Comparison]
     relight: list[Comparison]
+    check: CheckResult | None = None
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from texgs.workflow.stages.settings import OfScene
 
 if TYPE_CHECKING:
     import numpy as np
-    from torch import Tensor
 
     from texgs.core.camera import Camera
     from texgs.fields.field import Composed
@@ -31,18 +30,20 @@ PICTURES = {
 }
 BELOW = "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
 COMPARED = 6  # views around the object, one of which is shown
+CHECKED = 64  # views with lights and edits at random
 POLAR = 20.0  # of these views, degrees
 LEFT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
 SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in the paper's figure, degrees
 
 
 def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
-    """Write a scene file for each edit, pse.png and relight.png.
+    """Write a scene file for each edit, pse.png, relight.png and, where there is a volume, check.png.
 
     It reads `scene`, the scene.yaml, with what it names.
     """
     from texgs.core.check import torch_device
     from texgs.core.figures import write_grid
+    from texgs.report.check import check
     from texgs.scene.scene_file import read_scene, write_scene
     from texgs.scene.twin import Twin
     from texgs.volume.cameras import orbit_path
@@ -64,8 +65,12 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
             for name, image in shown.items():
                 rows.setdefault(name, []).append(image)
         write_grid(output / f"{group}.png", rows, [caption(entry) for entry in done[group]])
-    end = BELOW if twin else "."
-    return Outcome(PseResult(COMPARED, **done), {name: words + end for name, words in PICTURES.items()})
+    captions, checked = {name: words + (BELOW if twin else ".") for name, words in PICTURES.items()}, None
+    if twin is not None:
+        words = CHECKED, settings.fit.seed, output / "check.png"
+        checked = check(scene, composition, twin, settings.views.lens, *words)
+        captions["check.png"] = f"{checked.sentence} The worst of {CHECKED}."
+    return Outcome(PseResult(COMPARED, done["pse"], done["relight"], checked), captions)
 
 
 def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str]) -> dict[str, Scene]:
@@ -117,22 +122,21 @@ def compared(
 ) -> tuple[Comparison, dict[str, np.ndarray]]:
     """Return PSNR and SSIM against the volume over some views, and all pictures [H, W, 3] of the first."""
     from texgs.metrics.quality import compare
-    from texgs.report.fit_figure import ERROR, signed_error
+    from texgs.report.beside_volume import pictures
     from texgs.scene.frame import frame
 
     scores = defaultdict[str, list[float]](list)
     if twin is None:
         picture = frame(composition, cameras[0], scene.light, scene.edits, background=scene.background)
         return Comparison(title), {"scene": picture}
-    shown: dict[str, Tensor] = {}
+    shown: dict[str, np.ndarray] = {}
     for camera in cameras:
-        image, truth = twin.beside(camera, scene, composition)
-        error = ERROR(signed_error(image.color, truth.color))
-        shown = shown or {"scene": image.color, "volume": truth.color, "error": error}
-        for name, value in compare(image, truth).items():
+        seen = twin.beside(camera, scene, composition)
+        shown = shown or pictures(*seen)
+        for name, value in compare(*seen).items():
             scores[name].append(value)
     means = {name: fmean(values) for name, values in scores.items()}
-    return Comparison(title, **means), {name: x.cpu().clamp(0, 1).numpy() for name, x in shown.items()}
+    return Comparison(title, **means), shown
 
 
 def caption(entry: Comparison) -> str:

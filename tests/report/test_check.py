@@ -1,0 +1,94 @@
+"""How far a scene is from its volume: the floor as its proof says, and what is drawn at random."""
+
+import json
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.fields.surfels.test_composition import ball
+from tests.scene.test_twin import HIGH, LOW, sphere_volume
+from texgs.cli.main import main
+from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
+from texgs.fields.surfels.model_file import write_model
+from texgs.metrics.quality import compare
+from texgs.report.check import LIT, check, floor_of, shots
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
+from texgs.scene.twin import Twin
+
+LENS = Lens(3.0, 30.0, 32, 32)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scene")
+    files = {name: write_model(folder / f"{name}.safetensors", ball(seed)) for seed, name in enumerate("ab")}
+    models = {name: SceneModel(file) for name, file in files.items()}
+    return Scene(models, volume=sphere_volume(folder, a=LOW, b=HIGH))
+
+
+def test_the_floor_is_an_order_statistic():
+    values = list(range(64, 0, -1))
+    assert floor_of(values) == 3
+    assert floor_of(values[:19]) == min(values[:19])
+    with pytest.raises(ArgumentError, match="views: expected at least 19, got 18"):
+        floor_of(values[:18])
+
+
+def test_new_values_reach_the_floor():
+    """Of uniform values the share above a floor is 1 - floor; over draws of 64 it is Beta(62, 3)."""
+    draws = np.random.default_rng(3).random((4000, 64))
+    shares = 1 - np.array([floor_of(each.tolist()) for each in draws])
+    assert shares.mean() == pytest.approx(62 / 65, abs=0.002), "0.95 at least; 5 standard errors"
+    assert (shares >= 0.9).mean() > 0.95, "1 - P(binomial(64, 0.1) < 3) = 0.961"
+    ties = np.random.default_rng(4).integers(0, 5, (4000, 65))
+    assert np.mean([each[-1] >= floor_of(each[:-1].tolist()) for each in ties]) > 0.95
+
+
+def test_views_lights_and_edits_are_drawn_from_a_seed(scene):
+    drawn = list(shots(scene, LENS, 400, 5))
+    assert [title for title, *_ in drawn] == [title for title, *_ in shots(scene, LENS, 400, 5)]
+    assert drawn[0][0] != next(shots(scene, LENS, 1, 6))[0]
+    kinds = Counter(changed.light.kind for *_, changed in drawn)
+    assert kinds["directional"] / 400 == pytest.approx(LIT, abs=0.1)
+    edits = [model.edit for *_, changed in drawn for model in changed.models.values()]
+    assert np.mean([edit.palette is not None for edit in edits]) == pytest.approx(0.5, abs=0.1)
+    assert np.mean([edit.opacity != 1 for edit in edits]) == pytest.approx(0.5, abs=0.1)
+    heights = [float(camera.position[1]) / LENS.radius for _, camera, _ in drawn]
+    assert np.abs(np.quantile(heights, [0.25, 0.5, 0.75]) - [-0.5, 0, 0.5]).max() < 0.15, (
+        "evenly on the sphere"
+    )
+
+
+def test_a_check_tells_what_its_views_have(scene, tmp_path):
+    twin, composition = Twin(scene), scene.open()
+    result = check(scene, composition, twin, LENS, 19, 7, tmp_path / "worst.png")
+    views = [compare(*twin.beside(*x[1:], composition)) for x in shots(scene, LENS, 19, 7)]
+    psnr = [each["psnr"] for each in views]
+    assert result.psnr["mean"] == pytest.approx(np.mean(psnr))
+    assert result.psnr["worst"] == result.psnr["floor"] == min(psnr)
+    assert result.object_psnr["worst"] == min(each["object_psnr"] for each in views)
+    assert f"At least {min(psnr) - 0.05:.1f} dB from direct volume rendering in 95 of 100" in result.sentence
+    assert (tmp_path / "worst.png").stat().st_size > 5000
+
+
+def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_scene("ball.yaml", scene)
+    write_scene("old.yaml", replace(scene, volume=None))
+    words = ["--views", "19", "--width", "24", "--seed", "2"]
+    assert main(["check", "ball.yaml", *words]) == 0
+    told = json.loads((tmp_path / "ball-check.json").read_text())
+    assert told["sentence"] in capsys.readouterr().out
+    assert (told["views"], told["seed"], told["width"], told["height"]) == (19, 2, 24, 24)
+    assert (tmp_path / "ball-check.png").exists()
+    for file, more, message in (
+        ("ball.yaml", ["--views", "18"], "views: expected at least 19, got 18"),
+        ("old.yaml", [], "old.yaml: volume: expected the volume that the scene was made from, got none"),
+    ):
+        assert main(["check", file, *more, "--output", "none.json"]) == 2
+        assert message in capsys.readouterr().err
+    assert not list(tmp_path.glob("none*"))

@@ -1,0 +1,40 @@
+"""Check how far a scene is from its volume, over seeded views, lights and edits, and draw the worst."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+
+from texgs.cli.options import add_device, add_lens, lens_of, option
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the scene, what is looked at, and where to."""
+    parser.add_argument("scene", type=Path, help="scene.yaml, which names its volume")
+    words = ".json, and the worst views in a .png beside; default SCENE-check.json here"
+    parser.add_argument("--output", type=Path, help=words)
+    option(parser, "--views", 64, "number of views, each with a light and edits of its own; 19 or more")
+    option(parser, "--seed", 0, "of what they show")
+    add_lens(parser, "pixels", "pixels; default the width")
+    parser.set_defaults(width=400)
+    add_device(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the numbers and the picture."""
+    from texgs.core.check import torch_device
+    from texgs.core.errors import located
+    from texgs.core.io import write_json
+    from texgs.report.check import check
+    from texgs.scene.scene_file import read_scene
+    from texgs.scene.twin import Twin
+
+    scene, device = read_scene(arguments.scene), torch_device(arguments.device)
+    output = arguments.output or Path(f"{arguments.scene.stem}-check.json")
+    with located(arguments.scene):
+        composition, twin = scene.open(device), Twin(scene, device)
+    seen = lens_of(arguments), arguments.views, arguments.seed, output.with_suffix(".png")
+    result = check(scene, composition, twin, *seen)
+    print(result.sentence, write_json(output, asdict(result)), sep="\n")
+    return 0

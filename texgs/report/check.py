@@ -1,0 +1,102 @@
+"""How far a scene is from its volume: over seeded views, lights and edits, with a floor for new ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from math import asin, degrees, floor
+from pathlib import Path
+from random import Random
+from statistics import fmean
+
+import numpy as np
+
+from texgs.core.camera import Camera, orbit
+from texgs.core.errors import ArgumentError
+from texgs.core.figures import write_grid
+from texgs.core.lens import Lens
+from texgs.core.light import HEADLIGHT, Light
+from texgs.core.progress import progress
+from texgs.fields.field import Composed
+from texgs.fields.files import kind_of
+from texgs.metrics.quality import BEST, compare
+from texgs.report.beside_volume import pictures
+from texgs.report.results import CheckResult
+from texgs.scene.scene import Scene
+from texgs.scene.twin import Twin
+
+MISSED = 0.05  # share of new views that may be farther off than the floor
+LIT, EDITED = 0.7, 0.5  # shares of views under a light from anywhere, and of opacities and palettes edited
+OPACITIES = (0.2, 1.5)  # factors
+WORST = 4  # views that are shown
+
+
+def check(
+    scene: Scene, composition: Composed, twin: Twin, lens: Lens, count: int, seed: int, picture: Path
+) -> CheckResult:
+    """Return how close `shots` of a scene are to those of its volume; the worst are drawn into a PNG."""
+    floor_of([BEST] * count)  # refuses too few before the work
+    drawn, psnr, on_object = list(shots(scene, lens, count, seed)), list[float](), list[float]()
+    for _, camera, changed in progress(drawn, title="check", unit="view"):
+        scores = compare(*twin.beside(camera, changed, composition))
+        psnr.append(scores["psnr"])
+        on_object.append(scores.get("object_psnr", BEST))
+    worst = sorted(range(count), key=psnr.__getitem__)[:WORST]
+    shown = [pictures(*twin.beside(*drawn[index][1:], composition)) for index in worst]
+    titles = [f"{drawn[index][0]}\n{psnr[index]:.1f} dB" for index in worst]
+    write_grid(picture, {name: [each[name] for each in shown] for name in shown[0]}, titles)
+    whole, part = (floor(10 * floor_of(values)) / 10 for values in (psnr, on_object))
+    sentence = (
+        f"At least {whole:.1f} dB from direct volume rendering in 95 of 100 such views, on the object "
+        f"{part:.1f} dB (views from anywhere, lights and edits at random)."
+    )
+    return CheckResult(sentence, count, seed, lens.width, lens.height, told(psnr), told(on_object))
+
+
+def shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str, Camera, Scene]]:
+    """Yield independent views with a title, from anywhere on a sphere, with lights and edits at random.
+
+    Opacities and palettes that are not edited are those of the scene. A seed gives the same again.
+    """
+    random = Random(seed)
+
+    def anywhere() -> tuple[float, float]:
+        return random.uniform(-180, 180), degrees(asin(random.uniform(-1, 1)))
+
+    for _ in range(count):
+        azimuth, polar = anywhere()
+        light = Light("directional", *anywhere()) if random.random() < LIT else HEADLIGHT
+        models = {}
+        for name, model in scene.models.items():
+            edit, can = model.edit, kind_of(model.file).can
+            if random.random() < EDITED and "opacity" in can:
+                edit = replace(edit, opacity=random.uniform(*OPACITIES))
+            if random.random() < EDITED and "palette" in can:
+                edit = replace(edit, palette=(random.random(), random.random(), random.random()))
+            models[name] = replace(model, edit=edit)
+        lit = light.kind if light == HEADLIGHT else f"light {light.azimuth:.0f}°, {light.polar:.0f}°"
+        title = f"camera {azimuth:.0f}°, {polar:.0f}°\n{lit}"
+        yield title, orbit(azimuth, polar, *lens), replace(scene, models=models, light=light)
+
+
+def told(values: Sequence[float]) -> dict[str, float]:
+    """Return what is told of the values of all views, by name."""
+    low = float(np.percentile(values, 5))
+    return {"mean": fmean(values), "percentile_5": low, "worst": min(values), "floor": floor_of(values)}
+
+
+def floor_of(values: Sequence[float], missed: float = MISSED) -> float:
+    """Return what a new value reaches with a probability of 1 - missed at least: split conformal prediction.
+
+    It is the k-th smallest of n values, k = floor(missed (n + 1)): of 64 the third. Proof: the new value and
+    the n are exchangeable, so that its rank among all n + 1, ties broken at random, is uniform. If it is
+    below the k-th smallest of the others, at most k - 1 of them are not above it, and its rank is k at most,
+    which has the probability k / (n + 1) <= missed (Vovk, Gammerman and Shafer 2005).
+
+    Raises:
+        ArgumentError: if there are too few for k = 1.
+    """
+    k = int(missed * (len(values) + 1))
+    if k < 1:
+        raise ArgumentError(f"views: expected at least {round(1 / missed) - 1}, got {len(values)}")
+    return sorted(values)[k - 1]
