@@ -12,6 +12,7 @@ from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.image import read_rgba, to_pillow
 from texgs.metrics.quality import compare
+from texgs.report.check import checked
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import Twin
 from texgs.volume.view_set import read_views
@@ -86,8 +87,10 @@ def test_edits_are_compared_with_the_volume(results):
     assert metrics["pse"][0]["psnr"] > 16
     for name in ("pse.png", "relight.png"):
         assert (results / "pse" / name).stat().st_size > 5000
-    checked, told = metrics["check"], json.loads((results / "pse" / "metrics.json").read_text())
-    assert checked["psnr"]["worst"] <= checked["psnr"]["floor"] <= checked["psnr"]["mean"]
+    check, told = metrics["check"], json.loads((results / "pse" / "metrics.json").read_text())
+    assert check["psnr"]["worst"] <= check["psnr"]["floor"] <= check["psnr"]["mean"]
+    composed = results / "compose" / "scene.yaml"
+    assert checked(composed, read_scene(composed)) == check["sentence"]
     assert "in 95 of 100 such views" in told["pictures"]["check.png"]
     last = read_scene(results / "pse" / "pse-4.yaml")
     edit = last.models["TF01"].edit

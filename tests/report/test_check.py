@@ -3,9 +3,12 @@
 import json
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
+import av
 import numpy as np
 import pytest
+from PIL import Image
 
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
@@ -14,7 +17,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.fields.surfels.model_file import write_model
 from texgs.metrics.quality import compare
-from texgs.report.check import LIT, check, floor_of, shots
+from texgs.report.check import LIT, check, checked, floor_of, shots
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 from texgs.scene.twin import Twin
@@ -65,7 +68,7 @@ def test_views_lights_and_edits_are_drawn_from_a_seed(scene):
 
 def test_a_check_tells_what_its_views_have(scene, tmp_path):
     twin, composition = Twin(scene), scene.open()
-    result = check(scene, composition, twin, LENS, 19, 7, tmp_path / "worst.png")
+    result = check(scene, composition, twin, LENS, 19, 7, tmp_path / "worst.json")
     views = [compare(*twin.beside(*x[1:], composition)) for x in shots(scene, LENS, 19, 7)]
     psnr = [each["psnr"] for each in views]
     assert result.psnr["mean"] == pytest.approx(np.mean(psnr))
@@ -85,6 +88,20 @@ def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, cap
     assert told["sentence"] in capsys.readouterr().out
     assert (told["views"], told["seed"], told["width"], told["height"]) == (19, 2, 24, 24)
     assert (tmp_path / "ball-check.png").exists()
+    assert checked(Path("ball.yaml"), scene) == told["sentence"], "here"
+    frames = ["--width", "200", "--path", "orbit", "--frames", "2"]
+    assert main(["render", "ball.yaml", "--width", "200", "--caption", "--output", "ball.png"]) == 0
+    for name in ("turn.gif", "turn.mp4"):
+        assert main(["render", "ball.yaml", *frames, "--output", name]) == 0
+    with Image.open("ball.png") as picture, Image.open("turn.gif") as gif, av.open("turn.mp4") as film:
+        found = picture.info["Comment"], gif.info["comment"].decode(), film.metadata["comment"]
+        assert picture.height > picture.width == 200
+    assert set(found) == {told["sentence"]}
+    other = Scene({"a": scene.models["a"]})
+    assert checked(Path("ball.yaml"), other) == "", "of other models"
+    write_scene("other.yaml", other)
+    assert main(["render", "other.yaml", "--caption"]) == 2
+    assert "--caption: expected a check of other.yaml; run texgs check" in capsys.readouterr().err
     for file, more, message in (
         ("ball.yaml", ["--views", "18"], "views: expected at least 19, got 18"),
         ("old.yaml", [], "old.yaml: volume: expected the volume that the scene was made from, got none"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
 from pathlib import Path
 
 from texgs.cli.options import add_device, add_lens, lens_of, option
@@ -25,7 +24,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the numbers and the picture."""
     from texgs.core.check import torch_device
     from texgs.core.errors import located
-    from texgs.core.io import write_json
     from texgs.report.check import check
     from texgs.scene.scene_file import read_scene
     from texgs.scene.twin import Twin
@@ -34,7 +32,6 @@ def run(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(f"{arguments.scene.stem}-check.json")
     with located(arguments.scene):
         composition, twin = scene.open(device), Twin(scene, device)
-    seen = lens_of(arguments), arguments.views, arguments.seed, output.with_suffix(".png")
-    result = check(scene, composition, twin, *seen)
-    print(result.sentence, write_json(output, asdict(result)), sep="\n")
+    seen = lens_of(arguments), arguments.views, arguments.seed, output
+    print(check(scene, composition, twin, *seen).sentence, output, sep="\n")
     return 0

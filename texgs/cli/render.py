@@ -48,14 +48,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--compare", action="store_true", help="show scene, volume, and difference, with PSNR and SSIM"
     )
     option(parser, "--gain", 4.0, f"factor on differences, 1 to {MOST_GAIN:g}")
+    parser.add_argument("--caption", action="store_true", help="write below what texgs check has found")
     add_device(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Render and write."""
     from texgs.core.check import torch_device
+    from texgs.core.image import with_caption
     from texgs.core.movie import write_frames
     from texgs.core.progress import progress
+    from texgs.report.check import checked
     from texgs.scene.frame import Mode, frame
     from texgs.scene.scene_file import read_scene
 
@@ -75,7 +78,12 @@ def run(arguments: argparse.Namespace) -> int:
             frame(composition, camera, light, scene.edits, arguments.mode, scene.background)
             for camera, light in shots
         )
-    print(write_frames(output, frames, arguments.fps))
+    words = checked(arguments.scene, scene)
+    if arguments.caption:
+        if not words:
+            raise ArgumentError(f"--caption: expected a check of {arguments.scene}; run texgs check first")
+        frames = (with_caption(each, words) for each in frames)
+    print(write_frames(output, frames, arguments.fps, comment=words))
     return 0
 
 

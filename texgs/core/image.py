@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from textwrap import wrap
 
 import cv2
 import numpy as np
 import torch
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 from torch import Tensor
 
 from texgs.core import check
@@ -51,6 +52,17 @@ def to_pillow(color: Tensor, alpha: Tensor | None = None) -> Image.Image:
 def _rounded(planes: Tensor) -> np.ndarray:
     """Return the values in [0, 1] as 8 bits, those beyond clamped."""
     return (planes * 255).clamp_(0, 255).round_().to(torch.uint8).numpy()
+
+
+def with_caption(picture: np.ndarray, words: str) -> np.ndarray:
+    """Return a picture [H, W, 3], uint8, with words below it, as large as its width has room for."""
+    width = picture.shape[1]
+    size = max(10, width // 36)
+    lines = wrap(words, max(1, 2 * (width - size) // size))
+    strip = Image.new("RGB", (width, (len(lines) + 1) * round(1.3 * size)), "white")
+    place, font = (size // 2, size // 2), ImageFont.load_default(size)
+    ImageDraw.Draw(strip).multiline_text(place, "\n".join(lines), "black", font)
+    return np.concatenate([picture, np.asarray(strip)])
 
 
 def write_png(path: str | Path, color: Tensor, alpha: Tensor | None = None) -> Path:

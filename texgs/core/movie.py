@@ -11,6 +11,7 @@ from typing import IO
 
 import numpy as np
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
@@ -22,12 +23,15 @@ LEAST_GIF_FPS = 0.01  # a GIF counts hundredths of a second in 16 bits
 FINE = 18  # constant rate factor of H.264 that looks like the frames
 
 
-def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25.0, crf: int = FINE) -> Path:
+def write_frames(
+    path: str | Path, frames: Iterable[np.ndarray], fps: float = 25.0, crf: int = FINE, comment: str = ""
+) -> Path:
     """Write frames as they come and return the path; the file appears when it is complete.
 
     The path ends in .png for one frame, .gif or .mp4 for several; without an ending it is a folder, which
     receives one PNG a frame and must not have pictures of another film. Frames are [H, W, 3] uint8, of one
     size. The constant rate factor of H.264 is 0 to 51: the higher, the smaller and the coarser.
+    All files have the comment in their metadata.
     """
     path = Path(path)
     if path.suffix not in ("", *KINDS):
@@ -49,23 +53,28 @@ def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25
         raise ArgumentError(f"{path}: expected at least one frame, got none")
     if path.suffix == "":
         for number, frame in enumerate(chain([first], left)):
-            _write_png(path / f"{number:04}.png", frame)
+            _write_png(path / f"{number:04}.png", frame, comment)
     elif path.suffix == ".png":
         if next(left, None) is not None:
             raise ArgumentError(f"{path}: expected one frame, got several; use .gif, .mp4 or a folder")
-        _write_png(path, first)
+        _write_png(path, first, comment)
     else:
         write = _write_gif if path.suffix == ".gif" else partial(_write_mp4, crf=crf)
-        write_atomic(path, lambda file: write(file, first, left, fps))
+        write_atomic(path, lambda file: write(file, first, left, fps, comment))
     return path
 
 
-def _write_png(path: Path, frame: np.ndarray) -> None:
+def _write_png(path: Path, frame: np.ndarray, comment: str) -> None:
     """Write one frame."""
-    write_atomic(path, lambda file: Image.fromarray(frame).save(file, format="PNG"))
+    facts = PngInfo()
+    if comment:
+        facts.add_text("Comment", comment)
+    write_atomic(path, lambda file: Image.fromarray(frame).save(file, format="PNG", pnginfo=facts))
 
 
-def _write_gif(file: IO[bytes], first: np.ndarray, left: Iterator[np.ndarray], fps: float) -> None:
+def _write_gif(
+    file: IO[bytes], first: np.ndarray, left: Iterator[np.ndarray], fps: float, comment: str
+) -> None:
     """Write frames whose times are rounded so that errors do not add up."""
     kept, n_bytes = [], 0
     for frame in chain([first], left):
@@ -74,10 +83,13 @@ def _write_gif(file: IO[bytes], first: np.ndarray, left: Iterator[np.ndarray], f
         kept.append(Image.fromarray(frame))
     ends = [round(100 * index / fps) for index in range(len(kept) + 1)]  # in hundredths of a second
     durations = [10 * (end - start) for start, end in pairwise(ends)]
-    kept[0].save(file, format="GIF", save_all=True, append_images=kept[1:], duration=durations, loop=0)
+    facts = {"duration": durations, "loop": 0, "comment": comment.encode()}
+    kept[0].save(file, format="GIF", save_all=True, append_images=kept[1:], **facts)
 
 
-def _write_mp4(file: IO[bytes], first: np.ndarray, left: Iterator[np.ndarray], fps: float, crf: int) -> None:
+def _write_mp4(
+    file: IO[bytes], first: np.ndarray, left: Iterator[np.ndarray], fps: float, comment: str, crf: int
+) -> None:
     """Write H.264 with colours at half resolution, which every browser and slide program plays."""
     import av
 
@@ -85,6 +97,7 @@ def _write_mp4(file: IO[bytes], first: np.ndarray, left: Iterator[np.ndarray], f
     to_even = ((0, height % 2), (0, width % 2), (0, 0))
     try:
         with av.open(file, "w", format="mp4") as container:
+            container.metadata["comment"] = comment
             stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
             stream.height, stream.width = height + height % 2, width + width % 2
             stream.pix_fmt, stream.options = "yuv420p", {"crf": str(crf)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from math import asin, degrees, floor
 from pathlib import Path
 from random import Random
@@ -12,8 +12,10 @@ from statistics import fmean
 import numpy as np
 
 from texgs.core.camera import Camera, orbit
+from texgs.core.checksum import combined, sha256
 from texgs.core.errors import ArgumentError
 from texgs.core.figures import write_grid
+from texgs.core.io import read_json, write_json
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.progress import progress
@@ -32,9 +34,12 @@ WORST = 4  # views that are shown
 
 
 def check(
-    scene: Scene, composition: Composed, twin: Twin, lens: Lens, count: int, seed: int, picture: Path
+    scene: Scene, composition: Composed, twin: Twin, lens: Lens, count: int, seed: int, file: Path
 ) -> CheckResult:
-    """Return how close `shots` of a scene are to those of its volume; the worst are drawn into a PNG."""
+    """Return how close `shots` of a scene are to those of its volume, and write it to a file of JSON.
+
+    The worst are drawn into a PNG beside it.
+    """
     floor_of([BEST] * count)  # refuses too few before the work
     drawn, psnr, on_object = list(shots(scene, lens, count, seed)), list[float](), list[float]()
     for _, camera, changed in progress(drawn, title="check", unit="view"):
@@ -44,13 +49,33 @@ def check(
     worst = sorted(range(count), key=psnr.__getitem__)[:WORST]
     shown = [pictures(*twin.beside(*drawn[index][1:], composition)) for index in worst]
     titles = [f"{drawn[index][0]}\n{psnr[index]:.1f} dB" for index in worst]
-    write_grid(picture, {name: [each[name] for each in shown] for name in shown[0]}, titles)
+    write_grid(file.with_suffix(".png"), {name: [each[name] for each in shown] for name in shown[0]}, titles)
     whole, part = (floor(10 * floor_of(values)) / 10 for values in (psnr, on_object))
     sentence = (
         f"At least {whole:.1f} dB from direct volume rendering in 95 of 100 such views, on the object "
         f"{part:.1f} dB (views from anywhere, lights and edits at random)."
     )
-    return CheckResult(sentence, count, seed, lens.width, lens.height, told(psnr), told(on_object))
+    seen = count, seed, lens.width, lens.height
+    result = CheckResult(sentence, checksum_of(scene), *seen, told(psnr), told(on_object))
+    write_json(file, asdict(result))
+    return result
+
+
+def checked(path: Path, scene: Scene) -> str:
+    """Return what a check of the models of a scene file has found: here, beside it, or by the workflow."""
+    name = f"{path.stem}-check.json"
+    for file in (Path(name), path.with_name(name), path.resolve().parent.with_name("pse") / "check.json"):
+        if file.is_file():
+            found = read_json(file)
+            if isinstance(found, dict) and found.get("models") == checksum_of(scene):
+                return str(found.get("sentence", ""))
+    return ""
+
+
+def checksum_of(scene: Scene) -> str:
+    """Return a checksum of the models with their looks, whatever else is edited."""
+    files = [(name, file) for name, model in scene.models.items() for file in model.files if file]
+    return combined((name, sha256(file)) for name, file in files)
 
 
 def shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str, Camera, Scene]]:

@@ -160,6 +160,7 @@ class CheckResult:
     """How close views from anywhere, with lights and edits at random, are to those of the volume."""
 
     sentence: str  # what holds for further views; each of its two numbers by itself
+    models: str  # their checksum
     views: int
     seed: int
     width: int  # of the views, pixels

@@ -37,7 +37,7 @@ SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in th
 
 
 def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
-    """Write a scene file for each edit, pse.png, relight.png and, where there is a volume, check.png.
+    """Write a scene file for each edit, pse.png and relight.png, and a check if there is a volume.
 
     It reads `scene`, the scene.yaml, with what it names.
     """
@@ -67,7 +67,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
         write_grid(output / f"{group}.png", rows, [caption(entry) for entry in done[group]])
     captions, checked = {name: words + (BELOW if twin else ".") for name, words in PICTURES.items()}, None
     if twin is not None:
-        words = CHECKED, settings.fit.seed, output / "check.png"
+        words = CHECKED, settings.fit.seed, output / "check.json"
         checked = check(scene, composition, twin, settings.views.lens, *words)
         captions["check.png"] = f"{checked.sentence} The worst of {CHECKED}."
     return Outcome(PseResult(COMPARED, done["pse"], done["relight"], checked), captions)
