@@ -14,6 +14,8 @@ import torch
 from PIL import Image
 
 from tests.edit.lift_scenes import two_balls
+from tests.fields.surfels.test_composition import ball
+from tests.scene.test_twin import HIGH, LOW, sphere_volume
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
@@ -216,6 +218,39 @@ def test_planes_cut_move_and_tilt(chromium, scene_file):
         page.get_by_role("button", name="Remove plane 1").click()
         page.get_by_role("button", name="Undo").click()
         expect(page.get_by_role("checkbox", name="Plane 1")).to_be_checked()
+
+
+def test_a_scene_is_seen_beside_its_volume(chromium, tmp_path):
+    files = {name: write_model(tmp_path / f"{name}.safetensors", ball(1)) for name in ("low", "high")}
+    models = {name: SceneModel(file) for name, file in files.items()}
+    volume = sphere_volume(tmp_path, low=LOW, high=HIGH)
+    scene_file = write_scene(tmp_path / "scene.yaml", Scene(models, volume=volume))
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        scene, show = still(page), page.get_by_label("Show")
+        expect(page.get_by_text("PSNR of this view")).to_have_count(0)
+        show.select_option("Volume")
+        expect(page.get_by_text("PSNR of this view")).to_contain_text("on the object", timeout=WAIT)
+        truth = still(page)
+        assert np.abs(shown(page) - pixels(truth)[:-50]).mean() < JPEG
+        show.select_option("Scene and volume")
+        line = page.get_by_role("slider", name="Line between scene and volume")
+        expect(line).to_have_attribute("aria-valuenow", "50")
+        line.press("ArrowLeft")
+        expect(line).to_have_attribute("aria-valuenow", "48")
+        drag(page, line, (0.5, 0.5), (5, 0.5))
+        assert int(line.get_attribute("aria-valuenow")) > 55
+        line.press("End")
+        assert pixels(still(page)).tolist() == pixels(scene).tolist()
+        line.press("Home")
+        assert pixels(still(page)).tolist() == pixels(truth).tolist()
+        right = np.s_[60:-50, 40:]  # of the words at the line
+        assert np.abs(shown(page)[60:, 40:] - pixels(truth)[right]).mean() < JPEG
+        show.select_option("Difference from the volume")
+        expect(page.get_by_text("+25 %")).to_be_visible()
+        first = shown(page)
+        page.get_by_role("slider", name="Enlarged").press("End")
+        expect(page.get_by_text("+6.25 %")).to_be_visible()
+        assert shown(page).mean() < first.mean() - 1, "what is off has stronger colours"
 
 
 def test_a_click_makes_a_segment(chromium, tmp_path):

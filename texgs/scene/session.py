@@ -21,11 +21,13 @@ from texgs.core.names import require_name
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit, color, require_possible
+from texgs.raster import Render
 from texgs.scene.frame import Mode, frame
 from texgs.scene.parts import entry_of, key_path, replaced, require_new, split, with_textures
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, cuts_of, known, light_of, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
+from texgs.scene.twin import Twin
 
 SCENE_KEYS = {
     "light": "headlight",
@@ -51,6 +53,7 @@ class Session:
         self._past, self._future = [(scene, "")], list[tuple[Scene, str]]()  # with titles of steps
         self._device = device
         self._opened = deque[tuple[list[object], Composed]](maxlen=KEPT)
+        self._twin: tuple[object, Twin] | None = None
 
     @classmethod
     def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Session:
@@ -225,6 +228,17 @@ class Session:
         scene = self.scene if scene is None else scene
         composition = self._composition_of(scene)
         return frame(composition, camera, scene.light, scene.edits, mode, scene.background)
+
+    def twin_of(self, scene: Scene) -> Twin:
+        """Return the twin of a scene of the history; kept as long as the volume is the same."""
+        state = (scene.volume, state_of(scene.volume.file if scene.volume else None))
+        if self._twin is None or self._twin[0] != state:
+            self._twin = (state, Twin(scene, self._device))
+        return self._twin[1]
+
+    def beside(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
+        """Return a view of a scene of the history, and the same view of its volume; see `Twin.beside`."""
+        return self.twin_of(scene).beside(camera, scene, self._composition_of(scene))
 
     def save(self, path: str | Path) -> Path:
         """Write the scene file in one step; files in it are relative to its folder."""

@@ -7,6 +7,7 @@ import io
 import json
 import struct
 import time
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import sqrt
@@ -18,8 +19,8 @@ from PIL import Image
 
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
+from texgs.viewer.beside import Beside
 from texgs.viewer.messages import View
-from texgs.viewer.origins import Origins
 
 SLOW = 0.025  # seconds of a frame above which those of a moving camera have fewer rows and columns
 LEAST = 1 / 3  # part of them that stays
@@ -50,8 +51,8 @@ class Pace:
 class Frames:
     """Renders scenes of a session, or their views, in one thread, in the order they are asked for."""
 
-    def __init__(self, session: Session, origins: Origins) -> None:
-        self._session, self._origins = session, origins
+    def __init__(self, session: Session, beside: Beside) -> None:
+        self._session, self._beside = session, beside
         threads = torch.get_num_threads()
         self._thread = ThreadPoolExecutor(1, "render", torch.set_num_threads, (threads,))
 
@@ -60,10 +61,10 @@ class Frames:
 
         def work() -> bytes:
             scale, start = pace.scale(view.moving), time.perf_counter()
-            pixels = self.pixels(view, scene, scale)
+            pixels, scores = self._shown(view, scene, scale)
             seconds = time.perf_counter() - start
             pace.took(seconds, scale)
-            return packed(view, pixels, seconds)
+            return packed(view, pixels, seconds, scores)
 
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
@@ -77,21 +78,25 @@ class Frames:
 
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
-    def pixels(self, view: View, scene: Scene, scale: float = 1.0) -> np.ndarray:
-        """Return what a view shows [H, W, 3], uint8, with sides of this part of the pixels."""
-        if view.mode == "truth" or view.mode == "difference":
-            return self._origins.frame(view, scene, scale)
-        return self._session.frame(view.camera.camera(scale), view.mode, scene)
+    def pixels(self, view: View, scene: Scene) -> np.ndarray:
+        """Return what a view shows [H, W, 3], uint8."""
+        return self._shown(view, scene, 1.0)[0]
 
     def close(self) -> None:
         """End the thread, once the frame that it renders is there."""
         self._thread.shutdown(wait=True, cancel_futures=True)
 
+    def _shown(self, view: View, scene: Scene, scale: float) -> tuple[np.ndarray, dict[str, float]]:
+        """Return what a view shows, with sides of this part of the pixels, and what is measured of it."""
+        if view.mode == "truth" or view.mode == "difference" or view.mode == "wipe":
+            return self._beside.frame(view, scene, scale)
+        return self._session.frame(view.camera.camera(scale), view.mode, scene), {}
 
-def packed(view: View, pixels: np.ndarray, seconds: float) -> bytes:
+
+def packed(view: View, pixels: np.ndarray, seconds: float, scores: Mapping[str, float]) -> bytes:
     """Return the length of a header (4 bytes, little-endian), the header (JSON), a JPEG picture."""
     quality, sampling = MOVING if view.moving else STILL
     options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, sampling]
     _, picture = cv2.imencode(".jpg", cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR), options)
-    header = json.dumps({"id": view.id, "ms": round(1000 * seconds, 1)}).encode()
+    header = json.dumps({"id": view.id, "ms": round(1000 * seconds, 1), **scores}).encode()
     return struct.pack("<I", len(header)) + header + picture.tobytes()

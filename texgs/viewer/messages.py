@@ -13,8 +13,7 @@ from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
 from texgs.scene.frame import Mode
 
-OfViews = Literal["truth", "difference"]
-OF_VIEWS = get_args(OfViews)  # modes that show the training view nearest to the camera
+Compared = Literal["truth", "difference", "wipe"]  # the volume, the scene's difference from it, or both
 LARGEST = 1 << 16  # bytes of a message; a page's own have a few hundred
 MOST_POINTS = 100
 MOST_PARTS = 1000
@@ -55,7 +54,11 @@ class View:
 
     camera: Orbit
     id: Number = 0  # comes back with the frame
-    mode: Mode | OfViews = "shaded"
+    mode: Mode | Compared = "shaded"
+    gain: Annotated[float, Field(ge=1, le=16)] = 4.0  # of differences
+    wipe: Annotated[float, Field(ge=0, le=1)] | None = (
+        None  # part of the width that is the scene; none: beside it
+    )
     moving: bool = False  # another one follows at once: speed counts more than quality
     before: bool = False  # the scene as it was opened
     only: str = ""  # a model that is shown alone and unedited, to be clicked on

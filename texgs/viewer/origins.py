@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import asin, atan, atan2, degrees
 from pathlib import Path
@@ -20,8 +20,6 @@ from texgs.core.io import read_json
 from texgs.core.names import is_number
 from texgs.fields.files import kind_of
 from texgs.scene.scene import Scene
-from texgs.scene.session import Session
-from texgs.viewer.messages import OF_VIEWS, View
 from texgs.volume.view_set import View as Image
 from texgs.volume.view_set import read_views
 
@@ -29,7 +27,6 @@ log = logging.getLogger("texgs.viewer")
 NEAR = 5  # folders above a model in which its views are looked for
 VIEWS, VOLUME = ("views", f"views{ONE_LIGHT}"), "volume/volume.json"
 BINS = 256  # of a histogram that a page shows, at most
-GAIN = 4.0  # of differences, so that they are seen
 SAME = 1e-3  # by which elements of two cameras may differ
 
 
@@ -69,35 +66,25 @@ class Origin:
 class Origins:
     """Views and transfer functions of the models of a scene, as far as they are there."""
 
-    def __init__(self, scene: Scene, session: Session) -> None:
-        self._session = session
+    def __init__(self, scene: Scene) -> None:
         self._origins = {each.name: each for each in origins_of(scene)}
         volumes = (find_upwards(entry.file, VOLUME) for entry in scene.models.values())
         self._volume = next(filter(None, volumes), None)
 
     @property
-    def modes(self) -> list[str]:
-        """Return what else can be shown, where views are there."""
-        return list(OF_VIEWS) if self._origins else []
+    def has_views(self) -> bool:
+        """Return whether training views are there."""
+        return bool(self._origins)
 
-    def frame(self, view: View, scene: Scene, scale: float) -> np.ndarray:
-        """Return the training view that is nearest to a camera, or by how much the scene differs from it.
-
-        One model of the scene is visible. The view is in the middle of a frame [H, W, 3] of this scale.
-        """
-        camera = view.camera.camera(scale)
+    def nearest(self, camera: Camera, scene: Scene) -> Image:
+        """Return the training view that is nearest to a camera; one model of the scene is visible."""
         visible = [name for name, entry in scene.models.items() if entry.edit.visible]
         if len(visible) != 1 or visible[0] not in self._origins:
             raise ArgumentError(
                 f"Training views show one transfer function each: show {' or '.join(self._origins)} alone "
                 f"by the ticks beside names. Visible now: {', '.join(visible) or 'none'}."
             )
-        image = self._origins[visible[0]].nearest(camera)
-        truth = over(image, scene.background)
-        if view.mode == "difference":
-            shown = self._session.frame(image.camera, "shaded", replace(scene, light=image.light))
-            truth = (GAIN * np.abs(shown.astype(np.float32) - truth)).clip(0, 255).astype(np.uint8)
-        return fitted(truth, camera.width, camera.height)
+        return self._origins[visible[0]].nearest(camera)
 
     @cached_property
     def places(self) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer import messages
+from texgs.viewer.beside import Beside
 from texgs.viewer.description import bounds_of, describe
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
@@ -46,8 +47,9 @@ class Server:
         kind = kind_of(next(iter(opened.scene.models.values())).file)
         self._choices = {"styles": list(PICTURES), "words": list(WORDS), "exports": exports_of(kind)}
         self.edits = SharedEdits(session, opened)
-        self._origins = Origins(opened.scene, session)
-        self.frames = Frames(session, self._origins)
+        self._origins = Origins(opened.scene)
+        self._beside = Beside(session, self._origins)
+        self.frames = Frames(session, self._beside)
         self._changing = asyncio.Lock()  # a change that reads files takes its time in another thread
         self.work = Work(self.frames, self.edits, self._changing, self._tell_all, device)
         self._pages: dict[Page, web.WebSocketResponse] = {}
@@ -208,7 +210,8 @@ class Server:
         """Return the same, for a page that knows nothing yet, with what does not change."""
         whole = self._describe(self.edits.scene)
         whole["views"] += self._origins.places
-        whole["modes"] += self._origins.modes
+        whole["modes"] += self._beside.modes
+        whole["volume"] = self.edits.scene.volume is not None
         whole["transfer"] = self._origins.transfer
         facts = {"run": self._run, "choices": self._choices, "original": self._describe(self.edits.original)}
         return {**self.scene_message(), "scene": whole, **facts}

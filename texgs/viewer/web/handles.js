@@ -34,7 +34,9 @@ export class PlaneHandles {
 
   /** Draw the arrows as the camera sees them. */
   draw() {
-    const { planes } = this.#cuts, { before, only } = this.#page.shown, isShown = this.#isOn && !before && !only;
+    const { planes } = this.#cuts, { before, only, mode } = this.#page.shown;
+    const isFromHere = this.#page.state.scene.volume || !["truth", "difference"].includes(mode);
+    const isShown = this.#isOn && !before && !only && isFromHere;
     while (this.#drawn.length < planes.length) this.#make(this.#drawn.length);
     this.#drawn.forEach(({ group, place }, index) => {
       const isThere = isShown && planes[index]?.isOn && place(planes[index]);

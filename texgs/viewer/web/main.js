@@ -1,5 +1,6 @@
 // The page of `texgs view`: a camera, the shared state of the scene, and the server's renderer.
 
+import { Compare } from "./compare.js";
 import { Connection } from "./connection.js";
 import { Cuts } from "./cuts.js";
 import { ask, save } from "./inputs.js";
@@ -21,8 +22,9 @@ class Page extends ScenePage {
   constructor(greeting, connection, notices) {
     const { scene, choices, run } = greeting;
     const renderer = new Remote(get("picture"), (text, level) => notices.tell(text, level));
-    renderer.onframe = ({ ms, width, height }) => {
+    renderer.onframe = ({ ms, width, height, ...scores }) => {
       get("pace").textContent = `${width} × ${height}, ${Math.round(ms)} ms`;
+      this.compare?.tell(scores);
     };
     renderer.open(connection, scene);
     super(new SharedState(greeting, connection), renderer, () => this.segments.isLocked);
@@ -38,6 +40,7 @@ class Page extends ScenePage {
       { segment: (model) => this.#segment(model), look: (part) => this.beginLook(part),
         rename: (part) => this.#rename(part), remove: (part) => this.state.remove(part) });
     this.cuts = new Cuts(this);
+    this.compare = new Compare(this);
     this.toolbar = new Toolbar(this, choices);
     get("transfer-section").hidden = !scene.transfer;
     if (scene.transfer) new TransferPanel(get("transfer"), scene.transfer, (only) => this.#single(only));
@@ -49,6 +52,7 @@ class Page extends ScenePage {
   draw(moving) {
     super.draw(moving);
     this.cuts?.draw();
+    this.compare?.show();
   }
 
   /** Show one model alone, or all, unless a segment is being made of one. */

@@ -9,6 +9,9 @@ export class Remote {
   #latest = null; // the view that was asked for last, to ask again after a break
   #count = 0;
   #shown = 0; // id of the frame on the canvas
+  #picture = null; // that frame: where two are compared, the other one is to its right
+  #wipe = 0.5; // part of the width that shows the first of two
+  #isPair = false;
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -44,9 +47,15 @@ export class Remote {
   }
 
   /** Ask for a frame; of those that cannot be asked for at once, the newest is. */
-  draw(camera, scene, { moving, mode = "shaded", before = false, only = "" }) {
-    this.#wanted = { camera: camera.wire(...this.size()), mode, moving, before, only };
+  draw(camera, scene, { moving, mode = "shaded", before = false, only = "", gain = 1 }) {
+    this.#wanted = { camera: camera.wire(...this.size()), mode, moving, before, only, gain };
     if (this.#asked === null) this.#next();
+  }
+
+  /** Move the line between two pictures. */
+  wipe(part) {
+    this.#wipe = part;
+    if (this.#picture) this.#paint();
   }
 
   #next() {
@@ -61,23 +70,36 @@ export class Remote {
   async #receive(data) {
     const length = new DataView(data).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-    const { width, height } = this.#latest.camera;
+    const { camera: { width, height }, mode } = this.#latest;
     this.#next();
     try {
       const picture = await createImageBitmap(new Blob([new Uint8Array(data, 4 + length)]));
-      if (header.id > this.#shown) this.#show(picture, width, height, header);
-      picture.close();
+      if (header.id > this.#shown) this.#show(picture, width, height, header, mode === "wipe");
+      else picture.close();
     } catch (error) {
       this.#notice(`A frame could not be shown: ${error.message}`, "error");
     }
   }
 
-  #show(picture, width, height, header) {
+  #show(picture, width, height, header, isPair) {
     const canvas = this.#canvas;
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
-    this.#context.drawImage(picture, 0, 0, width, height);
+    this.#picture?.close();
+    this.#picture = picture;
+    this.#isPair = isPair;
+    this.#paint();
     this.#shown = header.id;
-    this.onframe({ ...header, width: picture.width, height: picture.height });
+    this.onframe({ ...header, width: picture.width / (isPair ? 2 : 1), height: picture.height });
+  }
+
+  #paint() {
+    const { width, height } = this.#canvas, picture = this.#picture;
+    const whole = picture.width / (this.#isPair ? 2 : 1), part = this.#isPair ? this.#wipe : 1;
+    const paint = (left, from, to) => // the columns between two parts of the width
+      this.#context.drawImage(picture, left + from * whole, 0, (to - from) * whole, picture.height,
+        from * width, 0, (to - from) * width, height);
+    paint(0, 0, part);
+    paint(whole, part, 1);
   }
 }

@@ -7,6 +7,7 @@ import { LightControl } from "./light.js";
 import { difference, edited } from "./state.js";
 
 const REST = 100; // milliseconds after the last movement until a whole frame is drawn
+const ERROR = "Of the worst channel: red where the scene is too bright, blue where it is too dark.";
 const MODES = { // names, and what their colours mean
   shaded: ["Shaded", ""],
   unshaded: ["Without light", ""],
@@ -15,12 +16,17 @@ const MODES = { // names, and what their colours mean
   alpha: ["Opacity", "Black is transparent, white opaque."],
   texture: ["Texture alone", "What textures add to the palette; grey adds nothing."],
   discs: ["Surfels as discs", "Each has the radius of one standard deviation."],
-  truth: ["Nearest training view", ""],
-  difference: ["Difference from that view", "Four times as bright as it is."],
+  truth: ["Nearest training view", "This scene names no volume, which would be shown from anywhere."],
+  difference: ["Difference from that view", ERROR],
   ambient: ["Ambient factor", "Black is 0, white 1."],
   diffuse: ["Diffuse factor", "Black is 0, white 1."],
   specular: ["Specular factor", "Black is 0, white 1."],
   shininess: ["Shininess", "Black is 0, white 100."],
+};
+const OF_VOLUME = { // the same, where the scene names its volume
+  truth: ["Volume", ""],
+  difference: ["Difference from the volume", ERROR],
+  wipe: ["Scene and volume", "Drag the line, or move it by arrow keys."],
 };
 const get = (id) => document.getElementById(id);
 
@@ -41,7 +47,7 @@ function isDifferent(scene, edit) {
 
 export class ScenePage {
   #resting = 0; // timer
-  #shown = { mode: "shaded", before: false, only: "" };
+  #shown = { mode: "shaded", before: false, only: "", gain: 4, wipe: 0.5 };
   #isLocked;
 
   /**
@@ -63,7 +69,8 @@ export class ScenePage {
     window.addEventListener("hashchange", () => this.follow());
   }
 
-  /** What of the scene is shown: `mode`, whether as it was `before`, and `only` which model, or all. */
+  /** What of the scene is shown: `mode`, whether as it was `before`, `only` which model, or all; `gain` and
+   * `wipe` of what is beside its volume. */
   get shown() {
     return this.#shown;
   }
@@ -72,7 +79,7 @@ export class ScenePage {
   show(values) {
     Object.assign(this.#shown, values);
     get("mode").value = this.#shown.mode;
-    get("mode-legend").textContent = MODES[this.#shown.mode][1];
+    get("mode-legend").textContent = this.#words(this.#shown.mode)[1];
     get("badge").hidden = !this.#shown.before;
     this.draw();
   }
@@ -139,6 +146,11 @@ export class ScenePage {
     return [this.camera.toFragment(), words.toString()].filter(Boolean).join("&");
   }
 
+  /** The name of a mode, and what its colours mean. */
+  #words(mode) {
+    return this.state.scene.volume && OF_VOLUME[mode] || MODES[mode];
+  }
+
   #rest(moving) {
     if (moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
     try {
@@ -150,7 +162,7 @@ export class ScenePage {
 
   #inputs() {
     const mode = get("mode"), view = get("view"), fov = get("fov");
-    mode.append(...this.renderer.modes.map((name) => new Option(MODES[name][0], name)));
+    mode.append(...this.renderer.modes.map((name) => new Option(this.#words(name)[0], name)));
     mode.addEventListener("change", () => this.show({ mode: mode.value }));
     const [home, ...trained] = this.state.scene.views.map(({ name }) => new Option(capital(name), name));
     view.append(home, ...Object.keys(AXES).map((name) => new Option(`From ${name}`, name)));

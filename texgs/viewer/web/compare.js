@@ -1,0 +1,52 @@
+// The scene beside its volume: the line between them, the scale of differences, and how close they are.
+
+const STEP = 0.02; // of the width, a key
+const get = (id) => document.getElementById(id);
+
+export class Compare {
+  #page;
+
+  /** @param {object} page - with canvas, renderer, shown and show() */
+  constructor(page) {
+    this.#page = page;
+    get("gain").addEventListener("input", ({ target }) => page.show({ gain: 2 ** target.value }));
+    const line = get("wipe");
+    line.addEventListener("pointerdown", (event) => line.setPointerCapture(event.pointerId));
+    line.addEventListener("pointermove", (event) => {
+      const { left, width } = page.canvas.getBoundingClientRect();
+      if (line.hasPointerCapture(event.pointerId)) this.#move((event.clientX - left) / width);
+    });
+    line.addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: -STEP, ArrowDown: -STEP, ArrowRight: STEP, ArrowUp: STEP, Home: -1, End: 1 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      this.#move(page.shown.wipe + step);
+    });
+    this.show();
+  }
+
+  /** Show what belongs to the mode. */
+  show() {
+    const { mode, gain, wipe } = this.#page.shown, percent = `${Number((100 / gain).toPrecision(3))} %`;
+    get("wipe").hidden = mode !== "wipe";
+    get("wipe").style.left = `${100 * wipe}%`;
+    get("wipe").setAttribute("aria-valuenow", Math.round(100 * wipe));
+    get("gain-row").hidden = get("gain-scale").hidden = mode !== "difference";
+    get("gain").value = Math.log2(gain);
+    get("gain-value").textContent = `× ${gain}`;
+    get("gain-scale").firstChild.textContent = `−${percent}`;
+    get("gain-scale").lastChild.textContent = `+${percent}`;
+  }
+
+  /** Tell how close scene and volume are in the picture, where that was measured. */
+  tell({ psnr, object_psnr: onObject }) {
+    const rest = onObject === undefined ? "no object in view" : `on the object ${onObject.toFixed(2)} dB`;
+    get("scores").textContent = psnr === undefined ? "" : `PSNR of this view ${psnr.toFixed(2)} dB, ${rest}.`;
+  }
+
+  #move(part) {
+    this.#page.shown.wipe = Math.min(1, Math.max(0, part));
+    this.#page.renderer.wipe(this.#page.shown.wipe);
+    this.show();
+  }
+}
