@@ -245,7 +245,7 @@ def test_a_scene_is_seen_beside_its_volume(chromium, tmp_path):
         assert pixels(still(page)).tolist() == pixels(truth).tolist()
         right = np.s_[60:-50, 40:]  # of the words at the line
         assert np.abs(shown(page)[60:, 40:] - pixels(truth)[right]).mean() < JPEG
-        show.select_option("Difference from the volume")
+        show.select_option("Scene − volume")
         expect(page.get_by_text("+25 %")).to_be_visible()
         first = shown(page)
         page.get_by_role("slider", name="Enlarged").press("End")

@@ -25,7 +25,7 @@ const MODES = { // names, and what their colours mean
 };
 const OF_VOLUME = { // the same, where the scene names its volume
   truth: ["Volume", ""],
-  difference: ["Difference from the volume", ERROR],
+  difference: ["Scene − volume", ERROR],
   wipe: ["Scene and volume", "Drag the line, or move it by arrow keys."],
 };
 const get = (id) => document.getElementById(id);
