@@ -13,7 +13,7 @@ import torch
 
 from texgs.raster.api import rasterize
 from texgs.raster.reference import render as reference
-from texgs.raster.reference.fragments import ALPHA_MAX
+from texgs.raster.reference.fragments import ALPHA_MAX, within
 from texgs.raster.reference.render import TEXTURE_SIGMA, composite, kind_of, pixel_centres
 from texgs.raster.types import DEFAULT_OPTIONS
 
@@ -60,7 +60,10 @@ def decided(scene, options=DEFAULT_OPTIONS):
         brighter = replace(scene, opacities=scene.opacities * factor)
         names = ("low_pass", "transmittance_min", "near")
         thresholds = {name: factor * getattr(options, name) for name in names}
-        for other in (decisions(brighter, options), decisions(scene, replace(options, **thresholds))):
+        farther = (
+            scene if scene.depth_range is None else replace(scene, depth_range=factor * scene.depth_range)
+        )
+        for other in (decisions(brighter, options), decisions(farther, replace(options, **thresholds))):
             same &= (counts == other).all(1)
     return same.reshape(scene.height, scene.width)
 
@@ -71,6 +74,7 @@ def dense(scene, options):
     geometry = (scene.means, scene.quats, scene.scales, scene.opacities, scene.viewmat, scene.K)
     projected = kind.project(*geometry, scene.shift, size, options)
     fragments = kind.intersect(projected, pixel_centres(*size, scene.means), options)
+    fragments = within(fragments, scene.depth_range)
     return projected, fragments, *composite(fragments.alpha, options.transmittance_min)
 
 

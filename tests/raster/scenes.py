@@ -33,6 +33,7 @@ class Scene:
     texture: Texture | None = None
     background: Tensor | None = None
     shift: Tensor | None = None
+    depth_range: Tensor | None = None
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -51,7 +52,7 @@ class Scene:
 
     def geometry(self) -> dict:
         """What splat takes: primitives and camera."""
-        return {name: getattr(self, name) for name in GEOMETRY}
+        return {name: getattr(self, name) for name in (*GEOMETRY, "depth_range")}
 
     def render(self, rasterize: Callable, outputs=(), options: Options = DEFAULT_OPTIONS) -> Render:
         """Call a rasterizer on this scene."""

@@ -38,6 +38,7 @@ class VoxelScene:
             self.march.background,
             self.march.step,
             self.march.transmittance_min,
+            None if self.march.depth_range is None else self.march.depth_range.double(),
         )
 
 

@@ -27,6 +27,7 @@ def rasterize(
     texture: Texture | None = None,
     background: Tensor | None = None,  # [C]
     shift: Tensor | None = None,  # [N, 2]
+    depth_range: Tensor | None = None,  # [2, H, W]
     outputs: Collection[str] = (),
     options: Options = DEFAULT_OPTIONS,
 ) -> Render:
@@ -56,15 +57,17 @@ def rasterize(
         background: [C], black by default.
         shift: [N, 2] pixels added to the whole projection of a surfel or Gaussian. Pass zeros that require a
             gradient to learn how the loss changes as they move on screen, as densification needs it.
+        depth_range: [2, H, W] camera z: fragments count from the first on and before the second, as of a cut.
         outputs: any of "depth", "median", "normal", "distortion", "statistics".
-        options: filters, thresholds and depth range.
+        options: filters, thresholds, near and far.
 
     Returns:
         Render with color [H, W, C], alpha [H, W], and the outputs asked for. Images are views of planar
         memory.
     """
     surfels = arguments.surfel_tensors((means, quats, scales, opacities), shift, features, texture)
-    view = arguments.view(surfels, (viewmat, K, background), (width, height), texture, outputs, options)
+    camera = (viewmat, K, background, depth_range)
+    view = arguments.view(surfels, camera, (width, height), texture, outputs, options)
     extra: dict = {}
     images = RasterizeFunction.apply(view, extra, *surfels)
     image = dict(zip(IMAGES, images, strict=True))
@@ -83,6 +86,7 @@ def splat(
     viewmat: Tensor,
     K: Tensor,
     *,
+    depth_range: Tensor | None = None,
     options: Options = DEFAULT_OPTIONS,
 ) -> tuple[Tensor, Tensor]:
     """Splat an image back onto what shows it: the adjoint of rendering features over black.
@@ -98,6 +102,7 @@ def splat(
         opacities: [N].
         viewmat: [4, 4].
         K: [3, 3].
+        depth_range: [2, H, W].
         options: as the image was rendered with.
 
     Returns:
@@ -110,7 +115,8 @@ def splat(
     geometry = (means, quats, scales, opacities)
     with torch.no_grad():
         surfels = arguments.surfel_tensors(geometry, None, image.new_zeros(size["N"], 1), None)
-        view = arguments.view(surfels, (viewmat, K, None), (size["W"], size["H"]), None, (), options)
+        camera = (viewmat, K, None, depth_range)
+        view = arguments.view(surfels, camera, (size["W"], size["H"]), None, (), options)
         frame = bin_surfels(surfels, view, {})
         sums, weights, _, _ = contribute(frame, surfels, view, image.permute(2, 0, 1).contiguous())
     return sums, weights

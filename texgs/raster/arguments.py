@@ -123,14 +123,14 @@ def channels(name: str, n: int, most: int = MAX_CHANNELS) -> None:
 
 def view(
     surfels: SurfelTensors,
-    camera: tuple[Tensor, Tensor, Tensor | None],
+    camera: tuple[Tensor, Tensor, Tensor | None, Tensor | None],
     size: tuple[int, int],
     texture: Texture | None,
     outputs: Collection[str],
     options: Options,
 ) -> View:
-    """Check the rest; `camera` is viewmat, K and background or None, `size` is (width, height)."""
-    viewmat, K, background = camera
+    """Check the rest; `camera` is viewmat, K, background and depth range, `size` is (width, height)."""
+    viewmat, K, background, depth_range = camera
     constant = {
         "viewmat": (viewmat, "4 4"),
         "K": (K, "3 3"),
@@ -150,14 +150,16 @@ def view(
         raise ArgumentError(f"width, height: expected whole numbers, got {size[0]!r}, {size[1]!r}") from None
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise ArgumentError(f"width, height: expected 1 to {MAX_SIDE} pixels, got {width} x {height}")
+    ranges = {"depth_range": (depth_range, f"2 {height} {width}")}
+    require({"means": (surfels.means, "N 3"), **ranges}, constant=ranges)
     if options.check_finite:
         check.finite(**surfels._asdict(), **{name: x for name, (x, _) in constant.items()})
     planes = surfels.channels + 3 * len(wanted) + 2
     native.require_memory(4 * planes * width * height, surfels.means.device)
-    layout = () if texture is None else (texture.sizes.contiguous(), texture.offsets.contiguous())
     matrices = (viewmat.detach().contiguous(), K.detach().contiguous())
-    background = None if background is None else background.detach().contiguous()
-    return View(*matrices, width, height, wanted, options, background, *layout)
+    layout = (None, None) if texture is None else (texture.sizes, texture.offsets)
+    rest = (None if x is None else x.detach().contiguous() for x in (background, *layout, depth_range))
+    return View(*matrices, width, height, wanted, options, *rest)
 
 
 def pinhole(viewmat: Tensor, K: Tensor) -> None:

@@ -27,7 +27,7 @@ class Surfels(native.Struct):
 class Camera(native.Struct):
     """`texgs_camera`."""
 
-    _fields_ = native.fields("p viewmat K, i width height")
+    _fields_ = native.fields("p viewmat K, i width height, p depth_range")
 
 
 class RenderOptions(native.Struct):
@@ -97,6 +97,7 @@ class View:
     background: Tensor | None = None  # [C]
     sizes: Tensor | None = None  # [N, 2] of the texture
     offsets: Tensor | None = None  # [N]
+    depth_range: Tensor | None = None  # [2, H, W] camera z
 
     def structures(self, surfels: SurfelTensors) -> tuple[Surfels, Camera, RenderOptions]:
         """Return the surfels, camera and options as the library takes them."""
@@ -114,7 +115,8 @@ class View:
         far = min(o.far, 1e30)  # infinite: far / (far - near) is 1
         filters = (low_pass, o.filter_sigma, o.dilation, o.antialiased)
         options = RenderOptions(self.background, *filters, o.alpha_min, o.transmittance_min, o.near, far)
-        return scene, Camera(self.viewmat, self.K, self.width, self.height), options
+        camera = Camera(self.viewmat, self.K, self.width, self.height, self.depth_range)
+        return scene, camera, options
 
 
 def bin_surfels(surfels: SurfelTensors, view: View, images: dict[str, Tensor]) -> native.Handle:
@@ -160,7 +162,7 @@ class RasterizeFunction(torch.autograd.Function):
             extra["statistics"] = Statistics(weight_sum, weight_max, pixels, radii["radii"])
         ctx.view, ctx.frame = view, frame
         # The view has them already; saved here too, autograd refuses a backward pass after they were changed.
-        constants = (view.viewmat, view.K, view.background, view.sizes, view.offsets)
+        constants = (view.viewmat, view.K, view.background, view.sizes, view.offsets, view.depth_range)
         ctx.save_for_backward(*tensors, *(images.get(name) for name in IMAGES), *constants)
         ctx.set_materialize_grads(False)
         return tuple(images.get(name) for name in IMAGES)

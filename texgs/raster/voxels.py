@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ctypes import byref, c_int64
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import Any, NamedTuple
 
@@ -23,7 +23,7 @@ PIECE = 16_384  # rays at a time, where memory is to be saved
 class NativeMarch(native.Struct):
     """`texgs_march`."""
 
-    _fields_ = native.fields("n n, p rays, 3f background, f step transmittance_min")
+    _fields_ = native.fields("n n, p rays, 3f background, f step transmittance_min, p depth_range")
 
 
 native.declare("texgs_grid_render", NativeGrid, NativeMarch, "pppp")
@@ -34,17 +34,22 @@ native.declare("texgs_grid_points", "p", NativeGrid, NativeMarch, "pp")
 native.declare("texgs_grid_release", "p", result=None, stream=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class March:
     """How rays are sampled."""
 
     background: tuple[float, float, float] = (1.0, 1.0, 1.0)
     step: float = 0.5  # between samples, in spacings of voxels
     transmittance_min: float = 1e-3  # a ray ends with the sample that leaves less
+    depth_range: Tensor | None = None
+    """[2, N] in lengths of a ray's direction: samples count from the first on and before the second."""
 
     def structure(self, rays: Tensor) -> NativeMarch:
         """Return the march along rays [N, 6] as the library takes it."""
-        return NativeMarch(len(rays), rays, self.background, self.step, self.transmittance_min)
+        require({"rays": (rays, "N 6"), "depth_range": (self.depth_range, "2 N")}, constant=("depth_range",))
+        depth_range = None if self.depth_range is None else self.depth_range.contiguous()
+        sampling = (self.background, self.step, self.transmittance_min)
+        return NativeMarch(len(rays), rays, *sampling, depth_range)
 
 
 class Rays(NamedTuple):
@@ -159,12 +164,16 @@ def render_view(
     camera: Camera,
     march: March | None = None,
     *,
+    depth_range: Tensor | None = None,  # [2, H, W] camera z
     into: RowGradient | None = None,
     keep: bool = True,
 ) -> GridView:
     """Render all pixels of a camera, differentiable in the grid's rows; see `render_rays`."""
     size = (camera.height, camera.width)
     rays = camera_rays(camera).flatten(0, 1)
+    if depth_range is not None:
+        check.shape("depth_range", depth_range, f"2 {camera.height} {camera.width}")
+        march = replace(march or March(), depth_range=depth_range.flatten(1))
     color, alpha, distance = render_rays(grid, rays, march, into=into, keep=keep)
     depth = distance / rays[:, 3:].norm(dim=1)
     return GridView(color.reshape(*size, 3), alpha.reshape(size), depth.reshape(size))
@@ -204,9 +213,11 @@ class _Render(torch.autograd.Function):
         if ctx.samples:
             ctx.samples.add_gradient(color, alpha, into)
         else:
-            pieces = (repeat(None) if x is None else x.split(PIECE) for x in (ctx.rays, color, alpha))
-            for rays, color_part, alpha_part in zip(*pieces, strict=False):
-                Samples(ctx.grid, ctx.march, rays).add_gradient(color_part, alpha_part, into)
+            ranges = None if ctx.march.depth_range is None else ctx.march.depth_range.mT
+            pieces = (repeat(None) if x is None else x.split(PIECE) for x in (ctx.rays, ranges, color, alpha))
+            for rays, part, color_part, alpha_part in zip(*pieces, strict=False):
+                march = replace(ctx.march, depth_range=None if part is None else part.mT)
+                Samples(ctx.grid, march, rays).add_gradient(color_part, alpha_part, into)
         return None, None, None, None, None, None if ctx.into else into.rows
 
 

@@ -23,12 +23,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.core.memory import require_memory
 from texgs.raster import native
-from texgs.raster.arguments import pinhole
+from texgs.raster.arguments import pinhole, require
+from texgs.raster.cuts import CutRange
 from texgs.volume.grid import Grid
 from texgs.volume.render import Appearance, directions
 from texgs.volume.transfer import TransferFunction, left_limit, right_limit
@@ -58,7 +60,8 @@ class NativeView(native.Struct):
 
     _fields_ = native.fields(
         "p viewmat K, i width height, f step opacity_unit, 3f to_viewer to_light, "
-        "f ambient diffuse specular shininess, p rgba depth median normal"
+        "f ambient diffuse specular shininess, p rgba depth median normal, "
+        "p depth_range face planes, i n_planes unlit_faces"
     )
 
 
@@ -116,8 +119,23 @@ class Caster:
         """Return premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values."""
         return self.cast(tf, camera, light).rgba.cpu().numpy()
 
-    def cast(self, tf: TransferFunction, camera: Camera, light: Light, outputs: Collection[str] = ()) -> Cast:
-        """Cast a view, with what else is wanted of OUTPUTS, in one pass; without gradients and skew."""
+    def cast(
+        self,
+        tf: TransferFunction,
+        camera: Camera,
+        light: Light,
+        outputs: Collection[str] = (),
+        *,
+        depth_range: Tensor | None = None,  # [2, H, W] camera z
+        faces: CutRange | None = None,
+        lit_faces: bool = True,
+    ) -> Cast:
+        """Cast a view, with what else is wanted of OUTPUTS, in one pass; without gradients and skew.
+
+        Samples stay where they are without a depth range, and count for what of their step lies in it: two
+        parts of a ray join. Over an opacity unit behind the faces of a cut, normals are those of its planes,
+        as even matter has none; or, where faces are not to be lit, colours are those of the function.
+        """
         height, width = camera.height, camera.width
         require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
         self._check(camera)
@@ -134,9 +152,23 @@ class Caster:
             *map(tuple, directions(camera, light)),
             *(look.ambient, look.diffuse, look.specular, look.shininess),
             **seen,
+            **self._cut(camera, depth_range, faces),
+            unlit_faces=not lit_faces,
         )
         self._call("texgs_cast", transfer, distance, view)
         return Cast(**seen)
+
+    def _cut(self, camera: Camera, depth_range: Tensor | None, faces: CutRange | None) -> dict[str, Any]:
+        """Return what cuts a view, as the library takes it."""
+        size, cut = f"{camera.height} {camera.width}", {}
+        if depth_range is not None:
+            require({"depth_range": (depth_range, f"2 {size}")})
+            cut["depth_range"] = depth_range
+        if faces is not None:
+            check.shape("faces.face", faces.face, size)
+            cut |= {"face": faces.face, "planes": faces.normals}
+        on_device = {name: x.to(self._device).contiguous() for name, x in cut.items()}
+        return {**on_device, "n_planes": len(faces.normals) if faces else 0}
 
     def _check(self, camera: Camera) -> None:
         """Refuse cameras and steps that the library would take for others."""

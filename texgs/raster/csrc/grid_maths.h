@@ -88,17 +88,25 @@ TEXGS_MATHS void corner_weights(const float f[3], float w[8]) {
 
 // -- Rays ------------------------------------------------------------------------------------------------------------
 
-// The part of a ray inside the lattice; sample k lies at entry + (k + 0.5) step direction.
+// The part of a ray inside the lattice; sample k lies at entry + (k + 0.5) step direction. Those from `first` on and
+// before `samples` count.
 struct Ray {
     float entry[3], direction[3];  // lattice coordinates; unit length
     float samples_per[3];          // samples on which it moves by one along an axis, with the direction's sign; finite
     float near;                    // distance of the entry from the origin, spacings
-    int samples;
+    int first, samples;
 };
 
-TEXGS_MATHS Ray enter(const texgs_grid& g, const float* given, float step) {
+// The first of `samples` samples that lies no nearer than a place, in steps from the entry.
+TEXGS_MATHS int first_sample(float place, int samples) {
+    const float k = std::ceil(place - 0.5f);
+    return k > 0.0f ? k < static_cast<float>(samples) ? static_cast<int>(k) : samples : 0;
+}
+
+// Ray i.
+TEXGS_MATHS Ray enter(const texgs_grid& g, const texgs_march& how, int64_t i) {
     Ray ray;
-    const float* d = given + 3;
+    const float *given = how.rays + 6 * i, *d = given + 3, step = how.step;
     const float over = 1.0f / std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     float near = 0.0f, far = 1e30f;
     for (int a = 0; a < 3; ++a) {
@@ -123,6 +131,12 @@ TEXGS_MATHS Ray enter(const texgs_grid& g, const float* given, float step) {
     ray.near = near;
     const float length = far - near, longest = static_cast<float>(g.size[0] + g.size[1] + g.size[2]);
     ray.samples = length > 0.0f && length <= longest ? static_cast<int>(length / step + 0.5f) : 0;
+    ray.first = 0;
+    if (how.depth_range) {
+        const float per = 1.0f / (over * g.spacing);
+        ray.first = first_sample((how.depth_range[i] * per - near) / step, ray.samples);
+        ray.samples = first_sample((how.depth_range[how.n + i] * per - near) / step, ray.samples);
+    }
     return ray;
 }
 

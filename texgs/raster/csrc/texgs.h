@@ -25,11 +25,12 @@
 extern "C" {
 #endif
 
-#define TEXGS_ABI_VERSION 3
+#define TEXGS_ABI_VERSION 4
 #ifndef TEXGS_SOURCES /* the build defines it, see texgs_sources() */
 #define TEXGS_SOURCES "unknown"
 #endif
 #define TEXGS_MAX_CHANNELS 32
+#define TEXGS_MAX_PLANES 12    /* of a cut */
 #define TEXGS_MAX_SIDE 1048560 /* 2^20 - 16 pixels: 65535 tiles, which 16 bits can count */
 
 typedef enum {
@@ -64,6 +65,8 @@ typedef struct {
     const float* viewmat;  /* [4, 4] world to camera */
     const float* K;        /* [3, 3] */
     int32_t width, height; /* 1 to TEXGS_MAX_SIDE */
+    /* [2, H, W] camera z, or NULL: of a ray counts what lies from the first on and before the second. */
+    const float* depth_range;
 } texgs_camera;
 
 typedef struct {
@@ -127,6 +130,13 @@ TEXGS_API int32_t texgs_backward(texgs_frame*, const texgs_surfels*, const texgs
 TEXGS_API int32_t texgs_contribute(texgs_frame*, const texgs_surfels*, const texgs_camera*, const texgs_options*,
                                    const texgs_contributions*, void* stream);
 TEXGS_API void texgs_release(texgs_frame*);
+
+/* The part of each ray of a camera behind planes [n, 4]: where a x + b y + c z <= d, normals (a, b, c) of any length
+ * but zero. Writes depth_range [2, H, W], 0 to infinity without a plane, the second not above the first where nothing
+ * is left; and the plane through which a ray enters, face [H, W], -1 where it enters through none. */
+TEXGS_API int32_t texgs_cut_range(const texgs_camera*, int32_t n, const float* planes, float* depth_range,
+                                  int32_t* face, void* stream);
+
 /* Frees the memory of frames that were released: a few are kept, to be used again. */
 TEXGS_API void texgs_trim(void);
 /* CPU: seconds that the passes of the calling thread's latest calls took, in the order of texgs_pass. */

@@ -40,6 +40,9 @@ typedef struct {
     float background[3];
     float step;              /* between samples along a ray, in spacings; 0.1 or more */
     float transmittance_min; /* a ray ends with the sample that leaves less; the rest of its light is background */
+    /* [2, n] in lengths of the direction, or NULL: of a ray count the samples from the first on and before the second.
+     */
+    const float* depth_range;
 } texgs_march;
 
 /* Samples along rays: what rendering leaves for its gradients. */

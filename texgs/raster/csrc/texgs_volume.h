@@ -65,6 +65,14 @@ typedef struct {
     float* depth;  /* [H, W] mean camera z, weighted as colours are; 0 where nothing shows; or NULL */
     float* median; /* [H, W] camera z at which half of the light is gone, 0 where it never is; or NULL */
     float* normal; /* [H, W, 3] mean normal, against the ray, world axes; or NULL */
+    /* [2, H, W] camera z from which and to which a ray counts, or NULL: samples stay where they are, and count for what
+     * of their step lies there. */
+    const float* depth_range;
+    /* The faces of a cut: over an opacity unit from where a ray begins, its plane's normal takes the place of the
+     * volume's, or colours are unlit. */
+    const int32_t* face; /* [H, W] the plane through which a ray enters, or none of these; or NULL */
+    const float* planes; /* [n_planes, 3] unit normals */
+    int32_t n_planes, unlit_faces;
 } texgs_cast_view;
 
 TEXGS_API int32_t texgs_cast(const texgs_volume*, const texgs_transfer*, const uint8_t* distance,

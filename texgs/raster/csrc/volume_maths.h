@@ -36,8 +36,35 @@ struct CastRay {
     float entry[3], step[3], ahead[3];  // the last: 1 or -1, where it goes along each axis
     float direction[3];                 // in the world, with z 1 in the camera
     float near, z;
-    int32_t samples;
+    int32_t first, samples;  // those from `first` on and before `samples` count
+    float begin, end;        // what of it counts, in steps
+    const float* face;       // normal of the plane that cuts it, or NULL
+    float face_end;          // in steps
 };
+
+// Keeps what is in the depth range of a pixel.
+TEXGS_MATHS void cut_ray(const texgs_cast_view& view, int64_t pixel, CastRay& ray) {
+    ray.first = 0, ray.begin = -1e30f, ray.end = 1e30f, ray.face = nullptr;
+    if (!view.depth_range) return;
+    const float* range = view.depth_range + pixel;
+    ray.begin = (range[0] - ray.near) / ray.z;
+    ray.end = (range[int64_t(view.width) * view.height] - ray.near) / ray.z;
+    const float last = ::ceilf(ray.end);
+    if (!(last >= static_cast<float>(ray.samples))) ray.samples = last > 0.0f ? static_cast<int32_t>(last) : 0;
+    if (!(ray.begin < ray.end)) ray.samples = 0;
+    const float samples = static_cast<float>(ray.samples), first = ray.begin < samples ? ray.begin : samples;
+    ray.first = first > 0.0f ? static_cast<int32_t>(first) : 0;
+    const int32_t face = view.face ? view.face[pixel] : -1;
+    if (face < 0 || face >= view.n_planes) return;
+    ray.face = view.planes + 3 * face;
+    ray.face_end = ray.begin + view.opacity_unit / view.step;
+}
+
+// How much of the steps of samples k counts.
+template <class F>
+TEXGS_MATHS F share(const CastRay& ray, F k) {
+    return min(k + F(1.0f), F(ray.end)) - max(k, F(ray.begin));
+}
 
 // The ray through the centre of pixel (x, y).
 TEXGS_MATHS CastRay cast_ray(const Lattice& lattice, const texgs_cast_view& view, int x, int y) {
@@ -68,6 +95,7 @@ TEXGS_MATHS CastRay cast_ray(const Lattice& lattice, const texgs_cast_view& view
     }
     ray.near = static_cast<float>(near), ray.z = static_cast<float>(z);
     ray.samples = samples > 0.0 ? static_cast<int32_t>(samples < 1e9 ? samples : 1e9) : 0;
+    cut_ray(view, int64_t(y) * view.width + x, ray);
     return ray;
 }
 
@@ -78,7 +106,7 @@ struct Extent {
 
 // The first sample of a ray, and the one behind the last, that may be in a box.
 TEXGS_MATHS void clip(const CastRay& ray, const Extent& box, int32_t& first, int32_t& end) {
-    float enter = 0.0f, leave = static_cast<float>(ray.samples);
+    float enter = static_cast<float>(ray.first), leave = static_cast<float>(ray.samples);
     for (int a = 0; a < 3; ++a) {
         const float one = (box.lower[a] - ray.entry[a]) / ray.step[a],
                     other = (box.upper[a] - ray.entry[a]) / ray.step[a];
@@ -88,7 +116,8 @@ TEXGS_MATHS void clip(const CastRay& ray, const Extent& box, int32_t& first, int
     }
     enter = enter < static_cast<float>(ray.samples) ? enter : static_cast<float>(ray.samples);
     leave = leave > -1.0f ? leave : -1.0f;
-    first = static_cast<int32_t>(enter > 1.0f ? enter - 1.0f : 0.0f);  // rounding must not pass one by
+    first = static_cast<int32_t>(enter) - 1;  // rounding must not pass one by
+    first = first > ray.first ? first : ray.first;
     end = leave + 1.0f < static_cast<float>(ray.samples) ? static_cast<int32_t>(leave + 1.0f) : ray.samples;
 }
 
@@ -112,12 +141,12 @@ TEXGS_MATHS F mix(F a, F b, F t) {
 // The opacity of a sample, whose stretch of a ray is `lengths` units of length: 1 - (1 - a)^lengths, with small
 // opacities as exact as large ones.
 template <class F>
-TEXGS_MATHS F step_opacity(F a, float lengths) {
+TEXGS_MATHS F step_opacity(F a, F lengths) {
     const F s = a / (a - F(2.0f)), s2 = s * s;  // log2(1 - a) = 2 / ln 2 atanh(s)
     F p = fma(F(0.412198583f), s2, F(0.577078016f));
     p = fma(p, s2, F(0.961796694f));
     p = fma(p, s2, F(2.885390082f));
-    const F y = F(lengths) * select(a < F(0.25f), s * p, log2(max(F(1.0f) - a, F(1e-30f))));
+    const F y = lengths * select(a < F(0.25f), s * p, log2(max(F(1.0f) - a, F(1e-30f))));
     F q = fma(F(1.333355814e-3f), y, F(9.618129108e-3f));  // (2^y - 1) / y
     q = fma(q, y, F(5.550410866e-2f));
     q = fma(q, y, F(2.402265070e-1f));
@@ -136,6 +165,7 @@ TEXGS_MATHS F trilinear(const F (&v)[8], const F (&f)[3]) {
 struct Lamp {
     float viewer[3], light[3], half[3];  // half: between the two
     float ambient, diffuse, specular, shininess;
+    bool unlit_faces;
 };
 TEXGS_MATHS Lamp lamp_of(const texgs_cast_view& view) {
     Lamp lamp;
@@ -148,6 +178,7 @@ TEXGS_MATHS Lamp lamp_of(const texgs_cast_view& view) {
     for (int a = 0; a < 3; ++a) lamp.half[a] /= length > 0.0f ? ::sqrtf(length) : 1.0f;
     lamp.ambient = view.ambient, lamp.diffuse = view.diffuse;
     lamp.specular = view.specular, lamp.shininess = view.shininess;
+    lamp.unlit_faces = view.unlit_faces;
     return lamp;
 }
 
@@ -180,6 +211,20 @@ TEXGS_MATHS Vec3<F> lit(Vec3<F> color, Vec3<F> normal, const Lamp& lamp) {
     const F diffuse = fma(F(lamp.diffuse), n_l, F(lamp.ambient));
     return {min(max(fma(color.x, diffuse, specular), zero), one), min(max(fma(color.y, diffuse, specular), zero), one),
             min(max(fma(color.z, diffuse, specular), zero), one)};
+}
+
+// The same of samples k of a ray, as far as their steps do not belong to a face; there its normal counts.
+template <class F>
+TEXGS_MATHS Vec3<F> lit(const CastRay& ray, F k, Vec3<F> color, Vec3<F>& normal, const Lamp& lamp) {
+    const Vec3<F> inner = lit(color, normal, lamp);
+    if (!ray.face) return inner;
+    const F part = min(max(F(ray.face_end) - k, F(0.0f)), F(1.0f));
+    const Vec3<F> plane{F(ray.face[0]), F(ray.face[1]), F(ray.face[2])};
+    const Vec3<F> outer = lamp.unlit_faces ? color : lit(color, plane, lamp);
+    const auto is_face = F(0.5f) < part;
+    normal = {select(is_face, plane.x, normal.x), select(is_face, plane.y, normal.y),
+              select(is_face, plane.z, normal.z)};
+    return {mix(inner.x, outer.x, part), mix(inner.y, outer.y, part), mix(inner.z, outer.z, part)};
 }
 
 }  // namespace

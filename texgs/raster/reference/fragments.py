@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -34,6 +34,15 @@ def alpha_of(opacity: Tensor, rho: Tensor, options: Options) -> Tensor:
     """Return the alpha [P, M] at squared distances rho [P, M] in standard deviations; 0 below alpha_min."""
     alpha = (opacity * torch.exp(-rho / 2)).clamp(max=ALPHA_MAX)
     return torch.where(alpha >= options.alpha_min, alpha, 0.0)
+
+
+def within(fragments: Fragments, depth_range: Tensor | None) -> Fragments:
+    """Return fragments without alpha where they are outside of depth ranges [2, H, W], if any."""
+    if depth_range is None:
+        return fragments
+    near, far = depth_range.flatten(1)[..., None]  # [P, 1] each
+    counts = (near <= fragments.depth) & (fragments.depth < far)
+    return replace(fragments, alpha=torch.where(counts, fragments.alpha, 0.0))
 
 
 def largest_rho(opacity: Tensor, options: Options) -> Tensor:

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.raster.reference import gaussians, surfels
-from texgs.raster.reference.fragments import Fragments
+from texgs.raster.reference.fragments import Fragments, within
 from texgs.raster.types import (
     DEFAULT_OPTIONS,
     Options,
@@ -42,26 +42,24 @@ def rasterize(
     texture: Texture | None = None,
     background: Tensor | None = None,
     shift: Tensor | None = None,
+    depth_range: Tensor | None = None,
     outputs: Collection[str] = (),
     options: Options = DEFAULT_OPTIONS,
 ) -> Render:
     """Composite surfels or 3D Gaussians front to back into one view, as `texgs.raster.rasterize` does.
 
-    Differentiable in every floating-point tensor, the camera included. `options.alpha_min = 0` and
-    `options.transmittance_min = 0` switch the two thresholds off: what remains is smooth except where surfels
-    change order. Follows Huang et al. 2024 (2DGS), section 4, and Kerbl et al. 2023 (3DGS), section 4.
+    Differentiable in every floating-point tensor, the camera included. Where `options.alpha_min` and
+    `transmittance_min` are 0, what remains is smooth except where surfels change order, or leave a depth
+    range. Follows Huang et al. 2024 (2DGS), section 4, and Kerbl et al. 2023 (3DGS), section 4.
     """
     check_primitive(scales, texture is not None, outputs)
     kind, size = kind_of(scales), (width, height)
     projected = kind.project(means, quats, scales, opacities, viewmat, K, shift, size, options)
-    fragments = kind.intersect(projected, pixel_centres(width, height, means), options)
+    fragments = within(kind.intersect(projected, pixel_centres(*size, means), options), depth_range)
     weights, light = composite(fragments.alpha, options.transmittance_min)  # [P, M] each
-    alpha = weights.sum(1)
-    color = blend(weights, fragments, projected.index, features, texture)
+    image = {"alpha": weights.sum(1), "color": blend(weights, fragments, projected.index, features, texture)}
     if background is not None:
-        color = color + (1 - alpha[:, None]) * background
-
-    image = {"color": color, "alpha": alpha}
+        image["color"] = image["color"] + (1 - image["alpha"][:, None]) * background
     if "depth" in outputs:
         image["depth"] = expected_depth(weights, fragments.depth)
     if "median" in outputs:
@@ -73,7 +71,7 @@ def rasterize(
     radii = kind.visible_radii(projected, size, options) if "statistics" in outputs else None
     contributions = None if radii is None else statistics(weights, radii, projected.index, len(means))
     image = {name: x.reshape(height, width, *x.shape[1:]) for name, x in image.items()}
-    return Render(image.pop("color"), image.pop("alpha"), **image, statistics=contributions)
+    return Render(**image, statistics=contributions)
 
 
 def splat(
@@ -85,6 +83,7 @@ def splat(
     viewmat: Tensor,
     K: Tensor,
     *,
+    depth_range: Tensor | None = None,
     options: Options = DEFAULT_OPTIONS,
 ) -> tuple[Tensor, Tensor]:
     """Return sums [N, C] of blending weight times image [H, W, C], and of weights [N]; see `raster.splat`."""
@@ -92,7 +91,7 @@ def splat(
     kind = kind_of(scales)
     projected = kind.project(means, quats, scales, opacities, viewmat, K, None, (width, height), options)
     fragments = kind.intersect(projected, pixel_centres(width, height, means), options)
-    weights, _ = composite(fragments.alpha, options.transmittance_min)
+    weights, _ = composite(within(fragments, depth_range).alpha, options.transmittance_min)
     sums = weights.T @ image.reshape(-1, channels)
     return scatter(sums, projected.index, len(means)), scatter(weights.sum(0), projected.index, len(means))
 

@@ -20,6 +20,7 @@ def render_rays(
     background: Sequence[float] = (1.0, 1.0, 1.0),
     step: float = 0.5,  # between samples, in spacings
     transmittance_min: float = 1e-3,  # a ray ends with the sample that leaves less
+    depth_range: Tensor | None = None,  # [2, N] in lengths of the direction
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Return colour [N, 3] over the background, alpha [N], mean distance [N] (Fridovich-Keil et al. 2022)."""
     direction = normalize(rays[:, 3:], dim=1)
@@ -30,6 +31,9 @@ def render_rays(
     points = origin[:, None] + distance[..., None] * direction[:, None]  # [N, S, 3]
 
     sigma = interpolate(density[..., None], points)[..., 0].clamp_min(0) * (k < count[:, None])
+    if depth_range is not None:
+        first, last = depth_range[..., None] * rays[:, 3:].norm(dim=1)[:, None] / spacing  # [N, 1] each
+        sigma = sigma * ((first <= distance) & (distance < last))
     coefficients = interpolate(sh.flatten(3), points).unflatten(-1, sh.shape[3:])  # [N, S, k, 3]
     basis = harmonics(direction)[:, : sh.shape[3]]
     color = (0.5 + torch.einsum("nk,nskc->nsc", basis, coefficients)).clamp_min(0)

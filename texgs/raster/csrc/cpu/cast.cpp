@@ -143,7 +143,7 @@ private:
             const vf opacity = Intervals(t, value[i]).mixed(t.opacity);
             const vm visible = (vf(t.value[0]) <= value[i]) & (value[i] <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
             const vm is_used = to_float(iota()) < vf(static_cast<float>(waiting.n - i * kLanes));
-            const float lengths = job_.view.step / job_.view.opacity_unit;
+            const vf lengths = vf(job_.view.step / job_.view.opacity_unit) * share(ray, load(waiting.k + i * kLanes));
             alpha[i] = zero_unless(visible & is_used, step_opacity(opacity, lengths));
         }
         for (int i = 0; i < vectors && sums.light >= kOpaque; ++i) {
@@ -180,11 +180,10 @@ private:
         for (int i = 0; i < vectors; ++i) {
             vf slope[3];
             differences_in(blocks_[i], inside[i], slope);
-            const Vec3<vf> n =
-                unit(Vec3<vf>{slope[0] * vf(slope_[0]), slope[1] * vf(slope_[1]), slope[2] * vf(slope_[2])});
+            Vec3<vf> n = unit(Vec3<vf>{slope[0] * vf(slope_[0]), slope[1] * vf(slope_[1]), slope[2] * vf(slope_[2])});
             const Intervals intervals(t, load(seen.value + i * kLanes));
             const Vec3<vf> color{intervals.mixed(t.color[0]), intervals.mixed(t.color[1]), intervals.mixed(t.color[2])};
-            const Vec3<vf> shown = lit(color, n, lamp_);
+            const Vec3<vf> shown = lit(ray, load(seen.k + i * kLanes), color, n, lamp_);
             const Vec3<vf> against = turned(n, vf(0.0f) - along(n, ray.direction));
             const vf looks[3] = {shown.x, shown.y, shown.z}, normals[3] = {against.x, against.y, against.z};
             const vm is_used = to_float(iota()) < vf(static_cast<float>(seen.n - i * kLanes));

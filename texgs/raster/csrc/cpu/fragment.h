@@ -23,15 +23,23 @@ TEXGS_INLINE void with_constant(int n, Body body) {
     if constexpr (Most > 1) with_constant<Most - 1>(n, body);
 }
 
-// Pixel centres of a vector of pixels.
+inline void load_plane(const Raster& r, int tile, const float* image, float* plane);
+inline void prefetch_planes(const Raster& r, int tile, const float* image, int planes);
+
+// Pixel centres of a vector of pixels, and their depth ranges, if any.
 struct Pixels {
     vf x, y;
+    bool is_cut;
+    vf near, far;
 };
 struct TilePixels {
     vf lane_x[kParts], lane_y[kParts];
     float block_x[kBlocks], block_y[kBlocks];
+    float range[2 * kTilePixels];
+    bool is_cut;
 
-    TilePixels(const Raster& r, int tile) {
+    TilePixels(const Raster& r, int tile)
+        : is_cut(r.camera.depth_range && r.tile_begin[tile] < r.tile_begin[tile + 1]) {
         const int left = tile % r.tiles_x * kTile, top = tile / r.tiles_x * kTile;
         for (int b = 0; b < kBlocks; ++b) {
             block_x[b] = static_cast<float>(left + 4 * (b & 3));
@@ -45,9 +53,17 @@ struct TilePixels {
             }
             lane_x[p] = load(x), lane_y[p] = load(y);
         }
+        if (!is_cut) return;
+        const int64_t plane = int64_t(r.camera.width) * r.camera.height;
+        std::memset(range, 0, sizeof range);  // outside of the image nothing counts
+        for (int i = 0; i < 2; ++i) load_plane(r, tile, r.camera.depth_range + i * plane, range + i * kTilePixels);
+        prefetch_planes(r, tile + 1, r.camera.depth_range, 2);
     }
     TEXGS_INLINE Pixels of(int block, int part) const {
-        return {lane_x[part] + vf(block_x[block]), lane_y[part] + vf(block_y[block])};
+        const vf x = lane_x[part] + vf(block_x[block]), y = lane_y[part] + vf(block_y[block]);
+        if (!is_cut) return {x, y, false, 0.0f, 0.0f};
+        const float* own = range + block * kBlockPixels + part * kLanes;
+        return {x, y, true, load(own), load(own + kTilePixels)};
     }
 };
 
@@ -72,8 +88,9 @@ struct Fragments {
     vf rho_surfel, rho;
 };
 
+// As if there were no depth ranges.
 template <class P>
-TEXGS_INLINE Fragments evaluate(const Record& s, unsigned flags, Pixels at, const Limits& limits) {
+TEXGS_INLINE Fragments evaluate_all(const Record& s, unsigned flags, Pixels at, const Limits& limits) {
     const vf dx = at.x - vf(s.cx), dy = at.y - vf(s.cy);
     if constexpr (P::kAffine) {
         const vf u = fma(s.ux, dx, s.uy * dy), v = s.vy * dy, rho = fma(u, u, v * v);
@@ -92,18 +109,30 @@ TEXGS_INLINE Fragments evaluate(const Record& s, unsigned flags, Pixels at, cons
     return {fma(rho, -0.5f * kLog2E, s.log2_opacity), u, v, inverse_w, rho_surfel, rho};
 }
 
-// Opacity of fragments: 0 where below alpha_min.
-TEXGS_INLINE vf alpha_of(vf log2_alpha, const Limits& limits) {
-    const vf alpha = min(exp2(log2_alpha), kLargestAlpha);
-    return zero_unless(alpha >= limits.alpha_min, alpha);
-}
-
 // Camera depth of fragments: of the ray-splat intersection, or of the mean where the low-pass filter rules, and of
 // Gaussians.
 template <class P>
 TEXGS_INLINE vf depth_of(const Record& s, const Fragments& f) {
     if constexpr (P::kAffine) return s.zp;
     return select(f.rho_surfel <= f.rho, vf(s.zc) * f.inverse_w, s.zp);
+}
+
+template <class P>
+TEXGS_INLINE Fragments evaluate(const Record& s, unsigned flags, Pixels at, const Limits& limits) {
+    Fragments f = evaluate_all<P>(s, flags, at, limits);
+    if (at.is_cut) {
+        vf z = P::kAffine ? vf(s.zp) : vf(s.zc) * f.inverse_w;
+        if (flags & kFiltered) z = depth_of<P>(s, f);
+        const vm counts = (at.near <= z) & (z < at.far);
+        f.log2_alpha = select(counts, f.log2_alpha, -1e30f);
+    }
+    return f;
+}
+
+// Opacity of fragments: 0 where below alpha_min.
+TEXGS_INLINE vf alpha_of(vf log2_alpha, const Limits& limits) {
+    const vf alpha = min(exp2(log2_alpha), kLargestAlpha);
+    return zero_unless(alpha >= limits.alpha_min, alpha);
 }
 
 // What is blended of each primitive, constant over it: base and features, then the normal.

@@ -72,14 +72,15 @@ TEXGS_INLINE vf empty_samples(const texgs_grid& g, const Bundle& bundle, float s
 
 TEXGS_INLINE void enter_all(const texgs_grid& g, const texgs_march& how, int64_t begin, int n, Bundle& bundle) {
     for (int i = 0; i < kLanes; ++i) {
-        bundle.rays[i] = enter(g, how.rays + 6 * (begin + (i < n ? i : 0)), how.step);
+        bundle.rays[i] = enter(g, how, begin + (i < n ? i : 0));
         bundle.end[i] = bundle.rays[i].samples;
     }
     float before[kLanes], after[kLanes];
     store(before, empty_samples(g, bundle, how.step, false));
     store(after, empty_samples(g, bundle, how.step, true));
     for (int i = 0; i < kLanes; ++i) {
-        bundle.first[i] = static_cast<int32_t>(before[i]);
+        const int32_t first = static_cast<int32_t>(before[i]);
+        bundle.first[i] = first > bundle.rays[i].first ? first : bundle.rays[i].first;
         bundle.end[i] -= static_cast<int32_t>(after[i]);
     }
 }

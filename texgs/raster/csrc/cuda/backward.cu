@@ -127,7 +127,7 @@ __global__ __launch_bounds__(kThreads, 1) void backward_kernel(const Raster r) {
 #pragma unroll
         for (int p = 0; p < kPixels; ++p) {
             if (!(chunk.masks[place] & at.blocks[p])) continue;
-            const Fragment f = evaluate<P>(chunk.records[place], at.x(), at.y(p), r.options);
+            const Fragment f = evaluate<P>(r, chunk.records[place], at, p);
             const float before = transmittance[p], w = blend(f.alpha, limit, transmittance[p]);
             if (!(w > 0.0f)) continue;
             seen = true;

@@ -55,7 +55,7 @@ __device__ bool blend_chunk(const Raster& r, const Chunk<kSize, C, Textured>& ch
             for (int p = 0; p < kPixels; ++p) {
                 if (!(mask & place.blocks[p])) continue;
                 Pixel<C, Depth>& pixel = pixels[p];
-                const Fragment f = evaluate<P>(record, place.x(), place.y(p), r.options);
+                const Fragment f = evaluate<P>(r, record, place, p);
                 const float w = blend(f.alpha, limit, pixel.transmittance);
                 if (!(w > 0.0f)) continue;
                 const float* channels = chunk.channels + i * C;

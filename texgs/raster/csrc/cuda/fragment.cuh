@@ -78,6 +78,17 @@ __device__ float depth_of(const Record& s, const Fragment& f) {
     return f.filtered ? s.zp : __fmul_rn(s.zc, f.r);
 }
 
+// In a thread's pixel `p`: without alpha where it is outside of the pixel's depth range.
+template <class P>
+__device__ Fragment evaluate(const Raster& r, const Record& s, const Place& place, int p) {
+    Fragment f = evaluate<P>(s, place.x(), place.y(p), r.options);
+    if (r.camera.depth_range && f.alpha > 0.0f && place.inside(r, p)) {
+        const float z = depth_of<P>(s, f), *range = r.camera.depth_range + place.pixel(r, p);
+        f.alpha = range[0] <= z && z < range[r.plane] ? f.alpha : 0.0f;
+    }
+    return f;
+}
+
 // Depth mapped to 0 at the near plane and 1 at the far plane, and its derivative.
 struct NormalizedDepth {
     float m, slope;

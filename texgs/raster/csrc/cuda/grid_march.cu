@@ -14,7 +14,7 @@ template <class Body>
 __device__ float march(const texgs_grid& grid, const texgs_march& how, const Ray& ray, const Body& body) {
     const float step = how.step;
     float light = 1.0f;
-    for (int k = 0; k < ray.samples && !(light < how.transmittance_min);) {
+    for (int k = ray.first; k < ray.samples && !(light < how.transmittance_min);) {
         const Point p = sample_point(grid, ray, k, step);
         const int block = block_of(grid, p.cell);
         if (const int distance = grid.distance[block]) {
@@ -40,7 +40,7 @@ __global__ __launch_bounds__(kThreads) void count_kernel(const GridJob job) {
     if (i > job.how.n) return;
     uint64_t count = 0;
     if (i < job.how.n) {
-        const Ray ray = enter(job.grid, job.how.rays + 6 * i, job.how.step);
+        const Ray ray = enter(job.grid, job.how, i);
         march(job.grid, job.how, ray, [&](const Sample&) { ++count; });
     }
     job.begin[i] = count;
@@ -77,7 +77,7 @@ template <int K, bool Keep>
 __global__ __launch_bounds__(kThreads) void render_kernel(const GridJob job) {
     const int64_t i = thread_index();
     if (i >= job.how.n) return;
-    const Ray ray = enter(job.grid, job.how.rays + 6 * i, job.how.step);
+    const Ray ray = enter(job.grid, job.how, i);
     float basis[K];
     row_basis(K == 32 ? 2 : K == 16 ? 1 : 0, ray.direction, basis);
     if (Keep)

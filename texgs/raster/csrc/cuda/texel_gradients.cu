@@ -102,7 +102,7 @@ __global__ __launch_bounds__(kThreads) void texel_kernel(const Raster r) {
 #pragma unroll
         for (int p = 0; p < kPixels; ++p) {
             if (!(chunk.masks[place] & at.blocks[p])) continue;
-            const Fragment f = evaluate<Surfel<float>>(chunk.records[place], at.x(), at.y(p), r.options);
+            const Fragment f = evaluate<Surfel<float>>(r, chunk.records[place], at, p);
             const float w = blend(f.alpha, limit, transmittance[p]);
             if (!(w > 0.0f && gain_is_finite)) continue;
             seen = true;

@@ -136,7 +136,7 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
     const Samples<T> samples{static_cast<const T*>(volume.values), {volume.size[0], volume.size[1], volume.size[2]}};
     const float low = transfer.points[0], high = transfer.points[5 * (transfer.n - 1)];
     float light = 1.0f, depth = 0.0f, median = 0.0f, color[3] = {}, normal[3] = {};
-    for (int k = 0; k < ray.samples && light >= kOpaque;) {
+    for (int k = ray.first; k < ray.samples && light >= kOpaque;) {
         float place[3];
         int brick[3];
         for (int a = 0; a < 3; ++a) {
@@ -150,13 +150,14 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
             continue;
         }
         const Spot spot(lattice, ray, k);
-        const float value = spot.value(samples), z = ray.near + (static_cast<float>(k) + 0.5f) * ray.z;
+        const float value = spot.value(samples), at = static_cast<float>(k), z = ray.near + (at + 0.5f) * ray.z;
         ++k;
         if (!(value >= low && value <= high)) continue;
         const Interval interval(transfer, value);
         const float opacity = interval.column(1);
         if (!(opacity > 0.0f)) continue;
-        const float weight = light * step_opacity(opacity, view.step / view.opacity_unit), left = light - weight;
+        const float lengths = view.step / view.opacity_unit * share(ray, at);
+        const float weight = light * step_opacity(opacity, lengths), left = light - weight;
         if (light > 0.5f && left <= 0.5f) median = z;
         light = left;
         depth += weight * z;
@@ -165,8 +166,9 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
         slope.x *= static_cast<float>(lattice.per_unit[0]) * scale;
         slope.y *= static_cast<float>(lattice.per_unit[1]) * scale;
         slope.z *= static_cast<float>(lattice.per_unit[2]) * scale;
-        const Vec3<float> n = unit(slope);
-        const Vec3<float> shown = lit(Vec3<float>{interval.column(2), interval.column(3), interval.column(4)}, n, lamp);
+        Vec3<float> n = unit(slope);
+        const Vec3<float> own{interval.column(2), interval.column(3), interval.column(4)};
+        const Vec3<float> shown = lit(ray, at, own, n, lamp);
         const Vec3<float> against = turned(n, -along(n, ray.direction));
         color[0] = fma(weight, shown.x, color[0]), normal[0] = fma(weight, against.x, normal[0]);
         color[1] = fma(weight, shown.y, color[1]), normal[1] = fma(weight, against.y, normal[1]);
