@@ -84,7 +84,7 @@ __device__ Fragment evaluate(const Raster& r, const Record& s, const Place& plac
     Fragment f = evaluate<P>(s, place.x(), place.y(p), r.options);
     if (r.camera.depth_range && f.alpha > 0.0f && place.inside(r, p)) {
         const float z = depth_of<P>(s, f), *range = r.camera.depth_range + place.pixel(r, p);
-        f.alpha = range[0] <= z && z < range[r.plane] ? f.alpha : 0.0f;
+        if (!(range[0] <= z && z < range[r.plane])) f.alpha = 0.0f;
     }
     return f;
 }

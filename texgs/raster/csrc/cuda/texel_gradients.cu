@@ -82,7 +82,8 @@ __device__ void give_large(const TextureTable& t, const Given& given, int64_t* s
     }
 }
 
-__global__ __launch_bounds__(kThreads) void texel_kernel(const Raster r) {
+// Six blocks on a multiprocessor: as many as there are with all numbers in registers.
+__global__ __launch_bounds__(kThreads, 6) void texel_kernel(const Raster r) {
     __shared__ Chunk<kThreads, 1, true> chunk;
     const int tile = blockIdx.x;
     const Place at(r, tile);
