@@ -20,9 +20,8 @@ import pandas as pd
 from PIL import Image
 
 from benchmarks.results import RESULTS, ROOT, add
-from texgs.core.camera import Camera, orbit
+from texgs.core.camera import orbit
 from texgs.core.figures import Cell, Row, as_picture, content, grid_rows, lay_out, new_figure, words
-from texgs.core.lens import Lens
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
 from tools import workflow_picture
@@ -58,16 +57,17 @@ RECIPES = {  # variants of recipe `paper`, by the names that curves have
 LEAST = 30.0  # dB: just after a reset of opacities there is nothing to see
 
 
-def shown(scene_file: Path, camera: Camera) -> np.ndarray:
-    """Return a scene [H, W, 3], uint8, under its own light."""
+def shown(scene_file: Path, size: int, azimuth: float = 30, polar: float = 20) -> np.ndarray:
+    """Return a scene [size, size, 3], uint8, under its own light."""
     scene = read_scene(scene_file)
+    camera = orbit(azimuth, polar, *scene.framed().lens().square(size))
     return frame(scene.open(), camera, scene.light, scene.edits, background=scene.background)
 
 
 def hero(run: Path) -> Image.Image:
     """Draw six looks of one scene, a label below each."""
-    camera, scenes = orbit(30, 20, *Lens().square(1066)), run / "orbital/scene/demo"
-    pictures = {title: shown(scenes / LOOKS[title], camera) for title in list(LOOKS)[:6]}
+    scenes = run / "orbital/scene/demo"
+    pictures = {title: shown(scenes / LOOKS[title], 640) for title in list(LOOKS)[:6]}
     box = content(list(pictures.values()))
     cells = [Cell("", each[box], title) for title, each in pictures.items()]
     return as_picture(lay_out([Row("", cells[:3]), Row("", cells[3:])]))
@@ -78,8 +78,7 @@ def looks(run: Path) -> Image.Image:
     titles = [title for title in LOOKS if title not in ("recoloured", "relit")]
     scenes = [run / "orbital/scene/demo" / LOOKS[title] for title in titles]
     sides = {"front": (30, 20), "from above": (150, 50)}
-    cameras = {side: orbit(*angles, *Lens().square(512)) for side, angles in sides.items()}
-    rows = {side: [shown(scene, each) for scene in scenes] for side, each in cameras.items()}
+    rows = {side: [shown(scene, 512, *angles) for scene in scenes] for side, angles in sides.items()}
     return as_picture(lay_out(grid_rows(rows, titles)))
 
 
@@ -94,12 +93,12 @@ def views(run: Path) -> Image.Image:
 
 def styles(run: Path) -> Image.Image:
     """Draw each picture, and two scenes with it laid onto their surfaces and after the edit."""
-    camera, rows = orbit(30, 20, *Lens().square(512)), {}
+    rows = {}
     for style in STYLES:
         picture = np.asarray(Image.open(ROOT / f"texgs/edit/pictures/{style}.png").convert("RGB"))
         edits = [f"{name}/scene/quick/edits/style-{style}" for name in ("vortex", "engine")]
         files = [run / f"{edit}-{recipe}/scene.yaml" for edit in edits for recipe in ("preview", "default")]
-        rows[style] = [picture, *(shown(file, camera) for file in files)]
+        rows[style] = [picture, *(shown(file, 512) for file in files)]
     return as_picture(lay_out(grid_rows(rows, ["picture", *(("laid onto it", "edited") * 2)])))
 
 

@@ -15,15 +15,13 @@ from texgs.config.compose import compose
 from texgs.core.camera import orbit
 from texgs.core.figures import as_picture, new_figure
 from texgs.core.io import read_json
-from texgs.core.lens import Lens
 from texgs.report.given_row import plotted
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
 from texgs.workflow.stages.settings import basic_tfs_of
 
-CROP = slice(116, -116)  # of 512 pixels: the scene without most of what is white around it
 LINE = {"color": "0.35", "linewidth": 1.2}
-TF, CAMERA = "TF02", orbit(30, 20, *Lens().square(512))
+TF, SIZE = "TF02", 280  # of the models shown alone, and pixels of pictures
 WIDTH, DPI = 11.0, 110  # inches, dots per inch
 CELL, STEP, LEFT = 1.4, 1.8, 0.3  # inches: a picture, from one to the next, and before the first
 TOPS = 0.72, 3.34  # of pictures, from above
@@ -165,7 +163,8 @@ def rendered(scene_file: Path, mode: Any = "shaded", only: str = "") -> np.ndarr
     scene = read_scene(scene_file)
     if only:
         scene = replace(scene, models={only: scene.models[only]})
-    return frame(scene.open(), CAMERA, scene.light, scene.edits, mode=mode)[CROP, CROP]
+    camera = orbit(30, 20, *scene.framed().lens().square(SIZE))
+    return frame(scene.open(), camera, scene.light, scene.edits, mode=mode)
 
 
 def contact_sheet(folder: Path) -> np.ndarray:
@@ -174,8 +173,7 @@ def contact_sheet(folder: Path) -> np.ndarray:
     for file in files[:: len(files) // 4][:4]:
         view = Image.open(file).convert("RGBA")
         white = Image.new("RGBA", view.size, "white")
-        cut = round(view.width * CROP.start / 512)
-        tiles.append(np.asarray(Image.alpha_composite(white, view).convert("RGB"))[cut:-cut, cut:-cut])
+        tiles.append(np.asarray(Image.alpha_composite(white, view).convert("RGB")))
     return np.vstack([np.hstack(tiles[:2]), np.hstack(tiles[2:])])
 
 

@@ -2,6 +2,7 @@
 
 import json
 import lzma
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +19,7 @@ from tests.fields.surfels.test_composition import ball
 from tests.scene.balls import write_balls
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError, OutOfMemoryError
+from texgs.core.lens import Frame
 from texgs.fields.gaussians.files import write_gaussians
 from texgs.fields.surfels.compact import read_compact, write_compact
 from texgs.fields.surfels.model_file import write_model
@@ -63,6 +65,23 @@ def test_one_view_and_its_default_name(scene, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "here")
     assert main(["render", str(scene), "--width", "40", "--height", "30"]) == 0
     assert Image.open("scene.png").size == (40, 30)
+
+
+def test_a_picture_shows_the_frame_of_the_scene(scene, tmp_path):
+    """Numbers make the same picture again, and place cameras elsewhere."""
+    write_scene(scene, replace(read_scene(scene), frame=Frame([0.2, 0.1, 0.0], 1.0)))
+    shown = {}
+    for name, words in {
+        "framed": [],
+        "again": ["--target", "0.2", "0.1", "0", "--radius", str(Frame([0, 0, 0], 1.0).lens().radius)],
+        "paper": ["--frame", "paper"],
+        "origin": ["--target", "0", "0", "0", "--radius", "4.0311"],
+    }.items():
+        assert render(scene, tmp_path / f"{name}.png", *words) == 0
+        shown[name] = np.asarray(Image.open(tmp_path / f"{name}.png")).astype(int)
+    assert (shown["framed"] == shown["again"]).all()
+    assert (shown["paper"] == shown["origin"]).all()
+    assert np.abs(shown["framed"] - shown["paper"]).max() > 30
 
 
 @pytest.mark.parametrize("path", ["test", "orbit", "light"])
@@ -115,6 +134,7 @@ def test_a_mistake_in_an_edit_writes_nothing(request, capsys, of, word, message)
     [
         (["--frames", "0"], "--frames: expected at least 1, got 0"),
         (["--radius", "0"], "radius: expected more than 0, got 0"),
+        (["--fov", "0"], "fov_y: expected degrees between 0 and 180, got 0"),
         (["--height", "-4"], "height: expected at least 1 pixel, got -4"),
         (["--frames", "1000000000", "--path", "orbit"], "--frames: expected at most 100000, got 1000000000"),
         (["--width", "300000"], "GiB of memory, but"),

@@ -49,6 +49,24 @@ def test_views_makes_what_it_needs_first(folder, capsys):
     assert alpha[:, 0].max() == 0, "the sphere touches the border of the view"
 
 
+def test_views_show_what_all_transfer_functions_show(folder):
+    """On 90 % of the smaller side, centred: the larger of two balls fills it, the other one is smaller."""
+    outer = "dataset.basic_tfs.TF01.opacity=[[0.01, 0.5], [0.1, 0.5]]"
+    inner = "+dataset.basic_tfs.TF02={opacity: [[0.9, 0], [0.95, 1], [1, 1]], color: [[0.9, 1, 0, 0]]}"
+    assert main(["views", *TINY, outer, inner, "views.radius=null", "views.step=0.25"]) == 0
+    extents = {}
+    for tf in ("TF01", "TF02"):
+        views = read_views(folder / tf / "views").train
+        alpha = np.stack([view.load()[..., 3].numpy() for view in views])
+        rows, columns = (np.flatnonzero(alpha.any(axis=axes)) for axes in ((0, 2), (0, 1)))
+        extents[tf] = np.ptp(rows) + 1
+        assert np.ptp(columns) == pytest.approx(np.ptp(rows), abs=1)
+        assert rows.mean() == pytest.approx(15.5, abs=0.5)
+        assert columns.mean() == pytest.approx(23.5, abs=0.5)
+    assert 0.75 * 32 < extents["TF01"] <= 0.9 * 32 + 1, "cells reach farther than what is seen in them"
+    assert extents["TF02"] < 0.8 * extents["TF01"]
+
+
 def test_a_second_time_does_nothing_and_force_does_it_again(folder, capsys):
     times = []
     for words in ([], [], ["--force"]):

@@ -32,17 +32,19 @@ def test_a_word_beats_the_experiment():
 
 
 @pytest.mark.parametrize(
-    ("words", "frequency"),
+    ("words", "radius", "frequency"),
     [
-        (("fit=quick",), 3),
-        (("fit=paper",), 4),
-        (("fit=paper_quarter", "edit=glass"), 4),
-        (("fit=paper", "views=small"), 2),
-        (("experiment=texture", "fit=paper"), 4),
+        (("fit=quick",), None, 4),
+        (("fit=paper",), 4.0311, 4),
+        (("fit=paper_quarter", "edit=glass"), 4.0311, 4),
+        (("fit=paper", "views=small"), None, 2),
+        (("experiment=texture", "fit=paper"), 4.0311, 4),
     ],
 )
-def test_the_paper_s_recipe_takes_its_162_views_unless_others_are_named(words, frequency):
-    assert compose(words).views.train.frequency == frequency
+def test_the_paper_s_recipe_takes_its_162_views_unless_others_are_named(words, radius, frequency):
+    views = compose(words).views
+    assert (views.radius, views.train.frequency) == (radius, frequency)
+    assert all(light.kind == "headlight" for light in views.lights) == (radius is not None)
 
 
 def test_a_copied_file_does_not_take_the_place_of_its_original(tmp_path, monkeypatch):

@@ -25,6 +25,7 @@ from tests.volume.test_tf_files import RAMP, TENT, preset
 from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.camera import orbit
 from texgs.core.io import read_json, write_json
+from texgs.core.lens import Frame
 from texgs.core.light import Light
 from texgs.edit.style_picture import read_style
 from texgs.fields.gaussians.files import read_gaussians, write_gaussians
@@ -154,7 +155,9 @@ def scene(folder: Path) -> Path:
     entry = SceneModel(file, texture=texture, segments={"part": SceneSegment(mask)})
     prepare(ArraySource(sphere(8), "sphere"), folder / "volume.nrrd")
     volume = SceneVolume(folder / "volume.nrrd", {"TF01": RISE, "TF02": FALL})
-    return write_scene(folder / "scene.yaml", Scene({"TF01": entry, "TF02": SceneModel(file)}, volume=volume))
+    frame = Frame([0.1, 0.0, -0.2], 0.5)
+    whole = Scene({"TF01": entry, "TF02": SceneModel(file)}, volume=volume, frame=frame)
+    return write_scene(folder / "scene.yaml", whole)
 
 
 def read_whole_scene(path: Path) -> None:

@@ -10,6 +10,7 @@ from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import CAMERA, ball
 from texgs.core.cuts import Box, Cuts, Plane
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Frame
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
@@ -37,8 +38,9 @@ def scene_in(folder):
     edit, style = PartEdit(palette=(0.1, 0.2, 0.3), opacity=0.5), folder / "a" / "style.safetensors"
     first = SceneModel(folder / "a" / "model.safetensors", edit, style)
     second = SceneModel(folder / "b" / "model.safetensors", PartEdit(visible=False))
+    light, frame = Light("directional", 30, -10), Frame([0.1, 0.0, -0.25], 0.5)
     cuts = Cuts([Plane([3.0, 0.0, 4.0], 0.5)], Box([-0.5, -0.5, -0.5], [0.1, 0.2, 0.3]), "unlit")
-    return Scene({"TF01": first, "TF02": second}, Light("directional", 30, -10), (0.0, 0.5, 1.0), cuts)
+    return Scene({"TF01": first, "TF02": second}, light, (0.0, 0.5, 1.0), cuts, frame=frame)
 
 
 def resolved(scene):
@@ -88,6 +90,12 @@ def test_a_variant_replaces_texels(folder):
         ({"cuts": {"planes": [{"normal": [0, 0, 0]}]}}, "cuts: normal: expected three numbers that are not"),
         ({"cuts": {"box": {"low": [1e9, 0, 0], "high": [1, 1, 1]}}}, "cuts.box.low: expected at most 1e"),
         ({"cuts": {"faces": "dark"}}, "cuts.faces: expected one of shaded, unlit, got dark"),
+        ({"frame": 3}, "frame: expected keys with values, got 3"),
+        ({"frame": {"radius": 1}}, "frame.target: expected a value, got none"),
+        ({"frame": {"target": [0, 0, "x"], "radius": 1}}, "frame.target.2: expected a number, got 'x'"),
+        ({"frame": {"target": [0, 0], "radius": 1}}, "frame: target: expected three numbers, got"),
+        ({"frame": {"target": [0, 0, 0], "radius": 0}}, "frame.radius: expected more than 0, got 0"),
+        ({"frame": {"target": [0, 0, 0], "radios": 1}}, "frame.radios: no such key, did you mean radius"),
         ({"models": []}, r"models: expected a table of keys and values, got \[\]"),
         ({"models": {}}, "models: expected at least one, got none"),
         ({"models": {"a\x1b[2J": {"file": "x"}}}, "models: expected a name of 1 to 100"),

@@ -1,18 +1,15 @@
 """Films of several scenes in step."""
 
-from math import atan, degrees, radians, tan
-
 import av
 import numpy as np
 import pytest
 import torch
 
 from tests.fields.voxels.test_voxels import ball
-from texgs.core.camera import orbit
-from texgs.core.lens import Lens
+from texgs.core.lens import Frame
 from texgs.fields.voxels.file import write_voxels
 from texgs.scene.scene import Scene, SceneModel
-from texgs.study.film import cell, extent, filled, mosaic, write_film
+from texgs.study.film import cell, mosaic, write_film
 
 
 @pytest.mark.parametrize("count", range(1, 12))
@@ -26,27 +23,12 @@ def test_each_scene_has_its_cell(count):
     assert whole.shape[0] <= whole.shape[1] <= 16
 
 
-def test_the_extent_is_that_of_what_is_not_background():
-    picture = np.full((100, 100, 3), 255, dtype=np.uint8)
-    assert extent(picture) == 0.01
-    picture[50:60, 50:80, 1] = 0
-    assert extent(picture) == pytest.approx(0.6)
-
-
-def test_a_narrower_lens_shows_what_it_should():
-    lens = filled(Lens(fov_y=40), 0.5)
-    assert lens.fov_y == pytest.approx(2 * degrees(atan(0.55 * tan(radians(20)))))
-    assert filled(Lens(fov_y=40), 1.0).fov_y == pytest.approx(40)
-    near, far = (orbit(0, 0, *each.square(100)).K[0, 0] for each in (lens, Lens(fov_y=40)))
-    assert near / far == pytest.approx(1 / 0.55, rel=1e-5)
-
-
 def test_scenes_turn_side_by_side_and_fill_their_cells(tmp_path):
     """Balls of another colour each: the cells hold them in their order, all at the same place."""
     scenes = []
     for name, color in (("dark", -1.5), ("grey", 0.0), ("bright", 1.0)):
         path = write_voxels(tmp_path / f"{name}.safetensors", ball(color=color))
-        scenes.append(Scene({"TF01": SceneModel(path)}))
+        scenes.append(Scene({"TF01": SceneModel(path)}, frame=Frame([0.0, 0.0, 0.0], 0.2)))
     path = write_film(tmp_path / "film.mp4", scenes, 64, 3, torch.device("cpu"), "test")
     with av.open(str(path)) as film:
         stream = film.streams.video[0]

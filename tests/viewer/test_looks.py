@@ -14,7 +14,6 @@ from tests.fields.surfels.test_composition import ball
 from tests.viewer.pages import TOKEN, on_page, origin, page
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
-from texgs.core.lens import Lens
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.looks import Looks, ScratchFolders, Styles, ThrottledPreview
 from texgs.viewer.messages import Look
@@ -27,7 +26,7 @@ SHOT = {**VIEW, "mode": "shaded", "camera": asdict(FRONT) | {"target": [0, 0, 0]
 def quick(monkeypatch, tmp_path_factory):
     """Few and small views and no weights, wherever the tests run."""
     monkeypatch.setattr("texgs.viewer.looks.VIEWS", 12)
-    monkeypatch.setattr("texgs.viewer.looks.LENS", Lens().square(96))
+    monkeypatch.setattr("texgs.viewer.looks.SIZE", 96)
     monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path_factory.mktemp("none")))
     monkeypatch.setenv("TEXGS_CACHE", str(tmp_path_factory.mktemp("cache")))
     monkeypatch.setattr("texgs.viewer.looks.unusable", lambda name: "they are missing")

@@ -2,9 +2,11 @@
 
 import json
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from tests.fields.surfels.test_composition import ball
 from tests.viewer.training_views import SIZE, TF, write_results
@@ -19,12 +21,19 @@ def scene(tmp_path):
     return write_results(tmp_path)
 
 
-def test_a_page_can_go_to_the_training_views_that_are_on_an_orbit(scene):
+def test_a_page_can_go_to_the_training_views_with_y_up(scene):
     places = Origins(scene).places
     assert [each["name"] for each in places] == ["view 0", "view 1", "view 2"]
     assert (places[1]["azimuth"], places[1]["polar"]) == pytest.approx((90, 20), abs=1e-3)
     assert (places[1]["distance"], places[1]["fov_y"]) == pytest.approx((3, 40), abs=1e-3)
-    assert orbit_of(orbit(30, 20, 3.0, 40.0, SIZE, SIZE, target=(0.3, 0, 0))) is None
+    aside = orbit_of(orbit(30, 20, 3.0, 40.0, SIZE, SIZE, target=(0.3, 0, 0)), (0.3, 0, 0))
+    assert aside["target"] == pytest.approx([0.3, 0, 0], abs=1e-5)
+    assert (aside["azimuth"], aside["polar"], aside["distance"]) == pytest.approx((30, 20, 3), abs=1e-3)
+    camera = orbit(30, 20, 3.0, 40.0, SIZE, SIZE)
+    assert orbit_of(camera, tuple(2 * camera.position.tolist()[i] for i in range(3))) is None, "it is behind"
+    rolled = camera.viewmat.clone()
+    rolled[:2] = torch.stack([-rolled[1], rolled[0]])
+    assert orbit_of(replace(camera, viewmat=rolled), (0, 0, 0)) is None
 
 
 def test_transfer_functions_come_with_their_histogram(scene):

@@ -23,7 +23,7 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment
 from texgs.viewer.messages import Orbit
-from texgs.viewer.segments import LENS, isolated
+from texgs.viewer.segments import SIZE, isolated
 from texgs.volume.cameras import icosphere_of
 
 FRONT = Orbit((0.0, 0.0, 0.0), -90, 0, 4.0, 22.0, 120, 120)  # on +z
@@ -117,7 +117,8 @@ async def test_clicks_make_a_segment_that_is_edited_renamed_removed_undone_and_s
     model, red = two_balls()
     mask = read_segment(saved.segments["red"].file, model)
     clicks = Clicks(FRONT.camera(), torch.tensor([at(RED)]), torch.tensor([True]))
-    assert mask.equal(lift(model, clicks, icosphere_of(VIEWS, LENS), GrabCut()).mask)
+    cameras = icosphere_of(VIEWS, read_scene(scene_file).framed().lens().square(SIZE))
+    assert mask.equal(lift(model, clicks, cameras, GrabCut()).mask)
     assert bool(mask[red == 0].all())
 
 

@@ -102,8 +102,9 @@ def test_a_token_is_kept_where_only_its_owner_reads_it(tmp_path):
 
 @on_page
 async def test_frames_are_those_of_the_renderer(browser, client, scene_file, tmp_path):
-    words = ["--width", "64", "--height", "48", "--radius", "3", "--fov", "40", "--mode", "normal"]
-    assert main(["render", str(scene_file), "--output", str(tmp_path / "a.png"), *words]) == 0
+    words = ["--width", "64", "--height", "48", "--target", "0", "0", "0", "--radius", "3", "--fov", "40"]
+    words += ["--mode", "normal", "--output", str(tmp_path / "a.png")]
+    assert main(["render", str(scene_file), *words]) == 0
     expected = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
     await browser.send(**{**VIEW, "moving": False})
     header, shown = await browser.next("frame")

@@ -9,6 +9,7 @@ from tests.scene.test_twin import HIGH, LOW, sphere_volume
 from texgs.config.views import ViewKeys
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Frame
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
@@ -23,6 +24,7 @@ from texgs.workflow.stages.settings import FitLabel, OfScene
 
 SIZE = 48
 VIEW = [20.0, 10.0]
+FRAME = Frame([0.1, 0.0, 0.0], 0.8)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +35,7 @@ def scene(tmp_path_factory):
         name: SceneModel(write_model(folder / f"{name}.safetensors", ball(seed)))
         for seed, name in enumerate(("low", "high"), start=1)
     }
-    return Scene(models, volume=sphere_volume(folder, low=LOW, high=HIGH))
+    return Scene(models, volume=sphere_volume(folder, low=LOW, high=HIGH), frame=FRAME)
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +71,8 @@ def test_a_picture_is_a_frame_of_the_changed_scene(renderer):
     session = Session.open(renderer._inputs["quick/none"])
     session.set("low", "opacity", 0.5)
     session.set_light(Light("directional", -30.0, 40.0))
-    expected = session.frame(orbit(*VIEW, 4.0311, 20.0, SIZE, SIZE))
+    lens = FRAME.lens().square(SIZE)
+    expected = session.frame(orbit(*VIEW, *lens._replace(fov_y=20.0)))
     plain = renderer.render(cell()).pixels
     changed = renderer.render(cell(fov_y=20.0, light=[-30.0, 40.0], changes=["low.opacity=0.5"])).pixels
     np.testing.assert_array_equal(np.round(changed * 255), expected)

@@ -32,6 +32,6 @@ def run(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(f"{arguments.scene.stem}-check.json")
     with located(arguments.scene):
         composition, twin = scene.open(device), Twin(scene, device)
-    seen = lens_of(arguments), arguments.views, arguments.seed, output
+    seen = lens_of(arguments, scene.framed(composition)), arguments.views, arguments.seed, output
     print(check(scene, composition, twin, *seen).sentence, output, sep="\n")
     return 0

@@ -101,17 +101,17 @@ def run_segment(arguments: argparse.Namespace) -> int:
     scene, device = read_scene(arguments.scene), torch_device(arguments.device)
     name = model_name(scene, arguments.model, "--model")
     require_output(arguments)
-    clicks, masks = clicks_of(arguments, device), mask_model(arguments.masks, device)
+    lens = lens_of(arguments, scene.framed())
+    clicks, masks = clicks_of(arguments, lens, device), mask_model(arguments.masks, device)
     if arguments.preview:
         model = clicked_model(scene, name, device)
         print(write_png(arguments.preview, preview(model, clicks, masks, scene.light)[1]))
         return 0
-    lens = Lens(arguments.radius, arguments.fov).square(arguments.size)
     output = arguments.output
     file = new_part_file("--name", output.parent, output.stem, name, arguments.name)
     made = new_segment(
         *(scene, f"{name}/{arguments.name}", clicks),
-        [camera.to(device) for camera in icosphere_of(arguments.views, lens)],
+        [camera.to(device) for camera in icosphere_of(arguments.views, lens.square(arguments.size))],
         *(masks, file, {key: getattr(arguments, key) for key in KEPT}),
         vote=arguments.vote,
         threshold=arguments.threshold,
@@ -122,7 +122,7 @@ def run_segment(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def clicks_of(arguments: argparse.Namespace, device: torch.device) -> Clicks:
+def clicks_of(arguments: argparse.Namespace, lens: Lens, device: torch.device) -> Clicks:
     """Return the clicks, each in the middle of its pixel."""
     import torch
 
@@ -132,7 +132,7 @@ def clicks_of(arguments: argparse.Namespace, device: torch.device) -> Clicks:
     if not arguments.point:
         raise ArgumentError("--point: expected one at least, got none; name a pixel on the object")
     azimuth, polar = arguments.view
-    camera = orbit(azimuth, polar, *lens_of(arguments)).to(device)
+    camera = orbit(azimuth, polar, *lens).to(device)
     pixels = torch.tensor([*arguments.point, *arguments.other], device=device)
     positive = torch.arange(len(pixels), device=device) < len(arguments.point)
     return Clicks(camera, pixels + 0.5, positive)

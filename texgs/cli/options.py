@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from texgs.core.lens import Lens
+from texgs.core.lens import Frame, Lens
 
 LENS = Lens()
 
@@ -20,14 +20,21 @@ def add_device(parser: argparse.ArgumentParser) -> None:
 
 
 def add_lens(parser: argparse.ArgumentParser, width: str, height: str) -> None:
-    """Add the size of pictures, in these words, and the distance and field of view of the camera."""
+    """Add the size of pictures, in these words, and where the camera looks, from how far and how wide."""
     option(parser, "--width", LENS.width, width)
     parser.add_argument("--height", type=int, help=height)
-    option(parser, "--radius", LENS.radius, "distance, world units")
+    frames = "what is centred on 90 %% of the picture; paper: cameras 4.0311 from the origin"
+    option(parser, "--frame", "scene", frames, choices=("scene", "paper"))
+    target = "what the camera looks at, world units; default the middle of the frame"
+    parser.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=target)
+    parser.add_argument("--radius", type=float, help="distance from it, world units; default by the frame")
     option(parser, "--fov", LENS.fov_y, "vertical field of view, degrees")
 
 
-def lens_of(arguments: argparse.Namespace) -> Lens:
-    """Return what `add_lens` has added; pictures are square by default."""
-    height = arguments.width if arguments.height is None else arguments.height
-    return Lens(arguments.radius, arguments.fov, arguments.width, height)
+def lens_of(arguments: argparse.Namespace, framed: Frame) -> Lens:
+    """Return what `add_lens` has added; pictures are square and show all that is framed by default."""
+    size = arguments.width, arguments.width if arguments.height is None else arguments.height
+    is_paper = arguments.frame == "paper"
+    lens = Lens(LENS.radius, arguments.fov, *size) if is_paper else framed.lens(arguments.fov, *size)
+    radius = lens.radius if arguments.radius is None else arguments.radius
+    return lens._replace(radius=radius, target=arguments.target or lens.target)

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     import numpy as np
 
     from texgs.core.camera import Camera
+    from texgs.core.lens import Lens
     from texgs.core.light import Light
+    from texgs.fields.field import Composed
     from texgs.scene.scene import Scene
 
 MOST_FRAMES = 100_000  # an hour of film
@@ -66,14 +68,14 @@ def run(arguments: argparse.Namespace) -> int:
         raise ArgumentError(f"--mode: expected one of {', '.join(get_args(Mode))}, got {arguments.mode}")
     scene = read_scene(arguments.scene)
     count = frames_of(arguments)
-    shots = shots_of(arguments, scene.light, count)
     suffix = ".png" if count == 1 else ".mp4"
     output = arguments.output or Path(f"{arguments.scene.stem}{suffix}")
+    composition = scene.open(torch_device(arguments.device))
+    shots = shots_of(arguments, scene.light, count, lens_of(arguments, scene.framed(composition)))
     shots = progress(shots, count, title=str(output), unit="frame")
     if arguments.compare:
-        frames = compared(arguments, scene, shots)
+        frames = compared(arguments, scene, composition, shots)
     else:
-        composition = scene.open(torch_device(arguments.device))
         frames = (
             frame(composition, camera, light, scene.edits, arguments.mode, scene.background)
             for camera, light in shots
@@ -88,10 +90,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def compared(
-    arguments: argparse.Namespace, scene: Scene, shots: Iterable[tuple[Camera, Light]]
+    arguments: argparse.Namespace,
+    scene: Scene,
+    composition: Composed,
+    shots: Iterable[tuple[Camera, Light]],
 ) -> Iterator[np.ndarray]:
     """Yield frames of a scene beside its volume; their mean scores are printed at the end."""
-    from texgs.core.check import torch_device
     from texgs.metrics.quality import mean
     from texgs.report.beside_volume import beside_volume, in_words
     from texgs.scene.twin import Twin
@@ -100,9 +104,8 @@ def compared(
         raise ArgumentError(f"--compare: expected --mode shaded, got {arguments.mode}; leave one of them out")
     if not 1 <= arguments.gain <= MOST_GAIN:
         raise ArgumentError(f"--gain: expected 1 to {MOST_GAIN:g}, got {arguments.gain:g}")
-    device = torch_device(arguments.device)
     with located(arguments.scene):
-        twin, composition = Twin(scene, device), scene.open(device)
+        twin = Twin(scene, composition.device)
     measured = defaultdict[str, list[float]](list)
     for camera, light in shots:
         seen = twin.beside(camera, replace(scene, light=light), composition)
@@ -122,13 +125,14 @@ def frames_of(arguments: argparse.Namespace) -> int:
     return count
 
 
-def shots_of(arguments: argparse.Namespace, light: Light, count: int) -> Iterator[tuple[Camera, Light]]:
+def shots_of(
+    arguments: argparse.Namespace, light: Light, count: int, lens: Lens
+) -> Iterator[tuple[Camera, Light]]:
     """Return camera and light of each frame, of so many."""
     from texgs.core.camera import orbit
     from texgs.core.light import Light
     from texgs.volume.cameras import orbit_path, spiral
 
-    lens = lens_of(arguments)
     if arguments.path == "test":
         return ((camera, light) for camera in spiral(count, *lens))
     if arguments.path == "orbit":

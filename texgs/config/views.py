@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from texgs.core.keys import key
-from texgs.core.lens import Lens
+from texgs.core.lens import Frame, Lens
 
 LENS = Lens()
 
@@ -47,8 +47,12 @@ class ViewKeys:
     width: int = key("${dataset.image}", "width of views", "pixels", least=1)
     height: int = key("${dataset.image}", "height of views", "pixels", least=1)
     fov_y: float = key(LENS.fov_y, "vertical field of view", "degrees", above=0, below=180)
-    radius: float = key(
-        LENS.radius, "distance of cameras; the volume's longest side is 1", "world units", above=0
+    radius: float | None = key(
+        None,
+        "distance of cameras from the origin, the volume's longest side being 1; default: what all basic TFs "
+        "show is centred on 90 % of the smaller side",
+        "world units",
+        above=0,
     )
     lights: list[LightKeys] = field(
         default_factory=lambda: [LightKeys(), LightKeys("random"), LightKeys("random")],
@@ -74,7 +78,13 @@ class ViewKeys:
     geometry: bool = key(False, "also write depth and normals of the test views, geometry/*.npz")
     turntable: int = key(36, "number of frames of the turntable", least=1)
 
-    @property
-    def lens(self) -> Lens:
-        """What all cameras have in common."""
-        return Lens(self.radius, self.fov_y, self.width, self.height)
+    def lens(self, frame: Frame | None) -> Lens:
+        """Return what all cameras have in common.
+
+        Args:
+            frame: what is visible of the volume; None where views are from elsewhere, as the paper has them.
+        """
+        size = self.fov_y, self.width, self.height
+        if frame and self.radius is None:
+            return frame.lens(*size)
+        return Lens(self.radius or LENS.radius, *size)

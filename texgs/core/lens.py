@@ -1,24 +1,54 @@
-"""What cameras around the origin have in common."""
+"""What cameras around a target have in common, and how far away they show all that is visible."""
 
 from __future__ import annotations
 
-from math import isqrt
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isqrt, radians, sqrt, tan
 from typing import NamedTuple
 
+from texgs.core.cuts import FAR
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import REQUIRED, key
+
+ORIGIN = (0.0, 0.0, 0.0)
+FILLED = 0.9  # of the smaller side of an image, by what is framed
 
 
 class Lens(NamedTuple):
-    """Distance, field of view and size of images; the defaults are those of the paper's views."""
+    """Distance, field of view, size of images and target; the defaults are those of the paper's views."""
 
-    radius: float = 4.0311  # distance from the origin, world units
+    radius: float = 4.0311  # distance from the target, world units
     fov_y: float = 30.0  # vertical, degrees
     width: int = 800  # pixels
     height: int = 800  # pixels
+    target: Sequence[float] = ORIGIN  # [3], that cameras look at, world units
 
     def square(self, size: int) -> Lens:
         """Return the same for square images."""
         return self._replace(width=size, height=size)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What cameras look at: the ball of what is visible."""
+
+    target: list[float] = key(REQUIRED, "its centre [3]", "world units", least=-FAR, most=FAR)
+    radius: float = key(REQUIRED, "its radius", "world units", above=0, most=FAR)
+
+    def __post_init__(self) -> None:
+        if len(self.target) != 3:
+            raise ArgumentError(f"target: expected three numbers, got {self.target}")
+
+    def lens(self, fov_y: float = Lens().fov_y, width: int = 800, height: int = 800) -> Lens:
+        """Return the lens that shows the ball on 90 % of the smaller side of images.
+
+        The silhouette of a ball of radius r at distance d is a disc whose tangent is r / sqrt(d^2 - r^2).
+        """
+        if not 0 < fov_y < 180:
+            raise ArgumentError(f"fov_y: expected degrees between 0 and 180, got {fov_y}")
+        tangent = FILLED * tan(radians(0.5 * fov_y)) * min(1.0, max(width, 1) / max(height, 1))
+        return Lens(self.radius * sqrt(1 + tangent**-2), fov_y, width, height, self.target)
 
 
 def frequency_of(count: int, where: str = "views") -> int:

@@ -137,11 +137,10 @@ def picture(path: Path) -> np.ndarray:
     """Render a scene from the front."""
     import torch
 
-    from texgs.core.lens import Lens
     from texgs.report.before_after import POLAR, pictures
     from texgs.scene.scene_file import read_scene
     from texgs.volume.cameras import orbit_path
 
     scene = read_scene(path)
-    cameras = orbit_path(1, POLAR, *Lens().square(PIXELS))
+    cameras = orbit_path(1, POLAR, *scene.framed().lens().square(PIXELS))
     return next(pictures(scene, cameras, [scene.light], torch.device("cpu")))

@@ -15,7 +15,7 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
-from texgs.core.lens import Lens
+from texgs.core.lens import Frame
 from texgs.fields import files
 from texgs.fields.field import Field, Look
 from texgs.fields.gaussians.files import write_ply as write_gaussians
@@ -30,6 +30,7 @@ from texgs.fields.surfels.ply import write_ply as write_surfels
 from texgs.fields.surfels.texels import mean_texels
 from texgs.raster import Render
 from texgs.raster.shading import Y00
+from texgs.scene.bounds import bounds_of
 from texgs.scene.mesh import VERTEX, fill, fuse, write_mesh
 from texgs.scene.scene import Scene
 from texgs.volume.cameras import icosphere_of
@@ -49,10 +50,9 @@ class Export:
     drop_unseen: bool = False  # compact: no texture for surfels that no view sees
     device: torch.device | str = "cpu"
 
-    @property
-    def cameras(self) -> list[Camera]:
-        """Return views as far from the scene as the paper's training views."""
-        placed = icosphere_of(self.views, Lens().square(self.size), "--views")
+    def cameras(self, frame: Frame) -> list[Camera]:
+        """Return views of all that is framed."""
+        placed = icosphere_of(self.views, frame.lens().square(self.size), "--views")
         return [camera.to(self.device) for camera in placed]
 
 
@@ -78,7 +78,8 @@ def export_scene(path: Path, scene: Scene, export: Export) -> Path:
     composed, edits = scene.open(export.device), scene.edits
     if export.kind == "mesh":
         look: Look = "unshaded" if "unlit" in field.can else "shaded"
-        return _write_fused(path, export, partial(composed.render, edits=edits, look=look), field.depth)
+        render = partial(composed.render, edits=edits, look=look)
+        return _write_fused(path, export, export.cameras(scene.framed(composed)), render, field.depth)
     if isinstance(composed, JoinedGaussians):
         return write_gaussians(path, composed.edited(edits))
     return _write(path, export, joined(cast(Composition, composed).parts, edits))
@@ -90,10 +91,10 @@ def export_model(path: Path, model: Field, export: Export) -> Path:
     require_export(field, export.kind)
     model = model.to(export.device)
     if export.kind == "mesh":
+        cameras, render = export.cameras(bounds_of([model])), model.render
         if isinstance(model, Surfels) and model.stage != "surfels":
             render = partial(Composition([model]).render, look="unshaded")
-            return _write_fused(path, export, render, field.depth)
-        return _write_fused(path, export, model.render, field.depth)
+        return _write_fused(path, export, cameras, render, field.depth)
     if isinstance(model, Gaussians):
         return write_gaussians(path, model)
     return _write(path, export, cast(Surfels, model))
@@ -102,21 +103,23 @@ def export_model(path: Path, model: Field, export: Export) -> Path:
 def _write(path: Path, export: Export, model: Surfels) -> Path:
     """Write surfels as they are, without rendering them."""
     if export.kind == "compact":
-        seen = seen_surfels(model, export.cameras) if export.drop_unseen else None
-        return write_compact(path, model, seen)
+        cameras = export.cameras(bounds_of([model])) if export.drop_unseen else []
+        return write_compact(path, model, seen_surfels(model, cameras) if cameras else None)
     if export.kind == "points":
         return write_points(path, model, export.opacity)
     return write_surfels(path, model, export.kind)
 
 
-def _write_fused(path: Path, export: Export, render: Callable[..., Render], depth: str) -> Path:
+def _write_fused(
+    path: Path, export: Export, cameras: Sequence[Camera], render: Callable[..., Render], depth: str
+) -> Path:
     """Write the mesh of what `render` shows, with the depth of that name."""
     black = torch.zeros(3, device=export.device)
 
     def shown(camera: Camera) -> Render:
         return render(camera, background=black, outputs=(depth,))
 
-    return write_mesh(path, fuse(shown, export.cameras, export.voxel))
+    return write_mesh(path, fuse(shown, cameras, export.voxel))
 
 
 def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:

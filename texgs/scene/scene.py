@@ -11,6 +11,7 @@ from torch import Tensor
 
 from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.lens import Frame
 from texgs.core.light import Light
 from texgs.fields.field import Composed, Field
 from texgs.fields.files import open_field
@@ -19,6 +20,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import lean
 from texgs.fields.surfels.variants import labels_of, with_texture, with_variants
+from texgs.scene.bounds import bounds_of, models_of
 from texgs.scene.segment_file import read_segment
 from texgs.scene.twin import SceneVolume
 
@@ -86,13 +88,14 @@ class SceneModel:
 
 @dataclass(frozen=True)
 class Scene:
-    """Models by name in the order in which they were added; a light, a background and cuts hold for all."""
+    """Models by name in the order in which they were added; the rest holds for all of them."""
 
     models: Mapping[str, SceneModel]
     light: Light = field(default_factory=lambda: Light("headlight"))
     background: tuple[float, float, float] = WHITE
     cuts: Cuts = NO_CUTS
     volume: SceneVolume | None = None  # that it was made from, see `Twin`
+    frame: Frame | None = None  # what is visible of the volume, where that is known
 
     def __post_init__(self) -> None:
         if not self.models:
@@ -105,6 +108,14 @@ class Scene:
         for model in self.models.values():
             edits += [model.edit, *(segment.edit for segment in model.segments.values())]
         return edits
+
+    def framed(self, composed: Composed | None = None) -> Frame:
+        """Return what pictures show: the frame of the data, else the bounds of the models.
+
+        Args:
+            composed: the models, where they are open.
+        """
+        return self.frame or bounds_of(models_of(self.open() if composed is None else composed))
 
     def open(self, device: torch.device | str = "cpu", *, is_lean: bool = False) -> Composed:
         """Read and join the models.

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Collection
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
@@ -14,6 +14,7 @@ from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading, write_bytes
 from texgs.core.keys import ValueMismatch, typed
+from texgs.core.lens import Frame
 from texgs.core.light import Light
 from texgs.core.names import close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
@@ -23,9 +24,10 @@ from texgs.scene.twin import SceneVolume
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
+T = TypeVar("T")
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
-KEYS = ("texgs-scene", "light", "background", "cuts", "models", "volume")
+KEYS = ("texgs-scene", "light", "background", "cuts", "frame", "models", "volume")
 EDITS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDITS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
@@ -63,7 +65,8 @@ def _scene(values: Any, folder: Path) -> Scene:
     background = color("background", values.get("background", WHITE))
     light, cuts = light_of(values.get("light", "headlight")), cuts_of(values.get("cuts", {}))
     volume = volume_of(values["volume"], folder) if "volume" in values else None
-    return Scene(models, light, background, cuts, volume)
+    frame = table_of(Frame, values["frame"], "frame") if "frame" in values else None
+    return Scene(models, light, background, cuts, volume, frame)
 
 
 def write_scene(path: str | Path, scene: Scene) -> Path:
@@ -81,7 +84,8 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
     if scene.light.kind == "directional":
         light = {"azimuth": scene.light.azimuth, "polar": scene.light.polar}
     cuts = {"cuts": plain_cuts(scene.cuts)} if scene.cuts != NO_CUTS else {}
-    of_scene = {"light": light, "background": list(scene.background), **cuts}
+    frame = {"frame": asdict(scene.frame)} if scene.frame else {}
+    of_scene = {"light": light, "background": list(scene.background), **cuts, **frame}
     values = {"texgs-scene": VERSION, **of_scene, "models": models}
     if scene.volume is not None:
         tfs = {name: tf.to_dict() for name, tf in scene.volume.tfs.items()}
@@ -153,12 +157,17 @@ def light_of(value: Any) -> Light:
 
 def cuts_of(value: Any) -> Cuts:
     """Return the cuts that a value of a scene file stands for."""
+    return table_of(Cuts, value, "cuts")
+
+
+def table_of(kind: type[T], value: Any, where: str) -> T:
+    """Return an instance of a dataclass that a value of a scene file stands for."""
     try:
-        return typed(Cuts, value, "cuts")
+        return typed(kind, value, where)
     except ValueMismatch as error:
         raise ArgumentError(str(error)) from error
     except ArgumentError as error:
-        raise ArgumentError(f"cuts: {error}") from error
+        raise ArgumentError(f"{where}: {error}") from error
 
 
 def plain_cuts(cuts: Cuts) -> dict[str, Any]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan, ceil, degrees, radians, sqrt, tan
+from math import ceil, sqrt
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from texgs.core.camera import Camera
-from texgs.core.lens import Lens
 from texgs.core.movie import write_frames
 from texgs.core.progress import progress
 from texgs.scene.frame import frame
@@ -18,9 +17,6 @@ from texgs.scene.scene import WHITE, Scene
 from texgs.volume.cameras import orbit_path
 
 POLAR = 20.0  # degrees above the horizon
-LOOKS, COARSE = 12, 128  # views that tell how large a scene is, and their pixels
-SEEN = 250  # of 255: whatever is darker is not background
-MARGIN = 1.1
 CRF = 23  # of H.264: half the bytes of a film that is looked at alone, so that the page can be mailed
 
 
@@ -35,33 +31,19 @@ def write_film(
 ) -> Path:
     """Write one turn around scenes as MP4: the same cameras, background and size, pixels of a cell, for all.
 
-    The first scene fills its cell.
+    They show all that is framed of the first scene.
     """
     compositions = [scene.open(device) for scene in scenes]
 
-    def draw(camera: Camera, count: int) -> list[np.ndarray]:
+    def draw(camera: Camera) -> list[np.ndarray]:
         return [
             frame(composition, camera, scene.light, scene.edits, background=WHITE)
-            for composition, scene in zip(compositions[:count], scenes, strict=False)
+            for composition, scene in zip(compositions, scenes, strict=True)
         ]
 
-    coarse = orbit_path(LOOKS, POLAR, *Lens().square(COARSE))
-    lens = filled(Lens(), max(extent(*draw(camera, 1)) for camera in coarse)).square(size)
+    lens = scenes[0].framed(compositions[0]).lens().square(size)
     turn = progress(orbit_path(frames, POLAR, *lens), title=title, unit="frame")
-    return write_frames(path, (mosaic(draw(camera, len(scenes))) for camera in turn), crf=CRF)
-
-
-def extent(picture: np.ndarray) -> float:
-    """Return how far from its centre a square picture [H, W, 3] shows something, as a share of its half."""
-    size = len(picture)
-    places = np.argwhere(picture.min(axis=2) < SEEN) + 0.5
-    return float(np.abs(2 * places / size - 1).max(initial=0)) + 1 / size
-
-
-def filled(lens: Lens, share: float) -> Lens:
-    """Return the lens whose picture shows only that share of its width and height, with a margin."""
-    slope = tan(radians(lens.fov_y / 2)) * min(1.0, MARGIN * share)
-    return lens._replace(fov_y=2 * degrees(atan(slope)))
+    return write_frames(path, (mosaic(draw(camera)) for camera in turn), crf=CRF)
 
 
 def mosaic(pictures: Sequence[np.ndarray]) -> np.ndarray:

@@ -23,7 +23,6 @@ from texgs.config.recipes import Edit
 from texgs.core.checksum import digest
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed
-from texgs.core.lens import Lens
 from texgs.core.names import file_name, part_file
 from texgs.edit.method import method_of
 from texgs.edit.pictures import PICTURES, picture
@@ -37,8 +36,7 @@ from texgs.viewer.messages import Look
 from texgs.volume.cameras import icosphere_of
 from texgs.volume.view_set import View
 
-LENS = Lens().square(400)  # of the views that parts learn from
-VIEWS = 92
+VIEWS, SIZE = 92, 400  # that parts learn from, and pixels of their sides
 BETWEEN = 2.0  # seconds between textures on their way that are shown
 KEPT = 20  # of those of each part, and of previews: frames may be on their way
 LARGEST = 32 * 2**20  # bytes of a picture that a page sends
@@ -54,7 +52,7 @@ class OrbitTask(Task[Any]):
 
     def training_views(self, model: str) -> Sequence[View]:
         """Return the cameras on a sphere; there are no images."""
-        return [View(camera, Path(), self.scene.light) for camera in icosphere_of(VIEWS, LENS)]
+        return [View(camera, Path(), self.scene.light) for camera in icosphere_of(VIEWS, self.lens)]
 
 
 class Styles:
@@ -133,7 +131,8 @@ class Looks:
         """
         method = method_of(edit)
         settings, preview = method.of(edit), ThrottledPreview(show, self._scratch)
-        task = OrbitTask(settings, edit, scene, {}, output, self._device, 1, LENS, "look", show=preview)
+        lens = scene.framed().lens().square(SIZE)
+        task = OrbitTask(settings, edit, scene, {}, output, self._device, 1, lens, "look", show=preview)
         is_alone = not output.parent.exists()
         try:
             output.mkdir(parents=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import asin, atan, atan2, degrees
@@ -11,12 +12,12 @@ from typing import Any
 
 import cv2
 import numpy as np
-from torch.nn.functional import normalize
 
 from texgs.config.compose import ONE_LIGHT
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import read_json
+from texgs.core.lens import ORIGIN
 from texgs.core.names import is_number
 from texgs.fields.files import kind_of
 from texgs.scene.scene import Scene
@@ -58,9 +59,9 @@ class Origin:
         return {"model": self.name, "opacity": tf["opacity"], "color": color}
 
     def nearest(self, camera: Camera) -> Image:
-        """Return the view whose camera looks at the origin from nearly the same side."""
-        side = normalize(camera.position, dim=0)
-        return max(self.images, key=lambda each: float(side @ normalize(each.camera.position, dim=0)))
+        """Return the view whose camera looks from nearly the same side."""
+        forward = camera.viewmat[2, :3]
+        return max(self.images, key=lambda each: float(forward @ each.camera.viewmat[2, :3]))
 
 
 class Origins:
@@ -68,6 +69,7 @@ class Origins:
 
     def __init__(self, scene: Scene) -> None:
         self._origins = {each.name: each for each in origins_of(scene)}
+        self._middle = scene.frame.target if scene.frame else ORIGIN
         volumes = (find_upwards(entry.file, VOLUME) for entry in scene.models.values())
         self._volume = next(filter(None, volumes), None)
 
@@ -88,10 +90,10 @@ class Origins:
 
     @cached_property
     def places(self) -> list[dict[str, Any]]:
-        """Return the training views as a page goes to them, those that look at the origin with +y up."""
+        """Return the training views as a page goes to them, those with +y up."""
         origin = next(iter(self._origins.values()), None)
         images = [] if origin is None else origin.images
-        places = [(index, orbit_of(image.camera)) for index, image in enumerate(images)]
+        places = [(index, orbit_of(image.camera, self._middle)) for index, image in enumerate(images)]
         return [{"name": f"view {index}", **place} for index, place in places if place]
 
     @cached_property
@@ -157,15 +159,16 @@ def fitted(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
     return cv2.copyMakeBorder(small, *sides, cv2.BORDER_CONSTANT, value=pixels[0, 0].tolist())
 
 
-def orbit_of(camera: Camera) -> dict[str, Any] | None:
-    """Return where a camera on an orbit around the origin stands; None if it looks elsewhere."""
-    x, y, z = camera.position.tolist()
-    distance = (x * x + y * y + z * z) ** 0.5
-    if not distance:
+def orbit_of(camera: Camera, near: Sequence[float]) -> dict[str, Any] | None:
+    """Return where a camera stands on an orbit around what it sees `near` a place; None if +y is not up."""
+    position, forward = camera.position.tolist(), camera.viewmat[2, :3].tolist()
+    distance = sum((to - here) * step for to, here, step in zip(near, position, forward, strict=True))
+    if not distance > 0:
         return None
-    azimuth, polar = degrees(atan2(-z, x)), degrees(asin(y / distance))
+    target = [here + distance * step for here, step in zip(position, forward, strict=True)]
+    azimuth, polar = degrees(atan2(forward[2], -forward[0])), degrees(asin(max(-1.0, min(1.0, -forward[1]))))
     fov_y = degrees(2 * atan(0.5 * camera.height / float(camera.K[1, 1])))
-    again = orbit(azimuth, polar, distance, fov_y, camera.width, camera.height)
+    again = orbit(azimuth, polar, distance, fov_y, camera.width, camera.height, target)
     if not again.viewmat.allclose(camera.viewmat, atol=SAME):
         return None
-    return {"target": [0.0] * 3, "azimuth": azimuth, "polar": polar, "distance": distance, "fov_y": fov_y}
+    return {"target": target, "azimuth": azimuth, "polar": polar, "distance": distance, "fov_y": fov_y}

@@ -15,7 +15,6 @@ from torch import Tensor
 
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import TexgsError
-from texgs.core.lens import Lens
 from texgs.edit.clicks import Clicks, places_of
 from texgs.edit.lift import Lifted, lift, view_mask
 from texgs.edit.new_segment import clicked_model
@@ -29,8 +28,7 @@ from texgs.scene.session import state_of
 from texgs.viewer.messages import Clicked, Mask, Segment
 from texgs.volume.cameras import icosphere_of
 
-LENS = Lens().square(512)  # of the views that vote, as `texgs segment` has them
-VIEWS = 42
+VIEWS, SIZE = 42, 512  # that vote, as `texgs segment` has them, and pixels of their sides
 COLOR = (170, 0, 255, 150)  # over what is masked
 CHOICES = ("mobile_sam", "grabcut")  # the first whose weights are here
 
@@ -53,7 +51,8 @@ class Segmenter:
     def lift(self, scene: Scene, asked: Segment) -> Lifted:
         """Return the surfels that masks of many views agree on, which have the scene's light."""
         model = self._model(scene, split(scene, asked.part)[0])
-        cameras = [camera.to(self._device) for camera in icosphere_of(VIEWS, LENS)]
+        lens = scene.framed().lens().square(SIZE)
+        cameras = [camera.to(self._device) for camera in icosphere_of(VIEWS, lens)]
         clicks, masks, title = self._clicks(asked), self._mask_model(), f"segment {asked.part}"
         return lift(model, clicks, cameras, masks, light=scene.light, title=title)
 

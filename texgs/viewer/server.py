@@ -19,7 +19,7 @@ from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer import messages
 from texgs.viewer.beside import Beside
-from texgs.viewer.description import bounds_of, describe
+from texgs.viewer.description import describe
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import guard
@@ -43,7 +43,7 @@ class Server:
     def __init__(self, opened: Opened, device: torch.device | str = "cpu") -> None:
         session = Session(opened.scene, device)
         self._title, self._composed = opened.title, session.composition
-        self._bounds = bounds_of(self._composed)
+        self._framed = opened.scene.framed(self._composed)
         kind = kind_of(next(iter(opened.scene.models.values())).file)
         self._choices = {"styles": list(PICTURES), "words": list(WORDS), "exports": exports_of(kind)}
         self.edits = SharedEdits(session, opened)
@@ -218,7 +218,7 @@ class Server:
 
     def _describe(self, scene: Scene) -> dict[str, Any]:
         """Return a scene of the same models as pages need it."""
-        return describe(self._title, scene, self._composed, self._bounds)
+        return describe(self._title, scene, self._composed, self._framed)
 
     async def _say_goodbye(self, app: web.Application) -> None:
         """Close all connections."""

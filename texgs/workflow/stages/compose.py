@@ -10,7 +10,7 @@ from texgs.config.views import Shading
 from texgs.report.results import SceneResult
 from texgs.workflow.inputs import MODEL, has_scene, models_and_volume
 from texgs.workflow.stage import Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import Distance, FitLabel, OfVolume, basic_tfs_of
+from texgs.workflow.stages.settings import FitLabel, OfVolume, basic_tfs_of
 
 if TYPE_CHECKING:
     from texgs.scene.twin import SceneVolume
@@ -26,7 +26,7 @@ class Settings(OfVolume):
     step: float = read("views.step")
     opacity_unit: float = read("views.opacity_unit")
     image: int = read("dataset.image")
-    lens: Distance
+    fov_y: float = read("views.fov_y")  # degrees
     fit: FitLabel
 
 
@@ -41,14 +41,18 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.scene.frame import frame
     from texgs.scene.scene import Scene, SceneModel
     from texgs.scene.scene_file import write_scene
+    from texgs.volume.framing import frame_of
+    from texgs.volume.nrrd_file import open_grid
 
     models = {
         name.removeprefix(MODEL): SceneModel(path) for name, path in inputs.items() if name.startswith(MODEL)
     }
-    scene = Scene(models, volume=volume_of(settings, inputs["volume"]) if "volume" in inputs else None)
+    volume = volume_of(settings, inputs["volume"]) if "volume" in inputs else None
+    framed = frame_of(open_grid(volume.file), volume.tfs.values()) if volume else None
+    scene = Scene(models, volume=volume, frame=framed)
     write_scene(output / "scene.yaml", scene)
     composition = scene.open(torch_device(settings.fit.device))
-    camera = orbit(AZIMUTH, POLAR, *settings.lens.lens.square(settings.image))
+    camera = orbit(AZIMUTH, POLAR, *scene.framed(composition).lens(settings.fov_y).square(settings.image))
     picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
     write_frames(output / "scene.png", [picture])
     return Outcome(SceneResult(len(scene.models), len(composition)))

@@ -14,7 +14,7 @@ from texgs.fields.kinds import kinds
 from texgs.report.results import EditResult
 from texgs.workflow.edits import VIEWS, edit_keys, edited_scene, looks_of
 from texgs.workflow.stage import Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import Distance, FitLabel, OfDataset
+from texgs.workflow.stages.settings import FitLabel, OfDataset
 
 if TYPE_CHECKING:
     from texgs.edit.task import Task
@@ -38,7 +38,7 @@ class Settings(OfDataset):
     edit: Edit = read(edit_keys)
     fit: EditedFit
     reduce: int = read("fit.reduce")
-    lens: Distance
+    fov_y: float = read("views.fov_y")  # degrees
     weights: dict[str, str | None]
     followed: dict[str, str] = read(looks_of)  # by model, where not as the edit says
 
@@ -55,6 +55,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     method, title = method_of(settings.edit), f"{settings.dataset}: edit"
     device, before = torch_device(settings.fit.device), read_scene(inputs["scene"])
+    lens = before.framed().lens(settings.fov_y)
     task = Task(
         method.of(settings.edit),
         settings.edit,
@@ -63,7 +64,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         output,
         device,
         settings.reduce,
-        settings.lens.lens,
+        lens,
         title,
         settings.followed,
     )
@@ -74,7 +75,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     pictures = dict(edited.pictures)
     if method.is_look:
         kind = kinds()[settings.fit.field]
-        write_before_and_after(before, edited.scene, kind, settings.lens.lens, output, device, title)
+        write_before_and_after(before, edited.scene, kind, lens, output, device, title)
         pictures["edit.png"] = SHOWN
     if edited.losses:
         write_convergence(output / "convergence.png", edited.losses)

@@ -157,8 +157,11 @@ class GalleryRenderer:
 
     def __init__(self, settings: OfScene, inputs: Mapping[str, Path], size: int) -> None:
         from texgs.core.check import torch_device
+        from texgs.scene.scene_file import read_scene
 
-        self._device, self._lens = torch_device(settings.fit.device), settings.views.lens
+        first = next(path for name, path in inputs.items() if name != "volume")
+        self._lens = read_scene(first).framed().lens(settings.views.fov_y)  # of all pictures alike
+        self._device = torch_device(settings.fit.device)
         self._inputs, self._size = inputs, size
         self._open: tuple[str, Session] | None = None
         self._twin: Twin | None = None  # of the scene that is open
@@ -212,7 +215,8 @@ class GalleryRenderer:
 
         size = cell.pixels or round(self._size / (cell.box[2] if cell.box else 1))
         azimuth, polar = cell.view
-        return orbit(azimuth, polar, self._lens.radius, cell.fov_y or self._lens.fov_y, size, size)
+        lens = self._lens.square(size)
+        return orbit(azimuth, polar, *lens._replace(fov_y=cell.fov_y or lens.fov_y))
 
     def _cut(self, image: np.ndarray, cell: GalleryCell) -> np.ndarray:
         """Return the part of a view that is shown, as large as a picture, each pixel that of its place."""

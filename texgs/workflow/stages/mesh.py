@@ -15,7 +15,7 @@ from texgs.report.results import MeshResult
 from texgs.workflow.inputs import has_volume, last_phase, model_of, prepared_volume, without
 from texgs.workflow.locate import basic_tf
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import Distance, OfTF, Recipe, basic_tfs_of
+from texgs.workflow.stages.settings import OfTF, Recipe, basic_tfs_of
 
 if TYPE_CHECKING:
     from texgs.core.camera import Camera
@@ -36,7 +36,7 @@ class Settings(OfTF):
     tf_values: str = read("dataset.tf_values")
     points: BasicTF = read(basic_tf)
     mesh: MeshKeys = read(lambda config: without(config.mesh, "tfs"))
-    lens: Distance
+    fov_y: float = read("views.fov_y")  # degrees
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -49,6 +49,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.metrics.surface import compare, sample, seen
     from texgs.report.mesh_figure import write_mesh_figure
     from texgs.scene.mesh import fuse, write_mesh
+    from texgs.volume.framing import smallest_ball
     from texgs.volume.images import smaller
     from texgs.volume.view_set import read_views
 
@@ -66,7 +67,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     visible = seen(whole, small, 2 * keys.voxel)
     errors = compare(points, whole[visible], keys.tolerance)
     title = f"{settings.dataset}/{settings.tf}, recipe {settings.fit.name}: {len(mesh.triangles):,} triangles"
-    write_mesh_figure(output / "mesh.png", mesh, reference, whole[visible], settings.lens.lens, title)
+    lens = smallest_ball(reference.vertices).lens(settings.fov_y)
+    write_mesh_figure(output / "mesh.png", mesh, reference, whole[visible], lens, title)
     result = MeshResult(
         **{name: getattr(errors, name) for name in ERRORS},
         vertices=len(mesh.vertices),

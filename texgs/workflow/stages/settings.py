@@ -14,7 +14,6 @@ from texgs.config.dataset import BasicTF
 from texgs.config.views import ViewKeys
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
-from texgs.core.lens import Lens
 from texgs.workflow.inputs import is_changed, shown_tfs, sweep_of_fit, view_settings
 from texgs.workflow.stage import read
 from texgs.workflow.sweep import fit_variant
@@ -57,19 +56,6 @@ class Recipe(FitLabel):
     """The same, with what all stages of a fit read."""
 
     reduce: int = read("fit.reduce")
-
-
-@dataclass(kw_only=True)
-class Distance:
-    """Where cameras of pictures of a scene stand: as far as those of the views."""
-
-    radius: float = read("views.radius")  # world units
-    fov_y: float = read("views.fov_y")  # degrees
-
-    @property
-    def lens(self) -> Lens:
-        """Of these cameras, but for the size of images."""
-        return Lens(self.radius, self.fov_y)
 
 
 @dataclass(kw_only=True)

@@ -21,7 +21,7 @@ from texgs.report.results import ViewsResult
 from texgs.workflow.inputs import has_volume, prepared_volume, view_settings
 from texgs.workflow.locate import basic_tf
 from texgs.workflow.result import TIMES
-from texgs.workflow.stage import Outcome, Rule, Stage, read
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import OfTF, basic_tfs_of
 
 if TYPE_CHECKING:
@@ -36,12 +36,18 @@ if TYPE_CHECKING:
 TURNTABLE = 320  # pixels of its longer side
 
 
+def framed_tfs(config: Config) -> dict[str, BasicTF]:
+    """Return the basic TFs that views are framed by; none where their distance is given."""
+    return dict(config.dataset.basic_tfs) if config.views.radius is None else {}
+
+
 @dataclass(kw_only=True)
 class Settings(OfTF):
     """What the stage reads of the configuration."""
 
     tf_values: str = read("dataset.tf_values")
     points: BasicTF = read(basic_tf)
+    framed: dict[str, BasicTF] = read(framed_tfs)  # what all views show together
     views: ViewKeys = read(view_settings)
     vtk_frames: int = read("metric.vtk_frames")
 
@@ -55,6 +61,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     It reads `volume`, the volume.nrrd; volume.json is beside it.
     """
     from texgs.volume.caster import Caster
+    from texgs.volume.framing import frame_of
     from texgs.volume.nrrd_file import open_grid
     from texgs.volume.render import Times, render_views
     from texgs.volume.view_set import write_transforms
@@ -65,7 +72,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     appearance = appearance_of(views)
     renderer = renderer_for(views.renderer, grid, appearance)
     times, coverages = Times(output / TIMES), []
-    shots = views_of(views, output)
+    framed = basic_tfs_of(inputs["volume"], settings.framed, settings.tf_values).values()
+    lens = views.lens(frame_of(grid, framed) if framed else None)
+    shots = views_of(views, lens, output)
     for split, shot in shots.items():
         render_views(renderer, tf, shot, f"{title}: {split} views", times)
         coverages += [float((view.load()[..., 3] > 0).float().mean()) for view in shot]
@@ -73,7 +82,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             raise ArgumentError(
                 f"basic TF {title}: expected to see something, but all views are empty; raise its opacity"
             )
-    turntable(renderer, tf, views, output, title)
+    turntable(renderer, tf, views.turntable, lens, output, title)
     if views.geometry:
         caster = renderer if isinstance(renderer, Caster) else Caster(grid, appearance)
         write_geometry(caster, tf, shots["test"], output / "geometry", title)
@@ -133,7 +142,7 @@ def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
     return orbit_path(path.count, path.polar, *lens)
 
 
-def views_of(views: ViewKeys, output: Path) -> dict[Split, list[View]]:
+def views_of(views: ViewKeys, lens: Lens, output: Path) -> dict[Split, list[View]]:
     """Return cameras, lights and files of the training and the test views, by split; no split is empty."""
     from texgs.volume.view_set import View
 
@@ -148,7 +157,7 @@ def views_of(views: ViewKeys, output: Path) -> dict[Split, list[View]]:
         splits["relit"] = CameraPath("spiral", count=views.relit), [LightKeys("random")]
     shots = {}
     for place, (split, (path, lights)) in enumerate(splits.items()):
-        placed = cameras(path, views.lens)
+        placed = cameras(path, lens)
         files = [output / split / f"r_{index:04}.png" for index in range(len(placed))]
         lit = lights_of(lights, len(placed), views.seed, place)
         shots[split] = [View(*each) for each in zip(placed, files, lit, strict=True)]
@@ -168,9 +177,9 @@ def lights_of(lights: Sequence[LightKeys], count: int, *seed: int) -> list[Light
 
 
 def turntable(
-    renderer: VolumeRenderer, tf: TransferFunction, views: ViewKeys, output: Path, title: str
+    renderer: VolumeRenderer, tf: TransferFunction, count: int, lens: Lens, output: Path, title: str
 ) -> None:
-    """Write turntable.png, an animation of one turn under a headlight."""
+    """Write turntable.png, an animation of one turn under a headlight of so many frames."""
     from PIL.Image import fromarray
 
     from texgs.core.light import Light
@@ -179,9 +188,9 @@ def turntable(
     from texgs.volume.render import render_views
     from texgs.volume.view_set import View
 
-    scale = min(1.0, TURNTABLE / max(views.width, views.height))
-    small = [max(1, round(scale * size)) for size in (views.width, views.height)]
-    around = orbit_path(views.turntable, 15.0, views.radius, views.fov_y, *small)
+    scale = min(1.0, TURNTABLE / max(lens.width, lens.height))
+    width, height = (max(1, round(scale * size)) for size in (lens.width, lens.height))
+    around = orbit_path(count, 15.0, *lens._replace(width=width, height=height))
     shot = [
         View(camera, output / "turntable" / f"r_{index:04}.png", Light("headlight"))
         for index, camera in enumerate(around)

@@ -1,0 +1,42 @@
+"""The ball around the primitives of models: what cameras look at where the data are not known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import radians, sin
+
+import numpy as np
+import torch
+
+from texgs.core.lens import ORIGIN, Frame, Lens
+from texgs.fields.field import Composed, Field
+from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
+
+STRAYS = 0.01  # part of the primitives, far from all others, that bounds leave out
+REACH = 2.0  # standard deviations of a primitive that are visible
+SMALLEST = 1e-3  # radius, world units
+
+
+def bounds_of(models: Sequence[Field]) -> Frame:
+    """Return a ball that holds nearly all primitives of models.
+
+    Fields without means have the bounds that the paper's cameras see: volumes are centred and scaled alike.
+    """
+    whole = [model.parameters for model in models if isinstance(model, Surfels | Gaussians) and len(model)]
+    if not whole:
+        paper = Lens()
+        return Frame(list(ORIGIN), paper.radius * sin(radians(paper.fov_y / 2)))
+    places = torch.cat([p["means"] for p in whole]).double().cpu().numpy()
+    reach = torch.cat([p["scales"].exp().amax(dim=1) for p in whole]).double().cpu().numpy()
+    center = np.quantile(places, [STRAYS, 1 - STRAYS], axis=0).mean(axis=0)
+    ends = np.linalg.norm(places - center, axis=1) + REACH * reach
+    return Frame(center.tolist(), max(float(np.quantile(ends, 1 - STRAYS)), SMALLEST))
+
+
+def models_of(composed: Composed) -> list[Field]:
+    """Return the models of an open scene, as far as they have means."""
+    if isinstance(composed, Composition):
+        return [part.model for part in composed.parts]
+    return [composed.whole] if isinstance(composed, JoinedGaussians) else []
