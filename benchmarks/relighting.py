@@ -43,7 +43,8 @@ def main(output: str, *scenes: str) -> None:
 def relit(source: Path) -> dict[str, dict[str, float]]:
     """Return means over the cameras of what is measured of a scene, by light."""
     scene = read_scene(source)
-    composed, twin, lens = scene.open(), Twin(scene), Lens().square(SIZE)
+    composed, twin = scene.open(), Twin(scene)
+    lens = scene.frame.lens(width=SIZE, height=SIZE) if scene.frame else Lens().square(SIZE)
     places = [(light.azimuth, light.polar) for light in random_lights(VIEWS, SEED, 0)]
     lights = {
         "headlight": [HEADLIGHT] * VIEWS,
