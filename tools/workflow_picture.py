@@ -164,7 +164,7 @@ def rendered(scene_file: Path, mode: Any = "shaded", only: str = "") -> np.ndarr
     if only:
         scene = replace(scene, models={only: scene.models[only]})
     camera = orbit(30, 20, *scene.framed().lens().square(SIZE))
-    return frame(scene.open(), camera, scene.light, scene.edits, mode=mode)
+    return frame(scene.open(), camera, scene, mode)
 
 
 def contact_sheet(folder: Path) -> np.ndarray:

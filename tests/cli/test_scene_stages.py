@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from texgs.core.camera import orbit
 from texgs.core.image import read_rgba, to_pillow
 from texgs.metrics.quality import compare
 from texgs.report.check import checked
+from texgs.scene.cut_view import beside
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import Twin
 from texgs.volume.view_set import read_views
@@ -21,7 +23,12 @@ from texgs.volume.view_set import read_views
 @pytest.fixture(scope="module")
 def results(at, scene_of_two):
     """The scene, edited by numbers and timed."""
-    at(scene_of_two.parent, ["pse", *ORBITAL], ["timing", *ORBITAL])
+    at(
+        scene_of_two.parent,
+        ["pse", *ORBITAL],
+        ["timing", *ORBITAL],
+        ["cuts", *ORBITAL, "metric.cut_planes=3"],
+    )
     return scene_of_two / "orbital" / "scene" / "demo"
 
 
@@ -47,7 +54,7 @@ def test_a_view_beside_its_volume(results, tmp_path, monkeypatch, capsys):
     path, size = results / "compose" / "scene.yaml", ["--width", "48", "--radius", "2.5", "--azimuth", "10"]
     assert main(["render", str(path), "--compare", "--gain", "8", *size, "--output", "c.png"]) == 0
     scene = read_scene(path)
-    told = compare(*Twin(scene).beside(orbit(10, 20, 2.5, 30, 48, 48), scene, scene.open()))
+    told = compare(*beside(scene.open(), orbit(10, 20, 2.5, 30, 48, 48), scene, Twin(scene)))
     assert f"PSNR {told['psnr']:.2f} dB, SSIM {told['ssim']:.4f}, object: {told['object_psnr']:.2f} dB" in (
         capsys.readouterr().out
     )
@@ -131,3 +138,25 @@ def test_the_report_needs_no_other_file_and_takes_titles_as_text(tmp_path, monke
     text = (tmp_path / "results" / "report.html").read_text()
     assert all(told in text for told in ("31.25", "a &lt;b&gt; edit", "not measured"))
     assert "http" not in text.replace("http-equiv", "")
+
+
+def test_cuts_are_compared_with_the_cut_volume(results):
+    metrics = numbers(results / "cuts")
+    ways = {each["way"]: each for each in metrics["ways"]}
+    assert list(ways) == ["uncut", "dropped", "clipped", "slab", "volume"]
+    assert all(each["ms"] > 0 for each in ways.values())
+    assert ways["slab"]["whole"] > ways["clipped"]["whole"] - 0.5
+    assert ways["volume"]["whole"] is None, "it is what the others are compared with"
+    assert (results / "cuts" / "cuts.png").stat().st_size > 5000
+
+
+def test_a_film_moves_the_last_plane(results, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    path, size = results / "compose" / "scene.yaml", ["--width", "48", "--path", "cut", "--frames", "3"]
+    assert main(["render", str(path), *size]) == 2
+    assert "--path cut: expected a scene that a plane cuts, got none" in capsys.readouterr().err
+    assert main(["edit", str(path), "cut=x,0", "--output", "cut.yaml"]) == 0
+    assert main(["render", "cut.yaml", *size, "--output", "frames"]) == 0
+    first, middle, last = (np.asarray(Image.open(each)) for each in sorted(Path("frames").iterdir()))
+    assert (last == 255).all(), "all is cut away"
+    assert first.std() > middle.std() > 0

@@ -18,6 +18,7 @@ from texgs.core.lens import Lens
 from texgs.fields.surfels.model_file import write_model
 from texgs.metrics.quality import compare
 from texgs.report.check import LIT, check, checked, floor_of, shots
+from texgs.scene.cut_view import beside
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 from texgs.scene.twin import Twin
@@ -69,7 +70,7 @@ def test_views_lights_and_edits_are_drawn_from_a_seed(scene):
 def test_a_check_tells_what_its_views_have(scene, tmp_path):
     twin, composition = Twin(scene), scene.open()
     result = check(scene, composition, twin, LENS, 19, 7, tmp_path / "worst.json")
-    views = [compare(*twin.beside(*x[1:], composition)) for x in shots(scene, LENS, 19, 7)]
+    views = [compare(*beside(composition, *x[1:], twin)) for x in shots(scene, LENS, 19, 7)]
     psnr = [each["psnr"] for each in views]
     assert result.psnr["mean"] == pytest.approx(np.mean(psnr))
     assert result.psnr["worst"] == result.psnr["floor"] == min(psnr)

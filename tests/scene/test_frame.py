@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -9,6 +11,7 @@ from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import raw_material
 from texgs.scene.frame import frame
+from texgs.scene.scene import Scene, SceneModel
 
 
 @pytest.fixture(scope="module")
@@ -16,8 +19,12 @@ def scene():
     return Composition([ball(1, n=1500)])
 
 
-def shot(scene, mode, **options):
-    return frame(scene, CAMERA, SIDE, [PartEdit()], mode, **options)
+AS_FITTED = PartEdit()
+
+
+def shot(composed, mode, edit=AS_FITTED, background=(1.0, 1.0, 1.0)):
+    scene = Scene({"ball": SceneModel(Path(), edit)}, SIDE, background)
+    return frame(composed, CAMERA, scene, mode)
 
 
 def test_colour_is_what_is_rendered(scene):
@@ -64,7 +71,7 @@ def test_factors_are_grey_over_black():
 
 def test_nothing_to_see_is_the_background(scene):
     for mode in ("shaded", "normal", "depth"):
-        pixels = frame(scene, CAMERA, SIDE, [PartEdit(visible=False)], mode, (1.0, 0.0, 0.0))
+        pixels = shot(scene, mode, PartEdit(visible=False), (1.0, 0.0, 0.0))
         assert (pixels == [255, 0, 0]).all()
 
 

@@ -216,12 +216,17 @@ def test_words_cut_a_scene(session):
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("cut=w,0.1", "cut=w,0.1: expected AXIS,POSITION with x, -x, .*, or NX,NY,NZ,OFFSET, in world units"),
+        (
+            "cut=w,0.1",
+            "cut=w,0.1: expected AXIS,POSITION with x, -x, .*, or NX,NY,NZ,OFFSET, in world units or",
+        ),
         ("cut=x,up", "cut=x,up: expected AXIS,POSITION"),
+        ("cut=x,nan", "cut=x,nan: expected AXIS,POSITION"),
+        ("cut=x,5v", "cut=x,5v: expected world units, got samples: this scene names no volume"),
         ("cut=1,2,3", "cut=1,2,3: expected AXIS,POSITION"),
         ("cut=0,0,0,1", "normal: expected three numbers that are not all 0"),
-        ("cut.2=x,0", "expected cut, cut.box, cut.faces or cut.1, got cut.2"),
-        ("cut.box=1,2,3", "expected X0,Y0,Z0,X1,Y1,Z1, in world units, got 1,2,3"),
+        ("cut.2=x,0", "expected cut, cut.box or cut.faces or cut.1, got cut.2"),
+        ("cut.box=1,2,3", "expected X0,Y0,Z0,X1,Y1,Z1, in world units or along an axis as in 64v, got 1,2,3"),
         ("cut.faces=dark", "faces: expected one of shaded, unlit, got dark"),
     ],
 )

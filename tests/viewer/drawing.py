@@ -3,15 +3,18 @@
 import json
 import zlib
 from base64 import b64decode
+from pathlib import Path
 
 import numpy as np
 import torch
 from safetensors.numpy import load
 
+from texgs.core.cuts import NO_CUTS
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.scene.frame import frame
+from texgs.scene.scene import Scene, SceneModel
 from texgs.viewer.standalone import joined_modules
 
 START = """
@@ -79,6 +82,7 @@ def composed_of(packed):
     return Composition(models, masks)
 
 
-def rendered(packed, camera, light, edits, background, mode="shaded"):
+def rendered(packed, camera, light, edits, background, mode="shaded", cuts=NO_CUTS):
     """What the rasterizer makes of the numbers in a packed text [H, W, 3], uint8."""
-    return frame(composed_of(packed), camera, light, edits, mode, background)
+    models = {str(number): SceneModel(Path(), edit) for number, edit in enumerate(edits)}
+    return frame(composed_of(packed), camera, Scene(models, light, background, cuts), mode)

@@ -65,7 +65,7 @@ def rendered(scene_file, page):
     box, output = page.locator("#picture").bounding_box(), scene_file.parent / "render.png"
     size = ["--width", str(round(box["width"])), "--height", str(round(box["height"]))]
     camera = ["--azimuth", str(PLACE["azimuth"]), "--polar", str(PLACE["polar"])]
-    lens = ["--radius", str(PLACE["distance"]), "--fov", str(PLACE["fov_y"])]
+    lens = ["--radius", str(PLACE["distance"]), "--fov", str(PLACE["fov_y"]), "--target", "0", "0", "0"]
     assert main(["render", str(scene_file), "--output", str(output), *size, *camera, *lens]) == 0
     return output.read_bytes()
 

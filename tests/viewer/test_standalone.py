@@ -15,12 +15,13 @@ from tests.fields.surfels.test_composition import ball
 from tests.viewer.drawing import rendered
 from texgs.cli.main import main
 from texgs.core.camera import orbit
+from texgs.core.cuts import NO_CUTS
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.scene_file import write_scene
+from texgs.scene.scene_file import read_scene, write_scene
 from texgs.viewer import standalone
 from texgs.viewer.messages import Edit
 from texgs.viewer.standalone import web_file
@@ -89,7 +90,7 @@ def surfels(file):
     return re.search(r'id="surfels">([^<]*)<', file.read_text())[1]
 
 
-def expected(file, size, light=HEADLIGHT, edits=None, turned=(0.0, 0.0)):
+def expected(file, size, light=HEADLIGHT, edits=None, turned=(0.0, 0.0), cuts=NO_CUTS):
     """What the rasterizer makes of it, from where the page begins and then turned by so many degrees."""
     view = described(file)["views"][0]
     width, height = size
@@ -97,7 +98,7 @@ def expected(file, size, light=HEADLIGHT, edits=None, turned=(0.0, 0.0)):
     angles = view["azimuth"] + turned[0], view["polar"] + turned[1]
     camera = orbit(*angles, distance, Lens().fov_y, width, height, target=view["target"])
     edits = [PartEdit(opacity=0.8), PartEdit()] if edits is None else edits
-    return rendered(surfels(file), camera, light, edits, (0.9, 0.9, 1.0))
+    return rendered(surfels(file), camera, light, edits, (0.9, 0.9, 1.0), cuts=cuts)
 
 
 def differ(page, *rest, **edited):
@@ -147,7 +148,7 @@ def test_it_opens_as_a_file_and_shows_what_the_rasterizer_renders(page, file):
 
 
 def test_edits_and_lights_show_and_can_be_undone(page, file):
-    first, other = page.locator("fieldset.part").all()
+    first, other = page.locator("#models fieldset.part").all()
     assert HOSTILE in first.locator("legend").text_content()
     first.get_by_label(f"Palette of {HOSTILE}", exact=True).fill("#ff2040")
     first.get_by_label(f"Opacity of {HOSTILE}", exact=True).fill("0.5")
@@ -178,6 +179,18 @@ def test_edits_and_lights_show_and_can_be_undone(page, file):
     settle(page)
     assert page.locator("#words").is_hidden()
     assert differ(page, file) <= LEVELS
+
+
+def test_a_plane_cuts_the_page_and_words_make_the_same_cut(page, file, scene, folder):
+    page.get_by_role("button", name="Add a plane").click()
+    page.get_by_role("checkbox", name="Arrows in the picture").uncheck()
+    words = shlex.split(page.locator("#words textarea").input_value())
+    assert main(["edit", str(scene), *words, "--output", str(folder / "cut.yaml")]) == 0
+    cuts = read_scene(folder / "cut.yaml").cuts
+    assert len(cuts.planes) == 1
+    settle(page)
+    assert differ(page, file, cuts=cuts) <= LEVELS
+    assert differ(page, file) > 50, "it takes something away"
 
 
 def test_pointers_and_keys_turn_the_camera(page, file):

@@ -1,6 +1,7 @@
 """The renderer of the HTML export against the rasterizer, for the same numbers, in a real browser."""
 
 import copy
+from dataclasses import asdict
 from typing import get_args
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from tests.fields.surfels.test_composition import ball
 from tests.viewer.drawing import drawn, open_renderer, rendered
 from texgs.core.camera import orbit
+from texgs.core.cuts import Box, Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
@@ -88,6 +90,18 @@ def difference(page, packed, description, scene, camera, mode="shaded", *, light
     pixels = drawn(page, camera, shown, mode)
     assert expected.std() > 5  # something is seen
     return int(np.abs(expected.astype(int) - pixels.astype(int)).max())
+
+
+@pytest.mark.parametrize("mode", ["shaded", "depth", "discs"])
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_cuts_are_those_of_the_rasterizer(page, packed, description, scene, camera, mode):
+    cuts = Cuts([Plane([1.0, 2.0, 0.5], 0.2), Plane([0.0, 0.0, -1.0], 0.3)], Box([-0.6] * 3, [0.5] * 3))
+    shown = copy.deepcopy(description) | {"cuts": asdict(cuts)}
+    expected = rendered(packed, camera, HEADLIGHT, scene.edits, scene.background, mode, cuts)
+    whole = rendered(packed, camera, HEADLIGHT, scene.edits, scene.background, mode)
+    assert not np.array_equal(expected, whole)
+    error = np.abs(expected.astype(int) - drawn(page, camera, shown, mode).astype(int)).max(axis=2)
+    assert (error > LEVELS).mean() < 0.002, "fragments on a plane but for rounding"
 
 
 @pytest.mark.parametrize("light", [HEADLIGHT, SIDE, Light("directional", -60, -50)])

@@ -1,4 +1,4 @@
-"""Render a scene to PNG, GIF or MP4: one view, the paper's test path, an orbit, or a light that moves."""
+"""Render a scene to PNG, GIF or MP4: one view, the test path, an orbit, a light or a cut that moves."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     import numpy as np
 
     from texgs.core.camera import Camera
-    from texgs.core.lens import Lens
-    from texgs.core.light import Light
+    from texgs.core.cuts import Cuts
+    from texgs.core.lens import Frame
     from texgs.fields.field import Composed
     from texgs.scene.scene import Scene
 
 MOST_FRAMES = 100_000  # an hour of film
 MOST_GAIN = 16.0
-PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61}  # frames by default
+PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61, "cut": 61}  # frames by default
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,8 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "diffuse, specular or shininess"
     )
     option(parser, "--mode", "shaded", modes)
-    option(parser, "--path", "view", "camera or light path", choices=PATHS)
-    parser.add_argument("--frames", type=int, help="default test 181, orbit 72, light 61")
+    option(parser, "--path", "view", "of the camera, the light, or the last plane that cuts", choices=PATHS)
+    parser.add_argument("--frames", type=int, help="default test 181, orbit 72, light and cut 61")
     add_lens(parser, "pixels", "pixels; default the width")
     azimuth = "azimuth of the camera, not for path test, on an orbit of the first frame, degrees"
     option(parser, "--azimuth", 30.0, azimuth)
@@ -63,6 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.report.check import checked
     from texgs.scene.frame import Mode, frame
     from texgs.scene.scene_file import read_scene
+    from texgs.scene.twin import twin_of_cuts
 
     if arguments.mode not in get_args(Mode):
         raise ArgumentError(f"--mode: expected one of {', '.join(get_args(Mode))}, got {arguments.mode}")
@@ -71,15 +72,13 @@ def run(arguments: argparse.Namespace) -> int:
     suffix = ".png" if count == 1 else ".mp4"
     output = arguments.output or Path(f"{arguments.scene.stem}{suffix}")
     composition = scene.open(torch_device(arguments.device))
-    shots = shots_of(arguments, scene.light, count, lens_of(arguments, scene.framed(composition)))
+    shots = shots_of(arguments, scene, count, scene.framed(composition))
     shots = progress(shots, count, title=str(output), unit="frame")
     if arguments.compare:
         frames = compared(arguments, scene, composition, shots)
     else:
-        frames = (
-            frame(composition, camera, light, scene.edits, arguments.mode, scene.background)
-            for camera, light in shots
-        )
+        twin = twin_of_cuts(scene, composition.device)
+        frames = (frame(composition, camera, shown, arguments.mode, twin) for camera, shown in shots)
     words = checked(arguments.scene, scene)
     if arguments.caption:
         if not words:
@@ -93,11 +92,12 @@ def compared(
     arguments: argparse.Namespace,
     scene: Scene,
     composition: Composed,
-    shots: Iterable[tuple[Camera, Light]],
+    shots: Iterable[tuple[Camera, Scene]],
 ) -> Iterator[np.ndarray]:
     """Yield frames of a scene beside its volume; their mean scores are printed at the end."""
     from texgs.metrics.quality import mean
     from texgs.report.beside_volume import beside_volume, in_words
+    from texgs.scene.cut_view import beside
     from texgs.scene.twin import Twin
 
     if arguments.mode != "shaded":
@@ -107,9 +107,8 @@ def compared(
     with located(arguments.scene):
         twin = Twin(scene, composition.device)
     measured = defaultdict[str, list[float]](list)
-    for camera, light in shots:
-        seen = twin.beside(camera, replace(scene, light=light), composition)
-        picture, scores = beside_volume(*seen, arguments.gain)
+    for camera, shown in shots:
+        picture, scores = beside_volume(*beside(composition, camera, shown, twin), arguments.gain)
         for name, value in scores.items():
             measured[name].append(value)
         yield picture
@@ -126,21 +125,35 @@ def frames_of(arguments: argparse.Namespace) -> int:
 
 
 def shots_of(
-    arguments: argparse.Namespace, light: Light, count: int, lens: Lens
-) -> Iterator[tuple[Camera, Light]]:
-    """Return camera and light of each frame, of so many."""
+    arguments: argparse.Namespace, scene: Scene, count: int, framed: Frame
+) -> Iterator[tuple[Camera, Scene]]:
+    """Return camera and scene of each frame, of so many."""
     from texgs.core.camera import orbit
     from texgs.core.light import Light
     from texgs.volume.cameras import orbit_path, spiral
 
+    lens = lens_of(arguments, framed)
     if arguments.path == "test":
-        return ((camera, light) for camera in spiral(count, *lens))
+        return ((camera, scene) for camera in spiral(count, *lens))
     if arguments.path == "orbit":
         turn = orbit_path(count, arguments.polar, *lens, start=arguments.azimuth)
-        return ((camera, light) for camera in turn)
+        return ((camera, scene) for camera in turn)
     camera = orbit(arguments.azimuth, arguments.polar, *lens)
     if arguments.path == "view":
-        return ((camera, light) for _ in range(count))
+        return ((camera, scene) for _ in range(count))
+    shares = (i / max(count - 1, 1) for i in range(count))
+    if arguments.path == "cut":
+        return ((camera, replace(scene, cuts=moved(scene.cuts, framed, share))) for share in shares)
     # as the paper shows relighting: from below the object to above it, on the camera's side
-    angles = (-90 + 180 * i / max(count - 1, 1) for i in range(count))
-    return ((camera, Light("directional", arguments.azimuth, polar)) for polar in angles)
+    lights = (Light("directional", arguments.azimuth, -90 + 180 * share) for share in shares)
+    return ((camera, replace(scene, light=light)) for light in lights)
+
+
+def moved(cuts: Cuts, framed: Frame, share: float) -> Cuts:
+    """Return cuts whose last plane is on its way through what is framed, against its normal."""
+    if not cuts.planes:
+        raise ArgumentError("--path cut: expected a scene that a plane cuts, got none; texgs edit cut=x,0")
+    last = cuts.planes[-1]
+    middle = sum(along * place for along, place in zip(last.normal, framed.target, strict=True))
+    offset = middle + (1 - 2 * share) * framed.radius
+    return replace(cuts, planes=[*cuts.planes[:-1], replace(last, offset=offset)])

@@ -90,6 +90,7 @@ class Composed(Protocol):
         look: Look = "shaded",
         background: Tensor | None = None,
         outputs: Collection[str] = (),
+        depth_range: Tensor | None = None,
     ) -> Render:
         """Render one view of all visible fields.
 
@@ -101,6 +102,7 @@ class Composed(Protocol):
                 of one standard deviation, with light and without texels; or one factor of the material.
             background: [3]; white by default, for a factor black.
             outputs: besides colour and alpha.
+            depth_range: [2, H, W] camera z from which on, and before which, a pixel shows something.
 
         Raises:
             ArgumentError: if there are not as many edits as parts, or fields of this kind cannot show one.

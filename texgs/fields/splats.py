@@ -65,8 +65,12 @@ class Splats:
         background: Tensor | None = None,
         outputs: Collection[str] = (),
         opacity: Tensor | None = None,
+        depth_range: Tensor | None = None,
     ) -> Render:
-        """Render one view, see `Field`; `opacity` [N] are factors on opacities, which stay at most 1."""
+        """Render one view, see `Field` and `Composed`.
+
+        `opacity` [N] are factors on opacities, which stay at most 1.
+        """
         place = geometry(self.parameters)
         if opacity is not None:
             place = (*place[:3], (place[3] * opacity).clamp_max(1))
@@ -76,6 +80,7 @@ class Splats:
             *place,
             *(camera.viewmat, camera.K, camera.width, camera.height),
             background=torch.ones_like(camera.viewmat[0, :3]) if background is None else background,
+            depth_range=depth_range,
             outputs=outputs,
             options=self.shading.options,
             **{kind: colored},  # type: ignore[arg-type]

@@ -72,6 +72,7 @@ class UnlitScene(ABC, Generic[F]):
         look: Look = "shaded",
         background: Tensor | None = None,
         outputs: Collection[str] = (),
+        depth_range: Tensor | None = None,
     ) -> Render:
         """Render one view, see `Composed`; light changes nothing, and the look is "shaded"."""
         if look != "shaded":
@@ -79,11 +80,16 @@ class UnlitScene(ABC, Generic[F]):
                 f"look: expected shaded, got {look}; {self.kind} have light in their colours, fit surfels"
             )
         factors = opacity_factors(edits, len(self.counts), self.kind)
-        return self._blend(factors, camera, background, outputs)
+        return self._blend(factors, camera, background, outputs, depth_range)
 
     @abstractmethod
     def _blend(
-        self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
+        self,
+        factors: Sequence[float],
+        camera: Camera,
+        background: Tensor | None,
+        outputs: Collection[str],
+        depth_range: Tensor | None,
     ) -> Render:
         """Render all fields, each with a factor on its opacity."""
 

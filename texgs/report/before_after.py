@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from texgs.core.progress import progress
 from texgs.fields.kinds import Kind
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
+from texgs.scene.twin import twin_of_cuts
 from texgs.volume.cameras import orbit_path
 
 POLAR = 20.0  # degrees
@@ -50,9 +52,9 @@ def pictures(
     scene: Scene, cameras: Sequence[Camera], lights: Sequence[Light], device: torch.device
 ) -> Iterator[np.ndarray]:
     """Yield frames [H, W, 3], uint8, as they are rendered."""
-    composition = scene.open(device)
+    composition, twin = scene.open(device), twin_of_cuts(scene, device)
     for camera, light in zip(cameras, lights, strict=True):
-        yield frame(composition, camera, light, scene.edits, background=scene.background)
+        yield frame(composition, camera, replace(scene, light=light), twin=twin)
 
 
 def write_convergence(path: str | Path, curves: Mapping[str, Mapping[str, Sequence[float]]]) -> Path:

@@ -24,6 +24,7 @@ from texgs.fields.files import kind_of
 from texgs.metrics.quality import BEST, compare
 from texgs.report.beside_volume import pictures
 from texgs.report.results import CheckResult
+from texgs.scene.cut_view import beside
 from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin
 
@@ -43,11 +44,11 @@ def check(
     floor_of([BEST] * count)  # refuses too few before the work
     drawn, psnr, on_object = list(shots(scene, lens, count, seed)), list[float](), list[float]()
     for _, camera, changed in progress(drawn, title="check", unit="view"):
-        scores = compare(*twin.beside(camera, changed, composition))
+        scores = compare(*beside(composition, camera, changed, twin))
         psnr.append(scores["psnr"])
         on_object.append(scores.get("object_psnr", BEST))
     worst = sorted(range(count), key=psnr.__getitem__)[:WORST]
-    shown = [pictures(*twin.beside(*drawn[index][1:], composition)) for index in worst]
+    shown = [pictures(*beside(composition, *drawn[index][1:], twin)) for index in worst]
     titles = [f"{drawn[index][0]}\n{psnr[index]:.1f} dB" for index in worst]
     write_grid(file.with_suffix(".png"), {name: [each[name] for each in shown] for name in shown[0]}, titles)
     whole, part = (floor(10 * floor_of(values)) / 10 for values in (psnr, on_object))

@@ -195,6 +195,30 @@ class TimingResult(Result):
 
 
 @dataclass(frozen=True)
+class CutWay:
+    """One way to show a cut scene: PSNR in dB against the cut volume, means and tenths over planes."""
+
+    way: str
+    ms: float  # median of a frame
+    whole: float | None = None  # all pixels
+    whole_tenth: float | None = None
+    face: float | None = None  # where the cut opens the volume
+    face_tenth: float | None = None
+    band: float | None = None  # along the edge of the face
+    band_tenth: float | None = None
+
+
+@dataclass(frozen=True)
+class CutResult(Result, section="cuts"):
+    """A scene that is cut by planes that face the camera."""
+
+    planes: int
+    width: int  # of frames, pixels
+    height: int
+    ways: list[CutWay] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
 class PageResult(Result, section="scenes"):
     """A scene as a page for a browser."""
 

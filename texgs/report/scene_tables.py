@@ -21,7 +21,7 @@ from texgs.report.published import (
     paper,
     volumes,
 )
-from texgs.report.results import PseResult, SheetResult, TimingResult, ViewsResult, VolumeResult
+from texgs.report.results import CutResult, PseResult, SheetResult, TimingResult, ViewsResult, VolumeResult
 from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Column, Table
 
 DATASETS = (
@@ -50,6 +50,19 @@ RENDERING = (
     Column("volume, mean ms", 1),
     Column("volume / scene", 1),
     Column("volume, ms (paper)", 1, UNPUBLISHED),
+)
+WAYS = {
+    "uncut": "not cut",
+    "dropped": "surfels dropped by their centres",
+    "clipped": "surfels clipped, no face",
+    "slab": "slab of the volume over clipped surfels",
+    "volume": "the volume, cut",
+}
+CUTS = (
+    *map(Column, (DATA, LABEL, "way")),
+    *(Column(title, 2) for title in ("whole", "face", "face, tenth", "band", "band, tenth")),
+    Column("ms", 2),
+    Column("ms / not cut", 2),
 )
 CLOSENESS = {
     "psnr": Column("PSNR", 2),
@@ -160,3 +173,15 @@ def edits(records: Iterable[Record[Any]]) -> Table:
         for step in (*record.result.pse, *record.result.relight)
     ]
     return Table("", EDITS, rows)
+
+
+def cuts(records: Iterable[Record[Any]]) -> Table:
+    """Return ways to show a cut against the cut volume, with their times beside a frame that is not cut."""
+    rows = []
+    for record in in_order(of(CutResult, records)):
+        uncut = next(each.ms for each in record.result.ways if each.way == "uncut")
+        for each in record.result.ways if not record.is_swept else ():
+            tenths = {"face, tenth": each.face_tenth, "band, tenth": each.band_tenth}
+            own = {"whole": each.whole, "face": each.face, "band": each.band, "ms": each.ms, **tenths}
+            rows.append(cells(record, way=WAYS[each.way], **own, **{"ms / not cut": each.ms / uncut}))
+    return Table("", CUTS, rows)

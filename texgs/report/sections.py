@@ -26,6 +26,7 @@ SECTIONS = {
     "fitting": "Fitting",
     "pse": "Editing of colour, opacity and light",
     "relight": "Relighting",
+    "cuts": "Cuts",
     "image": "Image-driven editing",
     "text": "Text-driven editing",
     "parts": "Partial editing and other edits",

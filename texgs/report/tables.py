@@ -11,7 +11,7 @@ from texgs.report.edit_tables import image_driven, looks, text_driven, text_driv
 from texgs.report.fit_tables import ablation, fits, fitting, meshes, model_size
 from texgs.report.metrics_files import LeftOut, Record, note
 from texgs.report.results import EditResult, FitResult
-from texgs.report.scene_tables import datasets, edits, rendering
+from texgs.report.scene_tables import cuts, datasets, edits, rendering
 from texgs.report.sweep_table import sweep
 from texgs.report.table import Table
 
@@ -144,6 +144,16 @@ OURS = (
         "pse",
         ("pse",),
         edits,
+    ),
+    TableSpec(
+        "cuts",
+        "Cuts",
+        "Planes that face the camera, each against the volume with the same cut: PSNR of all pixels, of the "
+        "face that the cut opens, and of a band along its edge, means, and what a tenth of the planes misses."
+        "  `slab` is how scenes with looks are shown; scenes without show the volume itself.",
+        "cuts",
+        ("cuts",),
+        cuts,
     ),
     TableSpec("looks", "All measures of all edits", "", "more", EDITED, looks),
     TableSpec("meshes", "Meshes", "", "fitting", ("mesh",), meshes),

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from texgs.core.cuts import AXES, NO_CUTS, Box, Plane, along
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.names import is_number
 from texgs.core.plain_yaml import parse_yaml
+from texgs.scene.cut_words import changed_cuts
 from texgs.scene.parts import entry_of, key_path
-from texgs.scene.scene_file import SEGMENT_KEYS, cuts_of, known, plain_cuts
+from texgs.scene.scene_file import SEGMENT_KEYS, known
 from texgs.scene.session import SCENE_KEYS, Session
 
 
@@ -36,7 +34,7 @@ def _apply(session: Session, word: str) -> None:
     if part in session.scene.models or (dot and "/" in part and "/" not in key):
         _change_part(session, part, key, text)
     elif name == "cut" or part == "cut":
-        _change_cuts(session, key if dot else "", text)
+        session.set_cuts(changed_cuts(session.scene, key if dot else "", text))
     elif "/" in name:
         session.add_segment(name, _file(text)) if text else session.remove_segment(name)
     elif dot:
@@ -66,49 +64,6 @@ def _change_scene(session: Session, key: str, text: str) -> None:
     if key == "light" and isinstance(value, list) and len(value) == 2:
         value = dict(zip(("azimuth", "polar"), value, strict=True))
     session.set_of_scene(key, value)
-
-
-def _change_cuts(session: Session, key: str, text: str) -> None:
-    """Add a plane, or change one by its number, the box or the faces; an empty text takes it back."""
-    cuts = session.scene.cuts
-    planes, numbers = list(cuts.planes), [str(n) for n in range(1, len(cuts.planes) + 1)]
-    if key == "box":
-        cuts = replace(cuts, box=_box(text) if text else None)
-    elif key == "faces":
-        cuts = cuts_of(plain_cuts(cuts) | {"faces": text or NO_CUTS.faces})
-    elif key in numbers:
-        planes[int(key) - 1 : int(key)] = [_plane(text)] if text else []
-    elif key:
-        raise ArgumentError(
-            f"expected cut, cut.box, cut.faces or cut.{' or '.join(numbers) or 'NUMBER'}, got cut.{key}"
-        )
-    else:
-        planes = [*planes, _plane(text)] if text else []
-    session.set_cuts(replace(cuts, planes=planes))
-
-
-def _plane(text: str) -> Plane:
-    """Return the plane of AXIS,POSITION, which takes away what is beyond, or of NX,NY,NZ,OFFSET."""
-    axis, _, position = text.rpartition(",")
-    sign = -1.0 if axis.startswith("-") else 1.0
-    if len(name := axis.lstrip("+-")) == 1 and name in AXES and is_number(place := _plain(position)):
-        return Plane(along(AXES.index(name), sign), sign * place)
-    numbers = _numbers(text, 4, "AXIS,POSITION with x, -x, y, -y, z or -z, or NX,NY,NZ,OFFSET")
-    return Plane(numbers[:3], numbers[3])
-
-
-def _box(text: str) -> Box:
-    """Return the box of its low and its high corner."""
-    numbers = _numbers(text, 6, "X0,Y0,Z0,X1,Y1,Z1")
-    return Box(numbers[:3], numbers[3:])
-
-
-def _numbers(text: str, count: int, form: str) -> list[float]:
-    """Return so many numbers with commas between them."""
-    values = _plain(text)
-    if not isinstance(values, list) or len(values) != count or not all(map(is_number, values)):
-        raise ArgumentError(f"expected {form}, in world units, got {text}")
-    return [float(value) for value in values]
 
 
 def _file(text: str) -> Path:

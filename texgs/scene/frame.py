@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal, get_args
 
 import numpy as np
@@ -11,12 +10,13 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.light import Light
 from texgs.core.memory import require_memory
 from texgs.fields.field import Composed, Look
-from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
 from texgs.raster.shading import MATERIAL
+from texgs.scene.cut_view import cut_view
+from texgs.scene.scene import Scene
+from texgs.scene.twin import Twin
 
 Mode = Literal[
     "shaded",
@@ -36,12 +36,7 @@ BYTES = 64  # of memory for a pixel: the images of the rasterizer, over a backgr
 
 
 def frame(
-    scene: Composed,
-    camera: Camera,
-    light: Light,
-    edits: Sequence[PartEdit],
-    mode: Mode = "shaded",
-    background: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    composed: Composed, camera: Camera, scene: Scene, mode: Mode = "shaded", twin: Twin | None = None
 ) -> np.ndarray:
     """Return one frame [H, W, 3], uint8.
 
@@ -51,12 +46,11 @@ def frame(
     100.
 
     Args:
-        scene: to show.
-        camera: from where; moved to the scene's device.
-        light: shines on it.
-        edits: one for each model, and behind it those of its segments.
+        composed: the scene's models.
+        camera: from where; moved to their device.
+        scene: whose edits, light, background and cuts count.
         mode: what to show.
-        background: behind it.
+        twin: of the scene's volume, which faces of cuts show; see `twin_of_cuts`.
 
     Raises:
         ArgumentError: if the mode is unknown.
@@ -66,13 +60,12 @@ def frame(
         raise ArgumentError(f"mode: expected one of {', '.join(get_args(Mode))}, got {mode}")
     what = f"a frame of {camera.width} x {camera.height} pixels"
     require_memory(BYTES * camera.width * camera.height, what, "choose a smaller one")
-    camera = camera.to(scene.device)
-    behind = torch.tensor(background, device=scene.device)
+    camera = camera.to(composed.device)
+    behind = torch.tensor(scene.background, device=composed.device)
     look: Look = mode if mode in get_args(Look) else "shaded"  # type: ignore[assignment]
     outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())
-    render = scene.render(
-        camera, light, edits, look=look, background=None if mode in MATERIAL else behind, outputs=outputs
-    )
+    background = None if mode in MATERIAL else behind
+    render = cut_view(composed, camera, scene, twin, look=look, background=background, outputs=outputs)
     shown = pixels(render, mode, behind)
     return shown.clamp(0, 1).mul_(255).round_().to(torch.uint8).cpu().numpy()
 

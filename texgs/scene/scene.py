@@ -117,6 +117,13 @@ class Scene:
         """
         return self.frame or bounds_of(models_of(self.open() if composed is None else composed))
 
+    @property
+    def has_looks(self) -> bool:
+        """Return whether a part has other texels than it was fitted with, which its volume has not."""
+        textures = [model.texture for model in self.models.values()]
+        textures += [segment.texture for model in self.models.values() for segment in model.segments.values()]
+        return any(textures)
+
     def open(self, device: torch.device | str = "cpu", *, is_lean: bool = False) -> Composed:
         """Read and join the models.
 

@@ -22,6 +22,7 @@ from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.raster import Render
+from texgs.scene.cut_view import beside
 from texgs.scene.frame import Mode, frame
 from texgs.scene.parts import entry_of, key_path, replaced, require_new, split, with_textures
 from texgs.scene.scene import WHITE, Scene, SceneSegment
@@ -227,7 +228,8 @@ class Session:
         """
         scene = self.scene if scene is None else scene
         composition = self._composition_of(scene)
-        return frame(composition, camera, scene.light, scene.edits, mode, scene.background)
+        twin = self.twin_of(scene) if scene.cuts and scene.volume is not None else None
+        return frame(composition, camera, scene, mode, twin)
 
     def twin_of(self, scene: Scene) -> Twin:
         """Return the twin of a scene of the history; kept as long as the volume is the same."""
@@ -237,8 +239,8 @@ class Session:
         return self._twin[1]
 
     def beside(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
-        """Return a view of a scene of the history, and the same view of its volume; see `Twin.beside`."""
-        return self.twin_of(scene).beside(camera, scene, self._composition_of(scene))
+        """Return a view of a scene of the history, and the same view of its volume; see `beside`."""
+        return beside(self._composition_of(scene), camera, scene, self.twin_of(scene))
 
     def save(self, path: str | Path) -> Path:
         """Write the scene file in one step; files in it are relative to its folder."""

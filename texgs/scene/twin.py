@@ -12,10 +12,11 @@ import numpy as np
 import torch
 
 from texgs.core.camera import Camera
+from texgs.core.cuts import Cuts
 from texgs.core.errors import ArgumentError, located
-from texgs.fields.field import Composed
 from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
+from texgs.raster.cuts import CutRange, cut_range
 from texgs.raster.shading import MATERIAL
 from texgs.volume.caster import Caster
 from texgs.volume.nrrd_file import open_grid
@@ -56,7 +57,18 @@ class Twin:
         with located("volume"):
             self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
 
-    def render(self, camera: Camera, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> Render:
+    @property
+    def opacity_unit(self) -> float:
+        """The length over which a basic TF's opacity counts, world units."""
+        return self._volume.appearance.opacity_unit
+
+    def render(
+        self,
+        camera: Camera,
+        scene: Scene,
+        palettes: Sequence[tuple[float, ...]],
+        cut: CutRange | None = None,
+    ) -> Render:
         """Return what a scene's visible models show of the volume, on the device that casts.
 
         A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
@@ -67,6 +79,7 @@ class Twin:
             camera: from where.
             scene: of this volume, with any edits.
             palettes: of its models, as fitted: `Composed.palettes`.
+            cut: what of the rays counts; by default what the scene's cuts leave, with their faces.
         """
         shown, factors = {}, list[dict[str, float]]()
         look = self._volume.appearance
@@ -79,15 +92,14 @@ class Twin:
             alpha = torch.zeros(camera.height, camera.width, device=self._device)
             return Render(behind.expand(*alpha.shape, 3), alpha)
         caster = self._caster = self._caster.with_appearance(replace(look, **factors[0]))
-        rgba = caster.cast(combine(shown), camera, scene.light).rgba
+        cut = range_of(scene.cuts, camera) if cut is None and scene.cuts else cut
+        rgba = caster.cast(
+            *(combine(shown), camera, scene.light),
+            depth_range=None if cut is None else cut.depth_range,
+            faces=cut,
+            lit_faces=scene.cuts.faces == "shaded",
+        ).rgba
         return Render(rgba[..., :3] + (1 - rgba[..., 3:]) * behind, rgba[..., 3])
-
-    def beside(self, camera: Camera, scene: Scene, composition: Composed) -> tuple[Render, Render]:
-        """Return a view of a scene, with its models as they are composed, and the same view of its volume."""
-        behind = torch.tensor(scene.background, device=composition.device)
-        here = camera.to(composition.device)
-        image = composition.render(here, scene.light, scene.edits, background=behind)
-        return image, self.render(camera, scene, composition.palettes)
 
     def _tf(self, name: str) -> TransferFunction:
         """Return the basic TF of a model."""
@@ -95,6 +107,18 @@ class Twin:
             known = ", ".join(self._volume.tfs) or "none"
             raise ArgumentError(f"volume.tfs: expected the basic TF of model {name}, got {known}; add it")
         return self._volume.tfs[name]
+
+
+def twin_of_cuts(scene: Scene, device: torch.device | str = "cpu") -> Twin | None:
+    """Return the twin that faces of a scene's cuts show; None without cuts, or without a volume."""
+    return Twin(scene, device) if scene.cuts and scene.volume is not None else None
+
+
+def range_of(cuts: Cuts, camera: Camera) -> CutRange:
+    """Return what cuts leave of the rays of a camera, and the faces at which rays begin."""
+    planes = [[*plane.normal, plane.offset] for plane in cuts.half_spaces]
+    normals, offsets = camera.viewmat.new_tensor(planes).split([3, 1], dim=1)
+    return cut_range(normals, offsets[:, 0], camera)
 
 
 def edited(tf: TransferFunction, edit: PartEdit, palette: Sequence[float]) -> TransferFunction:

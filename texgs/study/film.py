@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import ceil, sqrt
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from texgs.core.movie import write_frames
 from texgs.core.progress import progress
 from texgs.scene.frame import frame
 from texgs.scene.scene import WHITE, Scene
+from texgs.scene.twin import twin_of_cuts
 from texgs.volume.cameras import orbit_path
 
 POLAR = 20.0  # degrees above the horizon
@@ -33,15 +35,15 @@ def write_film(
 
     They show all that is framed of the first scene.
     """
-    compositions = [scene.open(device) for scene in scenes]
+    shown = [
+        (scene.open(device), replace(scene, background=WHITE), twin_of_cuts(scene, device))
+        for scene in scenes
+    ]
 
     def draw(camera: Camera) -> list[np.ndarray]:
-        return [
-            frame(composition, camera, scene.light, scene.edits, background=WHITE)
-            for composition, scene in zip(compositions, scenes, strict=True)
-        ]
+        return [frame(composition, camera, scene, twin=twin) for composition, scene, twin in shown]
 
-    lens = scenes[0].framed(compositions[0]).lens().square(size)
+    lens = scenes[0].framed(shown[0][0]).lens().square(size)
     turn = progress(orbit_path(frames, POLAR, *lens), title=title, unit="frame")
     return write_frames(path, (mosaic(draw(camera)) for camera in turn), crf=CRF)
 

@@ -25,6 +25,7 @@ from texgs.fields.surfels.compact import STEP, compact_tensors
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
+from texgs.scene.twin import twin_of_cuts
 from texgs.viewer.description import describe
 
 LARGEST = 256 * 2**20  # bytes; browsers hold a text of twice as many
@@ -96,7 +97,7 @@ def poster(scene: Scene, composed: Composition, view: dict[str, Any], fov_y: flo
     """Return a view of a scene, see `describe`, as JPEG."""
     place = (view["azimuth"], view["polar"], view["distance"], fov_y, POSTER, POSTER)
     camera = orbit(*place, target=view["target"])
-    shown = frame(composed, camera, scene.light, scene.edits, background=scene.background)
+    shown = frame(composed, camera, scene, twin=twin_of_cuts(scene, composed.device))
     file = BytesIO()
     Image.fromarray(shown).save(file, "JPEG", quality=QUALITY, optimize=True)
     return file.getvalue()

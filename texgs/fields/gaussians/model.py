@@ -87,10 +87,20 @@ class JoinedGaussians(UnlitScene[Gaussians]):
         self.whole = joined(models)
 
     def _blend(
-        self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
+        self,
+        factors: Sequence[float],
+        camera: Camera,
+        background: Tensor | None,
+        outputs: Collection[str],
+        depth_range: Tensor | None,
     ) -> Render:
-        opacity = self._per_gaussian(factors)
-        return self.whole.render(camera, background=background, outputs=outputs, opacity=opacity)
+        return self.whole.render(
+            camera,
+            background=background,
+            outputs=outputs,
+            opacity=self._per_gaussian(factors),
+            depth_range=depth_range,
+        )
 
     def edited(self, edits: Sequence[PartEdit]) -> Gaussians:
         """Return what is visible as one model, opacities as edited."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, ClassVar
 
 import torch
@@ -98,11 +99,22 @@ class PaletteScene(UnlitScene[PaletteField]):
     """Fields that are drawn together, see `UnlitScene`; opacity is a factor on densities, which add up."""
 
     def _blend(
-        self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
+        self,
+        factors: Sequence[float],
+        camera: Camera,
+        background: Tensor | None,
+        outputs: Collection[str],
+        depth_range: Tensor | None,
     ) -> Render:
         require_depth(outputs, "palette fields")
         rays = camera_rays(camera).flatten(0, 1)
-        blended = torch.cat([self._sums(factors, part) for part in rays.split(RAYS)])  # [N, 5]
+        near, far = (
+            torch.tensor([[0.0], [inf]]).expand(2, len(rays))
+            if depth_range is None
+            else depth_range.flatten(1)
+        )
+        parts = zip(*(x.split(RAYS) for x in (rays, near, far)), strict=True)
+        blended = torch.cat([self._sums(factors, *part) for part in parts])  # [N, 5]
         color, alpha, depth = blended.split([3, 1, 1], dim=1)
         behind = torch.ones(3) if background is None else background
         color = (color + (1 - alpha) * behind).clamp(0, 1)
@@ -110,11 +122,12 @@ class PaletteScene(UnlitScene[PaletteField]):
         depth = (depth / alpha.clamp_min(1e-12)).reshape(size) if outputs else None
         return Render(color.reshape(*size, 3), alpha.reshape(size), depth=depth)
 
-    def _sums(self, factors: Sequence[float], rays: Tensor) -> Tensor:
-        """Return sums [N, 5] over rays [N, 6] of weight times colour, 1 and distance."""
+    def _sums(self, factors: Sequence[float], rays: Tensor, near: Tensor, far: Tensor) -> Tensor:
+        """Return sums [N, 5] over parts of rays [N, 6] of weight times colour, 1 and distance."""
         several = []
         for each, factor in zip(self.fields, factors, strict=True):
             points = points_on(rays, each.geometry, each.parameters)
+            points = points.take((points.distance >= near[points.ray]) & (points.distance < far[points.ray]))
             several.append(points._replace(depth=factor * points.depth))
         points, owner = merged(several)
         shows = shown(points, LEAST_WEIGHT)

@@ -143,6 +143,7 @@ class Composition:
         look: Look = "shaded",
         background: Tensor | None = None,
         outputs: Collection[str] = (),
+        depth_range: Tensor | None = None,
     ) -> Render:
         """Render one view, see `Composed`."""
         if look not in get_args(Look):
@@ -160,6 +161,7 @@ class Composition:
             *(camera.viewmat, camera.K, camera.width, camera.height),
             texture=Texture(base, gain, self.texels, self.sizes, self.offsets),
             background=background,
+            depth_range=depth_range,
             outputs=outputs,
             options=self.options,
         )

@@ -48,11 +48,18 @@ class Voxels(UnlitField):
         density, sh = unpack_rows(self.grid.rows)
         return {"density": density} if role == "geometry" else {"sh": sh}
 
-    def draw(self, camera: Camera, background: Tensor | None, outputs: Collection[str]) -> Render:
-        """Render the grid."""
+    def draw(
+        self,
+        camera: Camera,
+        background: Tensor | None,
+        outputs: Collection[str],
+        depth_range: Tensor | None = None,
+    ) -> Render:
+        """Render the grid, of each pixel what is in its depth range [2, H, W]."""
         require_depth(outputs, self.kind)
         red, green, blue = (1.0, 1.0, 1.0) if background is None else background.tolist()
-        view = render_view(self.grid, camera, replace(self.march, background=(red, green, blue)))
+        march = replace(self.march, background=(red, green, blue))
+        view = render_view(self.grid, camera, march, depth_range=depth_range)
         return Render(view.color, view.alpha, depth=view.depth if outputs else None)
 
     def sizes(self) -> dict[str, float]:
@@ -81,12 +88,17 @@ class VoxelScene(UnlitScene[Voxels]):
         self._merged: tuple[tuple[float, ...], Voxels] | None = None
 
     def _blend(
-        self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
+        self,
+        factors: Sequence[float],
+        camera: Camera,
+        background: Tensor | None,
+        outputs: Collection[str],
+        depth_range: Tensor | None,
     ) -> Render:
         key = tuple(factors)
         if self._merged is None or self._merged[0] != key:
             self._merged = (key, self._merge(key))
-        return self._merged[1].render(camera, background=background, outputs=outputs)
+        return self._merged[1].draw(camera, background, outputs, depth_range)
 
     def _merge(self, factors: tuple[float, ...]) -> Voxels:
         first, grids = self.fields[0], []

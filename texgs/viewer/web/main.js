@@ -2,7 +2,6 @@
 
 import { Compare } from "./compare.js";
 import { Connection } from "./connection.js";
-import { Cuts } from "./cuts.js";
 import { ask, save } from "./inputs.js";
 import { Job } from "./job.js";
 import { LookTool } from "./look.js";
@@ -39,7 +38,6 @@ class Page extends ScenePage {
       { models: get("models"), background: get("background"), steps: get("steps") },
       { segment: (model) => this.#segment(model), look: (part) => this.beginLook(part),
         rename: (part) => this.#rename(part), remove: (part) => this.state.remove(part) });
-    this.cuts = new Cuts(this);
     this.compare = new Compare(this);
     this.toolbar = new Toolbar(this, choices);
     get("transfer-section").hidden = !scene.transfer;
@@ -51,7 +49,6 @@ class Page extends ScenePage {
 
   draw(moving) {
     super.draw(moving);
-    this.cuts?.draw();
     this.compare?.show();
   }
 

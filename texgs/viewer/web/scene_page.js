@@ -2,6 +2,7 @@
 
 import { AXES, OrbitCamera } from "./camera.js";
 import { control } from "./controls.js";
+import { Cuts } from "./cuts.js";
 import { capital, element } from "./inputs.js";
 import { LightControl } from "./light.js";
 import { difference, edited } from "./state.js";
@@ -62,6 +63,7 @@ export class ScenePage {
     this.camera = new OrbitCamera(state.scene);
     this.light = new LightControl(get("light"), state, this.camera);
     this.#isLocked = isLocked;
+    this.cuts = new Cuts(this);
     this.#inputs();
     control(this.canvas, () => this.camera, () => this.moved(), (name) => this.goTo(name), isLocked);
     state.addEventListener("change", () => this.draw(true));
@@ -87,6 +89,7 @@ export class ScenePage {
   /** Draw a frame; while something moves, a fast one now and a whole one at rest. */
   draw(moving = false) {
     this.renderer.draw(this.camera, this.state.scene, { moving, ...this.#shown });
+    this.cuts.draw();
     clearTimeout(this.#resting);
     this.#resting = setTimeout(() => this.#rest(moving), REST);
   }

@@ -6,6 +6,7 @@ import { LAYERS, WIDTH } from "./surfels.js";
 export const MODES = ["shaded", "unshaded", "normal", "depth", "alpha", "texture", "discs", "ambient", "diffuse",
   "specular", "shininess"];
 
+export const MOST_PLANES = 12; // six and a box
 const numbered = (names) => names.map((name, k) => `const int ${name.toUpperCase()} = ${k};`).join("\n");
 const layers = numbered(LAYERS);
 const looks = numbered(MODES).replaceAll("const int ", "const int LOOK_");
@@ -176,6 +177,9 @@ const float ALPHA_MAX = 0.99, ALPHA_MIN = 1.0 / 255.0;
 uniform isampler2D texels;
 uniform int look;
 uniform float low_pass, near;
+uniform vec2 focal, size;        // pixels
+uniform int n_planes;
+uniform vec4 planes[${MOST_PLANES}]; // normal and offset in the camera's axes: what is beyond is cut away
 
 flat in vec2 centre;
 flat in vec4 forms;
@@ -208,9 +212,12 @@ void main() {
   vec2 uv = vec2(dot(forms.xy, d), dot(forms.zw, d)) / w;
   float of_surfel = in_front ? dot(uv, uv) : 1e30, rho = min(of_surfel, low_pass * dot(d, d));
   float alpha = min(exp2(base.w - 0.5 * LOG2_E * rho), ALPHA_MAX);
+  float depth = of_surfel <= rho ? perspective.z / w : perspective.z;
+  vec3 place = depth * vec3((gl_FragCoord.xy - 0.5 * size) / focal, 1.0);
+  for (int k = 0; k < n_planes; k++) if (dot(planes[k].xyz, place) > planes[k].w) discard;
   if (alpha < ALPHA_MIN) discard;
   vec3 color = gain == 0.0 ? base.xyz : base.xyz + gain * texel(uv);
-  if (look == LOOK_DEPTH) color = vec3(of_surfel <= rho ? perspective.z / w : perspective.z);
+  if (look == LOOK_DEPTH) color = vec3(depth);
   fragment = vec4(alpha * color, alpha);
 }
 `;

@@ -22,7 +22,7 @@ class StandalonePage extends ScenePage {
 
   #tellWords() {
     const { original, scene } = this.state;
-    const words = difference(original, scene).map(wordOf).map(quoted);
+    const words = difference(original, scene).flatMap(wordsOf).map(quoted);
     get("words").hidden = !words.length;
     get("words").querySelector("textarea").value = words.join(" ");
   }
@@ -35,9 +35,14 @@ class StandalonePage extends ScenePage {
 }
 
 /** An edit as `texgs edit` takes it. */
-function wordOf({ part, key, value }) {
+function wordsOf({ part, key, value }) {
   const place = part ? `${part}.${key}` : key;
   if (key === "light") return `light=${value ? `${value.azimuth},${value.polar}` : "headlight"}`;
+  if (key === "cuts") {
+    const planes = value.planes.map(({ normal, offset }) => `cut=${[...normal, offset]}`);
+    const box = value.box ? [...value.box.low, ...value.box.high] : "";
+    return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`];
+  }
   return `${place}=${Array.isArray(value) ? toHex(value) : value ?? ""}`;
 }
 

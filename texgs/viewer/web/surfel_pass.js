@@ -1,5 +1,6 @@
 // Blends surfels in a given order into a picture of floats: all that is on the graphics card for it.
 
+import { dot } from "./camera.js";
 import { COLUMNS } from "./parts.js";
 import { makeProgram, makeTexture } from "./program.js";
 import { SURFEL_FRAGMENT, SURFEL_VERTEX } from "./shaders.js";
@@ -44,12 +45,12 @@ export class SurfelPass {
    * Blends far to near.
    *
    * @param {object} view viewmat [12], focal and size [2].
-   * @param {object} look `mode` (a number), and `light`, a direction [3] or null for a headlight.
+   * @param {object} look `mode` (a number), `light`, a direction [3] or null for a headlight, and `planes` that cut.
    * @param {Float32Array} table of parts.
    * @param {Uint32Array} order of the surfels.
    * @returns {object} the picture, a texture whose first row is on top: premultiplied colour and alpha.
    */
-  blend(view, { mode, light }, table, order) {
+  blend(view, { mode, light, planes }, table, order) {
     const gl = this._gl;
     const { program, uniforms } = this._shaders;
     this._resize(view.size);
@@ -63,6 +64,7 @@ export class SurfelPass {
     // The parts were bound last.
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, COLUMNS, table.length / (4 * COLUMNS), gl.RGBA, gl.FLOAT, table);
     setView(gl, uniforms, view);
+    setPlanes(gl, uniforms, view, planes);
     gl.uniform1i(uniforms.headlight, light ? 0 : 1);
     gl.uniform3fv(uniforms.light, light ?? [0, 0, 1]);
     gl.uniform1i(uniforms.look, mode);
@@ -125,6 +127,17 @@ export function bind(gl, unit, { texture, target }, uniform) {
   gl.activeTexture(gl.TEXTURE0 + unit);
   gl.bindTexture(target, texture);
   gl.uniform1i(uniform, unit);
+}
+
+/** Planes keep normal . x <= offset in the world; the camera has p = R x + t. */
+function setPlanes(gl, uniforms, { viewmat }, planes) {
+  const rows = [viewmat.slice(0, 4), viewmat.slice(4, 8), viewmat.slice(8, 12)];
+  const inCamera = planes.flatMap(({ normal, offset }) => {
+    const turned = rows.map((row) => dot(row, normal));
+    return [...turned, offset + dot(turned, rows.map((row) => row[3]))];
+  });
+  gl.uniform1i(uniforms.n_planes, planes.length);
+  if (planes.length) gl.uniform4fv(uniforms["planes[0]"], inCamera);
 }
 
 function setView(gl, uniforms, { viewmat, focal, size }) {

@@ -133,7 +133,8 @@ export class WebglRenderer {
     const view = viewOf(camera);
     const table = partTable(scene.models, this._optics.models);
     const light = scene.light && direction(scene.light.azimuth, scene.light.polar);
-    const picture = this._pass.blend(view, { mode: MODES.indexOf(mode), light }, table, this._sort(view, table));
+    const look = { mode: MODES.indexOf(mode), light, planes: halfSpaces(scene.cuts) };
+    const picture = this._pass.blend(view, look, table, this._sort(view, table));
     const range = mode === "depth" ? this._pass.depths() : [0, 0];
     const { program, uniforms } = this._present;
     gl.useProgram(program);
@@ -163,6 +164,13 @@ export class WebglRenderer {
     this._pass = new SurfelPass(this._gl, this._surfels, this._optics, rows);
     this._present = makeProgram(this._gl, PRESENT_VERTEX, PRESENT_FRAGMENT);
   }
+}
+
+/** All planes of cuts, with the sides of a box. */
+function halfSpaces({ planes, box }) {
+  const side = (axis, sign, corner) =>
+    ({ normal: [0, 1, 2].map((i) => i === axis ? sign : 0), offset: sign * corner[axis] });
+  return [...planes, ...(box ? [0, 1, 2].flatMap((i) => [side(i, 1, box.high), side(i, -1, box.low)]) : [])];
 }
 
 /** A camera as single-precision numbers: viewmat [12], focal length and size in pixels. */

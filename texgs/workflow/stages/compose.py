@@ -53,7 +53,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     write_scene(output / "scene.yaml", scene)
     composition = scene.open(torch_device(settings.fit.device))
     camera = orbit(AZIMUTH, POLAR, *scene.framed(composition).lens(settings.fov_y).square(settings.image))
-    picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
+    picture = frame(composition, camera, scene)
     write_frames(output / "scene.png", [picture])
     return Outcome(SceneResult(len(scene.models), len(composition)))
 

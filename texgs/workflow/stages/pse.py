@@ -123,15 +123,16 @@ def compared(
     """Return PSNR and SSIM against the volume over some views, and all pictures [H, W, 3] of the first."""
     from texgs.metrics.quality import compare
     from texgs.report.beside_volume import pictures
+    from texgs.scene.cut_view import beside
     from texgs.scene.frame import frame
 
     scores = defaultdict[str, list[float]](list)
     if twin is None:
-        picture = frame(composition, cameras[0], scene.light, scene.edits, background=scene.background)
+        picture = frame(composition, cameras[0], scene)
         return Comparison(title), {"scene": picture}
     shown: dict[str, np.ndarray] = {}
     for camera in cameras:
-        seen = twin.beside(camera, scene, composition)
+        seen = beside(composition, camera, scene, twin)
         shown = shown or pictures(*seen)
         for name, value in compare(*seen).items():
             scores[name].append(value)
