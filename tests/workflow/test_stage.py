@@ -35,7 +35,10 @@ def digest(stage, *overrides):
 def test_only_what_a_stage_reads_changes_its_digest():
     views = digest("views", "tf=TF01")
     assert digest("views", "tf=TF01", "tracking=none", "results=elsewhere", "data_folder=x") == views
-    assert digest("views", "tf=TF01", "dataset.basic_tfs.TF02.opacity=[[0.5,0],[0.6,1]]") == views
+    assert digest("views", "tf=TF01", "dataset.basic_tfs.TF02.color=[[0.5,1,0,0]]") == views
+    other = "dataset.basic_tfs.TF02.opacity=[[0.5,0],[0.6,1]]"
+    assert digest("views", "tf=TF01", other) != views, "views are framed by all that is visible"
+    assert digest("views", "tf=TF01", "views=paper", other) == digest("views", "tf=TF01", "views=paper")
     assert digest("views", "tf=TF01", "dataset.volume.size=64") == views
     assert digest("views", "tf=TF01", "views.step=0.3") != views
     assert digest("views", "tf=TF01", "dataset.basic_tfs.TF01.opacity=[[0.2,0],[0.3,1]]") != views

@@ -16,6 +16,7 @@ from texgs.config.views import CameraPath, LightKeys, ViewKeys
 from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.io import write_atomic
 from texgs.core.lens import Lens
+from texgs.core.names import is_number
 from texgs.core.progress import progress
 from texgs.report.results import ViewsResult
 from texgs.workflow.inputs import has_volume, prepared_volume, view_settings
@@ -37,8 +38,18 @@ TURNTABLE = 320  # pixels of its longer side
 
 
 def framed_tfs(config: Config) -> dict[str, BasicTF]:
-    """Return the basic TFs that views are framed by; none where their distance is given."""
-    return dict(config.dataset.basic_tfs) if config.views.radius is None else {}
+    """Return where basic TFs show something, which frames views; none where their distance is given."""
+    shown = config.dataset.basic_tfs if config.views.radius is None else {}
+    return {
+        name: BasicTF([shows(point) for point in tf.opacity], [[0.0, 1.0, 1.0, 1.0]])
+        for name, tf in shown.items()
+    }
+
+
+def shows(point: Any) -> Any:
+    """Return a point of an opacity as 0 or 1; one that is malformed, which is told later, as it is."""
+    is_point = isinstance(point, list) and len(point) == 2 and all(map(is_number, point))
+    return [point[0], float(point[1] > 0)] if is_point else point
 
 
 @dataclass(kw_only=True)
