@@ -137,6 +137,9 @@ def test_the_camera_moves_and_stands_in_the_link(chromium, scene_file):
         page.keyboard.press("Tab")
         page.locator("#picture").press("ArrowLeft")
         expect(page).to_have_url(re.compile(r"azimuth=5&"), timeout=WAIT)
+        expect(page.get_by_text("This view again")).to_contain_text(
+            "texgs render --target 0 0 0 --azimuth 5 "
+        )
         page.get_by_label("From").select_option("From +y")
         expect(page).to_have_url(re.compile(r"azimuth=-90&polar=90&"), timeout=WAIT)
         page.get_by_label("Show").select_option("Normals")

@@ -270,6 +270,17 @@ def test_pictures_are_saved_as_they_are_shown(page, file, tmp_path):
     assert np.abs(picture - expected(file, picture.shape[1::-1])).max() <= LEVELS
 
 
+def test_the_command_of_the_view_makes_it_again(page, scene, tmp_path):
+    for key in ("ArrowLeft", "ArrowUp", "+"):
+        page.locator("#picture").press(key)
+    settle(page)
+    program, verb, *options = page.get_by_text("This view again").inner_text().partition(": ")[2].split()
+    assert (program, verb) == ("texgs", "render")
+    assert main([verb, str(scene), "--output", str(tmp_path / "again.png"), *options]) == 0
+    again = np.asarray(Image.open(tmp_path / "again.png")).astype(int)
+    assert np.abs(again - shown(page))[4:-4, 4:-4].mean() < 1, "surfels of the page are rounded"
+
+
 def test_one_model_of_a_scene_keeps_its_edits(scene, tmp_path):
     assert main(["export", str(scene), "--to", str(tmp_path / "b.html"), "--model", HOSTILE]) == 0
     (model,) = described(tmp_path / "b.html")["models"]

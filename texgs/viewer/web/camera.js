@@ -97,6 +97,14 @@ export class OrbitCamera {
     return { target, azimuth, polar, distance, fov_y, width, height };
   }
 
+  /** As options of `texgs render`. */
+  options(width, height) {
+    const { target, azimuth, polar, distance, fov_y } = this;
+    const values = { azimuth, polar, radius: distance, fov: fov_y, width, height };
+    const words = Object.entries(values).map(([name, value]) => `--${name} ${round(value)}`);
+    return [`--target ${target.map(round).join(" ")}`, ...words].join(" ");
+  }
+
   /** As a part of a link. */
   toFragment() {
     const values = KEYS.map((key) => `${key}=${round(this[key])}`);

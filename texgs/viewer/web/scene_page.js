@@ -156,6 +156,7 @@ export class ScenePage {
 
   #rest(moving) {
     if (moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
+    get("options").textContent = `texgs render ${this.camera.options(...this.renderer.size())}`;
     try {
       history.replaceState(null, "", `#${this.#fragment}`);
     } catch {
