@@ -134,7 +134,7 @@ def test_models_of_a_comparison_are_those_of_the_last_phases_of_all_recipes():
     assert {name: path.as_posix() for name, path in STAGES["comparison"].inputs(compose(words)).items()} == {
         "quick": "results/engine/TF01/quick-s3/texture/model.safetensors",
         "gaussians_quick": "results/engine/TF01/gaussians_quick-s3/gaussians/model.safetensors",
-        "views": "results/engine/TF01/views/transforms_train.json",
+        "views": "results/engine/TF01/views-one-light/transforms_train.json",  # those of the fit named
     }
 
 
