@@ -116,3 +116,12 @@ def test_slabs_do_not_matter(monkeypatch):
 def test_nothing_visible():
     with pytest.raises(ArgumentError, match="expected some of the volume to be visible, got nothing"):
         frame_of(Grid(np.zeros((2, 2, 2), np.uint8)), [tf((1, 0), (2, 1))])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_points_on_a_sphere_have_its_ball(dtype):
+    directions = np.random.default_rng(0).normal(size=(20_000, 3))
+    points = 0.3 * directions / np.linalg.norm(directions, axis=1, keepdims=True) + (0.1, -0.2, 0.05)
+    frame = smallest_ball(points.astype(dtype))
+    assert frame.target == pytest.approx((0.1, -0.2, 0.05), abs=1e-3)
+    assert frame.radius == pytest.approx(0.3, abs=1e-4)

@@ -13,7 +13,7 @@ from texgs.volume.grid import Grid
 from texgs.volume.slabs import ArraySource, slab_bounds
 from texgs.volume.transfer import TransferFunction
 
-INSIDE = 1 + 1e-9  # times a squared radius: rounding
+INSIDE = 1 + 1e-7  # times a squared radius: rounding, of points that nearly lie in a plane too
 
 
 def frame_of(grid: Grid, tfs: Iterable[TransferFunction]) -> Frame:
@@ -75,6 +75,7 @@ def smallest_ball(points: np.ndarray) -> Frame:
     At most four points on its rim decide. As long as one is outside, the farthest comes in, and the ball is
     that of these few points: it grows with each (Welzl 1991 and Gaertner 1999 choose them one by one).
     """
+    points = points.astype(np.float64)
     rim = points[:1]
     center, square = rim[0], 0.0
     while True:
