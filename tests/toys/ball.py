@@ -40,7 +40,9 @@ class Ball:
     def palettes(self):
         return [(0.0, 0.0, 0.0)]
 
-    def render(self, camera, light=None, edits=None, *, look="shaded", background=None, outputs=()):
+    def render(
+        self, camera, light=None, edits=None, *, look="shaded", background=None, outputs=(), depth_range=None
+    ):
         import torch
 
         from texgs.raster import Render
@@ -56,6 +58,8 @@ class Ball:
         opacity = 1.0 if edits is None else edits[0].opacity * edits[0].visible
         alpha = (root > 0).float() * min(opacity, 1.0)
         depth = torch.where(root > 0, (-b - root.clamp_min(0).sqrt()) / a, 0.0)
+        if depth_range is not None:
+            alpha = alpha * ((depth >= depth_range[0]) & (depth < depth_range[1]))
         behind = torch.ones(3) if background is None else background
         color = alpha[..., None] * torch.tensor(self.color) + (1 - alpha[..., None]) * behind
         return Render(color, alpha, depth=depth, median=torch.where(alpha > 0.5, depth, 0.0))
