@@ -104,7 +104,8 @@ def test_every_result_is_there_and_recorded(project):
     of_surfels, of_ball, of_sweep = 5 + 3 + 4 + 3, 2 + 3 + 2, 3
     pages = 4  # of surfels as fitted, and of their three looks
     side_by_side = 2  # comparison and gallery
-    assert len(metrics(project)) == 4 + of_surfels + pages + of_ball + of_sweep + side_by_side
+    of_volume = 5  # the volume, its TFs, a sheet, and views under many lights and under one
+    assert len(metrics(project)) == of_volume + of_surfels + pages + of_ball + of_sweep + side_by_side
     for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "meshes", "sweep-tiny"):
         assert len((results / "tables" / f"{name}.csv").read_text().splitlines()) > 1
         assert f"fitted{{{name}.tex}}" in (results / "tables" / "tables.tex").read_text()
