@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
-from typing import ClassVar, Generic, TypeVar
+from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 import torch
 from torch import Tensor
@@ -17,6 +17,14 @@ from texgs.fields.part_edit import PartEdit, opacity_factors
 from texgs.raster import Render
 
 F = TypeVar("F", bound=Field)
+
+
+class Asked(NamedTuple):
+    """What is asked of a view, see `Composed.render`."""
+
+    background: Tensor | None
+    outputs: Collection[str]
+    depth_range: Tensor | None
 
 
 class UnlitField(ABC):
@@ -80,17 +88,10 @@ class UnlitScene(ABC, Generic[F]):
                 f"look: expected shaded, got {look}; {self.kind} have light in their colours, fit surfels"
             )
         factors = opacity_factors(edits, len(self.counts), self.kind)
-        return self._blend(factors, camera, background, outputs, depth_range)
+        return self._blend(factors, camera, Asked(background, outputs, depth_range))
 
     @abstractmethod
-    def _blend(
-        self,
-        factors: Sequence[float],
-        camera: Camera,
-        background: Tensor | None,
-        outputs: Collection[str],
-        depth_range: Tensor | None,
-    ) -> Render:
+    def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
         """Render all fields, each with a factor on its opacity."""
 
 

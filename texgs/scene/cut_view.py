@@ -58,17 +58,22 @@ def cut_view(
 
 def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Render:
     """Render a slab of the volume behind each face of a cut, over the models beyond it."""
-    near, far = cut.depth_range
-    thickness = SLAB * twin.opacity_unit / camera.rays().norm(dim=-1)  # as camera z
-    behind = torch.where(cut.face >= 0, torch.minimum(near + thickness, far), near)
-    before = cut._replace(depth_range=torch.stack([near, behind]))
+    before = slab_of(cut, camera, SLAB * twin.opacity_unit)
     slab = twin.render(camera, scene, composed.palettes, before)
     background = camera.viewmat.new_tensor(scene.background)
-    beyond = torch.stack([behind, far])
+    beyond = torch.stack([before.depth_range[1], cut.depth_range[1]])
     models = composed.render(camera, scene.light, scene.edits, background=background, depth_range=beyond)
     clear = 1 - slab.alpha[..., None]
     color = slab.color + clear * (models.color - background)
     return Render(color, slab.alpha + clear[..., 0] * models.alpha)
+
+
+def slab_of(cut: CutRange, camera: Camera, length: float) -> CutRange:
+    """Return what of a cut's rays lies within a length behind a face, world units; of other rays nothing."""
+    near, far = cut.depth_range
+    thickness = length / camera.rays().norm(dim=-1)  # as camera z
+    behind = torch.where(cut.face >= 0, torch.minimum(near + thickness, far), near)
+    return cut._replace(depth_range=torch.stack([near, behind]))
 
 
 def beside(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> tuple[Render, Render]:

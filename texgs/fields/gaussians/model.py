@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -17,7 +17,7 @@ from texgs.core.light import Light
 from texgs.fields.field import sizes_in_mib
 from texgs.fields.part_edit import MOST_OPAQUE, PartEdit, opacity_factors
 from texgs.fields.splats import Splats
-from texgs.fields.unlit import UnlitScene
+from texgs.fields.unlit import Asked, UnlitScene
 from texgs.raster import Options, Render
 from texgs.raster.shading import DEGREES, spherical_harmonics
 
@@ -86,21 +86,8 @@ class JoinedGaussians(UnlitScene[Gaussians]):
             raise ArgumentError("models: expected all antialiased or none, got both; fit them by one recipe")
         self.whole = joined(models)
 
-    def _blend(
-        self,
-        factors: Sequence[float],
-        camera: Camera,
-        background: Tensor | None,
-        outputs: Collection[str],
-        depth_range: Tensor | None,
-    ) -> Render:
-        return self.whole.render(
-            camera,
-            background=background,
-            outputs=outputs,
-            opacity=self._per_gaussian(factors),
-            depth_range=depth_range,
-        )
+    def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
+        return self.whole.render(camera, opacity=self._per_gaussian(factors), **asked._asdict())
 
     def edited(self, edits: Sequence[PartEdit]) -> Gaussians:
         """Return what is visible as one model, opacities as edited."""

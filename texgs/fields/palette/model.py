@@ -19,7 +19,7 @@ from texgs.core.errors import DeviceError
 from texgs.fields.field import Role, sizes_in_mib
 from texgs.fields.palette.networks import Parameters, free_color, light, palette_color
 from texgs.fields.palette.rendering import RAYS, Geometry, Points, merged, points_on, shown, view_harmonics
-from texgs.fields.unlit import UnlitField, UnlitScene, require_depth
+from texgs.fields.unlit import Asked, UnlitField, UnlitScene, require_depth
 from texgs.raster import Render
 from texgs.raster.voxels import camera_rays
 
@@ -98,14 +98,8 @@ class PaletteField(UnlitField):
 class PaletteScene(UnlitScene[PaletteField]):
     """Fields that are drawn together, see `UnlitScene`; opacity is a factor on densities, which add up."""
 
-    def _blend(
-        self,
-        factors: Sequence[float],
-        camera: Camera,
-        background: Tensor | None,
-        outputs: Collection[str],
-        depth_range: Tensor | None,
-    ) -> Render:
+    def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
+        background, outputs, depth_range = asked
         require_depth(outputs, "palette fields")
         rays = camera_rays(camera).flatten(0, 1)
         near, far = (

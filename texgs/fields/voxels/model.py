@@ -12,7 +12,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.fields.field import Role, sizes_in_mib
-from texgs.fields.unlit import UnlitField, UnlitScene, require_depth
+from texgs.fields.unlit import Asked, UnlitField, UnlitScene, require_depth
 from texgs.raster import Render
 from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, unpack_rows, voxel_grid
 from texgs.raster.voxels import March, render_view
@@ -87,18 +87,11 @@ class VoxelScene(UnlitScene[Voxels]):
         super().__init__(fields, segments)
         self._merged: tuple[tuple[float, ...], Voxels] | None = None
 
-    def _blend(
-        self,
-        factors: Sequence[float],
-        camera: Camera,
-        background: Tensor | None,
-        outputs: Collection[str],
-        depth_range: Tensor | None,
-    ) -> Render:
+    def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
         key = tuple(factors)
         if self._merged is None or self._merged[0] != key:
             self._merged = (key, self._merge(key))
-        return self._merged[1].draw(camera, background, outputs, depth_range)
+        return self._merged[1].draw(camera, *asked)
 
     def _merge(self, factors: tuple[float, ...]) -> Voxels:
         first, grids = self.fields[0], []

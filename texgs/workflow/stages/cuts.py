@@ -144,14 +144,11 @@ def places(composed: Composition, twin: Twin, camera: Camera, cut: Scene) -> dic
     import cv2
     import torch
 
+    from texgs.scene.cut_view import slab_of
     from texgs.scene.twin import range_of
 
-    cut_range = range_of(cut.cuts, camera)
-    near, far = cut_range.depth_range
-    behind = torch.minimum(near + UNITS * twin.opacity_unit / camera.rays().norm(dim=-1), far)
-    slab = cut_range._replace(depth_range=torch.stack([near, behind]))
-    alpha = twin.render(camera, cut, composed.palettes, slab).alpha
-    face = (cut_range.face >= 0) & (alpha >= OPAQUE)
+    slab = slab_of(range_of(cut.cuts, camera), camera, UNITS * twin.opacity_unit)
+    face = twin.render(camera, cut, composed.palettes, slab).alpha >= OPAQUE
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * BAND + 1, 2 * BAND + 1))
     edge = cv2.morphologyEx(face.cpu().numpy().astype("uint8"), cv2.MORPH_GRADIENT, disc)
     band = torch.from_numpy(edge).to(face.device).bool()
