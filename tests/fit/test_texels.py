@@ -20,7 +20,7 @@ from tests.fit.scenes import (
 )  # fmt: skip
 from texgs.core.errors import ArgumentError
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.shading import ShadingModel
+from texgs.fields.surfels.shading import ShadingModel, in_full_light, material, raw_material
 from texgs.fields.surfels.texels import offsets_of
 from texgs.fit.settings import TextureKeys
 from texgs.fit.texels import Sight, look, mean_color, sizes_for_budget, sizes_where_seen, textured, texturize
@@ -43,7 +43,7 @@ def total(sizes):
 
 
 def sight(largest, pixel):
-    return Sight(torch.tensor(largest), torch.tensor(pixel), torch.ones(len(largest)))
+    return Sight(torch.tensor(largest), torch.tensor(pixel), *torch.ones(2, len(largest)))
 
 
 def test_sizes_follow_the_formula_with_the_smallest_edge_that_keeps_the_budget():
@@ -130,7 +130,8 @@ def test_texels_can_take_the_colors_over(ball, images):
     p = with_offset.parameters
     for surfel, offset in enumerate(p["offsets"].tolist()):
         own = slice(offset, offset + int(p["sizes"][surfel].prod()))
-        assert_close(without.parameters["texels"][own], p["texels"][own] + p["colors"][surfel])
+        taken = without.parameters["palette"] + without.parameters["texels"][own]
+        assert_close(taken, p["palette"] + p["texels"][own] + p["colors"][surfel])
 
 
 def test_all_else_stays(ball, images):
@@ -161,3 +162,30 @@ def test_a_model_of_another_stage_is_refused(ball, images):
 def test_budgets_that_cannot_be_had(texels, message):
     with pytest.raises(ArgumentError, match=f"texels: expected {message}"):
         sizes_for_budget(torch.tensor([[1.0, 1.0]]), texels)
+
+
+@pytest.mark.parametrize("rows", [1, None])
+def test_colours_in_full_light_are_those_that_a_volume_has(ball, rows):
+    """A ball of one colour under k_a + k_d = 0.5 has half of it; its palette is then the colour itself."""
+    n, color = len(ball), torch.tensor([0.2, 0.3, 0.4])
+    dim = {name: x.repeat(rows or n) for name, x in raw_material(0.2, 0.3, 0.1, 20.0, "bounded").items()}
+    model = Surfels({**ball.parameters, **dim, "colors": 2 * color.repeat(n, 1)}, ball.shading)
+    scaled = Surfels(in_full_light(model.parameters, "bounded"), ball.shading)
+    factors = material(scaled.parameters, "bounded")
+    assert_close(factors["ambient"] / factors["diffuse"], torch.full((rows or n,), 2 / 3))
+    for view in cameras():
+        assert_close(scaled.render(view).color, model.render(view).color, atol=1e-5, rtol=0)
+    assert_close(scaled.parameters["colors"], color.repeat(n, 1))
+
+
+def test_a_palette_is_the_colour_without_light(ball, images):
+    n, color = len(ball), torch.tensor([0.2, 0.3, 0.4])
+    plain = Surfels({**ball.parameters, "colors": color.repeat(n, 1)}, ball.shading)
+    assert_close(texturize(plain, images, TextureKeys(2000, sweeps=0)).parameters["palette"], color)
+    of_views = texturize(plain, images, TextureKeys(2000, sweeps=0, has_offset=False)).parameters["palette"]
+    assert_close(of_views, mean_color(images))  # as in the paper
+
+
+def test_materials_without_ranges_of_light_stay(ball):
+    paper = {**ball.parameters, **raw_material(1.0, 0.5, 2.5, 36.0, "paper")}
+    assert in_full_light(paper, "paper") == paper

@@ -37,6 +37,8 @@ def texturize(
     sight = look(flat, images, title)
     budget = keys.texels
     sizes = sizes_where_seen(scales, sight) if budget is None else sizes_for_budget(scales, budget)
+    if keys.has_offset:
+        palette = mean_unlit_color(model, sight)
     result = textured(model, palette, sizes)
     if not keys.has_offset:
         result = without_offset(result)
@@ -73,6 +75,12 @@ def mean_color(images: Images) -> Tensor:
     return (premultiplied / alpha.clamp_min(1)).clamp(0, 1).float()
 
 
+def mean_unlit_color(model: Surfels, sight: Sight) -> Tensor:
+    """Return the mean colour [3] of a model without light, each surfel as much as views show of it."""
+    shown = sight.shown[:, None]
+    return ((shown * model.parameters["colors"]).sum(dim=0) / shown.sum().clamp_min(1e-12)).clamp(0, 1)
+
+
 # -- how many texels a surfel gets ---
 
 
@@ -87,6 +95,8 @@ class Sight:
     curvature: Tensor
     """[N] sum of weight * gain^2 over the pixels of a view that shows it. It bounds the sum of the surfel's
     rows of A'A 1, A being the weights of texels in pixels."""
+    shown: Tensor
+    """[N] sum of blending weights over all views."""
 
 
 @torch.no_grad()
@@ -98,7 +108,7 @@ def look(model: Surfels, images: Images, title: str) -> Sight:
     """
     means = model.parameters["means"]
     n = len(means)
-    largest, total, squares = means.new_zeros(3, n)
+    largest, shown, total, squares = means.new_zeros(4, n)
     pixel = means.new_full((n,), torch.inf)
     for index in progress(range(len(images)), title=f"{title}, sight", unit="view"):
         target = visible_part(images, index, model.parameters, model.shading.options)
@@ -114,13 +124,14 @@ def look(model: Surfels, images: Images, title: str) -> Sight:
             options=model.shading.options,
         ).statistics
         curvature = seen.weight_sum * texture.gain.square()  # type: ignore[union-attr]
+        shown += seen.weight_sum  # type: ignore[union-attr]
         total += curvature
         squares += curvature.square()
         largest = torch.maximum(largest, seen.weight_max)  # type: ignore[union-attr]
         depth = means @ camera.viewmat[2, :3] + camera.viewmat[2, 3]
         here = torch.where(seen.weight_max > 0, depth / camera.K[0, 0], torch.inf)  # type: ignore[union-attr]
         pixel = torch.minimum(pixel, here)
-    return Sight(largest, pixel, squares / total.clamp_min(torch.finfo(total.dtype).tiny))
+    return Sight(largest, pixel, squares / total.clamp_min(torch.finfo(total.dtype).tiny), shown)
 
 
 def sizes_for_budget(scales: Tensor, texels: int) -> Tensor:

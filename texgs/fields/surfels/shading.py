@@ -16,6 +16,7 @@ from texgs.raster import Options, Texture
 from texgs.raster.shading import MATERIAL, blinn_phong, blinn_phong_texture, spherical_harmonics
 
 FAR = 1e4  # world units: a viewer so far away sees all surfels from one direction
+LEAST = 1e-6  # share of ambient or of diffuse light, so that its logit is finite
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,20 @@ def raw_material(
     for name, (low, high) in RANGES[kind].items():
         raw[name] = ((raw[name] - low) / (high - low)).logit()
     return raw
+
+
+def in_full_light(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
+    """Return the same surfels with colours scaled so that k_a + k_d is 1: views stay as they are.
+
+    Views cannot tell brighter colours from more light. A colour is then what is seen where light falls
+    straight onto a surface, as in a transfer function. Materials without ranges of k_a and k_d stay.
+    """
+    if not {"ambient", "diffuse"} <= RANGES[kind].keys():
+        return dict(parameters)
+    factors = material(parameters, kind)
+    light = factors["ambient"] + factors["diffuse"]  # [N] or [1]
+    scaled = {name: (factors[name] / light).logit(eps=LEAST) for name in ("ambient", "diffuse")}
+    return {**parameters, **scaled, "colors": parameters["colors"] * light[:, None]}
 
 
 def viewer(camera: Camera, shading: ShadingModel) -> Tensor:

@@ -41,7 +41,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.fields.splats import base_color
     from texgs.fields.surfels.model import Surfels
     from texgs.fields.surfels.model_file import read_model, write_model
-    from texgs.fields.surfels.shading import material, raw_material
+    from texgs.fields.surfels.shading import in_full_light, material, raw_material
 
     fit, phase, job = settings.fit, settings.phase, FitJob.of(settings, inputs, output)
     before = read_model(inputs["model"]).to(job.device)
@@ -51,7 +51,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     rows = 1 if fit.materials == "shared" else len(before)
     start |= {name: value.to(job.device).repeat(rows) for name, value in first.items()}
     model, seconds, losses = job.run(start, before.shading, phase)
-    model = Surfels(model.parameters, before.shading, before.metadata)
+    lit = in_full_light(model.parameters, before.shading.material)
+    model = Surfels(lit, before.shading, before.metadata)
     write_model(output / "model.safetensors", model)
     factors = material(model.parameters, before.shading.material)
     medians = {name: float(value.median()) for name, value in factors.items()}
