@@ -18,13 +18,14 @@ from tests.fit.scenes import (
     striped,
 )  # fmt: skip
 from texgs.core.errors import FitError
+from texgs.core.light import random_lights
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, material, raw_material
 from texgs.fields.surfels.texels import owners
 from texgs.fit.settings import Densify, TextureKeys
 from texgs.fit.texels import look, sizes_for_budget, textured, texturize, without_offset
-from texgs.fit.texture_solve import curvature, refine, sampled_error, solve, texel_map
+from texgs.fit.texture_solve import FARTHEST, curvature, refine, sampled_error, solve, texel_map
 from texgs.raster import Texture, rasterize, reference
 from texgs.raster.losses import l1_dssim
 from texgs.raster.reference import shading
@@ -282,3 +283,21 @@ def test_numbers_that_are_not_finite_are_reported(bare, images):
     model = changed(bare, colors=bare.parameters["colors"] * torch.nan)
     with pytest.raises(FitError, match="texture: texels: expected finite values"):
         refined(model, images, 2)
+
+
+def test_lights_from_many_sides_do_not_drive_texels_away(start):
+    """Most of what such views show is dark and even, where D-SSIM is steep."""
+    dim = {name: x.repeat(1) for name, x in raw_material(0.05, 0.9, 0.01, 20, "bounded").items()}
+    model = changed(start, **dim)
+    wanted = changed(model, texels=0.2 * torch.rand_like(model.parameters["texels"]) - 0.1)
+    views, lights = cameras(40, 48), random_lights(40, 3)
+    planes = []
+    with torch.no_grad():
+        for camera, light in zip(views, lights, strict=True):
+            seen = wanted.render(camera, light)
+            planes.append(torch.cat([seen.color.clamp(0, 1).permute(2, 0, 1), seen.alpha[None]]))
+    images = replace(images_of(planes, views), lights=lights)
+    solved = solved_from(model, images, sweeps=4)
+    texels = solved.parameters["texels"]
+    assert 0 < float(texels.abs().max()) <= FARTHEST
+    assert sampled_error(solved, images) < 0.7 * sampled_error(model, images)

@@ -104,11 +104,12 @@ def look(model: Surfels, images: Images, title: str) -> Sight:
     """Gather what all views show of a textured model, whatever its texels.
 
     A surfel seen by few views has a small mean curvature and still a large one where it is seen;
-    `curvature` is therefore the mean over views weighted by itself, sum c^2 / sum c.
+    `curvature` is therefore the mean over views weighted by itself, sum c^2 / sum c, and at least half of
+    the largest: lights from many sides let it vary so much that steps would be too long in bright views.
     """
     means = model.parameters["means"]
     n = len(means)
-    largest, shown, total, squares = means.new_zeros(4, n)
+    largest, shown, total, squares, steepest = means.new_zeros(5, n)
     pixel = means.new_full((n,), torch.inf)
     for index in progress(range(len(images)), title=f"{title}, sight", unit="view"):
         target = visible_part(images, index, model.parameters, model.shading.options)
@@ -127,11 +128,13 @@ def look(model: Surfels, images: Images, title: str) -> Sight:
         shown += seen.weight_sum  # type: ignore[union-attr]
         total += curvature
         squares += curvature.square()
+        steepest = torch.maximum(steepest, curvature)
         largest = torch.maximum(largest, seen.weight_max)  # type: ignore[union-attr]
         depth = means @ camera.viewmat[2, :3] + camera.viewmat[2, 3]
         here = torch.where(seen.weight_max > 0, depth / camera.K[0, 0], torch.inf)  # type: ignore[union-attr]
         pixel = torch.minimum(pixel, here)
-    return Sight(largest, pixel, squares / total.clamp_min(torch.finfo(total.dtype).tiny), shown)
+    mean = squares / total.clamp_min(torch.finfo(total.dtype).tiny)
+    return Sight(largest, pixel, torch.maximum(mean, steepest / 2), shown)
 
 
 def sizes_for_budget(scales: Tensor, texels: int) -> Tensor:

@@ -22,6 +22,7 @@ from texgs.volume.images import Images, Target
 
 STEP = 0.6  # of a Newton step in a typical view: 2 is the limit of stability, and views differ
 LAST_STEP = 0.06  # noise of single views averages out as steps fall
+FARTHEST = 1.0  # texels from the colours of their surfels: more brings noise of views that hardly see them
 CHECKED = 12  # views in which texels must have lowered the error
 STRUCTURE = 1e-3  # weight of D-SSIM against half the mean squared error
 DSSIM = 0.2  # share of D-SSIM in what Adam follows
@@ -51,7 +52,7 @@ def solve(
         (gradient,) = torch.autograd.grad(loss, texels)
         rate = STEP * (LAST_STEP / STEP) ** (step / len(order))
         with torch.no_grad():
-            texels.addcmul_(gradient, scale, value=-rate)
+            texels.addcmul_(gradient, scale, value=-rate).clamp_(-FARTHEST, FARTHEST)
     _require_finite("the training views or the model of the phase before are damaged", texels=texels)
     solved = replace(model, parameters={**model.parameters, "texels": texels.detach()})
     return solved if sampled_error(solved, images) <= sampled_error(model, images) else model
