@@ -95,3 +95,8 @@ def test_an_orbit_around_a_target_is_one_around_the_origin_moved():
     for one, other in zip(still.project(points), moved.project(points + target), strict=True):
         torch.testing.assert_close(one, other, atol=1e-4, rtol=1e-5)  # pixels and lengths, of float32
     assert still.viewmat.equal(orbit(40, 25, 2.5, 30, 64, 48).viewmat)
+
+
+def test_lengths_of_rays():
+    camera = orbit(30, 20, radius=3, fov_y=40, width=7, height=5).crop(1, 1, 7, 4)
+    torch.testing.assert_close(camera.ray_lengths(), camera.rays().norm(dim=-1))

@@ -46,7 +46,8 @@ def test_edits_with_and_without_a_volume(tmp_path):
 
 
 def test_ways_to_cut_have_times_beside_a_frame_that_is_not_cut(tmp_path):
-    ways = [CutWay("uncut", 4.0), CutWay("slab", 6.0, 38.0, 35.0, 31.0, 28.5, 29.0, 26.5)]
+    scores = (38.0, 35.0, 31.0, 28.5, 29.0, 26.5)
+    ways = [CutWay("a plane", "uncut", 4.0), CutWay("a plane", "slab", 6.0, *scores)]
     metrics(tmp_path, "cuts", CutResult(20, 400, 400, ways))
     first, second = rows(cuts(records(tmp_path)))
     assert (first["way"], first["face"], first["ms / not cut"]) == ("not cut", None, 1.0)

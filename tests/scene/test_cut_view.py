@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from scipy.ndimage import binary_dilation, distance_transform_edt
 
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
@@ -13,7 +14,7 @@ from texgs.core.cuts import Box, Cuts, Plane
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.changes import apply_all
-from texgs.scene.cut_view import SLAB, cut_view
+from texgs.scene.cut_view import OPAQUE, SLAB, UNITS, cut_view, grown
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.session import Session
@@ -59,28 +60,38 @@ def test_a_scene_without_looks_shows_its_twin(scene):
 
 
 def test_a_look_lies_beyond_a_slab_of_the_volume(styled):
+    """Behind faces there is the volume, away from them there are models only; between lies a rim."""
     twin, composed = Twin(styled), styled.open()
     seen = cut_view(composed, CAMERA, styled, twin).color
-    near, behind = slab(styled).depth_range
-    far = range_of(styled.cuts, CAMERA).depth_range[1]
-    hidden = twin.render(CAMERA, styled, composed.palettes, slab(styled)).alpha
-    volume, models = (
-        twin.render(CAMERA, styled, composed.palettes),
-        models_within(styled, torch.stack([behind, far])),
-    )
-    is_opaque, is_clear = hidden > 0.99, hidden == 0
-    assert min(int(is_opaque.sum()), int(is_clear.sum())) > 10
+    cut = range_of(styled.cuts, CAMERA)
+    soon = slab(styled, cut, UNITS)
+    is_face = twin.render(CAMERA, styled, composed.palettes, soon).alpha >= OPAQUE
+    deep = slab(styled, cut, SLAB)
+    is_opaque = is_face & (twin.render(CAMERA, styled, composed.palettes, deep).alpha > 0.99)
+    volume = twin.render(CAMERA, styled, composed.palettes)
+    is_far = (
+        torch.from_numpy(distance_transform_edt(~is_face.numpy())) > 4
+    )  # pixels; the rim has two, and half of the pixels are looked at
+    models = models_within(styled, cut.depth_range)
+    assert min(int(is_opaque.sum()), int((is_far & (models != 1).any(dim=-1)).sum())) > 10
     assert (seen - volume.color)[is_opaque].abs().max() < 0.02
-    torch.testing.assert_close(seen[is_clear], models[is_clear], atol=1e-6, rtol=0)
-    assert bool((near < behind).any())
+    torch.testing.assert_close(seen[is_far], models[is_far], atol=1e-6, rtol=0)
+    assert (seen - models)[is_face].abs().max() > 0.1
 
 
-def slab(scene):
-    """The rays of a cut as far as the slab behind a face goes."""
-    cut = range_of(scene.cuts, CAMERA)
+def slab(scene, cut, units):
+    """The rays of a cut as far as so many opacity units behind a face."""
     near, far = cut.depth_range
-    behind = near + SLAB * scene.volume.appearance.opacity_unit / CAMERA.rays().norm(dim=-1)
+    behind = near + units * scene.volume.appearance.opacity_unit / CAMERA.rays().norm(dim=-1)
     return cut._replace(depth_range=torch.stack([near, torch.minimum(behind, far)]))
+
+
+def test_a_mask_grows_by_so_many_pixels_each_way():
+    mask = torch.zeros(9, 12, dtype=torch.bool)
+    mask[4, 5] = mask[0, 0] = True
+    expected = binary_dilation(mask.numpy(), np.ones((5, 5)))
+    assert np.array_equal(grown(mask, 2).numpy(), expected)
+    assert torch.equal(grown(mask, 0), mask)
 
 
 @pytest.mark.parametrize("mode", ["shaded", "normal", "depth", "ambient"])

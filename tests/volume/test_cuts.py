@@ -8,6 +8,7 @@ import torch
 
 from tests.volume.march import shade
 from tests.volume.scenes import SHELLS, ball, constant, lattice, over_white, psnr
+from tests.volume.vtk_caster import VtkCaster
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import HEADLIGHT, Light
@@ -56,6 +57,27 @@ def test_a_cut_is_the_array_cropped_at_a_plane_of_samples(axis, light, device):
         images.append(over_white(cast.rgba.cpu().numpy()))
         assert float((cut.face == 0).float().mean()) > 0.9  # the plane is before the camera
     assert psnr(*images) > 55
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_vtk_cuts_alike(count):
+    """Without light from anywhere, for VTK shades faces by gradients: all pixels, and those of faces."""
+    grid, look = ball(40), Appearance(ambient=1, diffuse=0, specular=0, step=0.1, opacity_unit=0.05)
+    ours, theirs = Caster(grid, look), VtkCaster(grid, look, threads=1)
+    rng = torch.Generator().manual_seed(count)
+    for _ in range(3):
+        normals = torch.nn.functional.normalize(torch.randn(count, 3, generator=rng), dim=1)
+        normals *= torch.where(normals @ CAMERA.position < 0, -1.0, 1.0)[:, None]  # faces are seen
+        offsets = 0.15 * torch.rand(count, generator=rng)
+        cut = cut_range(normals, offsets, CAMERA)
+        theirs.cut(normals.tolist(), offsets.tolist())
+        seen = over_white(ours.cast(SHELLS, CAMERA, HEADLIGHT, depth_range=cut.depth_range).rgba.numpy())
+        expected = over_white(theirs.render(SHELLS, CAMERA, HEADLIGHT))
+        uncut = over_white(ours.cast(SHELLS, CAMERA, HEADLIGHT).rgba.numpy())
+        is_face = np.abs(seen - uncut).max(axis=-1) > 0.05
+        assert is_face.sum() > 100
+        assert psnr(seen, expected) > 38
+        assert psnr(seen[is_face], expected[is_face]) > 32
 
 
 @pytest.mark.parametrize("step", [0.25, 1.0])

@@ -13,10 +13,12 @@ from __future__ import annotations
 
 import ctypes
 import re
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from vtkmodules import vtkRenderingVolumeOpenGL2  # noqa: F401, registers what the mapper creates
+from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer, vtkVolume
 from vtkmodules.vtkRenderingOpenGL2 import vtkGenericOpenGLRenderWindow
 from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
@@ -54,6 +56,15 @@ class VtkCaster:
         # Never shown: the renderer takes its size from a window.
         self._window = vtkGenericOpenGLRenderWindow()
         self._window.AddRenderer(self._renderer)
+
+    def cut(self, normals: Sequence[Sequence[float]], offsets: Sequence[float]) -> None:
+        """Leave what lies behind planes: where normal . x <= offset, for unit normals."""
+        self._mapper.RemoveAllClippingPlanes()
+        for normal, offset in zip(np.array(normals), offsets, strict=True):
+            plane = vtkPlane()
+            plane.SetNormal(*-normal)  # VTK keeps what is in front
+            plane.SetOrigin(*(normal * offset))
+            self._mapper.AddClippingPlane(plane)
 
     def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
         """Return premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values."""

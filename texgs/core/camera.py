@@ -39,6 +39,13 @@ class Camera:
         """Return world directions [H, W, 3] through the pixel centres, of length 1 along the view axis."""
         return self._rays_in_camera() @ self.viewmat[:3, :3]
 
+    def ray_lengths(self) -> Tensor:
+        """Return the lengths [H, W] of `rays`."""
+        K = self.K
+        right = (torch.arange(self.width, device=K.device) + 0.5 - K[0, 2]) / K[0, 0]
+        down = (torch.arange(self.height, device=K.device) + 0.5 - K[1, 2]) / K[1, 1]
+        return (1 + right.square() + down.square()[:, None]).sqrt()
+
     def project(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """Return pixels [..., 2] and camera z [...] of world points [..., 3]; behind it pixels are void."""
         viewmat, K = self.viewmat.to(points), self.K.to(points)

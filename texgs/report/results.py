@@ -198,6 +198,7 @@ class TimingResult(Result):
 class CutWay:
     """One way to show a cut scene: PSNR in dB against the cut volume, means and tenths over planes."""
 
+    case: str  # how many planes, and of which scene
     way: str
     ms: float  # median of a frame
     whole: float | None = None  # all pixels

@@ -59,7 +59,7 @@ WAYS = {
     "volume": "the volume, cut",
 }
 CUTS = (
-    *map(Column, (DATA, LABEL, "way")),
+    *map(Column, (DATA, LABEL, "cut by", "way")),
     *(Column(title, 2) for title in ("whole", "face", "face, tenth", "band", "band, tenth")),
     Column("ms", 2),
     Column("ms / not cut", 2),
@@ -179,9 +179,10 @@ def cuts(records: Iterable[Record[Any]]) -> Table:
     """Return ways to show a cut against the cut volume, with their times beside a frame that is not cut."""
     rows = []
     for record in in_order(of(CutResult, records)):
-        uncut = next(each.ms for each in record.result.ways if each.way == "uncut")
+        uncut = {each.case: each.ms for each in record.result.ways if each.way == "uncut"}
         for each in record.result.ways if not record.is_swept else ():
             tenths = {"face, tenth": each.face_tenth, "band, tenth": each.band_tenth}
-            own = {"whole": each.whole, "face": each.face, "band": each.band, "ms": each.ms, **tenths}
-            rows.append(cells(record, way=WAYS[each.way], **own, **{"ms / not cut": each.ms / uncut}))
+            scores = {"whole": each.whole, "face": each.face, "band": each.band, **tenths}
+            ms = {"ms": each.ms, "ms / not cut": each.ms / uncut[each.case]}
+            rows.append(cells(record, **{"cut by": each.case, "way": WAYS[each.way]}, **scores, **ms))
     return Table("", CUTS, rows)

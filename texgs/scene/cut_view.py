@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from math import ceil
 
 import torch
 from torch import Tensor
+from torch.nn.functional import max_pool2d
 
 from texgs.core.camera import Camera
 from texgs.fields.field import Composed, Look
@@ -13,8 +15,12 @@ from texgs.raster import Render
 from texgs.raster.cuts import CutRange
 from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin, range_of
+from texgs.volume.images import smaller
 
-SLAB = 20.0  # opacity units of the volume behind a face, which hide most of what is beyond
+SLAB = 30.0  # opacity units of the volume behind a face, which hide most of what is beyond
+UNITS, OPAQUE = 3.0, 0.05  # a face is where so many opacity units behind a cut have at least this alpha
+RIM = 0.0125  # of the smaller side of the picture: how far around a face the slab goes on
+STEP = 0.5  # voxels between the samples of a slab
 
 
 def cut_view(
@@ -58,20 +64,44 @@ def cut_view(
 
 def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Render:
     """Render a slab of the volume behind each face of a cut, over the models beyond it."""
-    before = slab_of(cut, camera, SLAB * twin.opacity_unit)
-    slab = twin.render(camera, scene, composed.palettes, before)
+    near, behind = slab_of(cut, camera, SLAB * twin.opacity_unit).depth_range
+    behind = torch.where(near_faces(composed, camera, scene, twin), behind, near)
+    before = cut._replace(depth_range=torch.stack([near, behind]))
+    slab = twin.with_step(STEP).render(camera, scene, composed.palettes, before)
     background = camera.viewmat.new_tensor(scene.background)
-    beyond = torch.stack([before.depth_range[1], cut.depth_range[1]])
+    beyond = torch.stack([behind, cut.depth_range[1]])
     models = composed.render(camera, scene.light, scene.edits, background=background, depth_range=beyond)
     clear = 1 - slab.alpha[..., None]
     color = slab.color + clear * (models.color - background)
     return Render(color, slab.alpha + clear[..., 0] * models.alpha)
 
 
+def near_faces(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> Tensor:
+    """Return pixels [H, W], bool, of faces and of a rim around them, looked for at half of the resolution."""
+    even = camera.crop(0, 0, camera.width + camera.width % 2, camera.height + camera.height % 2)
+    small = smaller(even, 2)
+    face = face_of(composed, small, scene, twin.with_step(1.0), range_of(scene.cuts, small))
+    near = grown(face, ceil(RIM * min(small.height, small.width)))
+    return near.repeat_interleave(2, 0).repeat_interleave(2, 1)[: camera.height, : camera.width]
+
+
+def face_of(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Tensor:
+    """Return pixels [H, W], bool, of a face: their rays enter through a plane and meet something soon."""
+    soon = slab_of(cut, camera, UNITS * twin.opacity_unit)
+    return twin.render(camera, scene, composed.palettes, soon).alpha >= OPAQUE
+
+
+def grown(mask: Tensor, pixels: int) -> Tensor:
+    """Return a mask [H, W] with all that is at most so many pixels beside it, along rows and columns."""
+    size = 2 * pixels + 1
+    rows = max_pool2d(mask[None, None].float(), (1, size), 1, (0, pixels))
+    return max_pool2d(rows, (size, 1), 1, (pixels, 0))[0, 0] > 0
+
+
 def slab_of(cut: CutRange, camera: Camera, length: float) -> CutRange:
     """Return what of a cut's rays lies within a length behind a face, world units; of other rays nothing."""
     near, far = cut.depth_range
-    thickness = length / camera.rays().norm(dim=-1)  # as camera z
+    thickness = length / camera.ray_lengths()  # as camera z
     behind = torch.where(cut.face >= 0, torch.minimum(near + thickness, far), near)
     return cut._replace(depth_range=torch.stack([near, behind]))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -56,6 +57,12 @@ class Twin:
         self._volume, self._device = scene.volume, torch.device(device)
         with located("volume"):
             self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
+
+    def with_step(self, step: float) -> Twin:
+        """Return a twin with another distance of samples, in voxels; nothing is read again."""
+        other = copy(self)
+        other._volume = replace(self._volume, appearance=replace(self._volume.appearance, step=step))
+        return other
 
     @property
     def opacity_unit(self) -> float:

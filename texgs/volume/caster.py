@@ -107,7 +107,7 @@ class Caster:
         self._extremes = torch.empty(bricks, 2, device=self._device)
         missing = torch.zeros(1, dtype=torch.int64, device=self._device)
         self._call("texgs_volume_extremes", self._extremes, missing)
-        self._prepared: tuple[TransferFunction, NativeTransfer, Tensor] | None = None
+        self._prepared = list[tuple[TransferFunction, NativeTransfer, Tensor]]()  # the last, of all copies
 
     def with_appearance(self, appearance: Appearance) -> Caster:
         """Return a caster of the same volume with another shading and sampling; nothing is read again."""
@@ -181,13 +181,14 @@ class Caster:
 
     def _prepare(self, tf: TransferFunction) -> tuple[NativeTransfer, Tensor]:
         """Return a function for the library, and how far each brick is from one in which something shows."""
-        prepared = self._prepared  # another thread may prepare another function
+        prepared = self._prepared[0] if self._prepared else None  # another thread may prepare another one
         if prepared is None or prepared[0] != tf:
             points = points_of(tf).to(self._device)
             transfer = NativeTransfer(len(points), points)
             distance = torch.zeros(len(self._extremes) + PADDING, dtype=torch.uint8, device=self._device)
             self._call("texgs_volume_distance", self._extremes, transfer, distance)
-            prepared = self._prepared = tf, transfer, distance
+            prepared = tf, transfer, distance
+            self._prepared[:] = [prepared]
         return prepared[1:]
 
     def _call(self, name: str, *arguments: Any) -> None:

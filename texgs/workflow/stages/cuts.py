@@ -1,4 +1,4 @@
-"""Stage `cuts`: seeded planes through a scene; ways to show a cut against its volume with the same cut."""
+"""Stage `cuts`: seeded planes through a scene, as fitted and edited, and ways to show what they cut."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from texgs.core.camera import Camera
+    from texgs.core.cuts import Plane
     from texgs.core.lens import Frame
     from texgs.fields.surfels.composition import Composition
     from texgs.raster import Render
@@ -29,12 +30,12 @@ if TYPE_CHECKING:
 
 FACING = 55.0  # largest angle between a plane's normal and the direction to the camera, degrees
 DEEPEST = 0.6  # largest distance of a plane from the centre, in radii of what is visible
-UNITS, OPAQUE = 3.0, 0.05  # a face is where so many opacity units behind a plane have at least this alpha
 BAND = 5  # pixels to both sides of a face's edge
 LEAST = 100  # pixels of a face, or of its edge, that is measured
 SHOWN = 5  # planes in the picture
 PICTURED = ("volume", "slab", "dropped")  # ways
 COMPARED = ("dropped", "clipped", "slab")
+PLANE, PLANES, EDITED = "a plane", "three planes", "a plane, edited"  # cases
 HIDDEN = -100.0  # opacity before the sigmoid
 
 
@@ -48,55 +49,65 @@ class Settings(OfScene):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write cuts.png. It reads `scene`, the scene.yaml, with what it names."""
     from texgs.core.check import torch_device
+    from texgs.core.cuts import Cuts
     from texgs.core.figures import write_grid
     from texgs.metrics.quality import psnr
     from texgs.scene.scene_file import read_scene
     from texgs.scene.twin import Twin
+    from texgs.workflow.stages.pse import chain
 
     scene = read_scene(inputs["scene"])
     device = torch_device(settings.fit.device)
     composed: Any = scene.open(device)
     twin = Twin(scene, device)
-    shots = seeded(scene, scene.framed(composed), settings)
+    shots = seeded(scene.framed(composed), settings)
+    shown = {
+        PLANE: (scene, 1),
+        PLANES: (scene, 3),
+        EDITED: (list(chain(scene, composed.palettes, ("palette", "relight")).values())[-1], 1),
+    }
     rows, ms, scores = (defaultdict[Any, list[Any]](list) for _ in range(3))
-    for camera, cut in progress(shots, settings.planes, title=f"{settings.dataset}: cuts", unit="plane"):
-        camera, images = camera.to(device), {}
-        for way, render in ways_of(composed, twin, camera, cut).items():
-            start = time.perf_counter()
-            images[way] = render().color.clamp(0, 1)
-            ms[way].append(1000 * (time.perf_counter() - start))
-        for place, mask in places(composed, twin, camera, cut).items():
-            for way in COMPARED if int(mask.sum()) >= LEAST else ():
-                scores[way, place].append(psnr(images[way][mask][None], images["volume"][mask][None]))
-        for way in PICTURED:
-            rows[way].append(images[way].cpu().numpy())
+    for camera, planes in progress(shots, settings.planes, title=f"{settings.dataset}: cuts", unit="shot"):
+        camera = camera.to(device)
+        for case, (seen, count) in shown.items():
+            cut, images = replace(seen, cuts=Cuts(planes[:count])), {}
+            for way, render in ways_of(composed, twin, camera, cut).items():
+                start = time.perf_counter()
+                images[way] = render().color.clamp(0, 1)
+                ms[case, way].append(1000 * (time.perf_counter() - start))
+            for place, mask in places(composed, twin, camera, cut).items():
+                for way in COMPARED if int(mask.sum()) >= LEAST else ():
+                    score = psnr(images[way][mask][None], images["volume"][mask][None])
+                    scores[case, way, place].append(score)
+            for way in PICTURED if case == PLANE else ():
+                rows[way].append(images[way].cpu().numpy())
     titles = [f"plane {number + 1}" for number in range(min(SHOWN, settings.planes))]
-    write_grid(output / "cuts.png", {way: shown[:SHOWN] for way, shown in rows.items()}, titles)
+    write_grid(output / "cuts.png", {way: images[:SHOWN] for way, images in rows.items()}, titles)
     result = CutResult(settings.planes, settings.views.width, settings.views.height)
-    return Outcome(replace(result, ways=[summary(way, ms[way], scores) for way in ms]))
+    return Outcome(replace(result, ways=[summary(case, way, ms[case, way], scores) for case, way in ms]))
 
 
-def seeded(scene: Scene, frame: Frame, settings: Settings) -> Iterator[tuple[Camera, Scene]]:
-    """Yield cameras, and the scene cut by a plane that faces each, at some depth of what is visible."""
+def seeded(frame: Frame, settings: Settings) -> Iterator[tuple[Camera, list[Plane]]]:
+    """Yield cameras with three planes each, at some depth of what is visible; the first faces the camera."""
     import torch
     from torch.nn.functional import normalize
 
     from texgs.core.camera import orbit
-    from texgs.core.cuts import Cuts, Plane
+    from texgs.core.cuts import Plane
 
     lens = frame.lens(settings.views.fov_y, settings.views.width, settings.views.height)
     rng = torch.Generator().manual_seed(settings.fit.seed)
-    count = 0
+    target, count = torch.tensor(frame.target, dtype=torch.float64), 0
     while count < settings.planes:
-        x, y, z = direction = normalize(torch.randn(3, generator=rng, dtype=torch.float64), dim=0)
-        normal = normalize(torch.randn(3, generator=rng, dtype=torch.float64), dim=0)
-        depth = DEEPEST * frame.radius * (2 * torch.rand((), generator=rng).item() - 1)
-        if normal @ direction < cos(radians(FACING)):
+        directions = normalize(torch.randn(4, 3, generator=rng, dtype=torch.float64), dim=1)
+        depths = DEEPEST * frame.radius * (2 * torch.rand(3, generator=rng, dtype=torch.float64) - 1)
+        (x, y, z), normals = directions[0], directions[1:]
+        if normals[0] @ directions[0] < cos(radians(FACING)):
             continue
         count += 1
-        offset = float(normal @ torch.tensor(frame.target, dtype=torch.float64)) + depth
+        offsets = (normals @ target + depths).tolist()
         camera = orbit(degrees(atan2(-z, x)), degrees(asin(y)), *lens)
-        yield camera, replace(scene, cuts=Cuts([Plane(normal.tolist(), offset)]))
+        yield camera, [Plane(*plane) for plane in zip(normals.tolist(), offsets, strict=True)]
 
 
 def ways_of(composed: Composition, twin: Twin, camera: Camera, cut: Scene) -> dict[str, Callable[[], Render]]:
@@ -137,31 +148,29 @@ def without_centres(composed: Composition, cut: Scene) -> Composition:
 
 
 def places(composed: Composition, twin: Twin, camera: Camera, cut: Scene) -> dict[str, Tensor]:
-    """Return pixels [H, W] bool: all, those of a face, and a band along the edge of the face.
-
-    A face is where a ray enters through a plane and meets something soon.
-    """
+    """Return pixels [H, W] bool: all, those of a face, and a band along the edge of the face."""
     import cv2
     import torch
 
-    from texgs.scene.cut_view import slab_of
+    from texgs.scene.cut_view import face_of
     from texgs.scene.twin import range_of
 
-    slab = slab_of(range_of(cut.cuts, camera), camera, UNITS * twin.opacity_unit)
-    face = twin.render(camera, cut, composed.palettes, slab).alpha >= OPAQUE
+    face = face_of(composed, camera, cut, twin, range_of(cut.cuts, camera))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * BAND + 1, 2 * BAND + 1))
     edge = cv2.morphologyEx(face.cpu().numpy().astype("uint8"), cv2.MORPH_GRADIENT, disc)
     band = torch.from_numpy(edge).to(face.device).bool()
     return {"whole": torch.ones_like(face), "face": face, "band": band}
 
 
-def summary(way: str, ms: Sequence[float], scores: Mapping[tuple[str, str], Sequence[float]]) -> CutWay:
+def summary(
+    case: str, way: str, ms: Sequence[float], scores: Mapping[tuple[str, str, str], Sequence[float]]
+) -> CutWay:
     """Return means and tenths over the planes, and the median time of a frame."""
     numbers: dict[str, float] = {}
     for place in ("whole", "face", "band"):
-        if values := scores.get((way, place)):
+        if values := scores.get((case, way, place)):
             numbers |= {place: fmean(values), f"{place}_tenth": quantile(values)}
-    return CutWay(way, median(ms), **numbers)
+    return CutWay(case, way, median(ms), **numbers)
 
 
 def quantile(values: Sequence[float]) -> float:

@@ -72,9 +72,11 @@ public:
     }
 
     void cast(int x, int y) {
-        const CastRay ray = cast_ray(lattice_, job_.view, x, y);
+        const int64_t pixel = int64_t(y) * job_.view.width + x;
         Sums sums;
         for (int a = 0; a < 3; ++a) sums.color[a] = 0.0f, sums.normal[a] = 0.0f;
+        if (is_empty(pixel)) return write(pixel, sums);
+        const CastRay ray = cast_ray(lattice_, job_.view, x, y);
         Queue waiting, seen;
         int32_t k, end;
         clip(ray, box_, k, end);
@@ -94,10 +96,16 @@ public:
         }
         if (waiting.n && sums.light >= kOpaque) weigh(ray, waiting, seen, sums);
         if (seen.n) shade(ray, seen, sums);
-        write(int64_t(y) * job_.view.width + x, sums);
+        write(pixel, sums);
     }
 
 private:
+    // Whether a cut leaves nothing of a pixel's ray.
+    bool is_empty(int64_t pixel) const {
+        const texgs_cast_view& v = job_.view;
+        return v.depth_range && !(v.depth_range[pixel] < v.depth_range[int64_t(v.width) * v.height + pixel]);
+    }
+
     // How far the brick of sample k is from one in which something shows.
     int distance_at(const CastRay& ray, int32_t k, float place[3], int32_t brick[3]) const {
         for (int a = 0; a < 3; ++a) {
