@@ -74,6 +74,27 @@ def test_a_view_beside_its_volume(results, tmp_path, monkeypatch, capsys):
     assert not (tmp_path / "none.png").exists()
 
 
+def test_what_an_edit_changed_of_a_view(results, tmp_path, monkeypatch, capsys):
+    """Colours alone, and the opacity of one model; pixels are counted from frames of `Scene.open`."""
+    monkeypatch.chdir(tmp_path)
+    scene, size = str(results / "compose" / "scene.yaml"), ["--width", "48", "--azimuth", "10"]
+    for words, told in (
+        ("TF02.palette=#cc2211", "; depth, normal, opacity: bit for bit as fitted"),
+        ("light=30,40", "colours differ by 0.000 at most; depth, normal, opacity: bit for bit as fitted"),
+        ("TF01.opacity=0.5", None),
+    ):
+        assert main(["edit", scene, words, "--output", "edited.yaml"]) == 0
+        assert main(["render", "edited.yaml", "--compare", "fitted", *size, "--output", "c.png"]) == 0
+        said = capsys.readouterr().out
+        if told is None:
+            edited = read_scene("edited.yaml")
+            camera = orbit(10, 20, *edited.framed().lens(30.0, 48, 48))
+            now = edited.open().render(camera, edits=edited.edits)
+            before = read_scene(scene).open().render(camera)
+            told = f"{int((now.alpha != before.alpha).sum())} pixels have another opacity"
+        assert told in said
+
+
 def test_fits_tell_which_views_they_are_of_and_what_their_data_stand_in_for(results):
     phases = [results.parents[1] / "TF01" / "demo" / phase for phase in ("shading", "texture")]
     for folder in (*phases, results / "pse"):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
@@ -12,6 +13,7 @@ from texgs.core.cuts import Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
+from texgs.raster.reference.losses import similarities
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
@@ -62,6 +64,9 @@ def test_the_volume_is_seen_from_where_the_camera_is_and_as_far_as_it_is_measure
     on_object = squares[(alpha > 0.01) | (truth.alpha.numpy() > 0.01)].mean()
     assert scores["object_psnr"] == pytest.approx(-10 * np.log10(on_object), abs=0.05)
     assert scores["object_psnr"] < scores["psnr"]
+    expected = float(similarities(torch.from_numpy(shown), truth.color.double()).mean())
+    assert scores["ssim"] == pytest.approx(expected, abs=0.01)
+    assert scores["object_ssim"] < scores["ssim"]
     assert frame(scene, view("truth", moving=True), 0.5)[1] == {}, "it takes time, and is in motion"
 
 
@@ -77,7 +82,7 @@ def test_a_difference_has_a_sign_and_a_gain(scene):
     hidden = replace(only(scene, "none"), background=(1.0, 1.0, 1.0))
     seen, scores = frame(hidden, view("difference"))
     assert (seen >= 254).all(), "two empty pictures"
-    assert scores == {"psnr": 100.0}
+    assert scores == {"psnr": 100.0, "ssim": pytest.approx(1)}
     shown = Session(scene).frame(view("truth").camera.camera()).astype(int)
     error = shown - frame(scene, view("truth"))[0]
     worst = np.take_along_axis(error, np.abs(error).argmax(2, keepdims=True), 2)[..., 0]

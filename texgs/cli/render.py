@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from texgs.core.cuts import Cuts
     from texgs.core.lens import Frame
     from texgs.fields.field import Composed
+    from texgs.raster import Render
     from texgs.scene.scene import Scene
 
 MOST_FRAMES = 100_000  # an hour of film
@@ -46,9 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, "--azimuth", 30.0, azimuth)
     option(parser, "--polar", 20.0, "angle above the horizon, not for path test, degrees")
     option(parser, "--fps", 25.0, "frames per second")
-    parser.add_argument(
-        "--compare", action="store_true", help="show scene, volume, and difference, with PSNR and SSIM"
-    )
+    compare = "show the scene, its volume or what it was as fitted, and their difference, with PSNR and SSIM"
+    parser.add_argument("--compare", nargs="?", const="volume", choices=("volume", "fitted"), help=compare)
     option(parser, "--gain", 4.0, f"factor on differences, 1 to {MOST_GAIN:g}")
     parser.add_argument("--caption", action="store_true", help="write below what texgs check has found")
     add_device(parser)
@@ -94,25 +94,46 @@ def compared(
     composition: Composed,
     shots: Iterable[tuple[Camera, Scene]],
 ) -> Iterator[np.ndarray]:
-    """Yield frames of a scene beside its volume; their mean scores are printed at the end."""
+    """Yield frames of a scene beside its volume, or as fitted; what differs is printed at the end."""
     from texgs.metrics.quality import mean
-    from texgs.report.beside_volume import beside_volume, in_words
-    from texgs.scene.cut_view import beside
-    from texgs.scene.twin import Twin
+    from texgs.report.beside_volume import changed, in_words, side_by_side, what_changed
 
     if arguments.mode != "shaded":
         raise ArgumentError(f"--compare: expected --mode shaded, got {arguments.mode}; leave one of them out")
     if not 1 <= arguments.gain <= MOST_GAIN:
         raise ArgumentError(f"--gain: expected 1 to {MOST_GAIN:g}, got {arguments.gain:g}")
-    with located(arguments.scene):
-        twin = Twin(scene, composition.device)
-    measured = defaultdict[str, list[float]](list)
+    is_fitted = arguments.compare == "fitted"
+    pair = pair_of(arguments, scene, composition, is_fitted)
+    measured, edits = defaultdict[str, list[float]](list), []
     for camera, shown in shots:
-        picture, scores = beside_volume(*beside(composition, camera, shown, twin), arguments.gain)
+        image, truth = pair(camera, shown)
+        titles = ("scene", "as fitted" if is_fitted else "volume")
+        picture, scores = side_by_side(image, truth, arguments.gain, titles)
         for name, value in scores.items():
             measured[name].append(value)
+        edits.append(changed(image, truth))
         yield picture
     print(", ".join(in_words(mean(measured))))
+    if is_fitted:
+        print(what_changed(edits))
+
+
+def pair_of(
+    arguments: argparse.Namespace, scene: Scene, composition: Composed, is_fitted: bool
+) -> Callable[[Camera, Scene], tuple[Render, Render]]:
+    """Return what renders a scene, and what it is compared with."""
+    from texgs.fields.files import kind_of
+    from texgs.scene.cut_view import beside, beside_fitted
+    from texgs.scene.twin import Twin
+
+    if is_fitted:
+        kind = kind_of(next(iter(scene.models.values())).file)
+        outputs = ("depth", "normal") if "normals" in kind.can else ("depth",)
+        fitted = scene.as_fitted.open(composition.device)
+        return lambda camera, shown: beside_fitted(composition, fitted, camera, shown, outputs)
+    with located(arguments.scene):
+        twin = Twin(scene, composition.device)
+    return lambda camera, shown: beside(composition, camera, shown, twin)
 
 
 def frames_of(arguments: argparse.Namespace) -> int:

@@ -1,8 +1,8 @@
-"""A view of a scene beside its volume: both, their difference, and how close they are."""
+"""A view of a scene beside its volume, or as fitted: both, their difference, and how close they are."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from texgs.core.figures import CELL, DPI, Cell, Row, Scale, as_picture, lay_out
 from texgs.metrics.quality import compare
 from texgs.raster import Render
 from texgs.report.fit_figure import DIVERGING, MAGNIFIED, signed_error
+
+KEPT = {"depth": "depth", "normal": "normal", "opacity": "alpha"}  # what new looks leave alone, in a render
 
 
 def pictures(image: Render, truth: Render, gain: float = MAGNIFIED) -> dict[str, np.ndarray]:
@@ -28,14 +30,16 @@ def scale_of(gain: float) -> Scale:
     return Scale(-1 / gain, 1 / gain, DIVERGING)
 
 
-def beside_volume(image: Render, truth: Render, gain: float) -> tuple[np.ndarray, dict[str, float]]:
+def side_by_side(
+    image: Render, truth: Render, gain: float, titles: tuple[str, str] = ("scene", "volume")
+) -> tuple[np.ndarray, dict[str, float]]:
     """Return `pictures` in a row [H, W, 3], uint8, and the scores of `compare`, which stand below.
 
     The pictures keep their pixels unless they are small.
     """
     scores, shown = compare(image, truth), pictures(image, truth, gain)
-    words = dict(zip(("scene", "volume"), in_words(scores), strict=True))
-    cells = [Cell(name, shown[name], text) for name, text in words.items()]
+    both = (shown["scene"], shown["volume"])
+    cells = [Cell(*each) for each in zip(titles, both, in_words(scores), strict=True)]
     cells.append(Cell(f"error × {gain:g}", shown["error"], scale=scale_of(gain)))
     figure = lay_out([Row("", cells)])
     figure.set_dpi(max(DPI, image.color.shape[1] / CELL))
@@ -48,3 +52,22 @@ def in_words(scores: Mapping[str, float]) -> tuple[str, str]:
     if "object_psnr" not in scores:
         return whole, "no object in view"
     return whole, "object: {object_psnr:.2f} dB, SSIM {object_ssim:.4f}".format(**scores)
+
+
+def changed(image: Render, fitted: Render) -> dict[str, float]:
+    """Return the largest difference of a colour, and in how many pixels depth, normals, opacity differ."""
+    told = {"colour": float((image.color - fitted.color).abs().max())}
+    for title, name in KEPT.items():
+        now, before = getattr(image, name), getattr(fitted, name)
+        if now is not None and before is not None:
+            told[title] = float((now != before).reshape(*image.alpha.shape, -1).any(dim=-1).sum())
+    return told
+
+
+def what_changed(told: Sequence[Mapping[str, float]]) -> str:
+    """Say what edits changed of all views; see `changed`."""
+    total = {title: sum(view[title] for view in told) for title in KEPT if title in told[0]}
+    kept = ", ".join(title for title, pixels in total.items() if not pixels)
+    other = [f"{pixels:.0f} pixels have another {title}" for title, pixels in total.items() if pixels]
+    words = [f"colours differ by {max(view['colour'] for view in told):.3f} at most", *other]
+    return ", ".join(words) + (f"; {kept}: bit for bit as fitted" if kept else "")

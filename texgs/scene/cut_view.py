@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import partial
 from math import ceil
 
 import torch
@@ -112,3 +113,13 @@ def beside(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> tupl
     background = camera.viewmat.new_tensor(scene.background)
     seen = cut_view(composed, camera, scene, twin, background=background)
     return seen, twin.render(camera, scene, composed.palettes)
+
+
+def beside_fitted(
+    composed: Composed, fitted: Composed, camera: Camera, scene: Scene, outputs: Collection[str]
+) -> tuple[Render, Render]:
+    """Return a view of a scene, and the same view of its models as fitted; cuts leave both without faces."""
+    camera = camera.to(composed.device)
+    background = camera.viewmat.new_tensor(scene.background)
+    view = partial(cut_view, camera=camera, twin=None, background=background, outputs=outputs)
+    return view(composed, scene=scene), view(fitted, scene=scene.as_fitted)

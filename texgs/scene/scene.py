@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import torch
@@ -116,6 +116,11 @@ class Scene:
             composed: the models, where they are open.
         """
         return self.frame or bounds_of(models_of(self.open() if composed is None else composed))
+
+    @property
+    def as_fitted(self) -> Scene:
+        """Return the scene without what is edited about its models; light, background and cuts stay."""
+        return replace(self, models={name: SceneModel(model.file) for name, model in self.models.items()})
 
     @property
     def has_looks(self) -> bool:

@@ -11,8 +11,7 @@ from torch import Tensor
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
 from texgs.core.figures import Scale
-from texgs.metrics.quality import object_of, psnr
-from texgs.raster import Render
+from texgs.metrics.quality import compare
 from texgs.report.fit_figure import DIVERGING, signed_error
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
@@ -41,7 +40,7 @@ class Beside:
         camera = view.camera.camera(scale)
         if scene.volume is not None:
             image, truth = self._session.beside(camera, scene)
-            return shown(view, image.color, truth.color), {} if view.moving else closeness(image, truth)
+            return shown(view, image.color, truth.color), {} if view.moving else compare(image, truth)
         if view.mode == "wipe":
             raise ArgumentError("wipe: expected a scene that names its volume; make it by texgs compose")
         nearest = self._origins.nearest(camera, scene)
@@ -63,11 +62,3 @@ def shown(view: View, image: Tensor, truth: Tensor) -> np.ndarray:
         left, right = (width, 0) if view.wipe is None else [round(view.wipe * width)] * 2
         picture = torch.cat([image[:, :left], truth[:, right:]], dim=1)
     return (picture.clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy()
-
-
-def closeness(image: Render, truth: Render) -> dict[str, float]:
-    """Return PSNR in dB of two images, and on the object where there is one."""
-    scores, seen = {"psnr": psnr(image.color, truth.color)}, object_of(image, truth)
-    if bool(seen.any()):
-        scores["object_psnr"] = psnr(image.color[seen], truth.color[seen])
-    return scores

@@ -39,9 +39,10 @@ export class Compare {
   }
 
   /** Tell how close scene and volume are in the picture, where that was measured. */
-  tell({ psnr, object_psnr: onObject }) {
-    const rest = onObject === undefined ? "no object in view" : `on the object ${onObject.toFixed(2)} dB`;
-    get("scores").textContent = psnr === undefined ? "" : `PSNR of this view ${psnr.toFixed(2)} dB, ${rest}.`;
+  tell(scores) {
+    const closeness = (of) => `${scores[`${of}psnr`].toFixed(2)} dB, SSIM ${scores[`${of}ssim`].toFixed(4)}`;
+    const rest = "object_psnr" in scores ? `on the object ${closeness("object_")}` : "no object in view";
+    get("scores").textContent = "psnr" in scores ? `PSNR of this view ${closeness("")}; ${rest}.` : "";
   }
 
   #move(part) {
