@@ -127,6 +127,13 @@ def test_a_session_shows_cuts_and_takes_them_back(scene, tmp_path):
     assert np.array_equal(session.frame(CAMERA), before)
 
 
+def test_a_session_may_cast_coarser(scene):
+    session = Session(scene)
+    coarse = session.frame(CAMERA, step=1.0)
+    assert not np.array_equal(coarse, session.frame(CAMERA))
+    assert np.array_equal(coarse, frame(scene.open(), CAMERA, scene, twin=Twin(scene).with_step(1.0)))
+
+
 def test_positions_may_count_samples_of_the_volume(scene):
     session = Session(replace(scene, cuts=Cuts()))
     apply_all(session, ["cut=x,0v", "cut=-y,31v", "cut=z,15.5v", "cut.box=0v,0v,0v,31v,31v,31v"])

@@ -1,6 +1,7 @@
 """The viewer's server: who may talk to it, what it answers, what pages share."""
 
 import asyncio
+import io
 import json
 
 import numpy as np
@@ -12,6 +13,8 @@ from tests.viewer.pages import TOKEN, WAIT, on_page, origin, page
 from tests.viewer.test_messages import CAMERA, VIEW
 from texgs.cli.main import main
 from texgs.core.cuts import NO_CUTS
+from texgs.core.io import write_json
+from texgs.report.check import checksum_of
 from texgs.scene.scene_file import read_scene
 from texgs.viewer import guard
 from texgs.viewer.segments import isolated
@@ -113,6 +116,20 @@ async def test_frames_are_those_of_the_renderer(browser, client, scene_file, tmp
     query = {"view": json.dumps({"camera": CAMERA, "mode": "normal"})}
     async with client.get(f"/{TOKEN}/still.png", params=query) as answer:
         assert await answer.read() == (tmp_path / "a.png").read_bytes()
+
+
+@on_page
+async def test_a_still_has_what_a_check_has_found_in_its_metadata(browser, client, scene_file):
+    scene, file = client.server_side.edits.scene, scene_file.with_name(f"{scene_file.stem}-check.json")
+    query = {"view": json.dumps({"camera": CAMERA})}
+    try:
+        for models, told in ((checksum_of(scene), "At least 30 dB"), ("others", None)):
+            write_json(file, {"models": models, "sentence": "At least 30 dB"})
+            async with client.get(f"/{TOKEN}/still.png", params=query) as answer:
+                picture = Image.open(io.BytesIO(await answer.read()))
+            assert picture.info.get("Comment") == told
+    finally:
+        file.unlink()
 
 
 @on_page

@@ -5,6 +5,7 @@ import io
 import json
 import re
 import shlex
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,13 +16,16 @@ from tests.fields.surfels.test_composition import ball
 from tests.viewer.drawing import rendered
 from texgs.cli.main import main
 from texgs.core.camera import orbit
-from texgs.core.cuts import NO_CUTS
+from texgs.core.cuts import NO_CUTS, Cuts, Plane
+from texgs.core.io import write_json
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
+from texgs.report.check import checksum_of
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.twin import SceneVolume
 from texgs.viewer import standalone
 from texgs.viewer.messages import Edit
 from texgs.viewer.standalone import web_file
@@ -135,6 +139,27 @@ def test_nothing_else_may_run_or_load(chromium, file):
     assert page.evaluate("globalThis.ran") is None
     assert page.evaluate("fetch('data:,x').then(() => 'loaded', () => 'refused')") == "refused"
     page.close()
+
+
+def test_it_tells_what_a_check_has_found(scene, folder, tmp_path):
+    told = "At least 30 dB & more"
+    write_json(folder / "scene-check.json", {"models": checksum_of(read_scene(scene)), "sentence": told})
+    try:
+        assert main(["export", str(scene), "--to", str(tmp_path / "checked.html")]) == 0
+    finally:
+        (folder / "scene-check.json").unlink()
+    html = (tmp_path / "checked.html").read_text()
+    assert '<meta name="description" content="At least 30 dB &amp; more">' in html
+    assert '<p class="hint">At least 30 dB &amp; more</p>' in html
+
+
+def test_cuts_are_hollow_in_the_page_and_on_its_poster(scene, tmp_path):
+    """A page has no volume: neither has its poster, whatever the scene names."""
+    opened = replace(read_scene(scene), cuts=Cuts([Plane([1.0, 0.0, 0.0], 0.0)]))
+    named = replace(opened, volume=SceneVolume(tmp_path / "gone.nrrd", {}))
+    pages = [standalone.write_page(tmp_path / "cut.html", each, "cut") for each in (opened, named)]
+    assert pages[0].poster == pages[1].poster
+    assert "Cuts are hollow here" in pages[0].path.read_text()
 
 
 def test_it_holds_a_picture_of_the_first_view(file):

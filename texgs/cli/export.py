@@ -98,6 +98,7 @@ def kind_of(arguments: argparse.Namespace) -> str:
 def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
     """Export a scene, one model of it or a model file as a web page."""
     from texgs.fields import files
+    from texgs.report.check import checked
     from texgs.scene.export import require_export
     from texgs.scene.scene import Scene, SceneModel
     from texgs.viewer.standalone import write_page
@@ -109,4 +110,4 @@ def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
         scene = replace(scene, models={arguments.model: chosen(scene, arguments.model)})
     for entry in scene.models.values():
         require_export(files.kind_of(entry.file), "html")
-    return write_page(arguments.to, scene, arguments.to.stem).path
+    return write_page(arguments.to, scene, arguments.to.stem, checked(source, scene)).path

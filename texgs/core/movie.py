@@ -53,23 +53,23 @@ def write_frames(
         raise ArgumentError(f"{path}: expected at least one frame, got none")
     if path.suffix == "":
         for number, frame in enumerate(chain([first], left)):
-            _write_png(path / f"{number:04}.png", frame, comment)
+            write_atomic(path / f"{number:04}.png", partial(save_png, frame=frame, comment=comment))
     elif path.suffix == ".png":
         if next(left, None) is not None:
             raise ArgumentError(f"{path}: expected one frame, got several; use .gif, .mp4 or a folder")
-        _write_png(path, first, comment)
+        write_atomic(path, partial(save_png, frame=first, comment=comment))
     else:
         write = _write_gif if path.suffix == ".gif" else partial(_write_mp4, crf=crf)
         write_atomic(path, lambda file: write(file, first, left, fps, comment))
     return path
 
 
-def _write_png(path: Path, frame: np.ndarray, comment: str) -> None:
-    """Write one frame."""
+def save_png(file: IO[bytes], frame: np.ndarray, comment: str) -> None:
+    """Write one frame [H, W, 3], uint8, with a comment in its metadata."""
     facts = PngInfo()
     if comment:
         facts.add_text("Comment", comment)
-    write_atomic(path, lambda file: Image.fromarray(frame).save(file, format="PNG", pnginfo=facts))
+    Image.fromarray(frame).save(file, format="PNG", pnginfo=facts)
 
 
 def _write_gif(

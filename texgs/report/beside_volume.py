@@ -40,7 +40,7 @@ def side_by_side(
     scores, shown = compare(image, truth), pictures(image, truth, gain)
     both = (shown["scene"], shown["volume"])
     cells = [Cell(*each) for each in zip(titles, both, in_words(scores), strict=True)]
-    cells.append(Cell(f"error × {gain:g}", shown["error"], scale=scale_of(gain)))
+    cells.append(Cell(f"difference × {gain:g}", shown["error"], scale=scale_of(gain)))
     figure = lay_out([Row("", cells)])
     figure.set_dpi(max(DPI, image.color.shape[1] / CELL))
     return np.asarray(as_picture(figure).convert("RGB")), scores

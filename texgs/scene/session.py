@@ -216,7 +216,9 @@ class Session:
         """Return the models of the scene, joined; kept as long as their files are the same."""
         return self._composition_of(self.scene)
 
-    def frame(self, camera: Camera, mode: Mode = "shaded", scene: Scene | None = None) -> np.ndarray:
+    def frame(
+        self, camera: Camera, mode: Mode = "shaded", scene: Scene | None = None, step: float | None = None
+    ) -> np.ndarray:
         """Return one frame [H, W, 3], uint8; see `texgs.scene.frame.frame`.
 
         Changes may be made in one thread while another one renders the scene that it was given.
@@ -225,10 +227,13 @@ class Session:
             camera: from where.
             mode: what to show.
             scene: one of the history; default as it is now.
+            step: of rays through a volume that is cut, voxels; default that of its views.
         """
         scene = self.scene if scene is None else scene
         composition = self._composition_of(scene)
         twin = self.twin_of(scene) if scene.cuts and scene.volume is not None else None
+        if twin is not None and step is not None:
+            twin = twin.with_step(step)
         return frame(composition, camera, scene, mode, twin)
 
     def twin_of(self, scene: Scene) -> Twin:

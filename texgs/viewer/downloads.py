@@ -18,6 +18,7 @@ from texgs.scene import export
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames
 from texgs.viewer.messages import Export, View
+from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.standalone import write_page
 
 FILMS = ("mp4", "gif")
@@ -27,8 +28,8 @@ FRAMES = 72  # of a turntable, as `texgs render` has it
 class Downloads:
     """Writes files into a folder of its own, which is removed in the end."""
 
-    def __init__(self, frames: Frames) -> None:
-        self._frames = frames
+    def __init__(self, frames: Frames, edits: SharedEdits) -> None:
+        self._frames, self._edits = frames, edits
         self._folder = TemporaryDirectory(prefix="texgs-files-")
 
     def write(self, scene: Scene, asked: Export, name: str) -> Path:
@@ -38,9 +39,10 @@ class Downloads:
         stem = f"{name}-{asked.kind}" if ending == "ply" else name  # there are several kinds of these
         path = Path(self._folder.name, f"{stem}.{ending}")
         if asked.kind in FILMS:
-            return write_frames(path, self._turntable(scene, asked.view))
+            words = self._edits.checked(scene)
+            return write_frames(path, self._turntable(scene, asked.view), comment=words)
         if asked.kind == "html":
-            return write_page(path, scene, name).path
+            return write_page(path, scene, name, self._edits.checked(scene)).path
         return export.export_scene(path, scene, export.Export(asked.kind))
 
     def file(self, name: str) -> Path | None:

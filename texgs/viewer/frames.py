@@ -15,8 +15,8 @@ from math import sqrt
 import cv2
 import numpy as np
 import torch
-from PIL import Image
 
+from texgs.core.movie import save_png
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer.beside import Beside
@@ -24,6 +24,7 @@ from texgs.viewer.messages import View
 
 SLOW = 0.025  # seconds of a frame above which those of a moving camera have fewer rows and columns
 LEAST = 1 / 3  # part of them that stays
+COARSE = 1.0  # voxels between samples of a volume that is cut, while something moves
 MOVING = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
 STILL = (95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 
@@ -68,12 +69,12 @@ class Frames:
 
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
-    async def still(self, view: View, scene: Scene) -> bytes:
-        """Return a PNG file with the pixels that `texgs render` writes."""
+    async def still(self, view: View, scene: Scene, comment: str) -> bytes:
+        """Return a PNG file with the pixels and the comment that `texgs render` writes."""
 
         def work() -> bytes:
             file = io.BytesIO()
-            Image.fromarray(self.pixels(view, scene)).save(file, format="PNG")
+            save_png(file, self.pixels(view, scene), comment)
             return file.getvalue()
 
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
@@ -90,7 +91,8 @@ class Frames:
         """Return what a view shows, with sides of this part of the pixels, and what is measured of it."""
         if view.mode == "truth" or view.mode == "difference" or view.mode == "wipe":
             return self._beside.frame(view, scene, scale)
-        return self._session.frame(view.camera.camera(scale), view.mode, scene), {}
+        step = COARSE if view.moving else None
+        return self._session.frame(view.camera.camera(scale), view.mode, scene, step), {}
 
 
 def packed(view: View, pixels: np.ndarray, seconds: float, scores: Mapping[str, float]) -> bytes:

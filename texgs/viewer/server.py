@@ -27,7 +27,7 @@ from texgs.viewer.looks import LARGEST, thumbnail
 from texgs.viewer.messages import Cancel, Export, Look, Mask, Message, Save, Segment, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
-from texgs.viewer.shared_edits import Opened, SharedEdits
+from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
 from texgs.viewer.work import Work
 
 WEB = Path(__file__).parent / "web"
@@ -42,7 +42,7 @@ class Server:
 
     def __init__(self, opened: Opened, device: torch.device | str = "cpu") -> None:
         session = Session(opened.scene, device)
-        self._title, self._composed = opened.title, session.composition
+        self._title, self._composed = title_of(opened.source), session.composition
         self._framed = opened.scene.framed(self._composed)
         kind = kind_of(next(iter(opened.scene.models.values())).file)
         self._choices = {"styles": list(PICTURES), "words": list(WORDS), "exports": exports_of(kind)}
@@ -113,7 +113,9 @@ class Server:
         """Return a PNG file of the view in the query on its page, as `texgs render` writes it."""
         try:
             view = parse(request.query.get("view", ""), messages.VIEWS)
-            png = await self.frames.still(view, self._shown(view, request.query.get("page", "")))
+            scene = self._shown(view, request.query.get("page", ""))
+            words = await asyncio.to_thread(self.edits.checked, scene)
+            png = await self.frames.still(view, scene, words)
         except TexgsError as error:
             raise web.HTTPBadRequest(text=str(error)) from error
         saved = {"Content-Disposition": f'attachment; filename="{Path(self.edits.name).stem}.png"'}

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.names import SCENES, file_name, label, new_part_file
+from texgs.report.check import checked
 from texgs.scene.parts import part_names, with_textures
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
@@ -30,7 +31,7 @@ class Opened:
     """A scene, and where its edits are saved."""
 
     scene: Scene
-    title: str
+    source: Path  # that it was read from
     folder: Path
     name: str  # that a scene file gets unless another one is chosen
     file: Path | None = None  # of the scene, where edits may be written to it
@@ -48,11 +49,11 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
     folder = folder or (Path.cwd() if of_job else path.parent)
     if path.suffix in SCENES:
         name, file = ("edited.yaml", None) if of_job and path.name == SCENE else (path.name, path)
-        return Opened(read_scene(path), title_of(path), folder, name, file)
+        return Opened(read_scene(path), path, folder, name, file)
     if not path.is_file():
         raise ArgumentError(f"{path}: no such scene, folder or model; texgs compose writes a scene")
     scene = Scene({label(str(path), path.stem): SceneModel(path)})
-    return Opened(scene, title_of(path), folder, SCENE)
+    return Opened(scene, path, folder, SCENE)
 
 
 def _only_scene(folder: Path) -> Path:
@@ -76,7 +77,7 @@ class SharedEdits:
 
     def __init__(self, session: Session, opened: Opened) -> None:
         self._session, self._folder = session, opened.folder
-        self.name, self._title = opened.name, opened.title
+        self.name, self._source, self._title = opened.name, opened.source, title_of(opened.source)
         files = [opened.file.resolve()] if opened.file else []
         self._own = {file: state_of(file) for file in files}  # replaced without a question, while they are so
         self.original = self._saved = session.scene
@@ -86,6 +87,10 @@ class SharedEdits:
     def scene(self) -> Scene:
         """Return the scene as it is now."""
         return self._session.scene
+
+    def checked(self, scene: Scene) -> str:
+        """Return what `texgs check` has found of the models of a scene, if anything."""
+        return checked(self._source, scene)
 
     @property
     def is_saved(self) -> bool:

@@ -25,7 +25,6 @@ from texgs.fields.surfels.compact import STEP, compact_tensors
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
-from texgs.scene.twin import twin_of_cuts
 from texgs.viewer.description import describe
 
 LARGEST = 256 * 2**20  # bytes; browsers hold a text of twice as many
@@ -45,11 +44,11 @@ class WrittenPage:
     poster: bytes  # a JPEG of the first view
 
 
-def write_page(path: Path, scene: Scene, name: str) -> WrittenPage:
+def write_page(path: Path, scene: Scene, name: str, checked: str = "") -> WrittenPage:
     """Create or replace the page of a scene of surfels in one step; the same scene gives the same bytes.
 
     The surfels are rounded as in compact model files. Hidden models are in the page: they can be shown there.
-    The name of the scene is the title.
+    The name of the scene is the title; what `texgs check` has found stands in the metadata, and below.
     """
     composed = scene.open()
     if not isinstance(composed, Composition):
@@ -62,11 +61,11 @@ def write_page(path: Path, scene: Scene, name: str) -> WrittenPage:
         )
     description = describe(name, scene, composed)
     picture = poster(scene, composed, description["views"][0], description["fov_y"])
-    write_bytes(path, page_of(description, surfels, picture).encode())
+    write_bytes(path, page_of(description, surfels, picture, checked).encode())
     return WrittenPage(path, len(composed), picture)
 
 
-def page_of(description: dict[str, Any], surfels: str, picture: bytes) -> str:
+def page_of(description: dict[str, Any], surfels: str, picture: bytes, checked: str) -> str:
     """Return the page of a description, see `describe`, packed surfels, and a JPEG that is shown first.
 
     Nothing but its own script and style may run in it, and it may load nothing: names of a scene are text.
@@ -82,6 +81,7 @@ def page_of(description: dict[str, Any], surfels: str, picture: bytes) -> str:
         .render(
             name=description["name"],
             version=__version__,
+            checked=checked,
             policy=f"default-src 'none'; script-src '{digest(script)}'; style-src '{digest(style)}'; "
             "img-src data:; base-uri 'none'; form-action 'none'",
             script=Markup(script),
@@ -97,7 +97,7 @@ def poster(scene: Scene, composed: Composition, view: dict[str, Any], fov_y: flo
     """Return a view of a scene, see `describe`, as JPEG."""
     place = (view["azimuth"], view["polar"], view["distance"], fov_y, POSTER, POSTER)
     camera = orbit(*place, target=view["target"])
-    shown = frame(composed, camera, scene, twin=twin_of_cuts(scene, composed.device))
+    shown = frame(composed, camera, scene)  # without faces, as the page
     file = BytesIO()
     Image.fromarray(shown).save(file, "JPEG", quality=QUALITY, optimize=True)
     return file.getvalue()

@@ -90,7 +90,7 @@ class Work:
         self._edits, self._changing, self._changed = edits, changing, changed
         self._jobs, self.styles = Jobs(), Styles()
         self._segmenter, self._looks = Segmenter(device), Looks(self.styles, device)
-        self.downloads = Downloads(frames)
+        self.downloads = Downloads(frames, edits)
         self._task: asyncio.Task[None] | None = None
         self._page: Page | None = None  # that it is for
         self._stop = threading.Event()
