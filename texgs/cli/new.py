@@ -19,41 +19,7 @@ if TYPE_CHECKING:
     from texgs.config.schema import Config
     from texgs.volume.transfer import TransferFunction
 
-README = """\
-# A project of texgs
-
-Run all commands in this folder:
-
-    texgs new VOLUME --name NAME       # writes conf/dataset/NAME.yaml, with suggested transfer functions
-    texgs run dataset=NAME fit=quick   # from the volume to results/report.html
-    texgs run experiment=demo          # the same with a small generated volume
-    texgs views --help                 # all data sets, recipes and keys
-
-`conf/` holds what is yours. A file there comes before the file of texgs with the same name:
-
-    conf/dataset/NAME.yaml       a volume and its transfer functions    dataset=NAME
-    conf/edit/NAME.yaml          a new look                             edit=NAME
-    conf/experiment/NAME.yaml    values of any keys; see example.yaml   experiment=NAME
-
-`texgs run` makes its own files in `results/` again. Before you remove the folder, copy what only you have:
-`results/study`, `results/mlflow.db`, and scenes and looks that you saved there.
-"""
-EXAMPLE = """\
-# @package _global_
-# Values that belong together: texgs run experiment=example
-defaults:
-  - override /dataset: turbulence # a file of conf/dataset: yours, or one of texgs
-  - override /views: small
-  - override /fit: demo
-edits: [gold] # files of conf/edit
-"""
-FILES = {
-    "README.md": README,
-    "conf/dataset/README.md": "Data sets: `texgs new VOLUME --name NAME` writes NAME.yaml here.\n",
-    "conf/edit/README.md": "New looks: NAME.yaml is chosen with `edit=NAME`.\n",
-    "conf/experiment/example.yaml": EXAMPLE,
-    ".gitignore": "/results/\n/.snakemake/\n",
-}
+PROJECT = Path(__file__).parent / "project"  # what a new one has; `gitignore` gets a dot in front
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -224,7 +190,8 @@ def run_init(arguments: argparse.Namespace) -> int:
         raise ArgumentError(
             f"{folder}: expected a new or empty folder, got one with {', '.join(names[:3])}; choose another"
         )
-    for name, text in FILES.items():
-        write_bytes(folder / name, text.encode())
+    for file in sorted(path for path in PROJECT.rglob("*") if path.is_file()):
+        name = file.relative_to(PROJECT).as_posix().replace("gitignore", ".gitignore")
+        write_bytes(folder / name, file.read_bytes())
     print(f"{folder}: a new project, see {folder / 'README.md'}")
     return 0
