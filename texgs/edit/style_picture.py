@@ -14,7 +14,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.image import open_picture, with_eight_bits
 from texgs.core.memory import require_memory
 
@@ -115,10 +115,8 @@ def read_style(path: str | Path, find: Find | None = None) -> StylePicture:
         region = find(pixels[:3].permute(1, 2, 0))
         check.shape("region", region, "h w", h=visible.shape[0], w=visible.shape[1])
         visible = visible & region
-    try:
+    with located(path):
         return StylePicture.of(pixels[:3].contiguous(), None if bool(visible.all()) else visible)
-    except ArgumentError as error:
-        raise ArgumentError(f"{path}: {error}") from error
 
 
 def reduced(picture: Image.Image) -> Image.Image:

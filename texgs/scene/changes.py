@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.plain_yaml import parse_yaml
 from texgs.scene.cut_words import changed_cuts
 from texgs.scene.parts import entry_of, key_path
@@ -19,10 +19,8 @@ from texgs.scene.session import SCENE_KEYS, Session
 def apply_all(session: Session, words: Sequence[str]) -> None:
     """Make the changes that words ask for, see `texgs edit --help`; an error names its word."""
     for word in words:
-        try:
+        with located(word):
             _apply(session, word)
-        except TexgsError as error:
-            raise type(error)(f"{word}: {error}") from error
 
 
 def _apply(session: Session, word: str) -> None:

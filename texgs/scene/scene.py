@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.cuts import NO_CUTS, Cuts
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.lens import Frame
 from texgs.core.light import Light
 from texgs.fields.field import Composed, Field
@@ -75,11 +75,9 @@ class SceneModel:
         model = fitted if self.texture is None else with_texture(fitted, self.texture)
         masks, variants = [], []
         for name, segment in self.segments.items():
-            try:
+            with located(f"segments.{name}"):
                 masks.append(read_segment(segment.file, fitted))
                 own = fitted if segment.texture is None else with_texture(fitted, segment.texture)
-            except TexgsError as error:
-                raise type(error)(f"segments.{name}: {error}") from error
             variants.append(own)
         if masks and fitted.stage == "texture":
             model = with_variants(model, labels_of(masks, len(model)), variants)
@@ -141,10 +139,8 @@ class Scene:
         """
         models, segments = [], []
         for name, entry in self.models.items():
-            try:
+            with located(f"models.{name}"):
                 model, masks = entry.open()
-            except TexgsError as error:
-                raise type(error)(f"models.{name}: {error}") from error
             models.append((lean(model) if is_lean else model).to(device))
             segments.append([mask.to(device) for mask in masks])
         made_of = sorted({model.kind for model in models})

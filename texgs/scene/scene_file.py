@@ -44,13 +44,10 @@ def read_scene(path: str | Path) -> Scene:
     path = Path(path)
     if not path.exists():
         raise ArgumentError(f"{path}: no such file; texgs compose writes one")
-    with reading(path, "a scene in YAML", "correct it"):
-        try:
-            if path.stat().st_size > LARGEST:
-                raise ArgumentError(f"expected a scene of at most {LARGEST} bytes; is it another file?")
-            return _scene(parse_yaml(path.read_text(encoding="utf-8")), path.parent)
-        except ArgumentError as error:
-            raise ArgumentError(f"{path}: {error}") from error
+    with reading(path, "a scene in YAML", "correct it"), located(path):
+        if path.stat().st_size > LARGEST:
+            raise ArgumentError(f"expected a scene of at most {LARGEST} bytes; is it another file?")
+        return _scene(parse_yaml(path.read_text(encoding="utf-8")), path.parent)
 
 
 def _scene(values: Any, folder: Path) -> Scene:
@@ -163,11 +160,10 @@ def cuts_of(value: Any) -> Cuts:
 def table_of(kind: type[T], value: Any, where: str) -> T:
     """Return an instance of a dataclass that a value of a scene file stands for."""
     try:
-        return typed(kind, value, where)
+        with located(where):
+            return typed(kind, value, where)
     except ValueMismatch as error:
         raise ArgumentError(str(error)) from error
-    except ArgumentError as error:
-        raise ArgumentError(f"{where}: {error}") from error
 
 
 def plain_cuts(cuts: Cuts) -> dict[str, Any]:

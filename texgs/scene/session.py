@@ -15,7 +15,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.cuts import Cuts
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.names import require_name
 from texgs.fields.field import Composed
@@ -266,10 +266,8 @@ class Session:
     def _push_read(self, scene: Scene, models: Iterable[str]) -> None:
         """Add a scene of which models have other files, which are read first."""
         for model in models:
-            try:
+            with located(f"models.{model}"):
                 scene.models[model].open()
-            except TexgsError as error:
-                raise type(error)(f"models.{model}: {error}") from error
         self._push(scene)
 
     def _push(self, scene: Scene) -> None:

@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
 from texgs.volume.grid import Dims, Grid, Triple
 from texgs.volume.headers import read_fields
@@ -24,10 +24,8 @@ def open_grid(path: str | Path) -> Grid:
     path = Path(path)
     if not path.is_file():
         raise ArgumentError(f"{path}: no such file; prepare the volume first")
-    try:
+    with located(path):
         source = open_prepared(path)
-    except (ArgumentError, ShapeError) as error:
-        raise type(error)(f"{path}: {error}") from error
     return Grid(source.mapped(), source.spacing, source.origin)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
 from texgs.volume.foreign import open_foreign
 from texgs.volume.grid import (
@@ -63,10 +63,9 @@ def open_source(
     path = Path(path)
     said = {key: value for key, value in keys.items() if value not in (None, "little", 0)}
     try:
-        _try_to_read(path)
-        return _open(path, spacing, origin, said)
-    except TexgsError as error:
-        raise type(error)(f"{path}: {error}") from error
+        with located(path):
+            _try_to_read(path)
+            return _open(path, spacing, origin, said)
     except FileNotFoundError as error:
         path = Path(error.filename or path)
         raise ArgumentError(f"{path}: no such file or folder; looked for {path.absolute()}") from error

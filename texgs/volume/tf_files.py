@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.io import read_json, reading_as, write_json
 from texgs.core.names import is_number
 from texgs.volume.transfer import TransferFunction
@@ -30,17 +30,14 @@ def read_tf(path: str | Path) -> TransferFunction:
     given over [0, 1]: see `TransferFunction.scaled`.
     """
     data = read_json(path)
-    try:
-        with reading_as("a transfer function"):
-            if isinstance(data, dict) and data.get("format") == FORMAT:
-                return _from_ours(data)
-            presets = data if isinstance(data, list) else [data]
-            if presets and all(
-                isinstance(p, dict) and p.keys() & {"RGBPoints", "IndexedColors"} for p in presets
-            ):
-                return _from_preset(presets)
-    except ArgumentError as error:
-        raise ArgumentError(f"{path}: {error}") from error
+    with located(path), reading_as("a transfer function"):
+        if isinstance(data, dict) and data.get("format") == FORMAT:
+            return _from_ours(data)
+        presets = data if isinstance(data, list) else [data]
+        if presets and all(
+            isinstance(p, dict) and p.keys() & {"RGBPoints", "IndexedColors"} for p in presets
+        ):
+            return _from_preset(presets)
     raise ArgumentError(
         f'{path}: expected a transfer function with "format": "{FORMAT}" or a list of ParaView presets, got '
         "neither; export it from ParaView, or take a *.paraview.json from results/DATASET/transfer"

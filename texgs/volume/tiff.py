@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
 from texgs.core.names import SLICES
 from texgs.volume.grid import ONES, ZEROS, Grid, Triple, dims_of, require_room
@@ -50,11 +50,8 @@ class PageSource(Source):
         """Return one slice, which must be like the first."""
         import tifffile
 
-        try:
-            with reading_as("a TIFF file"), complaints_raised():
-                values = tifffile.imread(file, key=page)
-        except ArgumentError as error:
-            raise ArgumentError(f"{file}: {error}") from error
+        with located(file), reading_as("a TIFF file"), complaints_raised():
+            values = tifffile.imread(file, key=page)
         if values.shape != self._shape or values.dtype != self.dtype:
             raise ArgumentError(
                 f"{file}: expected a page {list(self._shape)} of {self.dtype} as the first one, "
