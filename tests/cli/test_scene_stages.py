@@ -180,5 +180,4 @@ def test_a_film_moves_the_last_plane(results, tmp_path, monkeypatch, capsys):
     assert main(["edit", str(path), "cut=x,0", "--output", "cut.yaml"]) == 0
     assert main(["render", "cut.yaml", *size, "--output", "frames"]) == 0
     first, middle, last = (np.asarray(Image.open(each)) for each in sorted(Path("frames").iterdir()))
-    assert (last == 255).all(), "all is cut away"
-    assert first.std() > middle.std() > 0
+    assert first.std() > middle.std() > last.std() > 0, "the last frame still shows something"

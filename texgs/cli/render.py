@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 MOST_FRAMES = 100_000  # an hour of film
 MOST_GAIN = 16.0
+SWEPT = 0.6  # of the radius of what is framed: how far from its centre a plane moves
 PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61, "cut": 61}  # frames by default
 
 
@@ -171,10 +172,10 @@ def shots_of(
 
 
 def moved(cuts: Cuts, framed: Frame, share: float) -> Cuts:
-    """Return cuts whose last plane is on its way through what is framed, against its normal."""
+    """Return cuts whose last plane moves past the centre of what is framed, against its normal."""
     if not cuts.planes:
         raise ArgumentError("--path cut: expected a scene that a plane cuts, got none; texgs edit cut=x,0")
     last = cuts.planes[-1]
     middle = sum(along * place for along, place in zip(last.normal, framed.target, strict=True))
-    offset = middle + (1 - 2 * share) * framed.radius
+    offset = middle + (1 - 2 * share) * SWEPT * framed.radius
     return replace(cuts, planes=[*cuts.planes[:-1], replace(last, offset=offset)])

@@ -21,6 +21,7 @@ from texgs.volume.images import smaller
 SLAB = 30.0  # opacity units of the volume behind a face, which hide most of what is beyond
 UNITS, OPAQUE = 3.0, 0.05  # a face is where so many opacity units behind a cut have at least this alpha
 RIM = 0.0125  # of the smaller side of the picture: how far around a face the slab goes on
+HIDDEN = 0.998  # alpha of a slab behind which models are not drawn, half a level of 255
 STEP = 0.5  # voxels between the samples of a slab
 
 
@@ -70,7 +71,7 @@ def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut:
     before = cut._replace(depth_range=torch.stack([near, behind]))
     slab = twin.with_step(STEP).render(camera, scene, composed.palettes, before)
     background = camera.viewmat.new_tensor(scene.background)
-    beyond = torch.stack([behind, cut.depth_range[1]])
+    beyond = torch.stack([behind, torch.where(slab.alpha < HIDDEN, cut.depth_range[1], behind)])
     models = composed.render(camera, scene.light, scene.edits, background=background, depth_range=beyond)
     clear = 1 - slab.alpha[..., None]
     color = slab.color + clear * (models.color - background)

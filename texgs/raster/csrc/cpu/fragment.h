@@ -225,10 +225,11 @@ TEXGS_INLINE int list_block(const uint32_t* masks, int n, int block, int32_t* li
     return count;
 }
 
-// Pixels of a block that lie inside the image, as 1 and 0.
-TEXGS_INLINE vf inside_image(const Raster& r, Pixels at) {
-    const vm inside = (at.x < vf(float(r.camera.width))) & (at.y < vf(float(r.camera.height)));
-    return zero_unless(inside, 1.0f);
+// Pixels of a block that lie inside the image and in whose depth range something may lie, as 1 and 0.
+TEXGS_INLINE vf open_pixels(const Raster& r, Pixels at) {
+    vm open = (at.x < vf(float(r.camera.width))) & (at.y < vf(float(r.camera.height)));
+    if (at.is_cut) open = open & (at.near < at.far);
+    return zero_unless(open, 1.0f);
 }
 
 // Visits the rows of a tile's blocks that lie inside the image: pixel in the image plane [H, W], index in the

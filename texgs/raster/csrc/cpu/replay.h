@@ -56,14 +56,14 @@ private:
     }
 };
 
-// Transmittance of a tile's pixels at the start: 1, or 0 outside the image. Returns the blocks that have any.
+// Transmittance of a tile's pixels at the start: 1, or 0 where nothing counts. Returns the blocks that have any.
 TEXGS_INLINE uint32_t start_tile(const Raster& r, const TilePixels& pixels, float* transmittance) {
     uint32_t alive = 0;
     for (int block = 0; block < kBlocks; ++block)
         for (int part = 0; part < kParts; ++part) {
-            const vf inside = inside_image(r, pixels.of(block, part));
-            store(transmittance + block * kBlockPixels + part * kLanes, inside);
-            alive |= uint32_t(any(inside > vf(0.0f))) << block;
+            const vf open = open_pixels(r, pixels.of(block, part));
+            store(transmittance + block * kBlockPixels + part * kLanes, open);
+            alive |= uint32_t(any(open > vf(0.0f))) << block;
         }
     return alive;
 }
