@@ -207,6 +207,12 @@ def test_planes_cut_move_and_tilt(chromium, scene_file):
         page.get_by_role("checkbox", name="Box").check()
         page.get_by_role("spinbutton", name="Highest x of the box, as a number").fill("0.25")
         page.keyboard.press("Tab")
+        side = page.get_by_role("slider", name="Lowest y of the box: arrow keys move it")
+        low = -float(side.get_attribute("aria-valuenow"))
+        side.press("ArrowRight")  # outwards
+        assert float(side.get_attribute("aria-valuenow")) == pytest.approx(-low + 0.01, abs=1e-3)
+        drag(page, side.locator(".reach"), (0.5, 0.5), (0.5, -3))  # upwards, inwards
+        assert float(side.get_attribute("aria-valuenow")) < -low - 0.02
         page.get_by_role("button", name="Flip plane 1").click()
         save_as(page, "cut.yaml")
         cuts = read_scene(scene_file.parent / "cut.yaml").cuts

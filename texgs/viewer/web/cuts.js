@@ -5,6 +5,8 @@ import { capital, element, slider, tick } from "./inputs.js";
 import { PlaneHandles } from "./handles.js";
 
 const MOST = 6; // planes, as the server has it
+const SIDES = ["low", "high"].flatMap((side) => [0, 1, 2].map((axis) => ({ side, axis })));
+const HELD = MOST + SIDES.length;
 const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
 const plain = ({ normal, offset }) => ({ normal, offset });
 
@@ -73,8 +75,35 @@ export class Cuts {
     return near.map((x, i) => x + distance * normal[i]);
   }
 
-  /** Move a plane along its normal. */
+  /** What handles hold: planes, then sides of the box with their corners; undefined where one is off. */
+  get held() {
+    return Array.from({ length: HELD }, (_, index) => this.heldBy(index));
+  }
+
+  heldBy(index) {
+    if (index < MOST) return this.planes[index]?.isOn ? this.planes[index] : undefined;
+    const { box } = this.#page.state.scene.cuts, { side, axis } = SIDES[index - MOST], sign = side === "low" ? -1 : 1;
+    if (!box) return undefined;
+    const near = box.low.map((x, i) => (x + box.high[i]) / 2), [u, v] = [0, 1, 2].filter((i) => i !== axis);
+    const corners = [["low", "low"], ["high", "low"], ["high", "high"], ["low", "high"]].map(([a, b]) =>
+      [0, 1, 2].map((i) => i === axis ? box[side][i] : box[i === u ? a : b][i]));
+    return { normal: [0, 1, 2].map((i) => i === axis ? sign : 0), offset: sign * box[side][axis], near, corners };
+  }
+
+  /** Its words. */
+  name(index) {
+    if (index < MOST) return `Plane ${index + 1}: arrow keys move it, with Shift they tilt it`;
+    const { side, axis } = SIDES[index - MOST];
+    return `${side === "low" ? "Lowest" : "Highest"} ${"xyz"[axis]} of the box: arrow keys move it`;
+  }
+
+  /** Move a plane, or a side of the box, along its normal. */
   move(index, length, step) {
+    if (index >= MOST) {
+      const { side, axis } = SIDES[index - MOST];
+      this.#moveSide(side, axis, this.#lastBox[side][axis] + (side === "low" ? -length : length), step);
+      return;
+    }
     const offset = this.planes[index].offset + length;
     this.change(index, { offset: Math.min(this.far, Math.max(-this.far, offset)) }, step);
   }
@@ -156,6 +185,13 @@ export class Cuts {
     return box;
   }
 
+  #moveSide(side, axis, value, step) {
+    const box = { ...this.#lastBox, [side]: [...this.#lastBox[side]] };
+    box[side][axis] = side === "low" ? Math.max(-this.far, Math.min(value, box.high[axis] - this.unit))
+      : Math.min(this.far, Math.max(value, box.low[axis] + this.unit));
+    this.#send(step, box);
+  }
+
   #boxInputs() {
     const isOn = () => this.#page.state.scene.cuts.box !== null;
     const on = tick("Box", (value) => this.#send(0, value ? this.#lastBox : null));
@@ -163,12 +199,8 @@ export class Cuts {
     const sliders = [0, 1, 2].flatMap((axis) => ["low", "high"].map((side) => {
       const name = "xyz"[axis], [label, most] = side === "low" ? ["from", "lowest"] : ["to", "highest"];
       const what = `${most} ${name} of the box`;
-      const input = this.#slider(`${name} ${label}`, what, this.far, this.unit, (value, step) => {
-        const box = { ...this.#lastBox, [side]: [...this.#lastBox[side]] };
-        box[side][axis] = side === "low" ? Math.min(value, box.high[axis] - this.unit)
-          : Math.max(value, box.low[axis] + this.unit);
-        this.#send(step, box);
-      });
+      const input = this.#slider(`${name} ${label}`, what, this.far, this.unit,
+        (value, step) => this.#moveSide(side, axis, value, step));
       root.append(input.row);
       return () => {
         input.row.hidden = !isOn();

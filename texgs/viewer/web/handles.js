@@ -1,9 +1,11 @@
-// Arrows over the picture, one for each plane that cuts: drawn along it, a plane moves; by its tip, it tilts.
+// Arrows over the picture, one for each plane that cuts and each side of the box: drawn along it, these move; by its
+// tip, a plane tilts.
 
 import { cross, dot } from "./camera.js";
 import { gesture } from "./inputs.js";
 
-const LENGTH = 0.5; // of an arrow, in radii of the scene
+const LENGTH = 0.5; // of a plane's arrow, in radii of the scene
+const SIDE_LENGTH = 0.15; // of that of a side of the box
 const SHORT = 0.25; // of its length in the picture: below this it is seen from its end
 const TURN = 5; // degrees a key
 const CORNERS = 48; // of the rim
@@ -13,7 +15,7 @@ const path = (points) => `M${points.map(([x, y]) => `${x.toFixed(1)},${y.toFixed
 
 export class PlaneHandles {
   #cuts; #page; #svg;
-  #drawn = []; // by plane: its group and a function that draws it
+  #drawn = []; // by what is held: its group and a function that draws it
   #isOn = true;
 
   /**
@@ -34,13 +36,12 @@ export class PlaneHandles {
 
   /** Draw the arrows as the camera sees them. */
   draw() {
-    const { planes } = this.#cuts, { before, only, mode } = this.#page.shown;
+    const { before, only, mode } = this.#page.shown;
     const isFromHere = this.#page.state.scene.volume || !["truth", "difference"].includes(mode);
     const isShown = this.#isOn && !before && !only && isFromHere;
-    while (this.#drawn.length < planes.length) this.#make(this.#drawn.length);
-    this.#drawn.forEach(({ group, place }, index) => {
-      const isThere = isShown && planes[index]?.isOn && place(planes[index]);
-      group.toggleAttribute("hidden", !isThere);
+    this.#cuts.held.forEach((held, index) => {
+      if (held) this.#drawn[index] ??= this.#make(index);
+      this.#drawn[index]?.group.toggleAttribute("hidden", !(isShown && held && this.#drawn[index].place(held)));
     });
   }
 
@@ -65,42 +66,47 @@ export class PlaneHandles {
       for (const [name, value] of Object.entries(values)) made.setAttribute(name, value);
       return made;
     };
-    const label = `Plane ${index + 1}: arrow keys move it, with Shift they tilt it`;
+    const label = this.#cuts.name(index);
     const group = add(this.#svg, "g", { class: "plane", tabindex: 0, role: "slider", "aria-label": label });
     const [rim, reach, under, line, tip] = ["rim", "reach", "under", "line", "tip"].map(
       (name) => add(group, "path", { class: name }));
     const place = (plane) => {
       const { from, isSeen } = this.#pixels(plane), { radius } = this.#page.state.scene.bounds;
-      const at = this.#cuts.middle(plane);
-      const to = this.#project(at.map((x, i) => x + LENGTH * radius * plane.normal[i]));
+      const at = this.#cuts.middle(plane), reaches = (plane.corners ? SIDE_LENGTH : LENGTH) * radius;
+      const to = this.#project(at.map((x, i) => x + reaches * plane.normal[i]));
       if (from.scale <= 0 || to.scale <= 0) return false;
       const shaft = path([[from.x, from.y], [to.x, to.y]]);
       for (const each of [reach, under, line]) each.setAttribute("d", shaft);
-      rim.setAttribute("d", this.#rim(plane));
+      rim.setAttribute("d", this.#outline(plane.corners ?? this.#rim(plane)));
       const length = Math.hypot(to.x - from.x, to.y - from.y) || 1;
       const u = [(to.x - from.x) / length, (to.y - from.y) / length];
       const corners = HEAD.map(([a, b]) => [to.x + a * u[0] - b * u[1], to.y + a * u[1] + b * u[0]]);
       tip.setAttribute("d", `${path(corners)}Z`);
-      tip.style.pointerEvents = isSeen ? "" : "none"; // what lies under it moves the plane
+      tip.style.pointerEvents = isSeen && !plane.corners ? "" : "none"; // what lies under it moves the plane
       const range = { min: -this.#cuts.far, max: this.#cuts.far, now: plane.offset.toFixed(3) };
       for (const [name, value] of Object.entries(range)) group.setAttribute(`aria-value${name}`, value);
       return true;
     };
     this.#listen(group, tip, index);
-    this.#drawn.push({ group, place });
+    return { group, place };
   }
 
-  /** Where a plane leaves the ball around the scene; "" where a part of that is behind the camera. */
+  /** A closed line through corners in the picture; "" where one of them is behind the camera. */
+  #outline(corners) {
+    const seen = corners.map((corner) => this.#project(corner));
+    return seen.every(({ scale }) => scale > 0) ? `${path(seen.map(({ x, y }) => [x, y]))}Z` : "";
+  }
+
+  /** Corners of where a plane leaves the ball around the scene. */
   #rim({ normal, offset }) {
     const { center, radius } = this.#page.state.scene.bounds, at = this.#cuts.middle({ normal, offset });
     const size = Math.sqrt(Math.max(0, radius ** 2 - (offset - dot(normal, center)) ** 2));
     const side = Math.abs(normal[1]) < 0.9 ? [0, 1, 0] : [1, 0, 0];
     const u = cross(normal, side), v = cross(normal, u), scale = size / Math.hypot(...u);
-    const corners = Array.from({ length: CORNERS }, (_, k) => {
+    return Array.from({ length: CORNERS }, (_, k) => {
       const angle = 2 * Math.PI * k / CORNERS, c = scale * Math.cos(angle), s = scale * Math.sin(angle);
-      return this.#project(at.map((x, i) => x + c * u[i] + s * v[i]));
+      return at.map((x, i) => x + c * u[i] + s * v[i]);
     });
-    return corners.every(({ scale }) => scale > 0) ? `${path(corners.map(({ x, y }) => [x, y]))}Z` : "";
   }
 
   #listen(group, tip, index) {
@@ -113,7 +119,7 @@ export class PlaneHandles {
     group.addEventListener("pointerdown", (event) => {
       if (event.button) return;
       group.setPointerCapture(event.pointerId);
-      tilts = event.target === tip || event.shiftKey;
+      tilts = event.target === tip || (event.shiftKey && !this.#cuts.heldBy(index).corners);
       last = event;
     });
     group.addEventListener("pointermove", (event) => {
@@ -127,9 +133,9 @@ export class PlaneHandles {
       if (!arrow || event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();
       const [x, y] = arrow, { radius } = this.#page.state.scene.bounds;
-      const { from } = this.#pixels(this.#cuts.planes[index]);
+      const { from } = this.#pixels(this.#cuts.heldBy(index));
       const turn = TURN * Math.PI / 180 * LENGTH * radius * from.scale; // pixels of the tip
-      make((step) => event.shiftKey ? this.#tilt(index, turn * x, turn * y, step)
+      make((step) => event.shiftKey && !this.#cuts.heldBy(index).corners ? this.#tilt(index, turn * x, turn * y, step)
         : this.#cuts.move(index, (x - y) * this.#cuts.unit, step));
     });
     for (const end of ["keyup", "lostpointercapture"]) {
@@ -139,13 +145,13 @@ export class PlaneHandles {
 
   /** The plane follows a pointer that moves by so many pixels. */
   #move(index, x, y, step) {
-    const { along: [u, v] } = this.#pixels(this.#cuts.planes[index]);
+    const { along: [u, v] } = this.#pixels(this.#cuts.heldBy(index));
     this.#cuts.move(index, (x * u + y * v) / (u * u + v * v), step);
   }
 
   /** The tip of the arrow does. */
   #tilt(index, x, y, step) {
-    const plane = this.#cuts.planes[index], { right, down } = this.#page.camera.axes();
+    const plane = this.#cuts.heldBy(index), { right, down } = this.#page.camera.axes();
     const { from } = this.#pixels(plane), unit = LENGTH * this.#page.state.scene.bounds.radius * from.scale;
     this.#cuts.tilt(index, plane.normal.map((n, i) => n + (x * right[i] + y * down[i]) / unit), step);
   }
