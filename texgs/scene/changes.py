@@ -58,7 +58,8 @@ def _change_part(session: Session, part: str, key: str, text: str) -> None:
 
 def _change_scene(session: Session, key: str, text: str) -> None:
     """Change the light or the background; an empty text takes it back."""
-    value = _plain(text) if text else SCENE_KEYS.get(key)
+    known({key: text}, ("light", "background", "cut"), "the scene")
+    value = _plain(text) if text else SCENE_KEYS[key]
     if key == "light" and isinstance(value, list) and len(value) == 2:
         value = dict(zip(("azimuth", "polar"), value, strict=True))
     session.set_of_scene(key, value)

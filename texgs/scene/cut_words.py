@@ -32,8 +32,8 @@ def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:
     if key == "faces":
         return cuts_of(plain_cuts(cuts) | {"faces": text or NO_CUTS.faces})
     if key and key not in numbers:
-        known = " or ".join(f"cut.{each}" for each in ("box", "faces", *numbers))
-        raise ArgumentError(f"expected cut, {known}, got cut.{key}")
+        known = ", ".join(f"cut.{each}" for each in ("box", "faces", *numbers))
+        raise ArgumentError(f"expected cut, which adds a plane, or one of {known}, got cut.{key}")
     if key:
         planes[int(key) - 1 : int(key)] = [_plane(scene, text)] if text else []
     else:
