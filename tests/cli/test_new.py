@@ -90,6 +90,12 @@ def test_any_path_is_read_again(conf, scan, tmp_path, folder):
     assert compose(("dataset=mine",)).dataset.volume.file == str(file)
 
 
+def test_the_path_that_is_written_has_no_way_back_in_it(conf, scan, tmp_path):
+    (tmp_path / "other").mkdir()
+    assert main(["new", f"other/../{scan.name}", "--name", "mine"]) == 0
+    assert compose(("dataset=mine",)).dataset.volume.file == str(scan)
+
+
 @pytest.mark.parametrize("name", ["${oc.env:HOME}.npy", "${.npy", "a\udcff.npy"])
 def test_a_path_that_no_configuration_can_hold_is_refused(conf, scan, tmp_path, capsys, name):
     scan.rename(tmp_path / name)

@@ -86,7 +86,7 @@ def configuration(name: str, file: Path, overrides: list[str]) -> Config:
     """Return the configuration as it will be with the new data set, but without basic TFs and tracking."""
     from texgs.config.dataset import Dataset, Volume
 
-    path = str(file.absolute())
+    path = str(file.parent.resolve() / file.name)
     if "${" in path:
         raise ArgumentError(f"{path}: expected a path without ${{, which stands for another key; rename it")
     if any("\ud800" <= letter <= "\udfff" for letter in path):
