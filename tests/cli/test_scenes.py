@@ -148,6 +148,21 @@ def test_a_mistake_in_a_rendering(scene, tmp_path, capsys, monkeypatch, words, m
     assert not (tmp_path / "x.mp4").exists()
 
 
+def test_a_missing_file_of_a_scene_is_named_with_the_scene(scene, tmp_path, capsys):
+    values = yaml.safe_load(scene.read_text())
+    values["cuts"] = {"planes": [{"normal": [1, 0, 0]}]}
+    values["volume"] = {"file": "gone.nrrd", "tfs": {}}
+    scene.write_text(yaml.safe_dump(values))
+    message = refused(capsys, "render", scene, "--output", tmp_path / "x.png")
+    assert message.startswith(f"texgs render: {scene}: volume: ")
+    assert message.endswith("gone.nrrd: no such file; prepare the volume first")
+    values["models"]["TF01"]["file"] = "gone.safetensors"
+    scene.write_text(yaml.safe_dump(values))
+    message = refused(capsys, "render", scene, "--output", tmp_path / "x.png")
+    assert message.startswith(f"texgs render: {scene}: models.TF01: ")
+    assert not (tmp_path / "x.png").exists()
+
+
 def test_names_that_yaml_takes_for_numbers_or_that_have_dots(scene, tmp_path):
     values = yaml.safe_load(scene.read_text())
     values["models"] = {42: values["models"]["TF01"], "v1.2": values["models"]["TF02"]}

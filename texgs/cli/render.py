@@ -72,13 +72,15 @@ def run(arguments: argparse.Namespace) -> int:
     count = frames_of(arguments)
     suffix = ".png" if count == 1 else ".mp4"
     output = arguments.output or Path(f"{arguments.scene.stem}{suffix}")
-    composition = scene.open(torch_device(arguments.device))
+    with located(arguments.scene):
+        composition = scene.open(torch_device(arguments.device))
     shots = shots_of(arguments, scene, count, scene.framed(composition))
     shots = progress(shots, count, title=str(output), unit="frame")
     if arguments.compare:
         frames = compared(arguments, scene, composition, shots)
     else:
-        twin = twin_of_cuts(scene, composition.device)
+        with located(arguments.scene):
+            twin = twin_of_cuts(scene, composition.device)
         frames = (frame(composition, camera, shown, arguments.mode, twin) for camera, shown in shots)
     words = checked(arguments.scene, scene)
     if arguments.caption:
