@@ -148,6 +148,15 @@ def test_a_mistake_in_a_rendering(scene, tmp_path, capsys, monkeypatch, words, m
     assert not (tmp_path / "x.mp4").exists()
 
 
+def test_a_picture_is_not_replaced_by_a_scene(scene, tmp_path, capsys):
+    picture = tmp_path / "new.png"
+    assert render(scene, picture) == 0
+    before = picture.read_bytes()
+    assert edit(scene, "light=30,40", output=picture) == 2
+    assert f"--output: expected a file that ends in .yaml, got {picture}" in capsys.readouterr().err
+    assert picture.read_bytes() == before
+
+
 def test_a_missing_file_of_a_scene_is_named_with_the_scene(scene, tmp_path, capsys):
     values = yaml.safe_load(scene.read_text())
     values["cuts"] = {"planes": [{"normal": [1, 0, 0]}]}
@@ -183,7 +192,7 @@ def test_a_file_is_named_from_where_one_is_and_found_through_a_link(scene, tmp_p
 def test_a_folder_is_no_file(scene, tmp_path, capsys):
     (tmp_path / "folder").mkdir()
     assert edit(scene, output="folder") == 2
-    assert "expected the name of a file, got a folder" in capsys.readouterr().err
+    assert "--output: expected a file that ends in .yaml, got" in capsys.readouterr().err
 
 
 @pytest.fixture

@@ -42,6 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.scene.changes import apply_all
     from texgs.scene.session import Session
 
+    require_scene(arguments.output)
     session = Session.open(arguments.scene)
     apply_all(session, arguments.overrides)
     if any(word.partition("=")[0].endswith(".file") for word in arguments.overrides):
@@ -148,5 +149,10 @@ def require_output(arguments: argparse.Namespace) -> None:
     require_name(arguments.name, "--name")
     if not arguments.output:
         raise ArgumentError("--output: expected the new scene.yaml, or --preview and a PNG file; got neither")
-    if arguments.output.suffix not in SCENES or arguments.output.is_dir():
-        raise ArgumentError(f"--output: expected a file that ends in .yaml, got {arguments.output}")
+    require_scene(arguments.output)
+
+
+def require_scene(output: Path) -> None:
+    """Require the path of a scene file, so that no file of another kind is replaced."""
+    if output.suffix not in SCENES or output.is_dir():
+        raise ArgumentError(f"--output: expected a file that ends in .yaml, got {output}")
