@@ -226,6 +226,13 @@ def test_words_cut_a_scene(session):
         ("cut=1,2,3", "cut=1,2,3: expected AXIS,POSITION"),
         ("cut=0,0,0,1", "normal: expected three numbers that are not all 0"),
         ("cut.2=x,0", "expected cut, which adds a plane, or one of cut.box, cut.faces, cut.1, got cut.2"),
+        (
+            "cut=x,9",
+            r"cut=x,9: expected a cut through the models, which lie from -0\.\d+ to 0\.\d+ along 1,0,0",
+        ),
+        ("cut=-x,9", "along -1,0,0, got -9; samples are counted as in 64v"),
+        ("cut.1=0,1,1,9", "along 0,0.707,0.707, got 6.36"),
+        ("cut.box=4,4,4,5,5,5", "along -1,0,0, got -4"),
         ("cuts=x,0", "the scene: no such key 'cuts', did you mean cut?"),
         ("sun=3", "the scene: no such key 'sun'; expected light, background, cut$"),
         ("cut.box=1,2,3", "expected X0,Y0,Z0,X1,Y1,Z1, in world units or along an axis as in 64v, got 1,2,3"),
@@ -238,3 +245,9 @@ def test_a_word_that_cannot_cut_leaves_the_scene(session, word, message):
     with pytest.raises(ArgumentError, match=message):
         apply_all(session, [word])
     assert session.scene is before
+
+
+def test_a_box_may_be_larger_than_the_models_and_other_cuts_are_left_alone(session):
+    session.set_cuts(Cuts([Plane([1.0, 0.0, 0.0], 9.0)]))  # as a page drags it
+    apply_all(session, ["cut.box=-9,-9,-9,0,9,9", "cut.faces=unlit", "cut=x,0"])
+    assert [plane.offset for plane in session.scene.cuts.planes] == [9.0, 0.0]

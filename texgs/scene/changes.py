@@ -8,8 +8,10 @@ from typing import Any
 
 import yaml
 
+from texgs.core.cuts import Cuts
 from texgs.core.errors import ArgumentError, located
 from texgs.core.plain_yaml import parse_yaml
+from texgs.scene.bounds import models_of, span_of
 from texgs.scene.cut_words import changed_cuts
 from texgs.scene.parts import entry_of, key_path
 from texgs.scene.scene_file import SEGMENT_KEYS, known
@@ -32,7 +34,9 @@ def _apply(session: Session, word: str) -> None:
     if part in session.scene.models or (dot and "/" in part and "/" not in key):
         _change_part(session, part, key, text)
     elif name == "cut" or part == "cut":
-        session.set_cuts(changed_cuts(session.scene, key if dot else "", text))
+        cuts = changed_cuts(session.scene, key if dot else "", text)
+        _require_through(session, cuts)
+        session.set_cuts(cuts)
     elif "/" in name:
         session.add_segment(name, _file(text)) if text else session.remove_segment(name)
     elif dot:
@@ -40,6 +44,21 @@ def _apply(session: Session, word: str) -> None:
         raise ArgumentError(f"expected a model of the scene ({models}), got {part}")
     else:
         _change_scene(session, name, text)
+
+
+def _require_through(session: Session, cuts: Cuts) -> None:
+    """Require of each new plane that it takes away some of the models, and of a box that it leaves some."""
+    for plane in cuts.half_spaces:
+        if plane in session.scene.cuts.half_spaces:
+            continue
+        composed = session.composition
+        low, high = span_of(models_of(composed), session.scene.framed(composed), plane.normal)
+        if plane.offset < low or (plane.offset > high and plane in cuts.planes):
+            normal = ",".join(f"{each + 0.0:.3g}" for each in plane.normal)
+            raise ArgumentError(
+                f"expected a cut through the models, which lie from {low:.3g} to {high:.3g} along {normal}, "
+                f"got {plane.offset:.3g}; samples are counted as in 64v"
+            )
 
 
 def _change_part(session: Session, part: str, key: str, text: str) -> None:
