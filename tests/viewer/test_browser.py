@@ -412,3 +412,4 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
                 page.get_by_role("button", name="Make the other edits again").click()
                 expect(page.get_by_role("listitem")).to_have_text(steps)
                 expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked()
+            expect(page.get_by_text("texgs view has ended. Start it again")).to_be_visible(timeout=WAIT)

@@ -89,17 +89,6 @@ async def test_pages_are_served_with_a_strict_policy_and_nothing_else(client):
             assert answer.status in (403, 404), name
 
 
-def test_a_token_is_kept_where_only_its_owner_reads_it(tmp_path):
-    path = tmp_path / "new" / "token"
-    token = guard.kept_token(path)
-    assert path.stat().st_mode & 0o777 == 0o600
-    assert guard.kept_token(path) == token
-    path.chmod(0o644)
-    assert guard.kept_token(path) != token
-    path.write_text("short")
-    assert guard.TOKEN.fullmatch(guard.kept_token(path))
-
-
 # ---- Frames -----------------------------------------------------------------
 
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 PORT = 8765
-TOKEN = "viewer-token"  # file in the cache folder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,24 +44,26 @@ def run(arguments: argparse.Namespace) -> int:
 
     from texgs.core.cache import cache_folder
     from texgs.core.check import torch_device
-    from texgs.viewer.guard import is_loopback, kept_token
+    from texgs.viewer.entry import entry
+    from texgs.viewer.guard import is_loopback
     from texgs.viewer.server import Server
     from texgs.viewer.shared_edits import open_scene
 
     server = Server(open_scene(arguments.scene, arguments.folder), torch_device(arguments.device))
     listening = listen(arguments.host, arguments.port)
-    token = kept_token(cache_folder() / TOKEN)
-    address = f"http://{name_of(arguments.host)}:{listening.getsockname()[1]}/{token}/"
     if not is_loopback(arguments.host):
         sys.stderr.write(
             "Who knows this address and reaches this machine can edit the scene, and nothing is encrypted; "
             "a tunnel (ssh -L) is safer.\n"
         )
-    print(f"{address}\nCtrl-C ends it.", flush=True)
-    if not arguments.no_browser:
-        threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
-    application = server.application(token, arguments.host)
-    web.run_app(application, sock=listening, print=None, access_log=None, shutdown_timeout=1.0)
+    port = listening.getsockname()[1]
+    file = cache_folder() / f"viewer-{port}.html"
+    with entry(file, f"http://{name_of(arguments.host)}:{port}") as address:
+        print(f"{address}\nCtrl-C ends it.", flush=True)
+        if not arguments.no_browser:
+            threading.Thread(target=webbrowser.open, args=(file.absolute().as_uri(),), daemon=True).start()
+        application = server.application(address.split("/")[-2], arguments.host)
+        web.run_app(application, sock=listening, print=None, access_log=None, shutdown_timeout=1.0)
     ask_to_save(server.edits)
     return 0
 

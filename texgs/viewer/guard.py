@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
-import os
 import re
-import secrets
 import socket
 from collections.abc import Collection
 from contextlib import suppress
-from pathlib import Path
 from urllib.parse import urlsplit
 
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from texgs.core.errors import ArgumentError
-
-TOKEN = re.compile(r"[A-Za-z0-9_-]{43}")  # 32 random bytes
 HOST = re.compile(r"[A-Za-z0-9._:\[\]-]+")
 POLICY = (  # not every browser takes the socket for a part of 'self'
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
@@ -99,25 +93,3 @@ def is_address(name: str) -> bool:
 def is_loopback(name: str) -> bool:
     """Return whether a name is one of this machine alone."""
     return name.lower() == "localhost" or (is_address(name) and ipaddress.ip_address(name).is_loopback)
-
-
-def kept_token(path: Path) -> str:
-    """Return the user's token; a new one where the file has none, or others may have read it.
-
-    It is kept, so that open pages find a server that was started again.
-    """
-    try:
-        is_private = os.name != "posix" or not path.stat().st_mode & 0o077
-        if is_private and TOKEN.fullmatch(known := path.read_text(encoding="ascii")):
-            return known
-    except (OSError, UnicodeError):
-        pass  # a new one
-    token = secrets.token_urlsafe(32)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.unlink(missing_ok=True)
-        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-            file.write(token)
-    except OSError as error:
-        raise ArgumentError(f"{path}: cannot write there ({error.strerror}); set TEXGS_CACHE") from error
-    return token

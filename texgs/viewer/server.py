@@ -35,6 +35,7 @@ SERVED = (".js", ".css", ".svg")
 MOST_PAGES = 16
 PATIENCE = 2.0  # seconds for a page to close its connection
 HEARTBEAT = 20.0  # seconds, after which a page that is gone is noticed
+GOODBYE = b"texgs view has ended. Start it again, and open the address that it prints."
 
 
 class Server:
@@ -224,7 +225,7 @@ class Server:
 
     async def _say_goodbye(self, app: web.Application) -> None:
         """Close all connections."""
-        closing = [each.close(code=WSCloseCode.GOING_AWAY) for each in self._pages.values()]
+        closing = [each.close(code=WSCloseCode.GOING_AWAY, message=GOODBYE) for each in self._pages.values()]
         await asyncio.gather(*closing)
 
     async def _closing(self, app: web.Application) -> AsyncIterator[None]:

@@ -1,6 +1,7 @@
 // The connection to the server: messages both ways, made anew by itself when it breaks.
 
 const FIRST_DELAY = 500, LONGEST_DELAY = 4000; // milliseconds before another attempt
+const ENDED = 1001; // the server's code where it has ended: the next one has another address
 
 /** Dispatches "message" (detail: parsed JSON), "frame" (detail: ArrayBuffer), "open" and "lost" (detail: why). */
 export class Connection extends EventTarget {
@@ -32,8 +33,9 @@ export class Connection extends EventTarget {
       const [name, detail] = typeof data === "string" ? ["message", JSON.parse(data)] : ["frame", data];
       this.dispatchEvent(new CustomEvent(name, { detail }));
     };
-    socket.onclose = ({ reason }) => {
+    socket.onclose = ({ code, reason }) => {
       this.dispatchEvent(new CustomEvent("lost", { detail: reason }));
+      if (code === ENDED) return;
       setTimeout(() => this.#open(), this.#delay);
       this.#delay = Math.min(2 * this.#delay, LONGEST_DELAY);
     };
