@@ -165,7 +165,7 @@ def test_a_missing_file_of_a_scene_is_named_with_the_scene(scene, tmp_path, caps
     scene.write_text(yaml.safe_dump(values))
     message = refused(capsys, "render", scene, "--output", tmp_path / "x.png")
     assert message.startswith(f"texgs render: {scene}: volume: ")
-    assert message.endswith("gone.nrrd: no such file; prepare the volume first")
+    assert message.endswith("gone.nrrd: no such file; texgs volume dataset=NAME makes it")
     values["models"]["TF01"]["file"] = "gone.safetensors"
     scene.write_text(yaml.safe_dump(values))
     message = refused(capsys, "render", scene, "--output", tmp_path / "x.png")

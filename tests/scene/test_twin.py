@@ -144,7 +144,7 @@ def test_a_twin_without_what_it_needs(tmp_path, volume, twin):
     with pytest.raises(ArgumentError, match=r"volume: expected the volume that the .* by texgs compose"):
         Twin(old)
     moved = scene_of(replace(volume, file=tmp_path / "none.nrrd"))
-    with pytest.raises(ArgumentError, match=r"volume: .*none\.nrrd: no such file; prepare the volume first"):
+    with pytest.raises(ArgumentError, match=r"volume: .*none\.nrrd: no such file; texgs volume "):
         Twin(moved)
     strange = Scene({"other": SceneModel("x")})
     with pytest.raises(ArgumentError, match=r"volume\.tfs: expected the basic TF of model other, got low, h"):

@@ -55,11 +55,11 @@ def test_mistakes_are_named(tmp_path):
     whole = written(tmp_path / "v.nrrd", "uint16").read_bytes()
     WRITERS["gzip.nrrd"](tmp_path / "gzip.nrrd", sample_values())
     for name, content, message in [
-        ("none.nrrd", None, r"none.nrrd: no such file; prepare the volume first"),
+        ("none.nrrd", None, r"none.nrrd: no such file; texgs volume dataset=NAME makes it"),
         ("foreign.nrrd", bytes(1000), r"foreign.nrrd: expected an NRRD file, but it does not start"),
         ("v.nrrd", whole[:-1], r"v.nrrd: the file is cut off: expected 13 x 12 x 11 x 2 \(uint16"),
-        ("v.nrrd", whole[:100], r"v.nrrd: expected an NRRD file"),
-        ("gzip.nrrd", None, "expected a prepared volume with raw encoding, got gzip"),
+        ("v.nrrd", whole[:100], r"v.nrrd: expected an NRRD file.*makes it again"),
+        ("gzip.nrrd", None, "prepared volume with raw encoding, got gzip; texgs volume"),
     ]:
         if content is not None:
             (tmp_path / name).write_bytes(content)

@@ -16,6 +16,7 @@ from texgs.volume.slabs import RawSource
 
 ALIGNMENT = 64  # bytes; where the samples of a canonical file start: cache lines, and any vector type
 WORDS = {"int8": "signed char", "uint8": "uchar", "int16": "short", "uint16": "ushort", "float32": "float"}
+MAKES = "texgs volume dataset=NAME makes it"
 NUMBER = re.compile(r"[-+.\deE]+")
 
 
@@ -23,7 +24,7 @@ def open_grid(path: str | Path) -> Grid:
     """Map a prepared volume into memory; samples are read when they are used."""
     path = Path(path)
     if not path.is_file():
-        raise ArgumentError(f"{path}: no such file; prepare the volume first")
+        raise ArgumentError(f"{path}: no such file; {MAKES}")
     with located(path):
         source = open_prepared(path)
     return Grid(source.mapped(), source.spacing, source.origin)
@@ -31,11 +32,11 @@ def open_grid(path: str | Path) -> Grid:
 
 def open_prepared(path: Path) -> RawSource:
     """Return a prepared volume as a source."""
-    with reading_as("an NRRD file", "prepare the volume again"):
+    with reading_as("an NRRD file", f"{MAKES} again"):
         fields, offset = read_fields(path)
         encoding = fields["encoding"]
         if encoding != "raw":
-            raise ArgumentError(f"expected a prepared volume with raw encoding, got {encoding}; prepare it")
+            raise ArgumentError(f"expected a prepared volume with raw encoding, got {encoding}; {MAKES}")
         nx, ny, nz = map(int, fields["sizes"].split())
         dx, _, _, _, dy, _, _, _, dz = map(float, NUMBER.findall(fields["spacedirections"]))
         x, y, z = map(float, NUMBER.findall(fields["spaceorigin"]))
