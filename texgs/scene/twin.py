@@ -22,7 +22,7 @@ from texgs.raster.shading import MATERIAL
 from texgs.volume.caster import Caster
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.render import Appearance
-from texgs.volume.transfer import TransferFunction, combine
+from texgs.volume.transfer import TransferFunction, check_disjoint, combine
 
 if TYPE_CHECKING:
     from texgs.scene.scene import Scene
@@ -45,7 +45,8 @@ class Twin:
         device: that casts rays.
 
     Raises:
-        ArgumentError: if the scene names no volume, or the volume cannot be read.
+        ArgumentError: if the scene names no volume, the volume cannot be read, or its basic TFs are not
+            those of the scene's models.
     """
 
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
@@ -57,6 +58,9 @@ class Twin:
         self._volume, self._device = scene.volume, torch.device(device)
         with located("volume"):
             self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
+        basic = {name: self._tf(name) for name in scene.models}
+        with located("volume.tfs"):
+            check_disjoint(basic)
 
     def with_step(self, step: float) -> Twin:
         """Return a twin with another distance of samples, in voxels; nothing is read again."""
