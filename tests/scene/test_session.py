@@ -214,6 +214,22 @@ def test_words_cut_a_scene(session):
 
 
 @pytest.mark.parametrize(
+    ("words", "left"),
+    [
+        (["cut.1=", "cut.2="], [0.3, 0.4]),
+        (["cut.4=", "cut.2=", "cut.1="], [0.3]),
+        (["cut.1=", "cut.2=y,0", "cut.4="], [0.0, 0.3]),
+        (["cut.1=", "cut=y,0", "cut=y,-0.1", "cut=y,-0.2", "cut.4="], [0.2, 0.3, 0.0, -0.1, -0.2]),
+        (["cut.1=", "cut=", "cut=y,0"], [0.0]),
+    ],
+)
+def test_planes_have_the_numbers_of_before_all_words(session, words, left):
+    apply_all(session, [f"cut=x,0.{each}" for each in (1, 2, 3, 4)])
+    apply_all(session, words)
+    assert [plane.offset for plane in session.scene.cuts.planes] == left
+
+
+@pytest.mark.parametrize(
     ("word", "message"),
     [
         (

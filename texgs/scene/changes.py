@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,25 @@ from texgs.scene.parts import entry_of, key_path
 from texgs.scene.scene_file import SEGMENT_KEYS, known
 from texgs.scene.session import SCENE_KEYS, Session
 
+NUMBERED = re.compile(r"cut\.([1-9])=")
+
 
 def apply_all(session: Session, words: Sequence[str]) -> None:
-    """Make the changes that words ask for, see `texgs edit --help`; an error names its word."""
-    for word in words:
+    """Make the changes that words ask for, see `texgs edit --help`; an error names its word.
+
+    Numbers of planes are those of the scene as it is now: these planes are replaced first, then taken back.
+    """
+    for word in sorted(words, key=_turn):
         with located(word):
             _apply(session, word)
+
+
+def _turn(word: str) -> int:
+    """Return when it is the turn of a word: first planes by number, of which the last is taken back first."""
+    numbered = NUMBERED.match(word)
+    if not numbered:
+        return 0
+    return -int(numbered[1]) if numbered.end() == len(word) else -10
 
 
 def _apply(session: Session, word: str) -> None:
