@@ -413,3 +413,27 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
                 expect(page.get_by_role("listitem")).to_have_text(steps)
                 expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked()
             expect(page.get_by_text("texgs view has ended. Start it again")).to_be_visible(timeout=WAIT)
+
+
+def test_a_connection_that_falls_silent_is_noticed_and_made_again(chromium, scene_file):
+    with served(scene_file) as (_, address):
+        page, routes, silent = chromium.new_page(), [], [False]
+
+        def connect(route):
+            server = route.connect_to_server()
+            server.on_message(lambda message: None if silent[0] else route.send(message))
+            routes.append(route)
+
+        page.clock.install()
+        page.route_web_socket(re.compile("/socket$"), connect)
+        page.goto(address)
+        expect(page.locator("#pace")).to_contain_text("ms", timeout=WAIT)
+        silent[0] = True
+        page.clock.fast_forward(21_000)
+        lost = page.get_by_text("No connection to texgs view")
+        expect(lost).to_be_visible(timeout=WAIT)
+        silent[0] = False
+        page.clock.fast_forward(5_000)
+        expect(lost).to_be_hidden(timeout=WAIT)
+        assert len(routes) == 2
+        page.close()

@@ -9,7 +9,7 @@ import pytest
 from aiohttp import WSCloseCode, WSMsgType, WSServerHandshakeError
 from PIL import Image
 
-from tests.viewer.pages import TOKEN, WAIT, on_page, origin, page
+from tests.viewer.pages import TOKEN, WAIT, on_page, origin, page, served
 from tests.viewer.test_messages import CAMERA, VIEW
 from texgs.cli.main import main
 from texgs.core.cuts import NO_CUTS
@@ -306,6 +306,16 @@ async def test_messages_have_a_limit(browser, client):
     assert message.type == WSMsgType.CLOSE
     async with page(client) as again:
         await again.next("scene")
+
+
+def test_a_page_hears_of_its_server_while_nothing_happens(scene_file, monkeypatch):
+    async def work():
+        async with served(scene_file) as client, page(client) as browser:
+            for _ in range(2):
+                await browser.next("beat")
+
+    monkeypatch.setattr("texgs.viewer.page.BEAT", 0.01)
+    asyncio.run(work())
 
 
 @on_page

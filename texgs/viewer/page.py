@@ -21,6 +21,7 @@ from texgs.viewer.work import Stopped, Work
 
 log = logging.getLogger("texgs.viewer")
 MOST_NOTICES = 8  # that wait for a page which does not listen
+BEAT = 5.0  # seconds; a page that hears nothing for some of these takes its connection for broken
 
 
 class Page:
@@ -87,6 +88,12 @@ class Page:
         finally:
             if self._masking is not None:
                 self._masking.cancel()
+
+    async def beat(self) -> None:
+        """Send a word again and again until the page is gone: its script cannot see pings."""
+        while True:
+            await asyncio.sleep(BEAT)
+            await self._socket.send_str('{"type": "beat"}')
 
     async def _send_what_waits(self) -> None:
         """Send notices, news and the frame; masks are found meanwhile."""

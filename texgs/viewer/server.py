@@ -88,14 +88,15 @@ class Server:
         page = Page(socket, self.edits, self.frames, self.work, self._count)
         page.tell_scene({**self.greeting(), "page": page.number})
         self._pages[page] = socket
-        sending = asyncio.create_task(page.send())
+        sending = [asyncio.create_task(each) for each in (page.send(), page.beat())]
         try:
             await self._listen(socket, page)
         finally:
             del self._pages[page]
             self.work.stop(page)
-            sending.cancel()
-            await asyncio.gather(sending, return_exceptions=True)
+            for each in sending:
+                each.cancel()
+            await asyncio.gather(*sending, return_exceptions=True)
         return socket
 
     async def index(self, request: web.Request) -> web.StreamResponse:
