@@ -413,6 +413,14 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
                 expect(page.get_by_role("listitem")).to_have_text(steps)
                 expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked()
             expect(page.get_by_text("texgs view has ended. Start it again")).to_be_visible(timeout=WAIT)
+            undone = page.get_by_text("Not done: there is no connection to texgs view.")
+            expect(undone).to_have_count(0)
+            for ask in ("Save", "Undo"):
+                page.get_by_role("button", name=ask).click()
+                if ask == "Save":
+                    page.keyboard.press("Enter")
+                expect(undone).to_be_visible()
+                undone.get_by_role("button", name="Close").click()
 
 
 def test_a_connection_that_falls_silent_is_noticed_and_made_again(chromium, scene_file):

@@ -4,7 +4,7 @@ const FIRST_DELAY = 500, LONGEST_DELAY = 4000; // milliseconds before another at
 const SILENCE = 20_000; // milliseconds without a word, of which the server has one every 5 s: it counts as broken
 const ENDED = 1001; // the server's code where it has ended: the next one has another address
 
-/** Dispatches "message" (detail: parsed JSON), "frame" (detail: ArrayBuffer), "open" and "lost" (detail: why). */
+/** Dispatches "message" (detail: parsed JSON), "frame" (detail: ArrayBuffer), "open", "lost" (detail: why) and "unsent". */
 export class Connection extends EventTarget {
   #socket = null;
   #delay = FIRST_DELAY;
@@ -23,6 +23,7 @@ export class Connection extends EventTarget {
   /** Send a message; whether there was a connection to send it by. */
   send(message) {
     if (this.isOpen) this.#socket.send(JSON.stringify(message));
+    else this.dispatchEvent(new Event("unsent"));
     return this.isOpen;
   }
 

@@ -132,6 +132,7 @@ connection.addEventListener("message", ({ detail }) => {
   }
 });
 connection.addEventListener("open", () => page?.state.restart());
+connection.addEventListener("unsent", () => notices.tell("Not done: there is no connection to texgs view.", "error"));
 connection.addEventListener("lost", ({ detail: why }) => { // before the page's job hears of it
   if (page?.job.isAtWork) notices.tell("The connection broke, which cancelled what was being made.", "error stays");
   const gone = "No connection to texgs view. This page tries again; start the same command if it has ended.";
