@@ -10,7 +10,8 @@ import sys
 from collections.abc import Sequence
 
 from texgs import __version__
-from texgs.core.errors import TexgsError
+from texgs.cli.options import Parser
+from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.memory import as_out_of_memory
 from texgs.core.names import close
 from texgs.core.process import collect_rarely, keep_freed_memory, waiting
@@ -44,7 +45,7 @@ VERBS = {
 
 def overview() -> argparse.ArgumentParser:
     """Return the parser that lists the verbs."""
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="texgs",
         description="Editable 3D scenes of textured 2D Gaussians from scientific volumes.",
     )
@@ -63,7 +64,7 @@ def parser(verb: str) -> argparse.ArgumentParser:
     about = getattr(module, run).__doc__ if verb in SHARED else module.__doc__
     if verb in STAGE_VERBS:
         about = f"{VERBS[verb][0].upper()}{VERBS[verb][1:]}."
-    made = argparse.ArgumentParser(prog=f"texgs {verb}", description=about, conflict_handler="resolve")
+    made = Parser(prog=f"texgs {verb}", description=about, conflict_handler="resolve")
     getattr(module, add)(made)
     made.set_defaults(verb=verb, run=getattr(module, run))
     return made
@@ -74,7 +75,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     verb, *words = argv or ["-"]
     if verb not in VERBS:
         if not verb.startswith("-"):
-            overview().error(f"no verb {verb}{close(verb, VERBS) or '; texgs --help lists all'}")
+            raise ArgumentError(f"no such verb{close(verb, VERBS) or '; texgs --help lists all'}")
         return overview().parse_args(argv)
     if verb == "run" and words[:1] not in (["-h"], ["--help"]):
         return parser(verb).parse_args(["--", *words])  # its options are those of snakemake

@@ -1,11 +1,19 @@
-"""Options that verbs share: those with a default, and the cameras of pictures."""
+"""What the command lines of verbs share: how mistakes are told, options with a default, cameras."""
 
 import argparse
-from typing import Any
+from typing import Any, NoReturn
 
 from texgs.core.lens import Frame, Lens
 
 LENS = Lens()
+
+
+class Parser(argparse.ArgumentParser):
+    """Tells a mistake in one sentence, without the usage."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with code 2."""
+        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 
 def option(parser: argparse.ArgumentParser, name: str, default: Any, words: str, **more: Any) -> None:

@@ -19,6 +19,7 @@ from itertools import pairwise
 from pathlib import Path
 from types import FrameType
 
+from texgs.cli.options import Parser
 from texgs.core.errors import ArgumentError
 
 INTERRUPTED = ": interrupted; "  # of `texgs.cli.main`: the end of a run says so by itself
@@ -57,11 +58,17 @@ def run(arguments: argparse.Namespace) -> int:
 def snakemake(words: Sequence[str]) -> bool:
     """Run the workflow of texgs in this process; return whether it ended well."""
     try:
-        from snakemake.cli import args_to_api, get_argument_parser, parse_args, parse_cores, print_exception
+        from snakemake.cli import CliException, args_to_api, get_argument_parser, parse_args, parse_cores
+        from snakemake.common import argparse as theirs
+        from snakemake.exceptions import print_exception
 
+        theirs.ArgumentParser.error = Parser.error
+        sys.argv[:1] = ["snakemake"]  # what these parsers are of
         given, _ = get_argument_parser().parse_known_intermixed_args(list(words))
     except RuntimeError as error:  # it looks for its own configuration in the user's home
         raise ArgumentError(f"HOME: snakemake needs a home folder ({error}); set HOME to one") from error
+    except CliException as error:
+        raise ArgumentError(f"{error} See snakemake --help.") from error
     require_pairs([word for word in words if word in given.targets])
     chosen = [word for word in given.targets if WORD.fullmatch(word)]
     rest = [word for word in words if word not in chosen]
