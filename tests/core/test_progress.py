@@ -32,9 +32,9 @@ def test_log_file_gets_a_line_every_five_seconds_and_a_last_one(clock, log):
     for _ in progress(range(92), title="views engine/TF01", unit="view"):
         clock[0] += 0.25
     lines = log()
-    assert lines[0] == "views engine/TF01: 20 of 92 view, 4.0 view/s, 18 s left"
-    assert lines[1] == "views engine/TF01: 40 of 92 view, 4.0 view/s, 13 s left"
-    assert lines[-1] == "views engine/TF01: 92 of 92 view, 4.0 view/s, took 23 s"
+    assert lines[0] == "views engine/TF01: 20 of 92 views, 4.0 view/s, 18 s left"
+    assert lines[1] == "views engine/TF01: 40 of 92 views, 4.0 view/s, 13 s left"
+    assert lines[-1] == "views engine/TF01: 92 of 92 views, 4.0 view/s, took 23 s"
     assert len(lines) == 5  # at 5, 10, 15, 20 s and the end
 
 
@@ -42,23 +42,25 @@ def test_slow_items_and_long_times(clock, log):
     for _ in progress(range(200), title="fit", unit="step"):
         clock[0] += 90
     lines = log()
-    assert lines[0] == "fit: 1 of 200 step, 90.0 s/step, 4 h 58 min left"
-    assert lines[-2] == "fit: 199 of 200 step, 90.0 s/step, 1 min 30 s left"
-    assert lines[-1] == "fit: 200 of 200 step, 90.0 s/step, took 5 h 00 min"
+    assert lines[0] == "fit: 1 of 200 steps, 90.0 s/step, 4 h 58 min left"
+    assert lines[-2] == "fit: 199 of 200 steps, 90.0 s/step, 1 min 30 s left"
+    assert lines[-1] == "fit: 200 of 200 steps, 90.0 s/step, took 5 h 00 min"
 
 
 def test_unknown_and_given_lengths(clock, log):
     for _ in progress((letter for letter in "abcd"), title="wait", unit="poll"):
         clock[0] += 3
     assert log() == [
-        "wait: 2 poll, 3.0 s/poll",
-        "wait: 4 poll, 3.0 s/poll",
-        "wait: 4 poll, 3.0 s/poll, took 12 s",
+        "wait: 2 polls, 3.0 s/poll",
+        "wait: 4 polls, 3.0 s/poll",
+        "wait: 4 polls, 3.0 s/poll, took 12 s",
     ]
     for _ in progress(iter("abc"), 3, title="a", unit="letter"):
         clock[0] += 1
     assert list(progress([], title="b", unit="view")) == []
-    assert log() == ["a: 3 of 3 letter, 1.0 letter/s, took 3 s"]
+    assert log() == ["a: 3 of 3 letters, 1.0 letter/s, took 3 s"]
+    assert list(progress("a", title="c", unit="view")) == ["a"]
+    assert log() == ["c: 1 of 1 view, took 0 s"]
 
 
 def test_a_loop_left_early_says_how_far_it_came(clock, log):
@@ -70,7 +72,7 @@ def test_a_loop_left_early_says_how_far_it_came(clock, log):
 
     with pytest.raises(ValueError, match="NaN"):
         fail()
-    assert log() == ["fit: 4 of 10 step, 1.2 s/step, stopped after 5 s"]
+    assert log() == ["fit: 4 of 10 steps, 1.2 s/step, stopped after 5 s"]
 
 
 def test_terminal_shows_a_bar(monkeypatch):
@@ -86,7 +88,7 @@ def test_tqdm_is_not_imported_for_a_log_file():
     command = [sys.executable, "-c", f"import sys; {code}; sys.exit('tqdm' in sys.modules)"]
     root = Path(__file__).parents[2]
     child = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    assert child.stderr.startswith("a: 3 of 3 b, ")
+    assert child.stderr.startswith("a: 3 of 3 bs, ")
 
 
 def test_a_watch_is_told_of_each_item_and_may_end_the_loop():

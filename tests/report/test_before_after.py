@@ -36,4 +36,4 @@ def test_only_what_can_be_relit_is_shown_under_another_light(kind, columns, tmp_
         assert (stream.width, stream.height) == (2 * kind.film_size, kind.film_size)
         assert len(list(film.decode(stream))) == 3
     assert "ball, after: " in (log := capsys.readouterr().err)
-    assert "ball, turntable: 3 of 3 frame" in log
+    assert "ball, turntable: 3 of 3 frames" in log

@@ -108,8 +108,9 @@ def _lines(iterable: Iterable[T], total: int | None, title: str, unit: str) -> I
 
 
 def _state(done: int, total: int | None, unit: str, seconds: float) -> str:
-    """Return count and rate, such as "40 of 92 view, 5.1 view/s"; a rate below one is inverted."""
-    count = f"{done} of {total} {unit}" if total else f"{done} {unit}"
+    """Return count and rate, such as "40 of 92 views, 5.1 view/s"; a rate below one is inverted."""
+    units = unit if (total or done) == 1 else f"{unit}s"
+    count = f"{done} of {total} {units}" if total else f"{done} {units}"
     if not done or seconds <= 0:
         return count
     rate = done / seconds
