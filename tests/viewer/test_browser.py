@@ -152,8 +152,17 @@ def test_comparing_shows_the_scene_as_it_was_opened(chromium, scene_file):
         page.get_by_role("checkbox", name="TF01").uncheck()
         assert still(page) != first
         page.keyboard.press("b")
-        expect(page.get_by_text("As opened", exact=True)).to_be_visible()
+        opened_as = page.get_by_text("As opened", exact=True)
+        expect(opened_as).to_be_visible()
         assert still(page) == first
+        page.get_by_role("button", name="Undo").click()
+        expect(opened_as).to_be_hidden()
+        expect(page.get_by_role("button", name="Compare")).to_have_attribute("aria-pressed", "false")
+        page.keyboard.press("b")
+        expect(opened_as).to_be_visible()
+        page.get_by_role("textbox", name="Palette of TF02").fill("#ff0000")
+        expect(opened_as).to_be_hidden()
+        assert still(page) != first, "who edits sees it"
 
 
 def drag(page, what, start, end):
@@ -308,6 +317,7 @@ def test_a_model_gets_the_style_of_a_picture(chromium, scene_file):
         expect(make).to_be_disabled()
         page.get_by_role("radio", name="dots").check(force=True)  # its picture is what one clicks on
         before = shown(page)
+        page.get_by_role("button", name="Compare").click()
         preview.click()
         expect(page.get_by_text("A preview: nothing has changed yet.")).to_be_visible(timeout=WAIT)
         assert np.abs(shown(page) - before).mean() > 1

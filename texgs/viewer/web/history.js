@@ -54,8 +54,6 @@ export class EditHistory {
   }
 
   #compare() {
-    const before = !this.#page.shown.before;
-    get("before").setAttribute("aria-pressed", before);
-    this.#page.show({ before });
+    this.#page.show({ before: !this.#page.shown.before });
   }
 }

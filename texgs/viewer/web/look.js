@@ -10,7 +10,7 @@ export class LookTool {
   #isTried = false; // whether the page shows a preview, or a look on its way
 
   /**
-   * @param {object} page - with canvas, connection, job, notices, state, beginLook() and draw()
+   * @param {object} page - with canvas, connection, job, notices, shown, state, beginLook() and show()
    * @param {{styles: string[], words: string[]}} choices - pictures and words that the server knows
    */
   constructor(page, { styles, words }) {
@@ -106,7 +106,7 @@ export class LookTool {
 
   #try(parts) {
     this.#isTried = parts.length > 0;
-    this.#page.draw();
+    this.#page.show({ before: this.#page.shown.before && !this.#isTried });
     this.#show();
   }
 

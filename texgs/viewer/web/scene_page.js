@@ -66,6 +66,9 @@ export class ScenePage {
     this.cuts = new Cuts(this);
     this.#inputs();
     control(this.canvas, () => this.camera, () => this.moved(), (name) => this.goTo(name), isLocked);
+    state.addEventListener("edit", () => { // who edits wants to see it
+      if (this.#shown.before) this.show({ before: false });
+    });
     state.addEventListener("change", () => this.draw(true));
     new ResizeObserver(() => this.draw(true)).observe(this.canvas);
     window.addEventListener("hashchange", () => this.follow());
@@ -83,6 +86,7 @@ export class ScenePage {
     get("mode").value = this.#shown.mode;
     get("mode-legend").textContent = this.#words(this.#shown.mode)[1];
     get("badge").hidden = !this.#shown.before;
+    get("before").setAttribute("aria-pressed", this.#shown.before);
     this.draw();
   }
 

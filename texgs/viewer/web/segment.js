@@ -46,7 +46,7 @@ export class SegmentTool {
     while (taken.includes(`part${number}`)) number += 1;
     get("segment-name").value = `part${number}`;
     get("segment").hidden = false;
-    this.#page.show({ only: name, mode: "shaded" });
+    this.#page.show({ only: name, mode: "shaded", before: false });
     this.#clear();
     this.#page.canvas.focus();
   }

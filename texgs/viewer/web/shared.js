@@ -59,6 +59,7 @@ export class SharedState extends State {
   }
 
   #send(message) {
+    if (message.type !== "save") this.dispatchEvent(new Event("edit"));
     const sent = this.#connection.send(message);
     if (sent) this.#sent += 1;
     return sent;

@@ -61,7 +61,7 @@ export function isUnedited(key, value) {
   return value === UNEDITED[key];
 }
 
-/** Dispatches "change" whenever something of it is another. */
+/** Dispatches "change" whenever something of it is another, and "edit" before somebody changes the scene here. */
 export class State extends EventTarget {
   #scenes = []; // before each step of `past`, and after each of `future`
   #undone = [];
@@ -77,6 +77,7 @@ export class State extends EventTarget {
 
   /** Make an edit; those with the same number in a row are one step, such as those of a slider. */
   edit(part, key, value, step = 0) {
+    this.dispatchEvent(new Event("edit"));
     const latest = step ? `${step} ${part} ${key}` : null;
     const goesOn = latest !== null && latest === this.#latest, edit = { part, key, value };
     if (!goesOn) this.#scenes.push(this.scene);
@@ -89,6 +90,7 @@ export class State extends EventTarget {
   /** Take the latest step back. */
   undo() {
     if (!this.past.length) return;
+    this.dispatchEvent(new Event("edit"));
     this.#latest = null;
     this.#undone.push(this.scene);
     const name = this.past.at(-1);
@@ -99,6 +101,7 @@ export class State extends EventTarget {
   /** Make the step again that was taken back last. */
   redo() {
     if (!this.future.length) return;
+    this.dispatchEvent(new Event("edit"));
     this.#latest = null;
     this.#scenes.push(this.scene);
     const [name, ...future] = this.future;
