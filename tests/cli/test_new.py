@@ -53,9 +53,13 @@ def test_a_data_set_with_suggested_tfs(conf, scan, capsys):
 
 def test_a_data_set_is_only_replaced_where_that_is_asked_for_and_that_of_texgs_never(conf, scan, capsys):
     shipped = (ROOT / "conf" / "dataset" / "engine.yaml").read_bytes()
+    refused = "texgs new: engine: is {} already; choose another --name, or {} it with --force\n"
     assert main(["new", str(scan), "--name", "engine"]) == 2
-    assert "is there already; choose another --name" in capsys.readouterr().err
+    assert capsys.readouterr().err == refused.format("a data set of texgs", "hide")
     assert main(["new", str(scan), "--name", "engine", "--force"]) == 0
+    capsys.readouterr()
+    assert main(["new", str(scan), "--name", "engine"]) == 2
+    assert capsys.readouterr().err == refused.format("there", "replace")
     assert (ROOT / "conf" / "dataset" / "engine.yaml").read_bytes() == shipped
     assert compose(("dataset=engine",)).dataset.volume.file == str(scan)
 

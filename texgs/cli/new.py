@@ -57,7 +57,8 @@ def run(arguments: argparse.Namespace) -> int:
     check_name("--name", name)
     target = own_folder() / "dataset" / f"{name}.yaml"
     if name in members("dataset") and not arguments.force:
-        raise ArgumentError(f"{name}: is there already; choose another --name, or replace it with --force")
+        there, do = ("is there", "replace") if target.exists() else ("is a data set of texgs", "hide")
+        raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
     if arguments.count is not None and arguments.count < 1:
         raise ArgumentError(f"--count: expected at least 1, got {arguments.count}")
     for path in arguments.tf or ():
