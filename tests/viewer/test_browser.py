@@ -16,6 +16,7 @@ from PIL import Image
 from tests.edit.lift_scenes import two_balls
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
+from tests.viewer.training_views import write_results
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
@@ -270,6 +271,22 @@ def test_a_scene_is_seen_beside_its_volume(chromium, tmp_path):
         page.get_by_role("slider", name="Enlarged").press("End")
         expect(page.get_by_text("+6.25 %")).to_be_visible()
         assert shown(page).mean() < first.mean() - 1, "what is off has stronger colours"
+
+
+def test_what_cannot_be_shown_leaves_no_picture_of_before(chromium, tmp_path):
+    scene_file = write_scene(tmp_path / "scene.yaml", write_results(tmp_path))
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        told = page.get_by_text("Training views show one transfer function each")
+        assert shown(page).std() > 1
+        for mode in ("Nearest training view", "Difference from that view"):
+            page.get_by_label("Show").select_option(mode)
+            expect(told).to_be_visible(timeout=WAIT)
+            assert np.ptp(shown(page)[:150], axis=(0, 1)).max() == 0, "the sentence is below"
+            page.get_by_role("checkbox", name="TF02").uncheck()
+            expect(told).to_be_hidden(timeout=WAIT)
+            assert shown(page).std() > 1
+            page.get_by_role("checkbox", name="TF02").check()
+            expect(told).to_be_visible(timeout=WAIT)
 
 
 def test_a_click_makes_a_segment(chromium, tmp_path):

@@ -23,7 +23,12 @@ class Page extends ScenePage {
     const renderer = new Remote(get("picture"), (text, level) => notices.tell(text, level));
     renderer.onframe = ({ ms, width, height, ...scores }) => {
       get("pace").textContent = `${width} × ${height}, ${Math.round(ms)} ms`;
+      get("refused").textContent = "";
       this.compare?.tell(scores);
+    };
+    renderer.onrefused = (why) => {
+      get("refused").textContent = why;
+      this.compare?.tell({});
     };
     renderer.open(connection, scene);
     super(new SharedState(greeting, connection), renderer, () => this.segments.isLocked);
@@ -127,7 +132,7 @@ connection.addEventListener("message", ({ detail }) => {
   } else if (detail.level === "file") {
     notices.tell(detail.text, "info");
     save(`files/${encodeURIComponent(detail.name)}`, detail.name);
-  } else if (detail.type === "notice") {
+  } else if (detail.type === "notice" && detail.frame === undefined) { // else the picture says it
     notices.tell(detail.text, detail.level);
   }
 });

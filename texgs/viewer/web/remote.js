@@ -23,6 +23,7 @@ export class Remote {
     this.#notice = notice;
     this.modes = [];
     this.onframe = () => {}; // is called with what the server says about a frame that is shown
+    this.onrefused = () => {}; // is called with the reason why a frame could not be rendered
   }
 
   /** Show what comes by a connection. */
@@ -31,7 +32,7 @@ export class Remote {
     this.modes = scene.modes;
     connection.addEventListener("frame", ({ detail }) => this.#receive(detail));
     connection.addEventListener("message", ({ detail }) => {
-      // it could not be rendered, or asked for; a notice says why
+      if (detail.frame === this.#asked) this.#refuse(detail.text);
       if (detail.frame === this.#asked || detail.refused) this.#next();
     });
     connection.addEventListener("open", () => {
@@ -81,8 +82,15 @@ export class Remote {
     }
   }
 
+  /** Show nothing: the frame before is none of what is asked for. */
+  #refuse(why) {
+    this.#canvas.classList.add("refused");
+    this.onrefused(why);
+  }
+
   #show(picture, width, height, header, isPair) {
     const canvas = this.#canvas;
+    canvas.classList.remove("refused");
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
     this.#picture?.close();
