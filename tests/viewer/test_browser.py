@@ -1,12 +1,14 @@
 """The page in a real browser: what it shows is what `texgs render` writes, and it finds a server again."""
 
 import io
+import json
 import os
 import re
 import signal
 import subprocess
 import sys
 from contextlib import contextmanager
+from urllib.parse import urlencode
 
 import numpy as np
 import pytest
@@ -386,6 +388,24 @@ def test_edits_stand_in_the_link(chromium, scene_file):
         page.goto("about:blank")
         page.goto(other + link[link.index("#") :])
         expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked(timeout=WAIT)
+
+
+def test_a_wrong_link_is_told_and_the_picture_stays(chromium, scene_file):
+    wrong = [
+        {"part": "", "key": "models", "value": None},
+        {"part": "", "key": "light", "value": {"azimuth": "<b>", "polar": 0}},
+        {"part": "TF01", "key": "opacity", "value": -5},
+    ]
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        first = still(page)
+        page.goto(f"{address}{LINK}&{urlencode({'edits': json.dumps(wrong)})}")
+        told = page.get_by_text("This page cannot use of the link: models, light, TF01 opacity.")
+        expect(told).to_be_visible()
+        page.goto(f"{address}{LINK.replace('azimuth=40', 'azimuth=1e300')}")
+        expect(page.get_by_text("This page cannot use of the link: azimuth.")).to_be_visible()
+        page.goto(address + LINK)
+        assert still(page) == first
+        expect(page.get_by_role("listitem")).to_have_count(0)
 
 
 def test_an_export_is_saved(chromium, scene_file):

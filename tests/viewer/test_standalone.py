@@ -247,6 +247,38 @@ def test_a_link_leads_back_to_the_view(page, chromium, file):
     other.close()
 
 
+WRONG = [  # as links to pages that were edited by hand
+    {"part": "", "key": "models", "value": None},
+    {"part": "", "key": "light", "value": {"azimuth": "<b>", "polar": 0}},
+    {"part": "", "key": "background", "value": [2, 0, 0]},
+    {"part": "", "key": "cuts", "value": {"planes": 3, "box": None, "faces": "shaded"}},
+    {"part": "", "key": "constructor", "value": 1},
+    {"part": "B", "key": "opacity", "value": -5},
+    {"part": "B", "key": "visible", "value": "no"},
+    {"part": "B", "key": "palette", "value": "red"},
+    {"part": "B", "key": "segments", "value": []},
+    {"part": "C", "key": "opacity", "value": 1},
+    {"part": 3},
+    None,
+]
+
+
+def test_of_a_wrong_link_is_done_what_can_be_and_the_rest_named(page, file):
+    good = {"part": "B", "key": "visible", "value": False}
+    words = {"azimuth": "<b>", "target": "1,2", "mode": "wipe", "edits": json.dumps([*WRONG, good])}
+    page.evaluate("words => { location.hash = new URLSearchParams(words); }", words)
+    told = page.get_by_text("This page cannot use of the link")
+    told.wait_for()
+    names = "mode, azimuth, target, models, light, background, cuts, constructor, B opacity, B visible, "
+    assert f"{names}B palette, B segments, C opacity, 3, an edit." in told.text_content()
+    page.evaluate("() => { document.getElementById('notices').hidden = true; }")
+    assert page.get_by_role("listitem").all_text_contents() == ["B visible off"]
+    settle(page)
+    assert differ(page, file, edits=[PartEdit(opacity=0.8), PartEdit(visible=False)]) <= LEVELS
+    page.evaluate("() => { location.hash = 'edits={'; }")
+    page.wait_for_function("document.getElementById('notices').textContent.includes('link: edits.')")
+
+
 def test_the_picture_comes_again_after_the_context_was_lost(page, file):
     before = shown(page)
     lose = "document.getElementById('picture').getContext('webgl2').getExtension('WEBGL_lose_context')"

@@ -1,6 +1,8 @@
 // A camera that looks at a target from a distance, and what moves it.
 // Axes are those of texgs.core.camera: world +y up, azimuth 0 at +x and -90 at +z; x right, y down, z forward.
 
+import { numbersOf } from "./link.js";
+
 const DEGREE = Math.PI / 180;
 const NEAREST = 0.05, FARTHEST = 30; // distances from the target, in radii of the scene
 const KEYS = ["azimuth", "polar", "distance", "fov_y"];
@@ -111,16 +113,10 @@ export class OrbitCamera {
     return [...values, `target=${this.target.map(round).join(",")}`].join("&");
   }
 
-  /** Go where a part of a link says, as far as it is one. */
-  fromFragment(fragment) {
-    const values = new URLSearchParams(fragment), place = {};
-    for (const key of KEYS) {
-      const value = parseFloat(values.get(key));
-      if (Number.isFinite(value)) place[key] = value;
-    }
-    const target = (values.get("target") ?? "").split(",").map(parseFloat);
-    if (target.length === 3 && target.every(Number.isFinite)) place.target = target;
-    this.place(place);
+  /** Go where the words of a link say; what is none of a camera is added to `wrong`. */
+  follow(words, wrong) {
+    const ofOne = (key) => [key, numbersOf(words, key, 1, wrong)?.[0]];
+    this.place({ ...Object.fromEntries(KEYS.map(ofOne)), target: numbersOf(words, "target", 3, wrong) });
   }
 }
 

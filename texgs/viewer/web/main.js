@@ -31,11 +31,10 @@ class Page extends ScenePage {
       this.compare?.tell({});
     };
     renderer.open(connection, scene);
-    super(new SharedState(greeting, connection), renderer, () => this.segments.isLocked);
+    super(new SharedState(greeting, connection), renderer, notices, () => this.segments.isLocked);
     this.run = run;
     this.number = greeting.page;
     this.connection = connection;
-    this.notices = notices;
     this.job = new Job(connection);
     this.segments = new SegmentTool(this);
     this.looks = new LookTool(this, choices);

@@ -5,6 +5,7 @@ import { control } from "./controls.js";
 import { Cuts } from "./cuts.js";
 import { capital, element } from "./inputs.js";
 import { LightControl } from "./light.js";
+import { editsOf } from "./link.js";
 import { difference, edited } from "./state.js";
 
 const REST = 100; // milliseconds after the last movement until a whole frame is drawn
@@ -31,16 +32,6 @@ const OF_VOLUME = { // the same, where the scene names its volume
 };
 const get = (id) => document.getElementById(id);
 
-/** Edits in a link; none where there are none, or something else. */
-function editsOf(text) {
-  try {
-    const edits = JSON.parse(text ?? "[]"), isNamed = (each) => [each?.part, each?.key].every((x) => typeof x === "string");
-    return Array.isArray(edits) ? edits.filter(isNamed) : [];
-  } catch {
-    return [];
-  }
-}
-
 /** Whether an edit changes a scene. */
 function isDifferent(scene, edit) {
   return JSON.stringify(edited(scene, edit)) !== JSON.stringify(scene);
@@ -54,14 +45,16 @@ export class ScenePage {
   /**
    * @param {State} state - of the scene
    * @param {object} renderer - on the canvas "picture", with the scene open
+   * @param {Notices} notices
    * @param {() => boolean} isLocked - whether the camera has to stay
    */
-  constructor(state, renderer, isLocked = () => false) {
+  constructor(state, renderer, notices, isLocked = () => false) {
     this.canvas = get("picture");
     this.state = state;
     this.renderer = renderer;
     this.camera = new OrbitCamera(state.scene);
     this.light = new LightControl(get("light"), state, this.camera);
+    this.notices = notices;
     this.#isLocked = isLocked;
     this.cuts = new Cuts(this);
     this.#inputs();
@@ -125,14 +118,16 @@ export class ScenePage {
   /** Go where the link says, and make its edits, as far as they are not made. */
   follow() {
     if (this.#isLocked()) return;
-    const fragment = location.hash.slice(1), words = new URLSearchParams(fragment), mode = words.get("mode");
+    const words = new URLSearchParams(location.hash.slice(1)), { modes } = this.renderer, { scene } = this.state;
+    const mode = words.get("mode") ?? "shaded", wrong = modes.includes(mode) ? [] : ["mode"];
     this.camera.goHome(this.canvas.clientWidth, this.canvas.clientHeight);
-    this.camera.fromFragment(fragment);
-    this.show({ mode: this.renderer.modes.includes(mode) ? mode : "shaded" });
-    const isOfAnother = (words.get("scene") ?? this.state.scene.name) !== this.state.scene.name;
-    const edits = isOfAnother ? [] : editsOf(words.get("edits"));
-    const missing = edits.filter((edit) => isDifferent(this.state.scene, edit));
+    this.camera.follow(words, wrong);
+    this.show({ mode: modes.includes(mode) ? mode : "shaded" });
+    const isOfAnother = (words.get("scene") ?? scene.name) !== scene.name;
+    const edits = isOfAnother ? [] : editsOf(words.get("edits"), scene, wrong);
+    const missing = edits.filter((edit) => isDifferent(scene, edit));
     if (missing.length) this.makeEdits(missing);
+    if (wrong.length) this.notices.tell(`This page cannot use of the link: ${wrong.join(", ").slice(0, 200)}.`, "error");
     this.moved();
   }
 

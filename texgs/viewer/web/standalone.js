@@ -11,8 +11,8 @@ import { WebglRenderer } from "./webgl.js";
 const get = (id) => document.getElementById(id);
 
 class StandalonePage extends ScenePage {
-  constructor(scene, renderer) {
-    super(new State(scene), renderer);
+  constructor(scene, renderer, notices) {
+    super(new State(scene), renderer, notices);
     new Panel(this.state, { models: get("models"), background: get("background"), steps: get("steps") });
     new EditHistory(this);
     get("still").onclick = () => this.#save();
@@ -59,7 +59,7 @@ async function start() {
     await renderer.open(get("surfels").textContent, scene);
     get("poster").hidden = true;
     get("picture").hidden = false;
-    new StandalonePage(scene, renderer);
+    new StandalonePage(scene, renderer, notices);
     notices.keep("");
   } catch (error) {
     notices.keep(error.message);

@@ -1,0 +1,55 @@
+// What a link says of a scene, checked as the server does it: what cannot be used is left out, and named.
+
+const MOST = 1e6; // of a coordinate
+const MOST_FACTOR = 1000, MOST_PLANES = 6;
+
+/** A number between two others; nothing else. */
+const isNumber = (x, low = -MOST, high = MOST) => typeof x === "number" && x >= low && x <= high;
+const areThree = (x, low, high) => Array.isArray(x) && x.length === 3 && x.every((each) => isNumber(each, low, high));
+const isColor = (x) => areThree(x, 0, 1);
+const isFactor = (x) => isNumber(x, 0, MOST_FACTOR);
+const isPlane = (x) => areThree(x?.normal) && Math.hypot(...x.normal) >= 1 / MOST && isNumber(x.offset);
+const isBox = (x) => areThree(x?.low) && areThree(x?.high) && x.low.every((low, i) => low < x.high[i]);
+const OF_PART = {
+  visible: (x) => typeof x === "boolean", palette: isColor, opacity: isFactor,
+  ambient: isFactor, diffuse: isFactor, specular: isFactor, shininess: isFactor,
+};
+const OF_SCENE = {
+  light: (x) => isNumber(x?.azimuth) && isNumber(x?.polar),
+  background: isColor,
+  cuts: (x) => Array.isArray(x?.planes) && x.planes.length <= MOST_PLANES && x.planes.every(isPlane)
+    && (x.box === null || isBox(x.box)) && ["shaded", "unlit"].includes(x.faces),
+};
+
+function isUsable(scene, { part, key, value }) {
+  const isPartOf = ({ name, segments }) =>
+    name === part || segments.some((each) => `${name}/${each.name}` === part);
+  const known = part === "" ? Object.keys(OF_SCENE) : scene.models.find(isPartOf)?.can ?? [];
+  const check = known.includes(key) && (part === "" ? OF_SCENE : OF_PART)[key];
+  return Boolean(check) && ((value ?? null) === null || check(value));
+}
+
+/** Edits in a link that a scene can have; the names of others are added to `wrong`. */
+export function editsOf(text, scene, wrong) {
+  let edits = null;
+  try {
+    edits = JSON.parse(text ?? "[]");
+  } catch {
+    // it is none
+  }
+  if (!Array.isArray(edits)) wrong.push("edits");
+  return Array.isArray(edits) ? edits.filter((each) => {
+    const isGood = isUsable(scene, each ?? {});
+    if (!isGood) wrong.push([each?.part, each?.key].filter(Boolean).join(" ") || "an edit");
+    return isGood;
+  }) : [];
+}
+
+/** Numbers in a link, so many by commas; undefined where there are none. What is none is added to `wrong`. */
+export function numbersOf(words, key, count, wrong) {
+  const text = words.get(key), numbers = (text ?? "").split(",").map((each) => each.trim() ? Number(each) : NaN);
+  if (text === null) return undefined;
+  if (numbers.length === count && numbers.every((each) => isNumber(each))) return numbers;
+  wrong.push(key);
+  return undefined;
+}
