@@ -292,6 +292,17 @@ def test_what_cannot_be_shown_leaves_no_picture_of_before(chromium, tmp_path):
             expect(told).to_be_visible(timeout=WAIT)
 
 
+def test_a_model_that_was_moved_is_told_in_place_of_the_picture(chromium, scene_file):
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        (model := scene_file.parent / "TF01.safetensors").rename(away := scene_file.parent / "away")
+        page.locator("#picture").press("ArrowLeft")
+        told = page.get_by_text(f"models.TF01: {model}: no such file")
+        expect(told).to_be_visible(timeout=WAIT)
+        away.rename(model)
+        page.locator("#picture").press("ArrowRight")
+        expect(told).to_be_hidden(timeout=WAIT)
+
+
 def test_a_click_makes_a_segment(chromium, tmp_path):
     file = write_model(tmp_path / "balls.safetensors", two_balls()[0])
     scene_file = write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(file)}))

@@ -281,6 +281,21 @@ async def test_a_file_that_others_have_written_is_replaced_after_a_question_only
 
 
 @on_page
+async def test_a_scene_whose_model_is_gone_is_not_saved(browser, scene_file):
+    (model := scene_file.parent / "TF01.safetensors").rename(away := scene_file.parent / "away")
+    for is_saved in (False, True):
+        await browser.send(type="save", name="new.yaml")
+        notice = await browser.next("notice")
+        assert notice["level"] == ("info" if is_saved else "error")
+        assert is_saved or notice["text"] == (
+            f"{model}: no such file, which the scene needs; bring it back, then save"
+        )
+        assert (scene_file.parent / "new.yaml").exists() is is_saved
+        if not is_saved:
+            away.rename(model)
+
+
+@on_page
 async def test_a_thousand_malformed_messages(browser, caplog):
     rng, whole = np.random.default_rng(0), json.dumps(VIEW)
     for number in range(1000):

@@ -16,7 +16,7 @@ from texgs.report.check import checked
 from texgs.scene.parts import part_names, with_textures
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
-from texgs.scene.session import SCENE_KEYS, Session, state_of
+from texgs.scene.session import SCENE_KEYS, Session, files_of, state_of
 from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
 
@@ -173,8 +173,11 @@ class SharedEdits:
         return path.exists() and self._own.get(path.resolve()) != state_of(path.resolve())
 
     def save(self, name: str) -> Path:
-        """Write the scene file in one step."""
+        """Write the scene file in one step, unless what it would name is gone."""
         path, scene = self.path_of(name), self.scene
+        gone = [file for file in files_of(scene) if file is not None and not file.exists()]
+        if gone:
+            raise ArgumentError(f"{gone[0]}: no such file, which the scene needs; bring it back, then save")
         write_scene(path, scene)
         self.name, self._title, self._saved = name, title_of(path), scene
         self._own[path.resolve()] = state_of(path.resolve())
