@@ -177,6 +177,21 @@ def test_the_experiments_of_a_union_make_no_two_jobs_in_one_folder():
                     assert of_folder.setdefault(stage.output(each), job) == job, stage.output(each)
 
 
+def test_the_whole_paper_has_images_of_each_data_sets_size():
+    by_sweep = selected(("experiment=paper", "on_missing=stop"), nothing).by_sweep
+    listed = [each for sweep, some in by_sweep.items() if sweep != "resolution" for each in some]
+    sizes = {(each.dataset.name, each.dataset.image, each.views.width, each.views.height) for each in listed}
+    assert {image for _, image, _, _ in sizes} >= {512, 800}
+    assert not [each for each in sizes if len({*each[1:]}) > 1]
+
+
+@pytest.mark.parametrize("name", ["paper_image", "paper_text", "paper_frozen", "paper_meshes"])
+def test_all_fields_of_a_comparison_of_the_paper_learn_from_the_same_views(name):
+    listed = configs(f"experiment={name}")
+    assert len({each.fit.name for each in listed}) > 1
+    assert len({repr(each.views) for each in listed if each.dataset.name == listed[0].dataset.name}) == 1
+
+
 def stages_of(config):
     """The stages of a configuration with those of its jobs, but for data sets that are not there."""
     for stage in STAGES.values():
