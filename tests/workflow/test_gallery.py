@@ -39,6 +39,7 @@ def test_each_look_is_there_once_for_each_recipe_that_its_method_takes():
     }, "a segment is no look"
     ((columns, rows),) = grids("fits=[quick,demo]", "edits=[glass,gold]")
     assert columns == ["volume", "as fitted", "glass, quick", "glass, demo", "gold, quick", "gold, demo"]
+    assert len({tuple(row[0]["view"]) for row in rows.values()}) == 3, "as in the paper's comparisons"
     assert [each["scene"] for each in rows["front"]] == [
         "quick/none",
         "quick/none",

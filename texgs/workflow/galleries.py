@@ -18,7 +18,7 @@ from texgs.workflow.locate import tf_names
 from texgs.workflow.stage import edit_folder, fit_folder, made
 from texgs.workflow.sweep import changes
 
-FRONT, SIDE = [-90.0, 20.0], [0.0, 20.0]  # azimuth and polar angle of cameras, degrees
+FRONT, SIDE, ABOVE = [-90.0, 20.0], [0.0, 20.0], [-130.0, 50.0]  # azimuth, polar angle of cameras, degrees
 ANYWHERE = ("background", "light")  # changes of the whole scene
 
 
@@ -76,7 +76,7 @@ def places_of(config: Config) -> list[tuple[GridKeys, list[list[Place]]]]:
 
 
 def all_looks(config: Config) -> GridKeys:
-    """Return a grid of the scene as fitted and all scenes with a new look, in two views."""
+    """Return a grid of the scene as fitted and all scenes with a new look, in three views."""
     if not config.edits:
         raise ConfigError("edits: expected some to show, such as edits=[glass,gold], got none")
     columns = [ShotKeys("volume", show="volume"), ShotKeys("as fitted")]
@@ -86,7 +86,8 @@ def all_looks(config: Config) -> GridKeys:
             titles = [name] if len(able) == 1 else [f"{name}, {recipe}" for recipe in able]
             columns += [ShotKeys(title, name, recipe) for title, recipe in zip(titles, able, strict=True)]
     words = "The volume, the scene of the first recipe as fitted, and all its new looks."
-    rows = [ShotKeys("front", view=FRONT), ShotKeys("side", view=SIDE)]
+    views = {"front": FRONT, "side": SIDE, "above": ABOVE}
+    rows = [ShotKeys(title, view=view) for title, view in views.items()]
     return GridKeys("gallery", words, rows, columns)
 
 
