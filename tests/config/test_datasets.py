@@ -33,6 +33,7 @@ PAPER = {
     "sphere": ((512, 512, 512), 800, 1),
     "vortex": ((1024, 1024, 1024), 800, 1),
 }
+PROMPTS = {"beetle": 1, "ionization": 1, "chameleon": 2, "engine": 2}  # of its text-driven comparison
 # Downloads come from one commit of a repository: what is there never changes.
 PINNED = re.compile(r"https://raw\.githubusercontent\.com/[\w.-]+/[\w.-]+/[0-9a-f]{40}/[\w./-]+")
 CHECKSUM = re.compile(r"[0-9a-f]{64}")
@@ -148,3 +149,8 @@ def test_no_file_is_left_out_and_none_of_the_user_need_follow_these_rules(tmp_pa
     monkeypatch.chdir(tmp_path)
     assert dataset("scan").source == ""
     assert "scan" not in with_key("file")
+
+
+def test_scenes_of_one_prompt_in_the_papers_figure_have_one_instruction():
+    instructions = {name: {look.instruction for look in dataset(name).looks.values()} for name in PROMPTS}
+    assert {name: len(some) for name, some in instructions.items()} == PROMPTS
