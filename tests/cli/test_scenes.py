@@ -91,6 +91,24 @@ def test_paths_are_films(scene, tmp_path, path):
     assert all(np.abs(one - other).max() > 8 for one, other in pairwise(shown))
 
 
+@pytest.mark.parametrize("axis", ["x", "-y", "0.3,0.8,-0.5"])
+def test_a_plane_of_a_film_goes_through_what_is_visible(scene, tmp_path, axis):
+    """It is smaller than the frame and beside its middle, and far from a model that is hidden."""
+    write_model(tmp_path / "TF01.safetensors", ball(1, middle=0.6))
+    write_model(tmp_path / "TF02.safetensors", ball(2, middle=-9.0))
+    write_scene(scene, replace(read_scene(scene), frame=Frame([0.0] * 3, 3.0)))
+    assert edit(scene, "TF02.visible=false", f"cut={axis},0.1") == 0
+    assert edit(scene, "TF02.visible=false", output="whole.yaml") == 0
+    assert render(tmp_path / "whole.yaml", tmp_path / "whole.png", "--width", "160") == 0
+    film = ["--path", "cut", "--frames", "3", "--width", "160"]
+    assert render(tmp_path / "new.yaml", tmp_path / "film", *film) == 0
+    files = [tmp_path / "whole.png", *sorted((tmp_path / "film").iterdir())]
+    shown = [np.asarray(Image.open(file)) for file in files]
+    whole, first, middle, last = (int((picture < 230).any(2).sum()) for picture in shown)
+    assert (shown[0] != shown[1]).any(), "it begins in what is visible"
+    assert whole >= first > middle > last > 0.02 * whole
+
+
 def test_edits_show_and_are_data(scene, tmp_path):
     edited = tmp_path / "new" / "edited.yaml"
     numbers = ["TF01.palette=#ff0000", "TF02.visible=false", "TF01.diffuse=0.5"]

@@ -16,15 +16,13 @@ if TYPE_CHECKING:
     import numpy as np
 
     from texgs.core.camera import Camera
-    from texgs.core.cuts import Cuts
-    from texgs.core.lens import Frame
     from texgs.fields.field import Composed
     from texgs.raster import Render
     from texgs.scene.scene import Scene
 
 MOST_FRAMES = 100_000  # an hour of film
 MOST_GAIN = 16.0
-SWEPT = 0.6  # of the radius of what is framed: how far from its centre a plane moves
+MARGIN = 0.1  # of the extent of what is visible: from its end to where a plane that moves starts or ends
 PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61, "cut": 61}  # frames by default
 
 
@@ -74,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(f"{arguments.scene.stem}{suffix}")
     with located(arguments.scene):
         composition = scene.open(torch_device(arguments.device))
-    shots = shots_of(arguments, scene, count, scene.framed(composition))
+    shots = shots_of(arguments, scene, count, composition)
     shots = progress(shots, count, title=str(output), unit="frame")
     if arguments.compare:
         frames = compared(arguments, scene, composition, shots)
@@ -149,14 +147,14 @@ def frames_of(arguments: argparse.Namespace) -> int:
 
 
 def shots_of(
-    arguments: argparse.Namespace, scene: Scene, count: int, framed: Frame
+    arguments: argparse.Namespace, scene: Scene, count: int, composition: Composed
 ) -> Iterator[tuple[Camera, Scene]]:
     """Return camera and scene of each frame, of so many."""
     from texgs.core.camera import orbit
     from texgs.core.light import Light
     from texgs.volume.cameras import orbit_path, spiral
 
-    lens = lens_of(arguments, framed)
+    lens = lens_of(arguments, scene.framed(composition))
     if arguments.path == "test":
         return ((camera, scene) for camera in spiral(count, *lens))
     if arguments.path == "orbit":
@@ -167,17 +165,26 @@ def shots_of(
         return ((camera, scene) for _ in range(count))
     shares = (i / max(count - 1, 1) for i in range(count))
     if arguments.path == "cut":
-        return ((camera, replace(scene, cuts=moved(scene.cuts, framed, share))) for share in shares)
+        low, high = swept(scene, composition)
+        return ((camera, moved(scene, high + share * (low - high))) for share in shares)
     # as the paper shows relighting: from below the object to above it, on the camera's side
     lights = (Light("directional", arguments.azimuth, -90 + 180 * share) for share in shares)
     return ((camera, replace(scene, light=light)) for light in lights)
 
 
-def moved(cuts: Cuts, framed: Frame, share: float) -> Cuts:
-    """Return cuts whose last plane moves past the centre of what is framed, against its normal."""
-    if not cuts.planes:
+def swept(scene: Scene, composition: Composed) -> tuple[float, float]:
+    """Return between which offsets the last plane moves: both ends show something."""
+    from texgs.scene.bounds import STRAYS, models_of, span_of
+
+    if not scene.cuts.planes:
         raise ArgumentError("--path cut: expected a scene that a plane cuts, got none; texgs edit cut=x,0")
-    last = cuts.planes[-1]
-    middle = sum(along * place for along, place in zip(last.normal, framed.target, strict=True))
-    offset = middle + (1 - 2 * share) * SWEPT * framed.radius
-    return replace(cuts, planes=[*cuts.planes[:-1], replace(last, offset=offset)])
+    models = zip(models_of(composition), scene.models.values(), strict=False)  # none of them without means
+    shown = [model for model, entry in models if entry.edit.visible or entry.segments]
+    low, high = span_of(shown, scene.framed(composition), scene.cuts.planes[-1].normal, STRAYS)
+    return low + MARGIN * (high - low), high - MARGIN * (high - low)
+
+
+def moved(scene: Scene, offset: float) -> Scene:
+    """Return a scene whose last plane has another offset."""
+    *others, last = scene.cuts.planes
+    return replace(scene, cuts=replace(scene.cuts, planes=[*others, replace(last, offset=offset)]))

@@ -8,9 +8,11 @@ from math import radians, sin
 import numpy as np
 import torch
 
+from texgs.core.geometry import quats_to_matrices
 from texgs.core.lens import ORIGIN, Frame, Lens
 from texgs.fields.field import Composed, Field
 from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
+from texgs.fields.splats import geometry
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 
@@ -24,38 +26,35 @@ def bounds_of(models: Sequence[Field]) -> Frame:
 
     Fields without means have the bounds that the paper's cameras see: volumes are centred and scaled alike.
     """
-    places, reach = primitives_of(models)
-    if not len(places):
+    whole = [model.parameters for model in models if isinstance(model, Surfels | Gaussians) and len(model)]
+    if not whole:
         paper = Lens()
         return Frame(list(ORIGIN), paper.radius * sin(radians(paper.fov_y / 2)))
+    places = torch.cat([p["means"] for p in whole]).double().cpu().numpy()
+    reach = torch.cat([p["scales"].exp().amax(dim=1) for p in whole]).double().cpu().numpy()
     center = np.quantile(places, [STRAYS, 1 - STRAYS], axis=0).mean(axis=0)
-    ends = np.linalg.norm(places - center, axis=1) + reach
+    ends = np.linalg.norm(places - center, axis=1) + REACH * reach
     return Frame(center.tolist(), max(float(np.quantile(ends, 1 - STRAYS)), SMALLEST))
 
 
 def span_of(
-    models: Sequence[Field], framed: Frame, normal: Sequence[float], share: float = 0.0
+    models: Sequence[Field], framed: Frame, normal: Sequence[float], strays: float = 0.0
 ) -> tuple[float, float]:
-    """Return from where to where models lie along a normal, but for a share of their primitives at each end.
+    """Return from where to where models are visible along a normal, but for a share of strays at each end.
 
-    Fields without means count as the surface of the framed ball, whose slices of one height have one area.
+    Fields without means count as the ball that is framed.
     """
-    places, reach = primitives_of(models)
-    if not len(places):
-        middle, half = float(np.dot(framed.target, normal)), (1 - 2 * share) * framed.radius
-        return middle - half, middle + half
-    along = places @ np.array(normal)
-    return float(np.quantile(along - reach, share)), float(np.quantile(along + reach, 1 - share))
-
-
-def primitives_of(models: Sequence[Field]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the means of primitives [N, 3], and how far around them they are visible [N]."""
-    whole = [model.parameters for model in models if isinstance(model, Surfels | Gaussians)]
-    if not whole:
-        return np.empty((0, 3)), np.empty(0)
-    places = torch.cat([p["means"] for p in whole]).double().cpu().numpy()
-    reach = torch.cat([p["scales"].exp().amax(dim=1) for p in whole]).double().cpu().numpy()
-    return places, REACH * reach
+    middle, ends = float(np.dot(framed.target, normal)), []
+    for model in models:
+        if isinstance(model, Surfels | Gaussians) and len(model):
+            means, quats, scales, _ = geometry(model.parameters)
+            along = means.new_tensor(normal)
+            reach = (along @ quats_to_matrices(quats)[..., : scales.shape[1]] * scales).norm(dim=1)
+            ends.append(torch.stack([means @ along - REACH * reach, means @ along + REACH * reach]))
+    if not ends:
+        return middle - framed.radius, middle + framed.radius
+    low, high = torch.cat(ends, dim=1).double().cpu().numpy()
+    return float(np.quantile(low, strays)), float(np.quantile(high, 1 - strays))
 
 
 def models_of(composed: Composed) -> list[Field]:
