@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from scipy.ndimage import binary_dilation, distance_transform_edt
+from scipy.ndimage import distance_transform_cdt
 
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
@@ -14,7 +14,7 @@ from texgs.core.cuts import Box, Cuts, Plane
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.changes import apply_all
-from texgs.scene.cut_view import OPAQUE, SLAB, UNITS, cut_view, grown
+from texgs.scene.cut_view import OPAQUE, SLAB, UNITS, cut_view, face_weights, softly_grown
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.session import Session
@@ -69,9 +69,8 @@ def test_a_look_lies_beyond_a_slab_of_the_volume(styled):
     deep = slab(styled, cut, SLAB)
     is_opaque = is_face & (twin.render(CAMERA, styled, composed.palettes, deep).alpha > 0.99)
     volume = twin.render(CAMERA, styled, composed.palettes)
-    is_far = (
-        torch.from_numpy(distance_transform_edt(~is_face.numpy())) > 4
-    )  # pixels; the rim has two, and half of the pixels are looked at
+    away = distance_transform_cdt(~is_face.numpy(), "chessboard")
+    is_far = torch.from_numpy(away) > 8  # pixels; the rim ends after three of the half as many, interpolated
     models = models_within(styled, cut.depth_range)
     assert min(int(is_opaque.sum()), int((is_far & (models != 1).any(dim=-1)).sum())) > 10
     assert (seen - volume.color)[is_opaque].abs().max() < 0.02
@@ -86,12 +85,25 @@ def slab(scene, cut, units):
     return cut._replace(depth_range=torch.stack([near, torch.minimum(behind, far)]))
 
 
-def test_a_mask_grows_by_so_many_pixels_each_way():
-    mask = torch.zeros(9, 12, dtype=torch.bool)
-    mask[4, 5] = mask[0, 0] = True
-    expected = binary_dilation(mask.numpy(), np.ones((5, 5)))
-    assert np.array_equal(grown(mask, 2).numpy(), expected)
-    assert torch.equal(grown(mask, 0), mask)
+def test_weights_grow_and_then_fall_softly():
+    mask = torch.zeros(40, 50)
+    mask[20, 25] = mask[0, 0] = 1
+    weights = softly_grown(mask, 3).numpy()
+    away = distance_transform_cdt(mask.numpy() == 0, "chessboard")
+    assert np.allclose(weights[away <= 3], 1)
+    assert not weights[away > 9].any()
+    assert ((weights > 0) & (weights < 1))[(away > 3) & (away <= 9)].all()
+    assert np.abs(np.diff(weights, axis=0)).max() <= 1 / 7 + 1e-6  # at most a row of the window of seven
+    assert torch.equal(softly_grown(mask, 0), mask)
+
+
+def test_the_slab_fades_out_where_matter_becomes_faint(styled):
+    """No pixel of a face jumps from the volume to the models: slabs get shorter with the alpha of a face."""
+    twin, composed = Twin(styled), styled.open()
+    weights = face_weights(composed, CAMERA, styled, twin)
+    steps = torch.maximum(weights.diff(dim=0).abs()[:, :-1], weights.diff(dim=1).abs()[:-1])
+    assert (weights.min(), weights.max()) == (0, 1)
+    assert steps.max() < 0.35  # a rim of one of the half as many pixels falls over three of them
 
 
 @pytest.mark.parametrize("mode", ["shaded", "normal", "depth", "ambient"])

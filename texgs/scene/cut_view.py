@@ -8,7 +8,7 @@ from math import ceil
 
 import torch
 from torch import Tensor
-from torch.nn.functional import max_pool2d
+from torch.nn.functional import avg_pool2d, interpolate, max_pool2d
 
 from texgs.core.camera import Camera
 from texgs.fields.field import Composed, Look
@@ -67,7 +67,7 @@ def cut_view(
 def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Render:
     """Render a slab of the volume behind each face of a cut, over the models beyond it."""
     near, behind = slab_of(cut, camera, SLAB * twin.opacity_unit).depth_range
-    behind = torch.where(near_faces(composed, camera, scene, twin), behind, near)
+    behind = torch.lerp(near, behind, face_weights(composed, camera, scene, twin))
     before = cut._replace(depth_range=torch.stack([near, behind]))
     slab = twin.with_step(STEP).render(camera, scene, composed.palettes, before)
     background = camera.viewmat.new_tensor(scene.background)
@@ -78,26 +78,32 @@ def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut:
     return Render(color, slab.alpha + clear[..., 0] * models.alpha)
 
 
-def near_faces(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> Tensor:
-    """Return pixels [H, W], bool, of faces and of a rim around them, looked for at half of the resolution."""
+def face_weights(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> Tensor:
+    """Return how much of a face each pixel shows, [H, W] in [0, 1]; around faces it falls to 0 softly.
+
+    Faces are looked for at half of the resolution.
+    """
     even = camera.crop(0, 0, camera.width + camera.width % 2, camera.height + camera.height % 2)
     small = smaller(even, 2)
-    face = face_of(composed, small, scene, twin.with_step(1.0), range_of(scene.cuts, small))
-    near = grown(face, ceil(RIM * min(small.height, small.width)))
-    return near.repeat_interleave(2, 0).repeat_interleave(2, 1)[: camera.height, : camera.width]
+    alpha = face_alpha(composed, small, scene, twin.with_step(1.0), range_of(scene.cuts, small))
+    face = softly_grown((alpha / OPAQUE).clamp(max=1), ceil(RIM * min(small.height, small.width)))
+    whole = interpolate(face[None, None], scale_factor=2, mode="bilinear")[0, 0]
+    return whole[: camera.height, : camera.width]
 
 
-def face_of(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Tensor:
-    """Return pixels [H, W], bool, of a face: their rays enter through a plane and meet something soon."""
+def face_alpha(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Tensor:
+    """Return alpha [H, W] of what rays meet soon behind a plane; there is a face from `OPAQUE` on."""
     soon = slab_of(cut, camera, UNITS * twin.opacity_unit)
-    return twin.render(camera, scene, composed.palettes, soon).alpha >= OPAQUE
+    return twin.render(camera, scene, composed.palettes, soon).alpha
 
 
-def grown(mask: Tensor, pixels: int) -> Tensor:
-    """Return a mask [H, W] with all that is at most so many pixels beside it, along rows and columns."""
-    size = 2 * pixels + 1
-    rows = max_pool2d(mask[None, None].float(), (1, size), 1, (0, pixels))
-    return max_pool2d(rows, (size, 1), 1, (pixels, 0))[0, 0] > 0
+def softly_grown(weights: Tensor, pixels: int) -> Tensor:
+    """Return weights [H, W] grown by so many pixels, along rows and columns, that then fall over as many."""
+    grown = weights[None, None]
+    for rows, columns in ((1, 0), (0, 1)):
+        reach = 2 * pixels * rows, 2 * pixels * columns
+        grown = max_pool2d(grown, (2 * reach[0] + 1, 2 * reach[1] + 1), 1, reach)
+    return avg_pool2d(grown, 2 * pixels + 1, 1, pixels, count_include_pad=False)[0, 0]
 
 
 def slab_of(cut: CutRange, camera: Camera, length: float) -> CutRange:

@@ -152,10 +152,10 @@ def places(composed: Composition, twin: Twin, camera: Camera, cut: Scene) -> dic
     import cv2
     import torch
 
-    from texgs.scene.cut_view import face_of
+    from texgs.scene.cut_view import OPAQUE, face_alpha
     from texgs.scene.twin import range_of
 
-    face = face_of(composed, camera, cut, twin, range_of(cut.cuts, camera))
+    face = face_alpha(composed, camera, cut, twin, range_of(cut.cuts, camera)) >= OPAQUE
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * BAND + 1, 2 * BAND + 1))
     edge = cv2.morphologyEx(face.cpu().numpy().astype("uint8"), cv2.MORPH_GRADIENT, disc)
     band = torch.from_numpy(edge).to(face.device).bool()
