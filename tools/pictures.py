@@ -24,7 +24,7 @@ from texgs.core.camera import orbit
 from texgs.core.figures import Cell, Row, as_picture, content, grid_rows, lay_out, new_figure, words
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
-from texgs.scene.twin import twin_of_cuts
+from texgs.scene.twin import twin_of
 from tools import workflow_picture
 
 DOCS, RUNS = ROOT / "docs", ROOT / "build" / "pictures"
@@ -62,7 +62,7 @@ def shown(scene_file: Path, size: int, azimuth: float = 30, polar: float = 20) -
     """Return a scene [size, size, 3], uint8, under its own light."""
     scene = read_scene(scene_file)
     camera = orbit(azimuth, polar, *scene.framed().lens().square(size))
-    return frame(scene.open(), camera, scene, twin=twin_of_cuts(scene))
+    return frame(scene.open(), camera, scene, twin=twin_of(scene))
 
 
 def hero(run: Path) -> Image.Image:

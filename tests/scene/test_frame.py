@@ -76,5 +76,5 @@ def test_nothing_to_see_is_the_background(scene):
 
 
 def test_a_mode_that_is_none(scene):
-    with pytest.raises(ArgumentError, match="mode: expected one of shaded, unshaded, normal"):
+    with pytest.raises(ArgumentError, match="mode: expected one of shaded, volume, unshaded, normal"):
         shot(scene, "colour")

@@ -184,3 +184,84 @@ def test_a_mistake_is_named_with_its_place(tmp_path, volume, change, message):
     with pytest.raises(ArgumentError, match=message) as error:
         read_scene(path)
     assert str(error.value).isprintable()
+
+
+PEAK = TransferFunction(((0.35, 0), (0.45, 0.6), (0.65, 0)), ((0.35, 0.9, 0.2, 0.1),))  # over both basic TFs
+
+
+def peak(volume):
+    """A function that overlaps both basic ones, in data values."""
+    values = [value for tf in volume.tfs.values() for value in tf.support]
+    low = (min(values) - 0.2 * max(values)) / 0.8  # LOW begins at a fifth of the range, HIGH ends with it
+    return PEAK.scaled(low, max(values))
+
+
+def test_a_function_that_is_tried_takes_the_place_of_a_basic_one(volume):
+    tried = replace(scene_of(volume), functions={"low": peak(volume)})
+    one = Twin(tried).render(CAMERA, replace(tried, models={"low": tried.models["low"]}), [PALETTES["low"]])
+    basic = replace(volume, tfs={"low": peak(volume)})
+    alone = replace(scene_of(basic), models={"low": SceneModel(Path("x"))})
+    expected = Twin(alone).render(CAMERA, alone, [PALETTES["low"]])
+    assert torch.equal(one.color, expected.color)
+
+
+def test_functions_that_overlap_are_cast_together(volume):
+    """A function beside the basic ones is seen where they are, as the same matter twice is twice as dense."""
+    scene = replace(scene_of(volume), functions={"new": peak(volume)})
+    palettes = [PALETTES[name] for name in scene.models]
+    seen = Twin(scene).render(CAMERA, scene, palettes).color
+    basic = Twin(scene).render(CAMERA, replace(scene, functions={}), palettes).color
+    assert (seen - basic).abs().max() > 0.02, "it lies below opaque matter"
+    twice = replace(scene_of(volume), functions={"again": volume.tfs["low"]})
+    dense = Twin(twice).render(CAMERA, replace(twice, models={"low": twice.models["low"]}), [PALETTES["low"]])
+    thick = {"low": SceneModel(Path("x"), PartEdit())}
+    low = volume.tfs["low"]
+    values = np.linspace(*low.support, 41)
+    double = TransferFunction([*zip(values, 1 - (1 - low(values)[:, 3]) ** 2, strict=True)], low.color)
+    once = replace(scene_of(replace(volume, tfs={"low": double})), models=thick)
+    expected = Twin(once).render(CAMERA, once, [PALETTES["low"]])
+    assert (dense.color - expected.color).abs().max() < 0.01
+
+
+def test_functions_of_hidden_models_are_hidden_and_others_are_shown(volume):
+    scene = scene_of(volume, low=HIDDEN, high=HIDDEN)
+    palettes = [PALETTES[name] for name in scene.models]
+    hidden = replace(scene, functions={"low": peak(volume)})
+    assert float(Twin(hidden).render(CAMERA, hidden, palettes).alpha.max()) == 0
+    shown = replace(scene, functions={"new": peak(volume)})
+    assert float(Twin(shown).render(CAMERA, shown, palettes).alpha.max()) > 0.5
+
+
+def test_a_scene_file_keeps_the_functions_that_are_tried(volume, tmp_path):
+    scene = replace(scene_of(volume), functions={"low": peak(volume), "TF 3": peak(volume)})
+    scene = replace(scene, models={name: SceneModel(volume.file) for name in scene.models})
+    again = read_scene(write_scene(tmp_path / "scene.yaml", scene))
+    assert again.functions == scene.functions
+
+
+@pytest.mark.parametrize(
+    ("functions", "message"),
+    [
+        ([], "functions: expected a table of keys and values, got \\[\\]"),
+        (
+            {"a": {"opacity": [[0, 1]]}},
+            "functions.a: transfer function: expected the keys opacity",
+        ),
+        ({"a": {"opacity": [[1, 0], [0, 1]], "color": [[0, 0, 0, 0]]}}, "functions.a: .*expected ascending"),
+        ({"": PEAK.to_dict()}, "functions: expected a name of 1 to 100 printable letters"),
+        ({f"n{i}": PEAK.to_dict() for i in range(33)}, "functions: expected at most 32, got 33"),
+    ],
+)
+def test_functions_that_are_none(volume, functions, message):
+    session = Session(scene_of(volume))
+    with pytest.raises(ArgumentError, match=message):
+        session.set_of_scene("functions", functions)
+    assert session.scene.functions == {}
+
+
+def test_functions_are_tried_and_taken_back(volume):
+    session = Session(scene_of(volume))
+    session.set_of_scene("functions", {"new": peak(volume).to_dict()})
+    assert list(session.scene.functions) == ["new"]
+    session.undo()
+    assert session.scene.functions == {}

@@ -122,4 +122,4 @@ def test_views_show_one_transfer_function(results):
 def test_what_there_is_to_show(scene, results, tmp_path):
     alone = Scene({"TF01": SceneModel(write_model(tmp_path / "a/b/c/d/e/f/model.safetensors", ball(1)))})
     modes = [Beside(Session(each), Origins(each)).modes for each in (scene, results, alone)]
-    assert modes == [["truth", "difference", "wipe"], ["truth", "difference"], []]
+    assert modes == [["volume", "difference", "wipe"], ["truth", "difference"], []]

@@ -63,13 +63,13 @@ def opened(chromium, address, ratio=1):
     assert errors == []
 
 
-def rendered(scene_file, page):
+def rendered(scene_file, page, *words):
     """What `texgs render` writes for the page's camera: bytes of a PNG."""
     box, output = page.locator("#picture").bounding_box(), scene_file.parent / "render.png"
     size = ["--width", str(round(box["width"])), "--height", str(round(box["height"]))]
     camera = ["--azimuth", str(PLACE["azimuth"]), "--polar", str(PLACE["polar"])]
     lens = ["--radius", str(PLACE["distance"]), "--fov", str(PLACE["fov_y"]), "--target", "0", "0", "0"]
-    assert main(["render", str(scene_file), "--output", str(output), *size, *camera, *lens]) == 0
+    assert main(["render", str(scene_file), "--output", str(output), *size, *camera, *lens, *words]) == 0
     return output.read_bytes()
 
 
@@ -250,11 +250,12 @@ def test_a_scene_is_seen_beside_its_volume(chromium, tmp_path):
         scene, show = still(page), page.get_by_label("Show")
         expect(page.get_by_text("PSNR of this view")).to_have_count(0)
         show.select_option("Volume")
-        expect(page.get_by_text("PSNR of this view")).to_contain_text("on the object", timeout=WAIT)
-        expect(page.get_by_text("PSNR of this view")).to_contain_text("SSIM 0.")
         truth = still(page)
+        assert truth == rendered(scene_file, page, "--mode", "volume")
         assert np.abs(shown(page) - pixels(truth)[:-50]).mean() < JPEG
         show.select_option("Scene and volume")
+        expect(page.get_by_text("PSNR of this view")).to_contain_text("on the object", timeout=WAIT)
+        expect(page.get_by_text("PSNR of this view")).to_contain_text("SSIM 0.")
         line = page.get_by_role("slider", name="Line between scene and volume")
         expect(line).to_have_attribute("aria-valuenow", "50")
         line.press("ArrowLeft")

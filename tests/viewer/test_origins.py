@@ -1,6 +1,5 @@
 """Training views and transfer functions beside the models of a scene."""
 
-import json
 import logging
 from dataclasses import replace
 
@@ -13,7 +12,9 @@ from tests.viewer.training_views import SIZE, TF, write_results
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.twin import SceneVolume
 from texgs.viewer.origins import Origins, fitted, orbit_of
+from texgs.volume.transfer import TransferFunction
 
 
 @pytest.fixture
@@ -36,17 +37,27 @@ def test_a_page_can_go_to_the_training_views_with_y_up(scene):
     assert orbit_of(replace(camera, viewmat=rolled), (0, 0, 0)) is None
 
 
-def test_transfer_functions_come_with_their_histogram(scene):
-    transfer = Origins(scene).transfer
-    assert transfer["functions"] == [{"model": "TF01", "opacity": TF["opacity"], "color": [0.5, 0.0, 0.5]}]
+def test_transfer_functions_come_with_the_histogram_of_their_volume(scene, tmp_path):
+    assert Origins(scene).transfer is None, "it names no volume"
+    transfer = Origins(named(scene, tmp_path)).transfer
+    assert transfer["functions"] == {"TF01": {key: TF[key] for key in ("opacity", "color")}}
     assert (transfer["minimum"], transfer["maximum"]) == (0, 4)
     assert transfer["histogram"] == [10] * 256
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"minimum": 0, "maximum": 1, "histogram": []}'])
-def test_a_damaged_summary_of_the_volume_is_left_out(scene, tmp_path, text):
+def named(scene, folder):
+    """The scene with its volume."""
+    tfs = {"TF01": TransferFunction(TF["opacity"], TF["color"])}
+    return replace(scene, volume=SceneVolume(folder / "volume/volume.nrrd", tfs))
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"minimum": 0, "maximum": 1, "histogram": []}', ""])
+def test_without_a_summary_of_the_volume_there_is_the_range_of_the_functions(scene, tmp_path, caplog, text):
     (tmp_path / "volume/volume.json").write_text(text)
-    assert Origins(scene).transfer is None
+    with caplog.at_level(logging.WARNING, "texgs.viewer"):
+        transfer = Origins(named(scene, tmp_path)).transfer
+    assert (transfer["minimum"], transfer["maximum"], transfer["histogram"]) == (1, 3, [])
+    assert "volume.json" in caplog.text
 
 
 def test_a_scene_by_itself_has_nothing(tmp_path):
@@ -61,15 +72,6 @@ def test_what_is_damaged_is_left_out_and_said(scene, tmp_path, caplog, text):
     with caplog.at_level(logging.WARNING, "texgs.viewer"):
         assert Origins(scene).has_views is False
     assert "transforms_train.json" in caplog.text
-
-
-@pytest.mark.parametrize("tf", [None, {}, {"opacity": [[1]], "color": []}, {**TF, "color": [["a", 1, 1, 1]]}])
-def test_views_without_a_transfer_function_are_still_views(scene, tmp_path, tf):
-    path = tmp_path / "TF01/views/transforms_train.json"
-    path.write_text(json.dumps({**json.loads(path.read_text()), "tf": tf}))
-    result = Origins(scene)
-    assert result.has_views
-    assert result.transfer is None
 
 
 def test_a_picture_fits_into_a_frame():

@@ -29,7 +29,7 @@ CAMERAS = [
     orbit(0, 90, 2.5, 30, 33, 47),
 ]
 SIDE = Light("directional", 100, 30)
-MODES = get_args(Mode)
+MODES = [mode for mode in get_args(Mode) if mode != "volume"]  # a page has none
 LEVELS = 3  # of 255: a pixel of the rasterizer ends where 1e-4 of the light is left, ours does not
 
 

@@ -35,8 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=".png, .gif, .mp4 or a folder; default SCENE.png here, or .mp4 for several frames",
     )
     modes = (
-        "shaded, unshaded, normal, depth, alpha, texture, discs, or a factor of the material: ambient, "
-        "diffuse, specular or shininess"
+        "shaded, volume, unshaded, normal, depth, alpha, texture, discs, or a factor of the material: "
+        "ambient, diffuse, specular or shininess"
     )
     option(parser, "--mode", "shaded", modes)
     option(parser, "--path", "view", "of the camera, the light, or the last plane that cuts", choices=PATHS)
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.report.check import checked
     from texgs.scene.frame import Mode, frame
     from texgs.scene.scene_file import read_scene
-    from texgs.scene.twin import twin_of_cuts
+    from texgs.scene.twin import twin_of
 
     if arguments.mode not in get_args(Mode):
         raise ArgumentError(f"--mode: expected one of {', '.join(get_args(Mode))}, got {arguments.mode}")
@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
         frames = compared(arguments, scene, composition, shots)
     else:
         with located(arguments.scene):
-            twin = twin_of_cuts(scene, composition.device)
+            twin = twin_of(scene, composition.device, arguments.mode)
         frames = (frame(composition, camera, shown, arguments.mode, twin) for camera, shown in shots)
     words = checked(arguments.scene, scene)
     if arguments.caption:

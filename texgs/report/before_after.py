@@ -18,7 +18,7 @@ from texgs.core.progress import progress
 from texgs.fields.kinds import Kind
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
-from texgs.scene.twin import twin_of_cuts
+from texgs.scene.twin import twin_of
 from texgs.volume.cameras import orbit_path
 
 POLAR = 20.0  # degrees
@@ -52,7 +52,7 @@ def pictures(
     scene: Scene, cameras: Sequence[Camera], lights: Sequence[Light], device: torch.device
 ) -> Iterator[np.ndarray]:
     """Yield frames [H, W, 3], uint8, as they are rendered."""
-    composition, twin = scene.open(device), twin_of_cuts(scene, device)
+    composition, twin = scene.open(device), twin_of(scene, device)
     for camera, light in zip(cameras, lights, strict=True):
         yield frame(composition, camera, replace(scene, light=light), twin=twin)
 

@@ -20,6 +20,7 @@ from texgs.scene.twin import Twin
 
 Mode = Literal[
     "shaded",
+    "volume",
     "unshaded",
     "normal",
     "depth",
@@ -40,20 +41,20 @@ def frame(
 ) -> np.ndarray:
     """Return one frame [H, W, 3], uint8.
 
-    Normals (world) are (n + 1) / 2, depth is black at the nearest and light grey at the farthest point in the
-    frame, both over the background; alpha is white where opaque; texels are around grey; discs are surfels of
-    one standard deviation, as if opaque; factors of the material are grey over black, shininess divided by
-    100.
+    The volume is that of the scene, with its edits, under the same light. Normals (world) are (n + 1) / 2,
+    depth is black at the nearest and light grey at the farthest point in the frame, both over the background;
+    alpha is white where opaque; texels are around grey; discs are surfels of one standard deviation, as if
+    opaque; factors of the material are grey over black, shininess divided by 100.
 
     Args:
         composed: the scene's models.
         camera: from where; moved to their device.
         scene: whose edits, light, background and cuts count.
         mode: what to show.
-        twin: of the scene's volume, which faces of cuts show; see `twin_of_cuts`.
+        twin: of the scene's volume, which the mode volume and faces of cuts show; see `twin_of`.
 
     Raises:
-        ArgumentError: if the mode is unknown.
+        ArgumentError: if the mode is unknown, or shows a volume and there is no twin.
         OutOfMemoryError: if the frame needs more memory than there is.
     """
     if mode not in get_args(Mode):
@@ -61,13 +62,21 @@ def frame(
     what = f"a frame of {camera.width} x {camera.height} pixels"
     require_memory(BYTES * camera.width * camera.height, what, "choose a smaller one")
     camera = camera.to(composed.device)
+    if mode == "volume":
+        if twin is None:
+            raise ArgumentError("mode: expected a twin to show the volume, got none")
+        return quantized(twin.render(camera, scene, composed.palettes).color)
     behind = torch.tensor(scene.background, device=composed.device)
     look: Look = mode if mode in get_args(Look) else "shaded"  # type: ignore[assignment]
     outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())
     background = None if mode in MATERIAL else behind
     render = cut_view(composed, camera, scene, twin, look=look, background=background, outputs=outputs)
-    shown = pixels(render, mode, behind)
-    return shown.clamp(0, 1).mul_(255).round_().to(torch.uint8).cpu().numpy()
+    return quantized(pixels(render, mode, behind))
+
+
+def quantized(colors: Tensor) -> np.ndarray:
+    """Return colours [H, W, 3] in [0, 1], cut off there, as uint8."""
+    return colors.clamp(0, 1).mul_(255).round_().to(torch.uint8).cpu().numpy()
 
 
 def pixels(render: Render, mode: Mode, background: Tensor) -> Tensor:

@@ -23,8 +23,10 @@ from texgs.fields.surfels.variants import labels_of, with_texture, with_variants
 from texgs.scene.bounds import bounds_of, models_of
 from texgs.scene.segment_file import read_segment
 from texgs.scene.twin import SceneVolume
+from texgs.volume.transfer import TransferFunction
 
 WHITE = (1.0, 1.0, 1.0)
+MOST_FUNCTIONS = 32
 
 
 @dataclass(frozen=True)
@@ -94,10 +96,13 @@ class Scene:
     cuts: Cuts = NO_CUTS
     volume: SceneVolume | None = None  # that it was made from, see `Twin`
     frame: Frame | None = None  # what is visible of the volume, where that is known
+    functions: Mapping[str, TransferFunction] = field(default_factory=dict)  # tried on the volume, see `Twin`
 
     def __post_init__(self) -> None:
         if not self.models:
             raise ArgumentError("models: expected at least one, got none")
+        if len(self.functions) > MOST_FUNCTIONS:
+            raise ArgumentError(f"functions: expected at most {MOST_FUNCTIONS}, got {len(self.functions)}")
 
     @property
     def edits(self) -> list[PartEdit]:

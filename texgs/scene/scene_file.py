@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -27,7 +27,7 @@ from texgs.volume.transfer import TransferFunction
 T = TypeVar("T")
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
-KEYS = ("texgs-scene", "light", "background", "cuts", "frame", "models", "volume")
+KEYS = ("texgs-scene", "light", "background", "cuts", "frame", "models", "volume", "functions")
 EDITS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDITS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
@@ -63,7 +63,8 @@ def _scene(values: Any, folder: Path) -> Scene:
     light, cuts = light_of(values.get("light", "headlight")), cuts_of(values.get("cuts", {}))
     volume = volume_of(values["volume"], folder) if "volume" in values else None
     frame = table_of(Frame, values["frame"], "frame") if "frame" in values else None
-    return Scene(models, light, background, cuts, volume, frame)
+    functions = functions_of(values.get("functions", {}), "functions")
+    return Scene(models, light, background, cuts, volume, frame, functions)
 
 
 def write_scene(path: str | Path, scene: Scene) -> Path:
@@ -85,9 +86,11 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
     of_scene = {"light": light, "background": list(scene.background), **cuts, **frame}
     values = {"texgs-scene": VERSION, **of_scene, "models": models}
     if scene.volume is not None:
-        tfs = {name: tf.to_dict() for name, tf in scene.volume.tfs.items()}
         look = asdict(scene.volume.appearance)
+        tfs = plain_functions(scene.volume.tfs)
         values["volume"] = {"file": relative(scene.volume.file), **look, "tfs": tfs}
+    if scene.functions:
+        values["functions"] = plain_functions(scene.functions)
     text = yaml.safe_dump(values, sort_keys=False, allow_unicode=True, default_flow_style=None)
     return write_bytes(path, text.encode())
 
@@ -130,17 +133,28 @@ def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, Part
 def volume_of(values: Any, folder: Path) -> SceneVolume:
     """Return the volume of the plain values of a scene file."""
     known(values, VOLUME_KEYS, "volume")
-    file, tfs = named_file("volume.file", folder, values.get("file"), "a volume"), values.get("tfs")
-    known(tfs, None, "volume.tfs")
-    functions = {}
-    for name, points in tfs.items():
-        with located(f"volume.tfs.{label('volume.tfs', name)}"):
-            functions[str(name)] = TransferFunction.from_dict(points)
+    file = named_file("volume.file", folder, values.get("file"), "a volume")
+    functions = functions_of(values.get("tfs"), "volume.tfs")
     try:
         look = Appearance(**{key: value for key, value in values.items() if key in LOOK})
     except ArgumentError as error:
         raise ArgumentError(f"volume.{error}") from error
     return SceneVolume(file, functions, look)
+
+
+def functions_of(values: Any, where: str) -> dict[str, TransferFunction]:
+    """Return transfer functions by name that a value of a scene file stands for."""
+    known(values, None, where)
+    functions = {}
+    for name, points in values.items():
+        with located(f"{where}.{label(where, name)}"):
+            functions[str(name)] = TransferFunction.from_dict(points)
+    return functions
+
+
+def plain_functions(functions: Mapping[str, TransferFunction]) -> dict[str, Any]:
+    """Return transfer functions by name as a scene file has them."""
+    return {name: tf.to_dict() for name, tf in functions.items()}
 
 
 def light_of(value: Any) -> Light:

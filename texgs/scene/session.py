@@ -26,14 +26,16 @@ from texgs.scene.cut_view import beside
 from texgs.scene.frame import Mode, frame
 from texgs.scene.parts import entry_of, key_path, replaced, require_new, split, with_textures
 from texgs.scene.scene import WHITE, Scene, SceneSegment
-from texgs.scene.scene_file import EDITS, cuts_of, known, light_of, read_scene, write_scene
+from texgs.scene.scene_file import EDITS, cuts_of, functions_of, known, light_of, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
-from texgs.scene.twin import Twin
+from texgs.scene.twin import Twin, needs_twin
+from texgs.volume.transfer import TransferFunction
 
 SCENE_KEYS = {
     "light": "headlight",
     "background": WHITE,
     "cuts": {},
+    "functions": {},
 }  # what is edited of a whole scene, and without edits
 KEPT = 3  # compositions of files as they are: pages may show others in turn, as before an edit and after it
 
@@ -120,14 +122,20 @@ class Session:
         """Cut the scene; cuts of before are gone."""
         self._push(replace(self.scene, cuts=cuts))
 
+    def set_functions(self, functions: Mapping[str, TransferFunction]) -> None:
+        """Try transfer functions on the volume; those of before are gone."""
+        self._push(replace(self.scene, functions=functions))
+
     def set_of_scene(self, key: str, value: Any) -> None:
-        """Set the light, the background or the cuts, as a scene file has them; see `SCENE_KEYS`."""
+        """Set what is edited of a whole scene, as a scene file has it; see `SCENE_KEYS`."""
         known({key: value}, SCENE_KEYS, "the scene")
         match key:
             case "light":
                 self.set_light(light_of(value))
             case "cuts":
                 self.set_cuts(cuts_of(value))
+            case "functions":
+                self.set_functions(functions_of(value, key))
             case _:
                 self.set_background(value)
 
@@ -227,11 +235,11 @@ class Session:
             camera: from where.
             mode: what to show.
             scene: one of the history; default as it is now.
-            step: of rays through a volume that is cut, voxels; default that of its views.
+            step: of rays through the volume, voxels; default that of its views.
         """
         scene = self.scene if scene is None else scene
         composition = self._composition_of(scene)
-        twin = self.twin_of(scene) if scene.cuts and scene.volume is not None else None
+        twin = self.twin_of(scene) if needs_twin(scene, mode) else None
         if twin is not None and step is not None:
             twin = twin.with_step(step)
         return frame(composition, camera, scene, mode, twin)

@@ -21,8 +21,9 @@ from texgs.raster.cuts import CutRange, cut_range
 from texgs.raster.shading import MATERIAL
 from texgs.volume.caster import Caster
 from texgs.volume.nrrd_file import open_grid
+from texgs.volume.overlay import overlay
 from texgs.volume.render import Appearance
-from texgs.volume.transfer import TransferFunction, check_disjoint, combine
+from texgs.volume.transfer import TransferFunction, check_disjoint
 
 if TYPE_CHECKING:
     from texgs.scene.scene import Scene
@@ -84,7 +85,7 @@ class Twin:
 
         A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
         of light hold for the whole volume: those of the first visible model. A volume has no segments and no
-        looks.
+        looks. A function that the scene tries takes the place of the basic TF of its name, or joins them.
 
         Args:
             camera: from where.
@@ -96,16 +97,19 @@ class Twin:
         look = self._volume.appearance
         for (name, model), palette in zip(scene.models.items(), palettes, strict=True):
             if model.edit.visible and model.edit.opacity > 0:
-                shown[name] = edited(self._tf(name), model.edit, palette)
+                tf = scene.functions.get(name) or self._tf(name)
+                shown[name] = edited(tf, model.edit, palette)
                 factors.append({key: getattr(look, key) * getattr(model.edit, key) for key in MATERIAL})
+        shown |= {name: tf for name, tf in scene.functions.items() if name not in scene.models}
         behind = torch.tensor(scene.background, device=self._device)
         if not shown:
             alpha = torch.zeros(camera.height, camera.width, device=self._device)
             return Render(behind.expand(*alpha.shape, 3), alpha)
-        caster = self._caster = self._caster.with_appearance(replace(look, **factors[0]))
+        look = replace(look, **factors[0]) if factors else look
+        caster = self._caster = self._caster.with_appearance(look)
         cut = range_of(scene.cuts, camera) if cut is None and scene.cuts else cut
         rgba = caster.cast(
-            *(combine(shown), camera, scene.light),
+            *(overlay(shown), camera, scene.light),
             depth_range=None if cut is None else cut.depth_range,
             faces=cut,
             lit_faces=scene.cuts.faces == "shaded",
@@ -120,9 +124,17 @@ class Twin:
         return self._volume.tfs[name]
 
 
-def twin_of_cuts(scene: Scene, device: torch.device | str = "cpu") -> Twin | None:
-    """Return the twin that faces of a scene's cuts show; None without cuts, or without a volume."""
-    return Twin(scene, device) if scene.cuts and scene.volume is not None else None
+def twin_of(scene: Scene, device: torch.device | str = "cpu", mode: str = "shaded") -> Twin | None:
+    """Return the twin that a mode of frames needs of a scene; None where it needs none.
+
+    Faces of cuts show it as far as there is one; the mode volume is nothing else.
+    """
+    return Twin(scene, device) if needs_twin(scene, mode) else None
+
+
+def needs_twin(scene: Scene, mode: str) -> bool:
+    """Return whether frames of a mode show the scene's volume."""
+    return mode == "volume" or (bool(scene.cuts) and scene.volume is not None)
 
 
 def range_of(cuts: Cuts, camera: Camera) -> CutRange:

@@ -15,7 +15,7 @@ from texgs.core.movie import write_frames
 from texgs.core.progress import progress
 from texgs.scene.frame import frame
 from texgs.scene.scene import WHITE, Scene
-from texgs.scene.twin import twin_of_cuts
+from texgs.scene.twin import twin_of
 from texgs.volume.cameras import orbit_path
 
 POLAR = 20.0  # degrees above the horizon
@@ -36,8 +36,7 @@ def write_film(
     They show all that is framed of the first scene.
     """
     shown = [
-        (scene.open(device), replace(scene, background=WHITE), twin_of_cuts(scene, device))
-        for scene in scenes
+        (scene.open(device), replace(scene, background=WHITE), twin_of(scene, device)) for scene in scenes
     ]
 
     def draw(camera: Camera) -> list[np.ndarray]:

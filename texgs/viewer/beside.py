@@ -29,7 +29,7 @@ class Beside:
     def modes(self) -> list[str]:
         """Return what there is to show of the session's scene."""
         if self._session.scene.volume is not None:
-            return ["truth", "difference", "wipe"]
+            return ["volume", "difference", "wipe"]
         return ["truth", "difference"] if self._origins.has_views else []
 
     def frame(self, view: View, scene: Scene, scale: float) -> tuple[np.ndarray, dict[str, float]]:

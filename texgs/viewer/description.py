@@ -13,12 +13,34 @@ from texgs.fields.surfels.composition import Composition
 from texgs.raster.shading import MATERIAL
 from texgs.scene.frame import Mode
 from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import plain_functions
 
 LENS = Lens()
 HOME = {"azimuth": 30.0, "polar": 20.0}  # degrees, as `texgs render` has them
 # What a kind of field has to be capable of for a mode of frames; all others are for each.
 MODES = {"unshaded": "unlit", "normal": "normals", "texture": "texture", "discs": "texture"}
 MODES |= dict.fromkeys(MATERIAL, "relight")
+MODES["volume"] = "a volume"  # of the scene, not of a field: see `Beside`
+# Colour maps of matplotlib by the names that ParaView has for them.
+PRESETS = {
+    "Cool to Warm": "coolwarm",
+    "Viridis": "viridis",
+    "Inferno": "inferno",
+    "Magma": "magma",
+    "Plasma": "plasma",
+    "Turbo": "turbo",
+    "Grayscale": "gray",
+    "X Ray": "binary",
+}
+STOPS = 9
+
+
+def presets() -> dict[str, list[list[float]]]:
+    """Return points [share of the range, r, g, b] of colour maps by name."""
+    from matplotlib import colormaps
+
+    shares = [i / (STOPS - 1) for i in range(STOPS)]
+    return {name: [[x, *colormaps[key](x)[:3]] for x in shares] for name, key in PRESETS.items()}
 
 
 def describe(name: str, scene: Scene, composed: Composed, framed: Frame | None = None) -> dict[str, Any]:
@@ -41,7 +63,8 @@ def describe(name: str, scene: Scene, composed: Composed, framed: Frame | None =
         "light": {"azimuth": light.azimuth, "polar": light.polar} if light.kind == "directional" else None,
         "cuts": asdict(scene.cuts),
         "models": models,
-        "modes": [mode for mode in get_args(Mode) if mode not in MODES or MODES[mode] in kind.can],
+        "functions": plain_functions(scene.functions),
+        "modes": [mode for mode in get_args(Mode) if MODES.get(mode, "") in ("", *kind.can)],
         "bounds": {"center": target, "radius": framed.radius},
         "up": [0.0, 1.0, 0.0],
         "fov_y": LENS.fov_y,

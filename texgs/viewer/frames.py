@@ -24,7 +24,8 @@ from texgs.viewer.messages import View
 
 SLOW = 0.025  # seconds of a frame above which those of a moving camera have fewer rows and columns
 LEAST = 1 / 3  # part of them that stays
-COARSE = 1.0  # voxels between samples of a volume that is cut, while something moves
+STEPS = {"volume": 0.5}  # voxels between samples of a volume while something moves, by mode
+COARSE = 1.0  # the same of faces of cuts
 MOVING = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
 STILL = (95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 
@@ -91,7 +92,7 @@ class Frames:
         """Return what a view shows, with sides of this part of the pixels, and what is measured of it."""
         if view.mode == "truth" or view.mode == "difference" or view.mode == "wipe":
             return self._beside.frame(view, scene, scale)
-        step = COARSE if view.moving else None
+        step = STEPS.get(view.mode, COARSE) if view.moving else None
         return self._session.frame(view.camera.camera(scale), view.mode, scene, step), {}
 
 

@@ -70,7 +70,7 @@ class Edit:
     """Change one value of a part, or of the scene where the part is empty."""
 
     part: str  # MODEL or MODEL/SEGMENT
-    key: str  # of a `PartEdit`; "light", "background" or "cuts" of the scene
+    key: str  # of a `PartEdit`; of `SCENE_KEYS` for the scene
     value: Any = None  # as in a scene file; None takes the edit back
     step: Number = 0  # edits of one number in a row are one step of the history, such as those of a slider
     type: Literal["edit"] = tag("edit")
@@ -78,8 +78,10 @@ class Edit:
     @property
     def title(self) -> str:
         """Return what the list of steps calls it, once it has been made."""
-        are_cuts = self.key == "cuts" and self.value is not None
-        value = title_of_cuts(self.value) if are_cuts else title_of_value(self.value)
+        if self.value is not None and self.key in ("cuts", "functions"):
+            value = title_of_cuts(self.value) if self.key == "cuts" else ", ".join(self.value)
+        else:
+            value = title_of_value(self.value)
         return f"{self.part} {self.key} {value}".strip()
 
 

@@ -21,12 +21,13 @@ from texgs.core.lens import ORIGIN
 from texgs.core.names import is_number
 from texgs.fields.files import kind_of
 from texgs.scene.scene import Scene
+from texgs.scene.scene_file import plain_functions
 from texgs.volume.view_set import View as Image
 from texgs.volume.view_set import read_views
 
 log = logging.getLogger("texgs.viewer")
 NEAR = 5  # folders above a model in which its views are looked for
-VIEWS, VOLUME = ("views", f"views{ONE_LIGHT}"), "volume/volume.json"
+VIEWS, SUMMARY = ("views", f"views{ONE_LIGHT}"), "volume.json"
 BINS = 256  # of a histogram that a page shows, at most
 SAME = 1e-3  # by which elements of two cameras may differ
 
@@ -49,15 +50,6 @@ class Origin:
         """Return its training views."""
         return read_views(self.file.parent).train
 
-    @cached_property
-    def transfer(self) -> dict[str, Any] | None:
-        """Return opacities [[value, opacity], ...] and mean colour of its transfer function, if known."""
-        tf = read_json(self.file).get("tf")
-        if not isinstance(tf, dict) or not is_table(tf.get("opacity"), 2) or not is_table(tf.get("color"), 4):
-            return None
-        color = np.mean([row[1:] for row in tf["color"]], axis=0).clip(0, 1).tolist()
-        return {"model": self.name, "opacity": tf["opacity"], "color": color}
-
     def nearest(self, camera: Camera) -> Image:
         """Return the view whose camera looks from nearly the same side."""
         forward = camera.viewmat[2, :3]
@@ -70,8 +62,7 @@ class Origins:
     def __init__(self, scene: Scene) -> None:
         self._origins = {each.name: each for each in origins_of(scene)}
         self._middle = scene.frame.target if scene.frame else ORIGIN
-        volumes = (find_upwards(entry.file, VOLUME) for entry in scene.models.values())
-        self._volume = next(filter(None, volumes), None)
+        self._volume = scene.volume
 
     @property
     def has_views(self) -> bool:
@@ -98,26 +89,27 @@ class Origins:
 
     @cached_property
     def transfer(self) -> dict[str, Any] | None:
-        """Return the histogram of the volume and the transfer functions of models, where both are known."""
-        functions = [tf for each in self._origins.values() if (tf := each.transfer)]
-        summary = summary_of(self._volume) if self._volume else {}
-        low, high, counts = (summary.get(key) for key in ("minimum", "maximum", "histogram"))
-        if not functions or not isinstance(counts, list) or not counts:
+        """Return range and histogram of the scene's volume, and its basic TFs; None where it names none."""
+        if self._volume is None:
             return None
-        if not all(map(is_number, (low, high, *counts))):
-            return None
-        merged = [int(part.sum()) for part in np.array_split(counts, min(BINS, len(counts)))]
-        return {"minimum": low, "maximum": high, "histogram": merged, "functions": functions}
+        functions = plain_functions(self._volume.tfs)
+        ends = [value for tf in self._volume.tfs.values() for value in tf.support]
+        range_of_values, counts = histogram_of(self._volume.file.parent / SUMMARY)
+        low, high = range_of_values or (min(ends, default=0.0), max(ends, default=1.0))
+        return {"minimum": low, "maximum": high, "histogram": counts, "functions": functions}
 
 
-def summary_of(file: Path) -> dict[str, Any]:
-    """Return what a volume.json says; nothing where it is damaged, which is said in the log."""
+def histogram_of(file: Path) -> tuple[tuple[float, float] | None, list[int]]:
+    """Return the range of values and the histogram in a volume.json; none where it is damaged or missing."""
     try:
         summary = read_json(file)
-    except TexgsError as error:
-        log.warning("%s", error)
-        return {}
-    return summary if isinstance(summary, dict) else {}
+        low, high, counts = summary["minimum"], summary["maximum"], summary["histogram"]
+        if not counts or not all(map(is_number, (low, high, *counts))):
+            raise ArgumentError(f"{file}: expected a range and a histogram in numbers")
+    except (TexgsError, KeyError, TypeError) as error:
+        log.warning("%s: %s", file, error)
+        return None, []
+    return (low, high), [int(part.sum()) for part in np.array_split(counts, min(BINS, len(counts)))]
 
 
 def origins_of(scene: Scene) -> list[Origin]:
@@ -129,17 +121,10 @@ def origins_of(scene: Scene) -> list[Origin]:
         if file := next(filter(None, found), None):
             origin = Origin(name, file)
             try:
-                whole.append((origin, origin.images, origin.transfer)[0])
+                whole.append((origin, origin.images)[0])
             except TexgsError as error:
                 log.warning("%s", error)
     return whole
-
-
-def is_table(values: object, columns: int) -> bool:
-    """Return whether plain values are rows of so many numbers, at least one."""
-    if not isinstance(values, list) or not values:
-        return False
-    return all(isinstance(row, list) and len(row) == columns and all(map(is_number, row)) for row in values)
 
 
 def over(image: Image, background: tuple[float, float, float]) -> np.ndarray:

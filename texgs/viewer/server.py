@@ -19,7 +19,7 @@ from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer import messages
 from texgs.viewer.beside import Beside
-from texgs.viewer.description import describe
+from texgs.viewer.description import describe, presets
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import guard
@@ -46,7 +46,12 @@ class Server:
         self._title, self._composed = title_of(opened.source), session.composition
         self._framed = opened.scene.framed(self._composed)
         kind = kind_of(next(iter(opened.scene.models.values())).file)
-        self._choices = {"styles": list(PICTURES), "words": list(WORDS), "exports": exports_of(kind)}
+        self._choices = {
+            "styles": list(PICTURES),
+            "words": list(WORDS),
+            "exports": exports_of(kind),
+            "presets": presets(),
+        }
         self.edits = SharedEdits(session, opened)
         self._origins = Origins(opened.scene)
         self._beside = Beside(session, self._origins)
@@ -207,14 +212,14 @@ class Server:
     def scene_message(self) -> dict[str, Any]:
         """Return what changes of the scene, and its history, for all pages."""
         scene = self._describe(self.edits.scene)
-        changing = {key: scene[key] for key in ("name", "background", "light", "cuts", "models")}
+        changing = {key: scene[key] for key in ("name", "background", "light", "cuts", "functions", "models")}
         return {"type": "scene", "scene": changing, **self.edits.state()}
 
     def greeting(self) -> dict[str, Any]:
         """Return the same, for a page that knows nothing yet, with what does not change."""
         whole = self._describe(self.edits.scene)
         whole["views"] += self._origins.places
-        whole["modes"] += self._beside.modes
+        whole["modes"][1:1] = self._beside.modes
         whole["volume"] = self.edits.scene.volume is not None
         whole["transfer"] = self._origins.transfer
         facts = {"run": self._run, "choices": self._choices, "original": self._describe(self.edits.original)}

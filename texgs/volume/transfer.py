@@ -188,13 +188,21 @@ def just_above(value: float) -> float:
 
 def check_disjoint(basic: Mapping[str, TransferFunction]) -> None:
     """Require that no value is visible in two basic transfer functions; ranges may touch."""
-    for (name, tf), (other, another) in combinations(basic.items(), 2):
+    if pair := overlapping(basic):
+        one, two = (row_text(basic[name].support) for name in pair)
+        raise ArgumentError(
+            f"{' and '.join(pair)}: expected ranges of values that do not overlap, got {one} and {two}; cut "
+            "one of them"
+        )
+
+
+def overlapping(functions: Mapping[str, TransferFunction]) -> tuple[str, str] | None:
+    """Return the names of the first two functions that both show some values, if there are such."""
+    for (name, tf), (other, another) in combinations(functions.items(), 2):
         one, two = tf.support, another.support
         if max(one[0], two[0]) < min(one[1], two[1]):
-            raise ArgumentError(
-                f"{name} and {other}: expected ranges of values that do not overlap, got {row_text(one)} and "
-                f"{row_text(two)}; cut one of them"
-            )
+            return name, other
+    return None
 
 
 def _cut(points: Sequence[tuple[float, ...]], low: float, high: float) -> list[tuple[float, ...]]:

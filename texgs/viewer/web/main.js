@@ -13,7 +13,7 @@ import { SegmentTool } from "./segment.js";
 import { SharedState } from "./shared.js";
 import { difference } from "./state.js";
 import { Toolbar } from "./toolbar.js";
-import { TransferPanel } from "./transfer.js";
+import { TransferEditor } from "./transfer.js";
 
 const get = (id) => document.getElementById(id);
 
@@ -45,7 +45,7 @@ class Page extends ScenePage {
     this.compare = new Compare(this);
     this.toolbar = new Toolbar(this, choices);
     get("transfer-section").hidden = !scene.transfer;
-    if (scene.transfer) new TransferPanel(get("transfer"), scene.transfer, (only) => this.#single(only));
+    if (scene.transfer) new TransferEditor(get("transfer"), this, scene.transfer, choices.presets);
     get("look-start").onclick = () => this.beginLook();
     get("look-start").disabled = !scene.models.some((model) => model.can.includes("look"));
     this.follow();
@@ -54,11 +54,6 @@ class Page extends ScenePage {
   draw(moving) {
     super.draw(moving);
     this.compare?.show();
-  }
-
-  /** Show one model alone, or all, unless a segment is being made of one. */
-  #single(only) {
-    if (get("segment").hidden) this.show({ only });
   }
 
   #segment(model) {

@@ -18,6 +18,7 @@ const MODES = { // names, and what their colours mean
   alpha: ["Opacity", "Black is transparent, white opaque."],
   texture: ["Texture alone", "What textures add to the palette; grey adds nothing."],
   discs: ["Surfels as discs", "Each has the radius of one standard deviation."],
+  volume: ["Volume", ""],
   truth: ["Nearest training view", "This scene names no volume, which would be shown from anywhere."],
   difference: ["Difference from that view", ERROR],
   ambient: ["Ambient factor", "Black is 0, white 1."],
@@ -26,10 +27,10 @@ const MODES = { // names, and what their colours mean
   shininess: ["Shininess", "Black is 0, white 100."],
 };
 const OF_VOLUME = { // the same, where the scene names its volume
-  truth: ["Volume", ""],
   difference: ["Scene − volume", ERROR],
   wipe: ["Scene and volume", "Drag the line, or move it by arrow keys."],
 };
+const OPTIONS = { shaded: "", truth: "", difference: " --compare", wipe: " --compare" }; // of `texgs render`
 const get = (id) => document.getElementById(id);
 
 /** Whether an edit changes a scene. */
@@ -155,7 +156,8 @@ export class ScenePage {
 
   #rest(moving) {
     if (moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
-    get("options").textContent = `texgs render ${this.camera.options(...this.renderer.size())}`;
+    const { mode } = this.#shown, asked = OPTIONS[mode] ?? ` --mode ${mode}`;
+    get("options").textContent = `texgs render ${this.camera.options(...this.renderer.size())}${asked}`;
     try {
       history.replaceState(null, "", `#${this.#fragment}`);
     } catch {

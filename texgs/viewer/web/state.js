@@ -1,13 +1,15 @@
 // A scene that is edited: its description, and the history of its edits. It knows no server.
-// Edits are {part, key, value}: part is "TF01" or "TF01/segment", or "" for the light, the background and the cuts
-// of the scene; value null takes an edit back.
+// Edits are {part, key, value}: part is "TF01" or "TF01/segment", or "" for what is edited of the
+// whole scene; value null takes an edit back.
 
 import { toHex } from "./inputs.js";
 
 const UNEDITED = {
   visible: true, palette: null, opacity: 1, ambient: 1, diffuse: 1, specular: 1, shininess: 1,
 };
-const OF_SCENE = { light: null, background: [1, 1, 1], cuts: { planes: [], box: null, faces: "shaded" } };
+const OF_SCENE = {
+  light: null, background: [1, 1, 1], cuts: { planes: [], box: null, faces: "shaded" }, functions: {},
+};
 
 /** Another description, with an edit made. */
 export function edited(scene, { part, key, value }) {

@@ -1,0 +1,99 @@
+"""Transfer functions are edited over the histogram in a real browser: the volume shows them at once."""
+
+import re
+
+import numpy as np
+import pytest
+
+from tests.fields.surfels.test_composition import ball
+from tests.scene.test_twin import HIGH, LOW, sphere_volume
+from tests.viewer.test_browser import JPEG, drag, opened, pixels, rendered, save_as, served, shown, still
+from texgs.fields.surfels.model_file import write_model
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
+
+expect = pytest.importorskip("playwright.sync_api", reason="needs Playwright").expect
+
+
+@pytest.fixture
+def sphere_file(tmp_path):
+    """Two balls that claim to be a sphere."""
+    files = {name: write_model(tmp_path / f"{name}.safetensors", ball(1)) for name in ("low", "high")}
+    models = {name: SceneModel(file) for name, file in files.items()}
+    return write_scene(
+        tmp_path / "scene.yaml", Scene(models, volume=sphere_volume(tmp_path, low=LOW, high=HIGH))
+    )
+
+
+def test_what_is_dragged_is_the_volume_that_texgs_renders(chromium, sphere_file):
+    with served(sphere_file) as (_, address), opened(chromium, address) as page:
+        before = still(page)
+        drag(page, page.get_by_role("slider", name="Point 2 of low"), (0.5, 0.5), (6, -3))
+        expect(page.get_by_label("Show")).to_have_value("volume")
+        expect(page.get_by_role("listitem")).to_have_text(["functions low"])
+        save_as(page, "tried.yaml")
+        tried = read_scene(sphere_file.parent / "tried.yaml")
+        basic, edited = tried.volume.tfs["low"], tried.functions["low"]
+        assert edited.opacity[1] != basic.opacity[1]
+        assert (edited.opacity[0], edited.opacity[2]) == (basic.opacity[0], basic.opacity[2])
+        picture = still(page)
+        assert picture == rendered(sphere_file.parent / "tried.yaml", page, "--mode", "volume")
+        assert np.abs(shown(page) - pixels(picture)[:-50]).mean() < JPEG
+        page.get_by_role("button", name="Undo").click()
+        page.get_by_label("Show").select_option("Shaded")
+        assert still(page) == before
+
+
+def test_keys_and_numbers_move_points(chromium, sphere_file):
+    with served(sphere_file) as (_, address), opened(chromium, address) as page:
+        point = page.get_by_role("slider", name="Point 2 of low")
+        value, alpha = page.get_by_label("Value of the point"), page.get_by_label("Opacity of the point")
+        first = float(alpha.input_value())
+        point.press("ArrowUp")
+        expect(alpha).to_have_value(f"{first + 0.005:g}")
+        point.press("Shift+ArrowDown")
+        expect(alpha).to_have_value(f"{first - 0.045:g}")
+        alpha.fill("0.25")
+        value.fill("-1000")  # not below the point before it
+        value.press("Tab")
+        save_as(page, "moved.yaml")
+        points = read_scene(sphere_file.parent / "moved.yaml").functions["low"].opacity
+        assert points[1][1] == 0.25
+        assert points[0][0] < points[1][0] < points[0][0] + 0.01 * (points[2][0] - points[0][0])
+        point.press("Delete")  # two transparent points would be left
+        save_as(page, "again.yaml")
+        assert len(read_scene(sphere_file.parent / "again.yaml").functions["low"].opacity) == 3
+
+
+def test_points_and_functions_are_added_and_removed(chromium, sphere_file):
+    with served(sphere_file) as (_, address), opened(chromium, address) as page:
+        editor, points = (
+            page.locator("#transfer svg"),
+            page.get_by_role("slider", name=re.compile("^Point . of")),
+        )
+        page.get_by_role("button", name="high", exact=True).click()
+        expect(points).to_have_count(3)
+        editor.dblclick(position={"x": 10, "y": 10})
+        expect(points).to_have_count(4)
+        points.nth(0).dblclick()
+        expect(points).to_have_count(3)
+        page.get_by_label("Colours of a preset").select_option("Viridis")
+        expect(page.get_by_role("slider", name=re.compile("^Colour"))).to_have_count(9)
+        page.get_by_role("slider", name="Colour 2 of high").focus()
+        page.get_by_label("Colour of the point").fill("#ff0000")
+        page.get_by_role("button", name="Copy").click()
+        page.get_by_role("button", name="New", exact=True).click()
+        save_as(page, "more.yaml")
+        functions = read_scene(sphere_file.parent / "more.yaml").functions
+        assert list(functions) == ["high", "TF03", "TF04"]
+        assert functions["TF03"] == functions["high"]
+        assert functions["high"].color[1][1:] == (1, 0, 0)
+        page.get_by_role("button", name="Delete").click()
+        page.get_by_role("button", name=re.compile("^high")).click()
+        page.get_by_role("button", name="As fitted").click()
+        save_as(page, "fewer.yaml")
+        assert list(read_scene(sphere_file.parent / "fewer.yaml").functions) == ["TF03"]
+        editor.hover(position={"x": 150, "y": 20})
+        expect(page.locator("#transfer .readout")).to_have_text(
+            re.compile(r"^[\d.]+: ([\d.]+ % of|not in) the volume$")
+        )
