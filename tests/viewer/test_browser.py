@@ -194,6 +194,14 @@ def test_a_movement_is_one_step(chromium, scene_file):
         # the right rim of the ball is to the right of a camera at azimuth 40
         azimuth = page.get_by_role("spinbutton", name="Azimuth of the light, degrees, as a number")
         assert 90 < float(azimuth.input_value()) < 135
+        for _ in range(3):  # a burst of keys is one, too
+            slider.press("ArrowRight")
+        page.keyboard.press("Tab")
+        slider.press("ArrowLeft")
+        steps = page.get_by_role("listitem")
+        expect(steps).to_have_count(4)
+        first, last = (float(each.split()[-1]) for each in steps.all_text_contents()[2:])
+        assert first - last == pytest.approx(0.01)
         save_as(page, "moved.yaml")
         assert still(page) == rendered(scene_file.parent / "moved.yaml", page)
 

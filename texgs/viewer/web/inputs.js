@@ -1,17 +1,28 @@
 // Native inputs that edit one value: they show what the state has, except while they are being used.
 
-let gestures = 0; // from the first input of a control to its change: one step of the history
+const BURST = 1000; // milliseconds between keys that are one step of the history
+let gestures = 0; // from the first input of a control to its change, or to the last of a burst of keys
 
 /** A step of its own for each use of an input. */
 export function gesture(input, edit) {
-  let step = 0;
+  let step = 0, isBusy = false, timer = 0;
+  const end = () => {
+    step = 0;
+    isBusy = false;
+  };
   input.addEventListener("input", () => {
+    clearTimeout(timer);
+    isBusy = true;
     step ||= ++gestures;
     edit(step);
   });
+  input.addEventListener("change", () => { // each arrow key makes one
+    isBusy = false;
+    timer = setTimeout(end, BURST);
+  });
   // a value that was typed and typed back makes no "change"
-  for (const end of ["change", "blur"]) input.addEventListener(end, () => { step = 0; });
-  return { isBusy: () => step !== 0 };
+  for (const name of ["pointerdown", "blur"]) input.addEventListener(name, end, { capture: true });
+  return { isBusy: () => isBusy };
 }
 
 /** An element with properties and children; names with a dash are attributes. */
