@@ -58,8 +58,8 @@ def test_values_of_the_paper_make_no_rows_and_others_do(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("recipes", "edits", "expected"),
     [
-        # Normals count from 2DGS's iteration on; c_ind starts from the zeroth harmonic and keeps the rate that
-        # it has in 2DGS. Both are as in the release.
+        # Normals count from the iteration of 2DGS on. c_ind starts from the zeroth harmonic and keeps the
+        # rate that it has in 2DGS. Both are as in the release.
         (
             ["paper"],
             [],
