@@ -5,7 +5,7 @@ import io
 import json
 import re
 import shlex
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from tests.fields.surfels.test_composition import ball
 from tests.viewer.drawing import rendered
 from texgs.cli.main import main
 from texgs.core.camera import orbit
-from texgs.core.cuts import NO_CUTS, Cuts, Plane
+from texgs.core.cuts import NO_CUTS, Box, Cuts, Plane
 from texgs.core.io import write_json
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
@@ -32,6 +32,7 @@ from texgs.viewer.standalone import web_file
 
 HOSTILE = "</script><b>&'\""
 LEVELS = 3  # of 255, see test_webgl.py
+BOX, UNLIT = {"box": Box([-1.0] * 3, [1.0] * 3)}, {"faces": "unlit"}
 SIZE = {"width": 900, "height": 400}  # of the window; a part of it is the picture
 REST = int(re.search(r"const REST = (\d+);", web_file("scene_page.js"))[1])  # milliseconds
 
@@ -213,9 +214,28 @@ def test_a_plane_cuts_the_page_and_words_make_the_same_cut(page, file, scene, fo
     assert main(["edit", str(scene), *words, "--output", str(folder / "cut.yaml")]) == 0
     cuts = read_scene(folder / "cut.yaml").cuts
     assert len(cuts.planes) == 1
+    page.get_by_role("checkbox", name="Box").check()
+    page.get_by_label("Faces").select_option("Without light")
+    titles = [Edit("", "cuts", asdict(replace(cuts, **more)), 0).title for more in ({}, BOX, BOX | UNLIT)]
+    assert (
+        page.get_by_role("list", name="Steps", exact=True).get_by_role("listitem").all_text_contents()
+        == titles
+    )
+    for _ in range(2):
+        page.get_by_role("button", name="Undo").click()
     settle(page)
     assert differ(page, file, cuts=cuts) <= LEVELS
     assert differ(page, file) > 50, "it takes something away"
+
+
+def test_the_words_at_an_input_are_in_its_name(page):
+    page.get_by_role("button", name="Add a plane").click()
+    page.get_by_role("checkbox", name="Box").check()
+    names = page.locator(".row:has(> .name):has(> [aria-label])").evaluate_all(
+        "all => all.map((r) => [r.querySelector('.name').textContent, r.querySelector('input').ariaLabel])"
+    )
+    assert len(names) > 20
+    assert [each for each in names if not each[1].startswith(each[0])] == []
 
 
 def test_pointers_and_keys_turn_the_camera(page, file):

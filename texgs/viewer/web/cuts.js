@@ -159,7 +159,7 @@ export class Cuts {
         const { azimuth, polar } = { ...angles(plane().normal), [key]: value };
         this.tilt(index, direction(azimuth, polar), step);
       });
-    const azimuth = angle("Azimuth", "azimuth", 180), polar = angle("Height", "polar", 90);
+    const azimuth = angle("Azimuth", "azimuth", 180), polar = angle("Polar", "polar", 90);
     const button = (text, what, onclick) =>
       element("button", { type: "button", onclick, "aria-label": `${what} ${name}` }, text);
     const box = element("fieldset", { className: "part" }, element("legend", {}, on.row), position.row, azimuth.row,
@@ -197,9 +197,8 @@ export class Cuts {
     const on = tick("Box", (value) => this.#send(0, value ? this.#lastBox : null));
     const root = element("fieldset", { className: "part" }, element("legend", {}, on.row));
     const sliders = [0, 1, 2].flatMap((axis) => ["low", "high"].map((side) => {
-      const name = "xyz"[axis], [label, most] = side === "low" ? ["from", "lowest"] : ["to", "highest"];
-      const what = `${most} ${name} of the box`;
-      const input = this.#slider(`${name} ${label}`, what, this.far, this.unit,
+      const what = `${side === "low" ? "lowest" : "highest"} ${"xyz"[axis]}`;
+      const input = this.#slider(capital(what), `${what} of the box`, this.far, this.unit,
         (value, step) => this.#moveSide(side, axis, value, step));
       root.append(input.row);
       return () => {

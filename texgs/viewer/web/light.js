@@ -26,7 +26,7 @@ export class LightControl {
       (value, step) => this.#set({ ...this.#angles(), [key]: value }, step),
     );
     this.#azimuth = angle("azimuth", "Azimuth", 180);
-    this.#polar = angle("polar", "Height", 90);
+    this.#polar = angle("polar", "Polar", 90);
     for (const { row } of [this.#azimuth, this.#polar]) row.querySelector(".reset").remove();
     const about = element("div", {}, this.#headlight.row,
       this.#hint);

@@ -47,7 +47,14 @@ function partsOf(scene) {
 
 /** What the list of steps calls an edit, as the server does. */
 export function titleOf({ part, key, value }) {
-  return `${part} ${key} ${titleOfValue(value)}`.trim();
+  return `${part} ${key} ${key === "cuts" && value ? titleOfCuts(value) : titleOfValue(value)}`.trim();
+}
+
+function titleOfCuts({ planes, box, faces }) {
+  const count = planes.length, words = count ? [count > 1 ? `${count} planes` : "1 plane"] : [];
+  if (box) words.push("box");
+  if (words.length && faces === "unlit") words.push("unlit");
+  return words.join(", ") || "none";
 }
 
 function titleOfValue(value) {
