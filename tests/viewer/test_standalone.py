@@ -238,6 +238,15 @@ def test_the_words_at_an_input_are_in_its_name(page):
     assert [each for each in names if not each[1].startswith(each[0])] == []
 
 
+def test_a_number_out_of_range_is_told(page):
+    number = page.get_by_label("Opacity of B, as a number")
+    number.fill("2000")
+    number.press("Tab")
+    told = page.get_by_text("Opacity of B: expected a number from 0 to 1000, got 2000.")
+    assert told.is_visible()
+    assert number.input_value() == "1"
+
+
 def test_pointers_and_keys_turn_the_camera(page, file):
     page.mouse.move(100, 160)
     page.mouse.down()
@@ -324,6 +333,7 @@ def test_without_webgl_there_is_a_picture_and_a_sentence(chromium, file):
     page.goto(file.as_uri())
     page.wait_for_function("document.getElementById('notices').textContent.includes('has no WebGL2')")
     assert page.locator("#poster").is_visible()
+    assert page.locator(":is(button, input, select):enabled").count() == 0
     page.close()
 
 

@@ -57,7 +57,7 @@ const resetButton = (what, reset) => element(
     onclick: reset }, "↺",
 );
 
-/** A slider with a number beside it; `edit(value, step)`, and null to reset. */
+/** A slider with a number beside it; `edit(value, step)`, and null to reset. "refused": why a number is none. */
 export function slider(label, what, { max, most = 1000, unedited = 1, min = 0, step = 0.01 }, edit) {
   const range = element("input", { type: "range", "aria-label": capital(what) });
   const number = element("input", { type: "number", "aria-label": `${capital(what)}, as a number` });
@@ -80,7 +80,12 @@ export function slider(label, what, { max, most = 1000, unedited = 1, min = 0, s
     number.value = Number(value.toFixed(3));
     reset.disabled = value === unedited;
   };
-  number.addEventListener("blur", () => show(latest)); // where it was left empty
+  number.addEventListener("change", () => {
+    if (number.validity.valid) return;
+    const detail = `${capital(what)}: expected a number from ${min} to ${most}, got ${number.value || "none"}.`;
+    number.dispatchEvent(new CustomEvent("refused", { bubbles: true, detail }));
+  });
+  number.addEventListener("blur", () => show(latest)); // where it was left empty, or is refused
   return { row, show };
 }
 

@@ -65,6 +65,7 @@ export class ScenePage {
     });
     state.addEventListener("change", () => this.draw(true));
     new ResizeObserver(() => this.draw(true)).observe(this.canvas);
+    document.addEventListener("refused", ({ detail }) => notices.tell(detail, "error"));
     window.addEventListener("hashchange", () => this.follow());
   }
 

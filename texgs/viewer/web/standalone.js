@@ -63,6 +63,7 @@ async function start() {
     notices.keep("");
   } catch (error) {
     notices.keep(error.message);
+    for (const each of document.querySelectorAll("button, input, select")) each.disabled = true;
   }
 }
 
