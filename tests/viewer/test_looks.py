@@ -141,6 +141,13 @@ async def test_a_picture_of_the_user_is_taken_in(browser, client, tmp_path):
             text = await answer.text()
             assert message in text
             assert str(tmp_path) not in text
+    Image.new("1", (13_000, 13_000)).save(tmp_path / "large.png")
+    large = (tmp_path / "large.png").read_bytes()
+    async with client.post(path, params={"name": "large.png"}, data=large, headers=headers) as answer:
+        assert answer.status == 400
+        assert await answer.text() == (
+            "large.png: expected a picture of at most 50 million pixels, got 13000 x 13000; scale it down"
+        )
     async with client.post(path, params={"name": "a.png"}, data=content) as answer:
         assert answer.status == 403
     async with client.post(path, data=bytes(33 * 2**20), headers=headers) as answer:
@@ -156,7 +163,10 @@ async def test_a_picture_of_the_user_is_taken_in(browser, client, tmp_path):
         ({"style": "dots", "instruction": "gold"}, "look: expected a picture or an instruction"),
         ({"style": "nothing"}, "style: expected one of strokes"),
         ({"style": "/etc/passwd"}, "style: expected one of strokes"),
-        ({"instruction": "make it a cathedral"}, "instruction: expected one of"),
+        (
+            {"instruction": "make it a cathedral"},
+            "'make it a cathedral': expected what filters know (stipple",
+        ),
         ({"style": "dots", "parts": ["TF09"]}, "expected a model of the scene (TF01, TF02), got TF09"),
         ({"style": "dots", "parts": "TF01"}, "parts: expected a valid array"),
     ],

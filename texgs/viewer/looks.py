@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 from threading import Lock
 from time import monotonic
 from typing import Any
+from warnings import catch_warnings
 
 import numpy as np
 import torch
@@ -22,6 +23,7 @@ from PIL import Image
 from texgs.config.recipes import Edit
 from texgs.core.checksum import digest
 from texgs.core.errors import ArgumentError
+from texgs.core.image import FORMATS
 from texgs.core.keys import typed
 from texgs.core.names import file_name, part_file
 from texgs.edit.method import method_of
@@ -30,6 +32,7 @@ from texgs.edit.style_picture import read_style
 from texgs.edit.task import EditedScene, Task
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import write_texture
+from texgs.models.instruction import understand, vocabulary
 from texgs.models.weights import unusable
 from texgs.scene.scene import Scene
 from texgs.viewer.messages import Look
@@ -41,6 +44,7 @@ BETWEEN = 2.0  # seconds between textures on their way that are shown
 KEPT = 20  # of those of each part, and of previews: frames may be on their way
 LARGEST = 32 * 2**20  # bytes of a picture that a page sends
 MOST = 50  # such pictures
+MOST_PIXELS = 50_000_000  # of one: more takes many seconds to read, at each preview again
 THUMBNAIL = 96  # pixels of a side
 # The first is taken whose weights are on this machine.
 FULL = ("default", "patches")  # recipes for pictures
@@ -72,6 +76,7 @@ class Styles:
             path = Path(self._folder.name, known)
             path.write_bytes(content)
             try:
+                require_readable(path)
                 read_style(path)
             except ArgumentError as error:
                 path.unlink()
@@ -121,6 +126,8 @@ class Looks:
             choices = [{"text": {"instruction": said, "guidance": guidance}} for guidance in GUIDANCE]
         *others, last = (edit_with(asked.parts, choice) for choice in choices)
         edit = next((each for each in others if has_weights(each)), last)
+        if edit is last and asked.instruction:
+            require_known(asked.instruction)
         method_of(edit).of(edit).check()
         return edit
 
@@ -193,6 +200,29 @@ def edit_with(parts: Sequence[str], choice: dict[str, Any]) -> Any:
     # What a page has written is taken as it is: a configuration would look for references in it.
     chosen = replace(getattr(edit, method), **values)
     return replace(edit, parts=list(parts), **{method: chosen})
+
+
+def require_readable(path: Path) -> None:
+    """Require of a picture, if it is one, that it takes a moment to read."""
+    quiet, refused = catch_warnings(action="ignore"), (OSError, Image.DecompressionBombError)
+    with suppress(*refused), quiet, Image.open(path, formats=FORMATS) as picture:
+        width, height = picture.size
+        if width * height > MOST_PIXELS:
+            raise ArgumentError(
+                f"{path}: expected a picture of at most {MOST_PIXELS // 10**6} million pixels, got {width} x "
+                f"{height}; scale it down"
+            )
+
+
+def require_known(instruction: str) -> None:
+    """Require words that filters know."""
+    try:
+        understand(instruction)
+    except ArgumentError as error:
+        raise ArgumentError(
+            f"{instruction!r}: expected what filters know ({', '.join(vocabulary())}), as the weights of "
+            "InstructPix2Pix are not on this machine"
+        ) from error
 
 
 def has_weights(edit: Any) -> bool:
