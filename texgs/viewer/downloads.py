@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from texgs.scene import export
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames
 from texgs.viewer.messages import Export, View
+from texgs.viewer.scratch import scratch_folder
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.standalone import write_page
 
@@ -30,7 +30,7 @@ class Downloads:
 
     def __init__(self, frames: Frames, edits: SharedEdits) -> None:
         self._frames, self._edits = frames, edits
-        self._folder = TemporaryDirectory(prefix="texgs-files-")
+        self._folder = scratch_folder()
 
     def write(self, scene: Scene, asked: Export, name: str) -> Path:
         """Return the file of a scene as it is shown; the name is without its ending."""

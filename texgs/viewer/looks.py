@@ -10,7 +10,6 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from shutil import rmtree
-from tempfile import TemporaryDirectory
 from threading import Lock
 from time import monotonic
 from typing import Any
@@ -36,6 +35,7 @@ from texgs.models.instruction import understand, vocabulary
 from texgs.models.weights import unusable
 from texgs.scene.scene import Scene
 from texgs.viewer.messages import Look
+from texgs.viewer.scratch import scratch_folder
 from texgs.volume.cameras import icosphere_of
 from texgs.volume.view_set import View
 
@@ -63,7 +63,7 @@ class Styles:
     """Pictures by name: those that texgs has, and files that pages send, kept as long as this is."""
 
     def __init__(self) -> None:
-        self._folder = TemporaryDirectory(prefix="texgs-styles-")
+        self._folder = scratch_folder()
         self._files: dict[str, Path] = {}
         self._adding = Lock()  # pages may send several at once
 
@@ -110,7 +110,7 @@ class Looks:
 
     def __init__(self, styles: Styles, device: torch.device | str = "cpu") -> None:
         self._styles, self._device = styles, torch.device(device)
-        self._folder = TemporaryDirectory(prefix="texgs-looks-")
+        self._folder = scratch_folder()
         self._scratch = ScratchFolders(Path(self._folder.name))
 
     def edit_of(self, asked: Look) -> Any:
