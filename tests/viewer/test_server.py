@@ -43,6 +43,8 @@ async def test_strangers_get_403(client, path, headers):
     async with client.get(path, headers=headers) as answer:
         assert answer.status == 403
         assert "open the address that texgs view printed" in await answer.text()
+        assert answer.headers["X-Content-Type-Options"] == "nosniff"
+        assert answer.headers["Content-Security-Policy"] == "default-src 'none'"
 
 
 @pytest.mark.parametrize(
@@ -87,6 +89,7 @@ async def test_pages_are_served_with_a_strict_policy_and_nothing_else(client):
     for name in ("page.html", "server.py", "..%2Fserver.py", "%2e%2e%2fserver.py", "x.js"):
         async with client.get(f"/{TOKEN}/{name}") as answer:
             assert answer.status in (403, 404), name
+            assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
 
 
 # ---- Frames -----------------------------------------------------------------
@@ -253,6 +256,14 @@ def earlier(scene_file, monkeypatch):
     (scene_file.parent / "metrics.json").write_text("{}")
     (path := scene_file.parent / "edited.yaml").write_text(scene_file.read_text())
     return path
+
+
+@on_page
+async def test_quotes_in_names_of_scenes(browser, client):
+    await browser.send(type="save", name='a "b".yaml')
+    assert (await browser.next("notice"))["level"] == "info"
+    async with client.get(f"/{TOKEN}/still.png", params={"view": json.dumps({"camera": CAMERA})}) as answer:
+        assert (answer.status, answer.headers["Content-Disposition"]) == (200, "attachment")
 
 
 @on_page

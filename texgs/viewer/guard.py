@@ -47,13 +47,15 @@ def guard(token: str, host: str) -> Middleware:
         needs_origin = is_socket or request.method != "GET"
         if not is_own_origin(request.headers.get("Origin"), name, needs_origin):
             raise web.HTTPForbidden(text="Wrong origin: open the address that texgs view printed.")
-        response = await handler(request)
-        if not response.prepared:
-            response.headers.update(HEADERS)
-            response.headers["Content-Security-Policy"] = POLICY.format(host=name)
-        return response
+        return await handler(request)
 
     return middleware
+
+
+async def add_headers(request: web.Request, response: web.StreamResponse) -> None:
+    """Let no browser keep an answer or take it for something else; errors are answers, too."""
+    policy = "default-src 'none'" if response.status >= 400 else POLICY.format(host=request.headers["Host"])
+    response.headers.update({**HEADERS, "Content-Security-Policy": policy})
 
 
 def is_own_host(header: str, host: str, names: Collection[str]) -> bool:

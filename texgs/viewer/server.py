@@ -22,7 +22,7 @@ from texgs.viewer.beside import Beside
 from texgs.viewer.description import describe, presets
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
-from texgs.viewer.guard import guard
+from texgs.viewer.guard import add_headers, guard
 from texgs.viewer.looks import LARGEST, thumbnail
 from texgs.viewer.messages import Cancel, Export, Look, Mask, Message, Save, Segment, View, parse
 from texgs.viewer.origins import Origins
@@ -75,6 +75,7 @@ class Server:
         }
         app.router.add_routes([web.get(f"/{token}/{path}", each) for path, each in handlers.items()])
         app.router.add_post(f"/{token}/styles", self.new_style)
+        app.on_response_prepare.append(add_headers)
         app.on_shutdown.append(self._say_goodbye)
         app.cleanup_ctx.append(self._closing)
         return app
@@ -125,7 +126,7 @@ class Server:
             png = await self.frames.still(view, scene, words)
         except TexgsError as error:
             raise web.HTTPBadRequest(text=str(error)) from error
-        saved = {"Content-Disposition": f'attachment; filename="{Path(self.edits.name).stem}.png"'}
+        saved = {"Content-Disposition": "attachment"}  # the page gives it a name
         return web.Response(body=png, content_type="image/png", headers=saved)
 
     async def style(self, request: web.Request) -> web.StreamResponse:
