@@ -80,6 +80,17 @@ def test_each_change_is_undone_and_made_again(session, tmp_path):
     assert not session.redo(), "another way was taken"
 
 
+def test_the_oldest_of_many_steps_stay_made(session):
+    for count in range(250):
+        session.set_light(Light("directional", count))
+        session.name_step(str(count))
+    assert session.past == [str(count) for count in range(50, 250)]
+    while session.undo():
+        pass
+    assert session.scene.light.azimuth == 49
+    assert len(session.future) == 200
+
+
 def test_a_new_segment_looks_as_its_model_does_and_an_earlier_scene_as_it_was(session, tmp_path):
     first, scene = session.frame(CAMERA), session.scene
     session.set("left", "palette", (0.9, 0.1, 0.2))

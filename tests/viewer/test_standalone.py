@@ -247,6 +247,16 @@ def test_a_number_out_of_range_is_told(page):
     assert number.input_value() == "1"
 
 
+def test_the_oldest_of_many_steps_stay_made(page):
+    visible = page.locator("#models").get_by_title("Visible").last
+    visible.evaluate("box => { for (let count = 0; count < 251; count++) box.click(); }")
+    steps = page.get_by_role("listitem")
+    assert steps.count() == 200
+    page.locator("#undo").evaluate("undo => { while (!undo.disabled) undo.click(); }")
+    assert visible.is_checked() is False, "the first 51 stay"
+    assert page.locator("#steps .undone").count() == 200
+
+
 def test_pointers_and_keys_turn_the_camera(page, file):
     page.mouse.move(100, 160)
     page.mouse.down()

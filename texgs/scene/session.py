@@ -37,6 +37,7 @@ SCENE_KEYS = {
     "cuts": {},
     "functions": {},
 }  # what is edited of a whole scene, and without edits
+MOST_STEPS = 200  # of the history: of more, the oldest cannot be undone
 KEPT = 3  # compositions of files as they are: pages may show others in turn, as before an edit and after it
 
 
@@ -280,7 +281,7 @@ class Session:
 
     def _push(self, scene: Scene) -> None:
         """Add a scene; what was undone is gone."""
-        self._past.append((scene, ""))
+        self._past = [*self._past[-MOST_STEPS:], (scene, "")]
         self._future.clear()
 
 

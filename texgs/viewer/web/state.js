@@ -7,6 +7,7 @@ import { toHex } from "./inputs.js";
 const UNEDITED = {
   visible: true, palette: null, opacity: 1, ambient: 1, diffuse: 1, specular: 1, shininess: 1,
 };
+const MOST_STEPS = 200; // of the history: of more, the oldest cannot be undone
 const OF_SCENE = {
   light: null, background: [1, 1, 1], cuts: { planes: [], box: null, faces: "shaded" }, functions: {},
 };
@@ -89,8 +90,8 @@ export class State extends EventTarget {
     this.dispatchEvent(new Event("edit"));
     const latest = step ? `${step} ${part} ${key}` : null;
     const goesOn = latest !== null && latest === this.#latest, edit = { part, key, value };
-    if (!goesOn) this.#scenes.push(this.scene);
-    const past = [...(goesOn ? this.past.slice(0, -1) : this.past), titleOf(edit)];
+    if (!goesOn) this.#scenes = [...this.#scenes, this.scene].slice(-MOST_STEPS);
+    const past = [...(goesOn ? this.past.slice(0, -1) : this.past), titleOf(edit)].slice(-MOST_STEPS);
     this.#undone = [];
     this.#latest = latest;
     this.update({ scene: edited(this.scene, edit), past, future: [], saved: false });
