@@ -7,7 +7,18 @@ import pytest
 
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
-from tests.viewer.test_browser import JPEG, drag, opened, pixels, rendered, save_as, served, shown, still
+from tests.viewer.test_browser import (
+    JPEG,
+    WAIT,
+    drag,
+    opened,
+    pixels,
+    rendered,
+    save_as,
+    served,
+    shown,
+    still,
+)
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
@@ -42,6 +53,22 @@ def test_what_is_dragged_is_the_volume_that_texgs_renders(chromium, sphere_file)
         page.get_by_role("button", name="Undo").click()
         page.get_by_label("Show").select_option("Shaded")
         assert still(page) == before
+
+
+def test_functions_stand_in_the_link(chromium, sphere_file):
+    with served(sphere_file) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("slider", name="Point 2 of low").press("ArrowUp")
+        expect(page).to_have_url(re.compile("functions"), timeout=WAIT)
+        link = page.url
+        page.get_by_role("button", name="Undo").click()
+        for wrong in ("[[0,2]]", "3"):
+            page.goto("about:blank")
+            page.goto(re.sub("%5B%5B.*?%5D%5D", wrong, link))
+            expect(page.get_by_text("This page cannot use of the link: functions.")).to_be_visible()
+        page.goto("about:blank")
+        page.goto(link)
+        page.get_by_role("button", name="Make it on all pages").click()
+        expect(page.get_by_role("listitem")).to_have_text(["functions low"])
 
 
 def test_keys_and_numbers_move_points(chromium, sphere_file):

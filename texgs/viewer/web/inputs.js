@@ -20,8 +20,8 @@ export function gesture(input, edit) {
     isBusy = false;
     timer = setTimeout(end, BURST);
   });
-  // a value that was typed and typed back makes no "change"
-  for (const name of ["pointerdown", "blur"]) input.addEventListener(name, end, { capture: true });
+  input.addEventListener("pointerdown", end, { capture: true }); // before what it begins
+  input.addEventListener("blur", end); // a value that was typed and typed back makes no "change"
   return { isBusy: () => isBusy };
 }
 

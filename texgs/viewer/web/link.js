@@ -10,6 +10,10 @@ const isColor = (x) => areThree(x, 0, 1);
 const isFactor = (x) => isNumber(x, 0, MOST_FACTOR);
 const isPlane = (x) => areThree(x?.normal) && Math.hypot(...x.normal) >= 1 / MOST && isNumber(x.offset);
 const isBox = (x) => areThree(x?.low) && areThree(x?.high) && x.low.every((low, i) => low < x.high[i]);
+const arePoints = (x, columns, least) => Array.isArray(x) && x.length >= least && x.every((row, i) =>
+  Array.isArray(row) && row.length === columns && Number.isFinite(row[0]) && !(row[0] < x[i - 1]?.[0])
+  && row.slice(1).every((each) => isNumber(each, 0, 1)));
+const isFunction = (x) => arePoints(x?.opacity, 2, 2) && arePoints(x?.color, 4, 1);
 const OF_PART = {
   visible: (x) => typeof x === "boolean", palette: isColor, opacity: isFactor,
   ambient: isFactor, diffuse: isFactor, specular: isFactor, shininess: isFactor,
@@ -19,6 +23,8 @@ const OF_SCENE = {
   background: isColor,
   cuts: (x) => Array.isArray(x?.planes) && x.planes.length <= MOST_PLANES && x.planes.every(isPlane)
     && (x.box === null || isBox(x.box)) && ["shaded", "unlit"].includes(x.faces),
+  functions: (x, scene) => Boolean(scene.transfer) && typeof x === "object" && !Array.isArray(x)
+    && Object.values(x).every(isFunction),
 };
 
 function isUsable(scene, { part, key, value }) {
@@ -26,7 +32,7 @@ function isUsable(scene, { part, key, value }) {
     name === part || segments.some((each) => `${name}/${each.name}` === part);
   const known = part === "" ? Object.keys(OF_SCENE) : scene.models.find(isPartOf)?.can ?? [];
   const check = known.includes(key) && (part === "" ? OF_SCENE : OF_PART)[key];
-  return Boolean(check) && ((value ?? null) === null || check(value));
+  return Boolean(check) && ((value ?? null) === null || check(value, scene));
 }
 
 /** Edits in a link that a scene can have; the names of others are added to `wrong`. */
