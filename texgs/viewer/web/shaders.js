@@ -28,6 +28,7 @@ const float SMALLEST = 1e-30;    // a cosine below is 0
 
 uniform sampler2DArray surfels;
 uniform usampler2D lookups;
+uniform usampler2D order;        // of the surfels, which have four vertices each
 uniform sampler2D parts;
 uniform mat3 rotation;           // world to camera
 uniform vec3 translation;
@@ -37,7 +38,6 @@ uniform bool headlight;
 uniform float low_pass, near, texel_step;
 uniform int look;
 
-in uint surfel;
 flat out vec2 centre;            // of the low-pass filter, pixels
 flat out vec4 forms;             // d(U, V) by the pixel: ux, uy, vx, vy
 flat out vec3 perspective;       // dW by the pixel, and the depth of the mean
@@ -129,6 +129,8 @@ vec4 colour_of(vec3 color, vec4 material, vec3 mean, vec3 n, vec4 flags) {
 
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0); // off screen, where nothing is drawn
+  int place_in_order = gl_VertexID / 4;
+  uint surfel = texelFetch(order, ivec2(place_in_order % ${WIDTH}, place_in_order / ${WIDTH}), 0).x;
   ivec2 at = ivec2(surfel % ${WIDTH}u, surfel / ${WIDTH}u);
   vec4 place = texelFetch(surfels, ivec3(at, PLACE), 0);
   uvec4 lookup = texelFetch(lookups, at, 0);
@@ -160,7 +162,7 @@ void main() {
   base = vec4(shaded.xyz, log2(opacity));
   gain = shaded.w * texel_step;
   texture_place = lookup.xyz;
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+  vec2 corner = vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1);
   gl_Position = vec4(2.0 * mix(box.xy, box.zw, corner) / size - 1.0, 0.0, 1.0); // the first row of the target is the top
 }
 `;

@@ -35,10 +35,11 @@ export class SurfelPass {
       surfels: makeTexture(gl, floats, [WIDTH, height, LAYERS.length], surfels),
       lookups: makeTexture(gl, [gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT], [WIDTH, height], lookups),
       texels: makeTexture(gl, ofTexels, [WIDTH, texels.length / (3 * WIDTH)], texels),
+      order: makeTexture(gl, [gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT], [WIDTH, height], null),
       parts: makeTexture(gl, floats, [COLUMNS, rows], null),
     };
     this._target = gl.createFramebuffer();
-    this._makeInstances(count);
+    this._makeCorners(count);
   }
 
   /**
@@ -47,7 +48,7 @@ export class SurfelPass {
    * @param {object} view viewmat [12], focal and size [2].
    * @param {object} look `mode` (a number), `light`, a direction [3] or null for a headlight, and `planes` that cut.
    * @param {Float32Array} table of parts.
-   * @param {Uint32Array} order of the surfels.
+   * @param {Uint32Array} order of the surfels, in a buffer of whole rows of the texture.
    * @returns {object} the picture, a texture whose first row is on top: premultiplied colour and alpha.
    */
   blend(view, { mode, light, planes }, table, order) {
@@ -60,9 +61,8 @@ export class SurfelPass {
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.useProgram(program);
+    this._upload(table, order);
     Object.entries(this._textures).forEach(([name, texture], unit) => bind(gl, unit, texture, uniforms[name]));
-    // The parts were bound last.
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, COLUMNS, table.length / (4 * COLUMNS), gl.RGBA, gl.FLOAT, table);
     setView(gl, uniforms, view);
     setPlanes(gl, uniforms, view, planes);
     gl.uniform1i(uniforms.headlight, light ? 0 : 1);
@@ -72,9 +72,7 @@ export class SurfelPass {
     gl.uniform1f(uniforms.near, NEAR);
     gl.uniform1f(uniforms.texel_step, this._optics.step);
     gl.bindVertexArray(this._vertices);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this._indices);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, order);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, order.length);
+    gl.drawElements(gl.TRIANGLES, 6 * order.length, gl.UNSIGNED_INT, 0);
     gl.bindVertexArray(null);
     gl.disable(gl.BLEND);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
@@ -96,18 +94,24 @@ export class SurfelPass {
     return high ? [low, high] : [BEYOND, BEYOND];
   }
 
-  /** A quad for each surfel, of which only its number comes from a buffer. */
-  _makeInstances(count) {
-    const gl = this._gl;
-    const place = gl.getAttribLocation(this._shaders.program, "surfel");
+  _upload(table, order) {
+    const gl = this._gl, rows = Math.ceil(order.length / WIDTH), parts = table.length / (4 * COLUMNS);
+    const whole = new Uint32Array(order.buffer, order.byteOffset, rows * WIDTH);
+    gl.bindTexture(gl.TEXTURE_2D, this._textures.parts.texture);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, COLUMNS, parts, gl.RGBA, gl.FLOAT, table);
+    gl.bindTexture(gl.TEXTURE_2D, this._textures.order.texture);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, whole);
+  }
+
+  /** Two triangles for each surfel. Instances would be fewer numbers, but software draws them one by one. */
+  _makeCorners(count) {
+    const gl = this._gl, corners = new Uint32Array(6 * count);
+    for (let i = 0; i < count; i++) [0, 1, 2, 2, 1, 3].forEach((corner, k) => { corners[6 * i + k] = 4 * i + corner; });
     this._vertices = gl.createVertexArray();
-    this._indices = gl.createBuffer();
     gl.bindVertexArray(this._vertices);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this._indices);
-    gl.bufferData(gl.ARRAY_BUFFER, 4 * count, gl.DYNAMIC_DRAW);
-    gl.enableVertexAttribArray(place);
-    gl.vertexAttribIPointer(place, 1, gl.UNSIGNED_INT, 0, 0);
-    gl.vertexAttribDivisor(place, 1);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
   }
 
   _resize(size) {

@@ -49,7 +49,7 @@ export class WebglRenderer {
     this._original = scene;
     this._optics = JSON.parse(metadata.optics);
     this._surfels = joinSurfels(tensors, this._optics.models, firstRows(scene.models));
-    this._order = new DepthOrder(this._surfels.count);
+    this._order = new DepthOrder(this._surfels.lookups.length / 4);
     this._upload();
   }
 
