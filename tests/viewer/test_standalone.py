@@ -28,13 +28,11 @@ from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import SceneVolume
 from texgs.viewer import standalone
 from texgs.viewer.messages import Edit
-from texgs.viewer.standalone import web_file
 
 HOSTILE = "</script><b>&'\""
 LEVELS = 3  # of 255, see test_webgl.py
 BOX, UNLIT = {"box": Box([-1.0] * 3, [1.0] * 3)}, {"faces": "unlit"}
 SIZE = {"width": 900, "height": 400}  # of the window; a part of it is the picture
-REST = int(re.search(r"const REST = (\d+);", web_file("scene_page.js"))[1])  # milliseconds
 
 
 @pytest.fixture(scope="module")
@@ -77,8 +75,8 @@ def page(chromium, file):
 
 def settle(page):
     """Wait for the frame in full that follows a movement."""
-    page.wait_for_timeout(REST + 50)
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    page.wait_for_selector("#picture[aria-busy=false]")
 
 
 def shown(page):
@@ -275,7 +273,7 @@ def test_pointers_and_keys_turn_the_camera(page, file):
 def test_a_link_leads_back_to_the_view(page, chromium, file):
     page.locator("#picture").press("ArrowLeft")
     page.get_by_label("Show").select_option("normal")
-    settle(page)
+    page.wait_for_url(re.compile("mode=normal"))
     other = chromium.new_page(viewport=SIZE)
     other.goto(page.url)
     other.wait_for_selector("#picture:not([hidden])")
@@ -336,6 +334,35 @@ def test_it_follows_the_size_of_the_window(page, file):
     page.locator("#picture").press("Home")
     settle(page)
     assert differ(page, file) <= LEVELS
+
+
+SLOW = """() => { // each frame takes 150 ms
+  const card = WebGL2RenderingContext.prototype, { fenceSync, getSyncParameter } = card;
+  card.fenceSync = function (...words) {
+    return Object.assign(fenceSync.apply(this, words), { begun: performance.now() });
+  };
+  card.getSyncParameter = function (fence, name) {
+    return performance.now() < fence.begun + 150 ? this.UNSIGNALED : getSyncParameter.call(this, fence, name);
+  };
+}"""
+MOVES = """async () => { // as rare as moves of a pointer between slow frames: widths of pictures meanwhile
+  const picture = document.getElementById("picture"), widths = [];
+  for (let count = 0; count < 20; count++) {
+    picture.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft" }));
+    await new Promise((done) => setTimeout(done, 150));
+    widths.push(picture.width);
+  }
+  return widths;
+}"""
+
+
+def test_slow_frames_of_what_moves_are_coarse_until_it_rests(page, file):
+    whole = page.locator("#picture").evaluate("picture => picture.width")
+    page.evaluate(SLOW)
+    assert set(page.evaluate(MOVES)[10:]) == {-(-whole // 4)}
+    settle(page)
+    assert page.locator("#picture").evaluate("picture => picture.width") == whole
+    assert differ(page, file, turned=(20 * 5, 0)) <= LEVELS
 
 
 def test_without_webgl_there_is_a_picture_and_a_sentence(chromium, file):

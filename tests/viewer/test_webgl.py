@@ -157,6 +157,28 @@ def test_the_background_is_that_of_the_scene(page, description):
     assert (drawn(page, CAMERAS[0], shown, "alpha") == 0).all()
 
 
+def test_surfels_are_sorted_again_where_their_order_may_be_another(page, description):
+    page.evaluate(
+        "() => { const order = renderer._order, sort = order.farToNear; globalThis.sorted = 0;"
+        " order.farToNear = () => { sorted += 1; return sort.call(order); }; }"
+    )
+    shown = copy.deepcopy(description)
+    edit = shown["models"][1]["edit"]
+    counts = []
+    for camera, changed in (
+        (CAMERAS[0], {}),
+        (CAMERAS[0], {"opacity": 0.5, "palette": [1, 0, 0]}),
+        (CAMERAS[0], {"visible": False}),
+        (CAMERAS[1], {}),
+        (CAMERAS[1], {"opacity": 0.2}),
+    ):
+        edit |= changed
+        drawn(page, camera, shown)
+        counts.append(page.evaluate("sorted"))
+    page.evaluate("() => { delete renderer._order.farToNear; }")
+    assert np.diff([0, *counts]).tolist() == [1, 0, 1, 1, 0]
+
+
 @pytest.mark.parametrize("count", [0, 1, 7, 5000])
 def test_depths_are_sorted_exactly_and_ties_as_the_rasterizer_has_them(page, count):
     depths = np.random.default_rng(count).exponential(size=count).astype(np.float32)

@@ -90,7 +90,7 @@ export class ScenePage {
     this.renderer.draw(this.camera, this.state.scene, { moving, ...this.#shown });
     this.cuts.draw();
     clearTimeout(this.#resting);
-    this.#resting = setTimeout(() => this.#rest(moving), REST);
+    this.#resting = setTimeout(() => this.#rest(moving), Math.max(REST, 2 * (this.renderer.took ?? 0)));
   }
 
   /** The camera was moved. */

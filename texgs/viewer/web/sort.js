@@ -1,4 +1,4 @@
-// The order in which surfels are blended: by the depth of their means, far to near, exactly and in every frame.
+// The order in which surfels are blended: by the depth of their means, far to near, exactly.
 
 const BITS = 11;
 const BUCKETS = 1 << BITS;
@@ -29,7 +29,7 @@ export class DepthOrder {
    * The surfels from far to near. Of equal depths the one that was added last comes first: this is the reverse
    * of the rasterizer's order, which is near to far and stable.
    *
-   * @returns {Uint32Array} valid until the next sort.
+   * @returns {Uint32Array} valid until the next sort; `latest`, too.
    */
   farToNear() {
     const last = this.count - 1;
@@ -38,7 +38,7 @@ export class DepthOrder {
       this._order[0][i] = this.surfels[last - i];
     }
     for (let pass = 0; pass < 3; pass++) this._scatter(pass & 1, pass * BITS);
-    return this._order[1].subarray(0, this.count);
+    return this.latest = this._order[1].subarray(0, this.count);
   }
 
   /** One stable pass of a radix sort by the bits from `shift`, out of buffer `from` into the other one. */

@@ -1,4 +1,4 @@
-// Draws a scene of surfels by WebGL2: sorted in every frame, blended far to near into floats, then shown.
+// Draws a scene of surfels by WebGL2: sorted, blended far to near into floats, then shown.
 
 import { direction } from "./camera.js";
 import { COLUMNS, firstRows, partTable } from "./parts.js";
@@ -11,7 +11,9 @@ import { joinSurfels } from "./surfels.js";
 import { unpack } from "./tensors.js";
 
 const OVER_BLACK = ["alpha", "ambient", "diffuse", "specular", "shininess"];
-const SLOW = 40; // milliseconds from frame to frame above which those of a moving scene have half the resolution
+const SLOW = 40; // milliseconds of a frame above which those of a moving scene have fewer rows and columns
+const LEAST = 1 / 4; // part of them that stays
+const LONGEST = 1000; // milliseconds that count: a page may have been hidden meanwhile
 const MISSING = "This browser has no WebGL2, which this scene needs: switch hardware acceleration on, or use another one.";
 const CONTEXT = { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" };
 
@@ -27,8 +29,11 @@ export class WebglRenderer {
     const gl = canvas.getContext("webgl2", CONTEXT);
     if (!gl) throw new Error(MISSING);
     this._gl = gl;
+    this._share = 1; // of the sides of a frame, while something moves
+    this.took = 0; // milliseconds of the latest of these frames
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault(); // asks for another context
+      this._begun = null;
       notice("The graphics driver has taken the picture back; it comes again by itself.");
     });
     canvas.addEventListener("webglcontextrestored", () => {
@@ -108,21 +113,41 @@ export class WebglRenderer {
   }
 
   _ask() {
-    if (this._request || !this._wanted || this._gl.isContextLost()) return;
-    this._request = requestAnimationFrame((time) => {
-      this._request = 0;
-      const { view, scene, mode, moving } = this._wanted;
-      this._pace(time, moving);
-      const share = moving && this._isSlow ? 0.5 : 1;
-      const [width, height] = [view.width, view.height].map((side) => Math.ceil(share * side));
-      this._frame({ ...view, width, height }, scene, mode);
-    });
+    this._isAsked = true;
+    this._canvas.setAttribute("aria-busy", "true"); // until a whole frame is there
+    this._request ||= requestAnimationFrame(() => this._tick());
   }
 
-  /** Notes whether the frame after one at this time comes late. It stays noted until nothing moves. */
-  _pace(time, moving) {
-    if (!moving) this._isSlow = false;
-    else requestAnimationFrame((next) => { this._isSlow ||= next - time > SLOW; });
+  /** Draws the newest frame that is asked for, once the one before is done: events come in time meanwhile. */
+  _tick() {
+    const gl = this._gl;
+    this._request = 0;
+    if (gl.isContextLost() || !this._wanted) return;
+    const isDone = !this._begun || gl.getSyncParameter(this._begun.fence, gl.SYNC_STATUS) === gl.SIGNALED;
+    if (isDone && this._begun) this._note(this._begun);
+    if (isDone && this._isAsked) this._begin(this._wanted);
+    if (this._begun) this._request = requestAnimationFrame(() => this._tick());
+  }
+
+  _begin({ view, scene, mode, moving }) {
+    const gl = this._gl, share = moving ? this._share : 1, at = performance.now();
+    const [width, height] = [view.width, view.height].map((side) => Math.ceil(share * side));
+    this._isAsked = false;
+    this._frame({ ...view, width, height }, scene, mode);
+    this._begun = { at, share, moving, fence: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) };
+    gl.flush();
+  }
+
+  /** Notes how long a frame took; a whole one counts while moving ones are whole, too. */
+  _note({ at, share, moving, fence }) {
+    const took = Math.min(performance.now() - at, LONGEST);
+    const part = Math.min(1, Math.max(LEAST, share * Math.sqrt(SLOW / took)));
+    const isOther = part === 1 || part < 0.8 * share || part > 1.25 * share; // else sharpness would waver
+    this._gl.deleteSync(fence);
+    this._begun = null;
+    if (moving) this.took = took;
+    else if (!this._isAsked) this._canvas.setAttribute("aria-busy", "false");
+    if (share === this._share && isOther) this._share = part;
   }
 
   _frame(camera, scene, mode) {
@@ -150,6 +175,9 @@ export class WebglRenderer {
     const [x, y, z, t] = viewmat.slice(8);
     const order = this._order;
     const round = Math.fround;
+    const shown = table.filter((_, k) => k % (4 * COLUMNS) === 3).map(Math.sign), key = [x, y, z, t, ...shown].join();
+    if (key === this._sorted) return order.latest;
+    this._sorted = key;
     order.clear();
     for (let i = 0, k = 0; i < count; i++, k += 4) {
       const sum = round(y * surfels[k + 1] + round(z * surfels[k + 2]));
