@@ -423,7 +423,10 @@ def test_a_wrong_link_is_told_and_the_picture_stays(chromium, scene_file):
         expect(told).to_be_visible()
         page.goto(f"{address}{LINK.replace('azimuth=40', 'azimuth=1e300')}")
         expect(page.get_by_text("This page cannot use of the link: azimuth.")).to_be_visible()
+        again = page.get_by_text("This view again")
+        expect(again).to_contain_text("--azimuth 30", timeout=WAIT)
         page.goto(address + LINK)
+        expect(again).to_contain_text("--azimuth 40", timeout=WAIT)
         assert still(page) == first
         expect(page.get_by_role("listitem")).to_have_count(0)
 
