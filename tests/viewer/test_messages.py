@@ -12,7 +12,7 @@ from texgs.viewer.messages import Cancel, Edit, Mask, Redo, Remove, Save, Segmen
 
 ANGLES = {"azimuth": 30, "polar": 20, "distance": 3, "fov_y": 40}
 CAMERA = {"target": [0, 0, 0], **ANGLES, "width": 64, "height": 48}
-TYPES = ["view", "edit", "undo", "redo", "save", "mask", "segment", "look"]
+TYPES = ["view", "edit", "undo", "redo", "save", "mask", "segment", "look", "fit"]
 TYPES += ["export", "rename", "remove", "cancel"]
 VIEW = {"type": "view", "id": 7, "camera": CAMERA, "mode": "normal", "moving": True, "before": False}
 MASK = {"type": "mask", "model": "TF01", "camera": CAMERA}

@@ -40,7 +40,6 @@ def test_a_page_can_go_to_the_training_views_with_y_up(scene):
 def test_transfer_functions_come_with_the_histogram_of_their_volume(scene, tmp_path):
     assert Origins(scene).transfer is None, "it names no volume"
     transfer = Origins(named(scene, tmp_path)).transfer
-    assert transfer["functions"] == {"TF01": {key: TF[key] for key in ("opacity", "color")}}
     assert (transfer["minimum"], transfer["maximum"]) == (0, 4)
     assert transfer["histogram"] == [10] * 256
 

@@ -124,3 +124,16 @@ def test_points_and_functions_are_added_and_removed(chromium, sphere_file):
         expect(page.locator("#transfer .readout")).to_have_text(
             re.compile(r"^[\d.]+: ([\d.]+ % of|not in) the volume$")
         )
+
+
+def test_a_model_of_a_function_is_begun_and_cancelled(chromium, sphere_file):
+    with served(sphere_file) as (_, address), opened(chromium, address) as page:
+        make = page.get_by_role("button", name="Make model")
+        expect(make).to_be_disabled()
+        page.get_by_role("button", name="New", exact=True).click()
+        make.click()
+        expect(page.locator("#job-title")).to_have_text(re.compile("TF03, (views|pass 1)"), timeout=WAIT)
+        page.get_by_role("button", name="Cancel").first.click()
+        expect(page.get_by_text("it was cancelled; nothing has changed")).to_be_visible(timeout=WAIT)
+        expect(page.get_by_role("listitem")).to_have_text(["functions TF03"])
+        assert not list(sphere_file.parent.glob("*TF03*"))

@@ -51,6 +51,43 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def add_model_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the scene, the function, and the new file."""
+    parser.add_argument("scene", type=Path, help="scene.yaml, whose key functions has functions to try")
+    parser.add_argument("name", help="of the function, which becomes that of the model")
+    option(parser, "--size", 400, "of the views, pixels")
+    parser.add_argument(
+        "--output", type=Path, required=True, help="the new scene.yaml; models are put beside it"
+    )
+    add_device(parser)
+
+
+def run_model(arguments: argparse.Namespace) -> int:
+    """Fit a model of a transfer function that a scene tries, in seconds, and put it into the scene."""
+    from texgs.core.check import torch_device
+    from texgs.core.errors import located
+    from texgs.edit.function_model import models_of, overlap_of, tried, with_model
+    from texgs.scene.scene_file import read_scene, write_scene
+
+    require_scene(arguments.output)
+    scene, output = read_scene(arguments.scene), arguments.output
+    require_name(arguments.name, "NAME")
+    if arguments.size < 16:
+        raise ArgumentError(f"--size: expected at least 16, got {arguments.size}")
+    with located(arguments.scene):
+        tf = tried(scene, arguments.name)
+        made = models_of(
+            *(scene, arguments.name, output.parent, output.stem),
+            device=torch_device(arguments.device),
+            size=arguments.size,
+        )
+        first, file = made
+    first.unlink()
+    scene = with_model(scene, arguments.name, file, tf)
+    print(f"{write_scene(output, scene)}{overlap_of(scene, arguments.name)}")
+    return 0
+
+
 def add_segment_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what is clicked on, and how masks are found and lifted."""
     parser.add_argument("scene", type=Path, help="scene.yaml")

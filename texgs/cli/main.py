@@ -20,7 +20,14 @@ from texgs.workflow.stage_table import STAGES
 NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`.
 # Verbs in the module of another have `add_VERB_arguments` and `run_VERB` there; those of stages share one.
-SHARED = {"init": "new", "segment": "edit", "report": "tables", "votes": "study", "download": "weights"}
+SHARED = {
+    "init": "new",
+    "segment": "edit",
+    "model": "edit",
+    "report": "tables",
+    "votes": "study",
+    "download": "weights",
+}
 STAGE_VERBS = {stage.name: stage.help for stage in STAGES.values()}
 VERBS = {
     "init": "start a folder with configurations of your own",
@@ -28,6 +35,7 @@ VERBS = {
     "run": "run the workflow: from the volume to the report, whatever is not done yet",
     **STAGE_VERBS,
     "edit": "change colours, opacities and lights of a scene",
+    "model": "fit a model of a transfer function that a scene tries, in seconds",
     "segment": "segment a model of a scene by clicks, to edit a part of it",
     "view": "look at a scene and edit it in the browser",
     "render": "render a scene to PNG, GIF or MP4",

@@ -127,6 +127,11 @@ class Session:
         """Try transfer functions on the volume; those of before are gone."""
         self._push(replace(self.scene, functions=functions))
 
+    def set_scene(self, scene: Scene) -> None:
+        """Go on with another scene, whose models are read first."""
+        changed = [name for name, entry in scene.models.items() if self.scene.models.get(name) != entry]
+        self._push_read(scene, changed)
+
     def set_of_scene(self, key: str, value: Any) -> None:
         """Set what is edited of a whole scene, as a scene file has it; see `SCENE_KEYS`."""
         known({key: value}, SCENE_KEYS, "the scene")

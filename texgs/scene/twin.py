@@ -23,7 +23,7 @@ from texgs.volume.caster import Caster
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlay
 from texgs.volume.render import Appearance
-from texgs.volume.transfer import TransferFunction, check_disjoint
+from texgs.volume.transfer import TransferFunction
 
 if TYPE_CHECKING:
     from texgs.scene.scene import Scene
@@ -59,9 +59,8 @@ class Twin:
         self._volume, self._device = scene.volume, torch.device(device)
         with located("volume"):
             self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
-        basic = {name: self._tf(name) for name in scene.models}
-        with located("volume.tfs"):
-            check_disjoint(basic)
+        for name in scene.models:
+            self._tf(name)
 
     def with_step(self, step: float) -> Twin:
         """Return a twin with another distance of samples, in voxels; nothing is read again."""

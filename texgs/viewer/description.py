@@ -64,6 +64,7 @@ def describe(name: str, scene: Scene, composed: Composed, framed: Frame | None =
         "cuts": asdict(scene.cuts),
         "models": models,
         "functions": plain_functions(scene.functions),
+        "tfs": plain_functions(scene.volume.tfs) if scene.volume else {},
         "modes": [mode for mode in get_args(Mode) if MODES.get(mode, "") in ("", *kind.can)],
         "bounds": {"center": target, "radius": framed.radius},
         "up": [0.0, 1.0, 0.0],

@@ -145,6 +145,14 @@ class Look:
 
 
 @dataclass(frozen=True, config=STRICT)
+class Fit:
+    """Fit a model of a function that the scene tries."""
+
+    function: str
+    type: Literal["fit"] = tag("fit")
+
+
+@dataclass(frozen=True, config=STRICT)
 class Export:
     """Write a file for the page to save."""
 
@@ -178,7 +186,7 @@ class Cancel:
     type: Literal["cancel"] = tag("cancel")
 
 
-Message = View | Edit | Undo | Redo | Save | Mask | Segment | Look | Export | Rename | Remove | Cancel
+Message = View | Edit | Undo | Redo | Save | Mask | Segment | Look | Fit | Export | Rename | Remove | Cancel
 MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 VIEWS = TypeAdapter(View)
 

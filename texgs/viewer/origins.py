@@ -21,7 +21,6 @@ from texgs.core.lens import ORIGIN
 from texgs.core.names import is_number
 from texgs.fields.files import kind_of
 from texgs.scene.scene import Scene
-from texgs.scene.scene_file import plain_functions
 from texgs.volume.view_set import View as Image
 from texgs.volume.view_set import read_views
 
@@ -89,14 +88,13 @@ class Origins:
 
     @cached_property
     def transfer(self) -> dict[str, Any] | None:
-        """Return range and histogram of the scene's volume, and its basic TFs; None where it names none."""
+        """Return range and histogram of the scene's volume; None where it names none."""
         if self._volume is None:
             return None
-        functions = plain_functions(self._volume.tfs)
         ends = [value for tf in self._volume.tfs.values() for value in tf.support]
         range_of_values, counts = histogram_of(self._volume.file.parent / SUMMARY)
         low, high = range_of_values or (min(ends, default=0.0), max(ends, default=1.0))
-        return {"minimum": low, "maximum": high, "histogram": counts, "functions": functions}
+        return {"minimum": low, "maximum": high, "histogram": counts}
 
 
 def histogram_of(file: Path) -> tuple[tuple[float, float] | None, list[int]]:

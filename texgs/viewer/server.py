@@ -24,7 +24,7 @@ from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import add_headers, guard
 from texgs.viewer.looks import LARGEST, thumbnail
-from texgs.viewer.messages import Cancel, Export, Look, Mask, Message, Save, Segment, View, parse
+from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Save, Segment, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
@@ -32,6 +32,7 @@ from texgs.viewer.work import Work
 
 WEB = Path(__file__).parent / "web"
 SERVED = (".js", ".css", ".svg")
+CHANGING = ("name", "background", "light", "cuts", "functions", "tfs", "models")  # of what a page knows
 MOST_PAGES = 16
 PATIENCE = 2.0  # seconds for a page to close its connection
 HEARTBEAT = 20.0  # seconds, after which a page that is gone is noticed
@@ -43,8 +44,9 @@ class Server:
 
     def __init__(self, opened: Opened, device: torch.device | str = "cpu") -> None:
         session = Session(opened.scene, device)
-        self._title, self._composed = title_of(opened.source), session.composition
-        self._framed = opened.scene.framed(self._composed)
+        self._title, composed = title_of(opened.source), session.composition
+        self._framed, self._device = opened.scene.framed(composed), device
+        self._opened = self._latest = (files_of_models(opened.scene), composed)  # models as they were fitted
         kind = kind_of(next(iter(opened.scene.models.values())).file)
         self._choices = {
             "styles": list(PICTURES),
@@ -174,6 +176,8 @@ class Server:
             self.work.begin_segment(message, page)
         elif isinstance(message, Look):
             await self.work.begin_look(message, page)
+        elif isinstance(message, Fit):
+            self.work.begin_fit(message, page)
         elif isinstance(message, Export):
             self.work.begin_export(message, page)
         elif isinstance(message, Cancel):
@@ -213,7 +217,7 @@ class Server:
     def scene_message(self) -> dict[str, Any]:
         """Return what changes of the scene, and its history, for all pages."""
         scene = self._describe(self.edits.scene)
-        changing = {key: scene[key] for key in ("name", "background", "light", "cuts", "functions", "models")}
+        changing = {key: scene[key] for key in CHANGING}
         return {"type": "scene", "scene": changing, **self.edits.state()}
 
     def greeting(self) -> dict[str, Any]:
@@ -227,8 +231,12 @@ class Server:
         return {**self.scene_message(), "scene": whole, **facts}
 
     def _describe(self, scene: Scene) -> dict[str, Any]:
-        """Return a scene of the same models as pages need it."""
-        return describe(self._title, scene, self._composed, self._framed)
+        """Return a scene as pages need it; models are read where there are others than before."""
+        files = files_of_models(scene)
+        if files not in (self._opened[0], self._latest[0]):
+            self._latest = (files, scene.as_fitted.open(self._device))
+        composed = self._opened[1] if files == self._opened[0] else self._latest[1]
+        return describe(self._title, scene, composed, self._framed)
 
     async def _say_goodbye(self, app: web.Application) -> None:
         """Close all connections."""
@@ -242,3 +250,8 @@ class Server:
             print("Waiting for what is being made to stop.", flush=True)
         await asyncio.to_thread(self.work.close)
         self.frames.close()
+
+
+def files_of_models(scene: Scene) -> list[Path]:
+    """Return the files of a scene's models."""
+    return [entry.file for entry in scene.models.values()]

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.names import SCENES, file_name, label, new_part_file
+from texgs.edit.function_model import with_model
 from texgs.report.check import checked
 from texgs.scene.parts import part_names, with_textures
 from texgs.scene.scene import Scene, SceneModel
@@ -19,6 +20,7 @@ from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.session import SCENE_KEYS, Session, files_of, state_of
 from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
+from texgs.volume.transfer import TransferFunction
 
 SCENE = "scene.yaml"  # as jobs write it
 OF_JOBS = "metrics.json"  # beside what a job wrote, and would write again
@@ -69,7 +71,7 @@ def _only_scene(folder: Path) -> Path:
 
 def title_of(path: Path) -> str:
     """Return enough of a path to know the scene by."""
-    return "/".join(path.resolve().parts[-4:])
+    return Path(*path.resolve().parts[-4:]).as_posix()
 
 
 class SharedEdits:
@@ -150,7 +152,7 @@ class SharedEdits:
 
     def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:
         """Write the file of a new segment, and add it."""
-        file = new_part_file("segment", self._folder, Path(self.name).stem, part)
+        file = new_part_file("segment", self._folder, self.stem, part)
         self._session.make_segment(part, mask, file, facts)
         self._session.name_step(f"{part} new")
         self._latest = None
@@ -160,6 +162,26 @@ class SharedEdits:
         self._session.set_textures(textures, own_colors=True)
         self._session.name_step(f"{', '.join(textures)} {look}")
         self._latest = None
+
+    def give_model(self, name: str, file: Path, tf: TransferFunction, before: Path | None) -> bool:
+        """Put a model in the place of a function; whether it was still wanted: none, or that of `before`."""
+        entry = self.scene.models.get(name)
+        is_there = self.scene.functions.get(name) == tf if before is None else entry and entry.file == before
+        if is_there:
+            self._session.set_scene(with_model(self.scene, name, file, tf))
+            self._session.name_step(f"{name} {'model' if before is None else 'finer model'}")
+            self._latest = None
+        return bool(is_there)
+
+    @property
+    def stem(self) -> str:
+        """Return how names of files that belong to the scene begin."""
+        return Path(self.name).stem
+
+    @property
+    def folder(self) -> Path:
+        """Return where scenes are saved."""
+        return self._folder
 
     def path_of(self, name: str) -> Path:
         """Return the scene file of a name in the folder for saving."""
@@ -185,8 +207,7 @@ class SharedEdits:
 
     def new_folder(self, kind: str) -> Path:
         """Return a folder for the files of a new look that is not there yet."""
-        stem = Path(self.name).stem
-        folders = (self._folder / f"{stem}-{kind}-{number}" for number in count(1))
+        folders = (self._folder / f"{self.stem}-{kind}-{number}" for number in count(1))
         return next(folder for folder in folders if not folder.exists())
 
     def _edit(self, edit: Edit) -> None:

@@ -18,12 +18,13 @@ import torch
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.names import part_file, require_name
 from texgs.core.progress import watched
+from texgs.edit.function_model import models_of, overlap_of, tried
 from texgs.edit.task import parts_with_surfels
 from texgs.scene.parts import entry_of, require_new, split
 from texgs.viewer.downloads import Downloads, require_kind
 from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks, Styles
-from texgs.viewer.messages import Export, Look, Mask, Segment
+from texgs.viewer.messages import Export, Fit, Look, Mask, Segment
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
 
@@ -46,15 +47,18 @@ class Watch:
 
 
 class Jobs:
-    """A thread that works with half of the threads of the machine: the others are for frames."""
+    """A thread that works with half of the threads of the machine, as a rule: the others are for frames."""
 
     def __init__(self) -> None:
-        half = max(1, torch.get_num_threads() // 2)
-        self._thread = ThreadPoolExecutor(1, "job", torch.set_num_threads, (half,))
+        self._all = torch.get_num_threads()
+        self._thread = ThreadPoolExecutor(1, "job")
 
-    async def run(self, work: Callable[[], T], watch: Watch) -> T:
-        """Return what work returns; who watches it is told in this thread about the loops in the other."""
-        loop = asyncio.get_running_loop()
+    async def run(self, work: Callable[[], T], watch: Watch, *, is_urgent: bool = False) -> T:
+        """Return what work returns; who watches it is told in this thread about the loops in the other.
+
+        Urgent work has all threads: somebody waits for it, and frames may be slower meanwhile.
+        """
+        loop, threads = asyncio.get_running_loop(), self._all if is_urgent else max(1, self._all // 2)
 
         def step(title: str, done: int, total: int | None) -> None:
             if watch.stop.is_set():
@@ -63,6 +67,7 @@ class Jobs:
                 loop.call_soon_threadsafe(watch.tell, title, done / total)
 
         def watched_work() -> T:
+            torch.set_num_threads(threads)
             with watched(step):
                 result = work()
             if watch.stop.is_set():  # after the last step, or there was none
@@ -88,6 +93,7 @@ class Work:
         device: torch.device | str,
     ) -> None:
         self._edits, self._changing, self._changed = edits, changing, changed
+        self._device = device
         self._jobs, self.styles = Jobs(), Styles()
         self._segmenter, self._looks = Segmenter(device), Looks(self.styles, device)
         self.downloads = Downloads(frames, edits)
@@ -113,6 +119,12 @@ class Work:
             entry_of(self._edits.scene, part)
         edit = await asyncio.to_thread(self._looks.edit_of, asked)
         self._begin(page, partial(self._look, asked, edit, page))
+
+    def begin_fit(self, asked: Fit, page: Page) -> None:
+        """Begin to fit a model of a function."""
+        tried(self._edits.scene, asked.function)
+        require_name(asked.function, "function")
+        self._begin(page, partial(self._fit, asked, page))
 
     def begin_export(self, asked: Export, page: Page) -> None:
         """Begin to write a file."""
@@ -198,6 +210,31 @@ class Work:
                 page.try_on(None)
         how = f"{name}: {edited.how}, {monotonic() - start:.0f} s."
         page.tell(f"{how} Textures are in {output}; the scene is not saved yet.", level="info")
+
+    async def _fit(self, asked: Fit, page: Page, watch: Watch) -> None:
+        """Put a first model in the place of its function, and then a finer one in the place of that."""
+        scene, name, edits = self._edits.scene, asked.function, self._edits
+        tf, start, loop = tried(scene, name), monotonic(), asyncio.get_running_loop()
+
+        async def give(file: Path, before: Path | None) -> bool:
+            async with self._changing:
+                is_wanted = await asyncio.to_thread(edits.give_model, name, file, tf, before)
+            self._changed()
+            if is_wanted:
+                what, more = ("finer model", "") if before else ("model", overlap_of(edits.scene, name))
+                took = f"{monotonic() - start:.0f} s; the scene is not saved yet."
+                page.tell(f"{name}: {what}, {took}{more}", level="info")
+            return is_wanted
+
+        def work() -> None:
+            before = None
+            for file in models_of(scene, name, edits.folder, edits.stem, self._device):
+                if not asyncio.run_coroutine_threadsafe(give(file, before), loop).result():
+                    file.unlink()
+                    break
+                before = file
+
+        await self._jobs.run(work, watch, is_urgent=True)
 
     async def _export(self, asked: Export, page: Page, watch: Watch) -> None:
         """Write a file, and tell its page where it is."""

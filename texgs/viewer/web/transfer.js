@@ -10,22 +10,22 @@ const SMALL = 0.005, LARGE = 0.05; // of the range, or of the opacity, that a ke
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 export class TransferEditor {
-  #page; #fitted; #presets; #picture;
+  #page; #presets; #picture;
   #name; // of the function that is edited
   #chosen = { key: "opacity", index: 1 }; // its point that inputs show
   #parts = {};
   #change = () => {}; // by what is dragged or pressed; takes the number of a step
   #drag = null;
+  #making = ""; // name of the function that a model is being made of
 
   /**
    * @param {Element} place
-   * @param {object} page - with shown, show() and state
-   * @param {{minimum: number, maximum: number, histogram: number[], functions: object}} transfer - of the volume
+   * @param {object} page - with job, mayBegin(), shown, show() and state
+   * @param {{minimum: number, maximum: number, histogram: number[]}} transfer - of the volume
    * @param {object} presets - colours by name
    */
   constructor(place, page, transfer, presets) {
     this.#page = page;
-    this.#fitted = transfer.functions;
     this.#presets = presets;
     this.#picture = new TransferPicture(transfer);
     for (const name of ["readout", "names", "inputs", "tools"]) this.#parts[name] = element("div", { className: name });
@@ -34,12 +34,17 @@ export class TransferEditor {
     this.#buildTools();
     this.#listen(this.#picture.svg);
     page.state.addEventListener("change", () => this.show());
+    page.job.addEventListener("end", () => { this.#making = ""; });
     this.show();
     this.#read();
   }
 
   /** Show the functions as they are. */
   show() {
+    if (this.#making && !(this.#making in this.#tried)) { // its model is there
+      this.#making = "";
+      this.#page.show({ mode: "shaded" });
+    }
     if (!this.#all[this.#name]) [this.#name] = Object.keys(this.#all);
     this.#chosen.index = Math.min(this.#chosen.index, this.#edited[this.#chosen.key].length - 1);
     if (!this.#drag) this.#picture.fit(this.#all);
@@ -48,7 +53,12 @@ export class TransferEditor {
     this.#showInputs();
   }
 
-  /** Those that the models were made by, and those that are tried in place of them or beside them. */
+  /** Those that the models were made by. */
+  get #fitted() {
+    return this.#page.state.scene.tfs;
+  }
+
+  /** The same, and those that are tried in place of them or beside them. */
   get #all() {
     return { ...this.#fitted, ...this.#tried };
   }
@@ -111,7 +121,7 @@ export class TransferEditor {
   }
 
   #showInputs() {
-    const { value, alpha, color, back } = this.#parts, isOpacity = this.#chosen.key === "opacity";
+    const { value, alpha, color, back, make } = this.#parts, isOpacity = this.#chosen.key === "opacity";
     for (const [input, number] of [[value, this.#point[0]], [alpha, this.#point[1]]]) {
       if (document.activeElement !== input) input.value = Number(number.toPrecision(5));
     }
@@ -119,7 +129,7 @@ export class TransferEditor {
     color.row.hidden = isOpacity;
     if (!isOpacity) color.show(this.#point.slice(1), false);
     back.textContent = this.#name in this.#fitted ? "As fitted" : "Delete";
-    back.disabled = !(this.#name in this.#tried);
+    back.disabled = make.disabled = !(this.#name in this.#tried);
   }
 
   #buildInputs() {
@@ -144,13 +154,16 @@ export class TransferEditor {
       const { [this.#name]: gone, ...others } = this.#tried;
       this.#try(others);
     });
+    this.#parts.make = button("Make model", "Fit a model of this function: a first one in seconds", () => {
+      if (this.#page.mayBegin() && this.#page.job.begin({ type: "fit", function: this.#name })) this.#making = this.#name;
+    });
     const presets = element("select", { "aria-label": "Colours of a preset", onchange: () => {
       this.#set(colored(this.#edited, this.#presets[presets.value]));
       presets.value = "";
     } }, new Option("Colours…", ""), ...Object.keys(this.#presets).map((name) => new Option(name, name)));
     this.#parts.tools.append(
       button("New", "Try one more function", () => this.#add(fresh(this.#picture.range, fromHex(FIRST)))),
-      button("Copy", "Try a copy of this function", () => this.#add(this.#edited)), this.#parts.back, presets);
+      button("Copy", "Try a copy of this function", () => this.#add(this.#edited)), this.#parts.back, this.#parts.make, presets);
   }
 
   #read(value) {

@@ -1,0 +1,96 @@
+"""A model of a function in seconds: where its surfels start, and what comes of them."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.scene.test_twin import HIGH, LOOK, LOW
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError
+from texgs.core.geometry import quats_to_matrices
+from texgs.core.lens import Lens
+from texgs.core.light import HEADLIGHT
+from texgs.fit import now
+from texgs.volume.caster import Caster
+from texgs.volume.generate import sphere
+from texgs.volume.transfer import TransferFunction
+
+LENS = Lens(3.0, 30.0, 64, 64)
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Fits of seconds."""
+    for name, value in {"FREQUENCY": 2, "SURFELS": 1500, "PASSES": (120, 120)}.items():
+        monkeypatch.setattr(now, name, value)
+
+
+@pytest.fixture(scope="module")
+def grid():
+    return sphere(32)
+
+
+def of_range(tf, grid):
+    return tf.scaled(float(grid.values.min()), float(grid.values.max()))
+
+
+def test_surfels_face_along_their_normals():
+    generator = torch.Generator().manual_seed(0)
+    normals = torch.nn.functional.normalize(torch.randn(200, 3, generator=generator), dim=1)
+    normals = torch.cat([normals, torch.tensor([[0.0, 0, 1], [0, 0, -1], [1e-5, 0, -1]])])
+    torch.testing.assert_close(quats_to_matrices(now.facing(normals))[:, :, 2], normals, atol=2e-4, rtol=0)
+
+
+def test_places_of_pixels_are_seen_in_these_pixels():
+    camera, depth = orbit(20, 10, 3.0, 40.0, 48, 32), torch.rand(32, 48) + 2
+    rows, columns = torch.tensor([0, 5, 31]), torch.tensor([47, 20, 0])
+    places = now.places_of(camera, depth, rows, columns)
+    seen = places @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]
+    pixels = seen @ camera.K.T
+    torch.testing.assert_close(seen[:, 2], depth[rows, columns])
+    torch.testing.assert_close(pixels[:, 0] / pixels[:, 2], columns + 0.5, atol=1e-3, rtol=0)
+    torch.testing.assert_close(pixels[:, 1] / pixels[:, 2], rows + 0.5, atol=1e-3, rtol=0)
+
+
+@pytest.mark.parametrize(("tf", "least"), [(HIGH, 30.0), (LOW, 27.0)])
+def test_the_finer_model_is_closer_to_the_volume_in_a_view_between_others(small, grid, tf, least):
+    tf, caster = of_range(tf, grid), Caster(grid, LOOK)
+    first, finer = now.fit_now(caster, LOOK, tf, LENS, "sphere")
+    assert first.stage == finer.stage == "texture"
+    camera = orbit(17, 23, *LENS)
+    truth = caster.cast(tf, camera, HEADLIGHT).rgba
+    errors = [
+        (
+            model.render(camera, HEADLIGHT, background=torch.ones(3)).color
+            - truth[..., :3]
+            - 1
+            + truth[..., 3:]
+        )
+        for model in (first, finer)
+    ]
+    quality = [-10 * float(error.square().mean().log10()) for error in errors]
+    assert least < quality[0] < quality[1] + 0.3
+    assert quality[1] > least
+
+
+def test_what_is_too_faint_for_rays_to_lose_half_starts_at_their_mean_depth(small, grid):
+    faint = of_range(replace(LOW, opacity=((0.2, 0), (0.3, 0.004), (0.4, 0))), grid)
+    caster = Caster(grid, LOOK)
+    images = now.cast_views(caster, faint, LENS, "faint", 0)
+    assert int(images.planes[:, 3].max()) < 100
+    points = now.ends_of_rays(caster, LOOK, faint, images, 0)
+    assert len(points.places) == now.SURFELS
+    assert points.places.norm(dim=1).max() < 0.9
+
+
+def test_a_function_that_shows_nothing_is_told(small, grid):
+    nothing = TransferFunction(((1e6, 0), (2e6, 1)), ((0, 1, 1, 1),))
+    with pytest.raises(ArgumentError, match="expected to see something of the volume, got nothing; raise"):
+        list(now.fit_now(Caster(grid, LOOK), LOOK, nothing, LENS, "nothing"))
+
+
+def test_the_same_seed_gives_the_same_model(small, grid):
+    tf, caster = of_range(HIGH, grid), Caster(grid, LOOK)
+    one, other = (next(now.fit_now(caster, LOOK, tf, LENS, "sphere", seed=3)) for _ in range(2))
+    assert all(torch.equal(x, other.parameters[name]) for name, x in one.parameters.items())

@@ -1,0 +1,75 @@
+"""A model of a transfer function that a scene tries on its volume, in place of the function."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+
+from texgs.core.errors import ArgumentError
+from texgs.core.names import new_part_file
+from texgs.fields.surfels.model_file import write_model
+from texgs.fit.now import fit_now
+from texgs.scene.scene import Scene, SceneModel
+from texgs.volume.caster import Caster
+from texgs.volume.framing import frame_of
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.transfer import TransferFunction, overlapping
+
+SIZE = 400  # pixels of either side of the views
+
+
+def models_of(
+    scene: Scene, name: str, folder: Path, stem: str, device: torch.device | str = "cpu", size: int = SIZE
+) -> Iterator[Path]:
+    """Yield the file of a first model of a function that a scene tries, then that of a finer one.
+
+    Views show all of what the function shows, as the other models' views show theirs.
+
+    Raises:
+        ArgumentError: if the scene tries no such function or names no volume, or nothing is to be seen.
+    """
+    volume, tf = scene.volume, tried(scene, name)
+    if volume is None:
+        raise ArgumentError("volume: expected the volume that the function is of, got none")
+    grid, look = open_grid(volume.file), volume.appearance
+    lens = frame_of(grid, [tf]).lens(width=size, height=size)
+    caster = Caster(grid, look, device)
+    for model in fit_now(caster, look, tf, lens, name):
+        yield write_model(new_part_file("model", folder, stem, name), model)
+
+
+def tried(scene: Scene, name: str) -> TransferFunction:
+    """Return the function of a name that a scene tries."""
+    if name not in scene.functions:
+        known = ", ".join(scene.functions) or "none"
+        raise ArgumentError(f"functions: expected one that the scene tries ({known}), got {name}")
+    return scene.functions[name]
+
+
+def with_model(scene: Scene, name: str, file: Path, tf: TransferFunction) -> Scene:
+    """Return the scene with a model of a function, which is then a basic one of its volume.
+
+    A model of the name that is there gets the file, and keeps what is edited by numbers.
+    """
+    if scene.volume is None:
+        raise ArgumentError("volume: expected the volume that the function is of, got none")
+    edit = scene.models[name].edit if name in scene.models else SceneModel(file).edit
+    volume = replace(scene.volume, tfs={**scene.volume.tfs, name: tf})
+    functions = {other: each for other, each in scene.functions.items() if other != name}
+    models = {**scene.models, name: SceneModel(file, edit)}
+    return replace(scene, models=models, volume=volume, functions=functions)
+
+
+def overlap_of(scene: Scene, name: str) -> str:
+    """Return what overlaps the function of a model means, in a sentence; nothing where none does."""
+    tfs = scene.volume.tfs if scene.volume else {}
+    others = [other for other in tfs if other != name and overlapping({name: tfs[name], other: tfs[other]})]
+    if not others:
+        return ""
+    return (
+        f" It shows values of {', '.join(others)} as well: models of both lie there, one over the other, "
+        "where the volume adds their extinctions up."
+    )

@@ -1,0 +1,153 @@
+"""A model of a transfer function in seconds: views cast in memory, surfels where rays end, two short fits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.geometry import z_order_of
+from texgs.core.lens import Lens
+from texgs.core.light import HEADLIGHT, random_lights
+from texgs.core.progress import progress
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel, in_full_light, raw_material
+from texgs.fit.loop import Fit
+from texgs.fit.seeds import surfels_at
+from texgs.fit.settings import Densify, Losses, Phase, Rates, TextureKeys
+from texgs.fit.texels import texturize
+from texgs.volume.cameras import icosphere
+from texgs.volume.caster import Caster
+from texgs.volume.images import Images, smaller
+from texgs.volume.render import Appearance
+from texgs.volume.transfer import TransferFunction
+
+FREQUENCY = 4  # of the icosphere of cameras, of which it has 162
+STEP = 0.5  # voxels between the samples of views
+SURFELS, OPACITY = 20_000, 0.2
+PIXELS = 250  # of each view, of which surfels are drawn
+LEAST = 100  # points
+FAINT = 0.02  # alpha below which a pixel shows nothing to speak of
+HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of their own
+RATES = Rates(quats=0.016, scales=0.05, opacities=0.1)
+
+
+PASSES = (800, 1200)  # iterations of the first fit, and of the one that goes on from it
+TEXTURE = TextureKeys(sweeps=1)
+
+
+class Points(NamedTuple):
+    """Where rays end: places, normals and colours [N, 3]."""
+
+    places: Tensor
+    normals: Tensor
+    colors: Tensor
+
+
+def fit_now(
+    caster: Caster, look: Appearance, tf: TransferFunction, lens: Lens, title: str, seed: int = 0
+) -> Iterator[Surfels]:
+    """Yield a first textured model of what a function shows of a volume, then a finer one.
+
+    The material starts at that of the volume, and surfels where its rays end, with its normals and colours:
+    nothing has to be found first, so that density control is not needed. Texels see the views under a
+    headlight.
+
+    Args:
+        caster: of the volume.
+        look: how it looks, as in the views of other models.
+        tf: in data values.
+        lens: of the training views.
+        title: of progress bars.
+        seed: of lights, first surfels and the order of views.
+
+    Raises:
+        ArgumentError: if the function shows nothing.
+    """
+    images = cast_views(caster.with_appearance(replace(look, step=STEP)), tf, lens, title, seed)
+    shading = ShadingModel(local_viewer=caster.local_viewer)
+    points = ends_of_rays(caster, look, tf, images, seed)
+    parameters = surfels_on(points, seed)
+    factors = (look.ambient, look.diffuse, look.specular, look.shininess)
+    parameters |= raw_material(*factors, kind=shading.material)
+    some = slice(None, None, HEADLIGHTS)
+    lit_alike = Images(images.planes[some], images.cameras[some], images.lights[some])
+    for number, iterations in enumerate(PASSES, start=1):
+        phase = Phase(iterations, rates=RATES, losses=Losses(alpha=0.0), densify=Densify(stop=0))
+        fit = Fit(parameters, shading, images, phase, seed)
+        for _ in progress(fit.run(), iterations, title=f"{title}, pass {number}", unit="view"):
+            pass
+        parameters = {key: x.detach() for key, x in fit.parameters.items()}
+        model = Surfels(in_full_light(parameters, shading.material), shading)
+        yield texturize(model, lit_alike, TEXTURE, seed, f"{title}, texture")
+
+
+def cast_views(caster: Caster, tf: TransferFunction, lens: Lens, title: str, seed: int) -> Images:
+    """Cast the training views of a function, under lights of their own."""
+    cameras = icosphere(FREQUENCY, *lens)
+    lights = [
+        light if index % HEADLIGHTS else HEADLIGHT
+        for index, light in enumerate(random_lights(len(cameras), seed, 0))
+    ]
+    planes = torch.empty(len(cameras), 4, lens.height, lens.width, dtype=torch.uint8)
+    for index, camera in enumerate(progress(cameras, title=f"{title}, views", unit="view")):
+        seen = caster.cast(tf, camera, lights[index]).rgba.permute(2, 0, 1)
+        over_white = torch.cat([seen[:3] + 1 - seen[3], seen[3:]])
+        planes[index] = (255 * over_white).round_().clamp_(0, 255).to(torch.uint8)
+    return Images(planes, cameras, lights)
+
+
+def ends_of_rays(caster: Caster, look: Appearance, tf: TransferFunction, images: Images, seed: int) -> Points:
+    """Return where rays of random pixels of all views lose half of their light, else its mean depth."""
+    unlit = caster.with_appearance(replace(look, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
+    generator = torch.Generator().manual_seed(seed)
+    for depth in ("median", "depth"):  # rays through faint matter never lose half of it
+        parts = [ends_of(unlit, tf, smaller(camera, 2), depth, generator) for camera in images.cameras]
+        points = Points(*map(torch.cat, zip(*parts, strict=True)))
+        if len(points.places) > LEAST:
+            chosen = torch.randperm(len(points.places), generator=generator)[:SURFELS]
+            ordered = chosen[z_order_of(points.places[chosen])]
+            return Points(*(x[ordered] for x in points))
+    raise ArgumentError("function: expected to see something of the volume, got nothing; raise its opacity")
+
+
+def ends_of(
+    caster: Caster, tf: TransferFunction, camera: Camera, depth: str, generator: torch.Generator
+) -> Points:
+    """Return the ends of rays of random pixels of one view, by a kind of depth that the caster has."""
+    seen = caster.cast(tf, camera, HEADLIGHT, (depth, "normal"))
+    z: Tensor = getattr(seen, depth)
+    normals: Tensor = seen.normal  # type: ignore[assignment]
+    rows, columns = ((z > 0) & (seen.rgba[..., 3] > FAINT)).nonzero(as_tuple=True)
+    some = torch.randperm(len(rows), generator=generator)[:PIXELS]
+    at = rows[some], columns[some]
+    rgba = seen.rgba[at]
+    return Points(places_of(camera, z, *at), normals[at], (rgba[:, :3] / rgba[:, 3:]).clamp(0, 1))
+
+
+def places_of(camera: Camera, depth: Tensor, rows: Tensor, columns: Tensor) -> Tensor:
+    """Return the points [N, 3], world units, that pixels show at their depths [H, W]."""
+    z = depth[rows, columns][:, None]
+    pixels = torch.stack([columns + 0.5, rows + 0.5, torch.ones(len(rows))], dim=1)
+    in_camera = z * (pixels @ torch.linalg.inv(camera.K).T)
+    return (in_camera - camera.viewmat[:3, 3]) @ camera.viewmat[:3, :3]
+
+
+def surfels_on(points: Points, seed: int) -> dict[str, Tensor]:
+    """Return raw parameters of surfels at points that face along their normals."""
+    parameters = surfels_at(points.places, OPACITY, torch.Generator().manual_seed(seed))
+    return {**parameters, "quats": facing(points.normals), "colors": points.colors}
+
+
+def facing(normals: Tensor) -> Tensor:
+    """Return quaternions [N, 4] wxyz that turn the z axis to normals [N, 3], on the shortest way."""
+    x, y, z = normalize(normals, dim=1).unbind(dim=1)
+    turned = torch.stack([1 + z, -y, x, torch.zeros_like(z)], dim=1)
+    around_x = normals.new_tensor([0.0, 1.0, 0.0, 0.0])  # half a turn, as all ways to -z are equally short
+    return normalize(torch.where((1 + z < 1e-6)[:, None], around_x, turned), dim=1)
