@@ -156,7 +156,8 @@ def scene(folder: Path) -> Path:
     prepare(ArraySource(sphere(8), "sphere"), folder / "volume.nrrd")
     volume = SceneVolume(folder / "volume.nrrd", {"TF01": RISE, "TF02": FALL})
     frame = Frame([0.1, 0.0, -0.2], 0.5)
-    whole = Scene({"TF01": entry, "TF02": SceneModel(file)}, volume=volume, frame=frame)
+    models = {"TF01": entry, "TF02": SceneModel(file)}
+    whole = Scene(models, volume=volume, frame=frame, functions={"TF02": RISE, "TF03": FALL})
     return write_scene(folder / "scene.yaml", whole)
 
 
