@@ -128,6 +128,30 @@ def test_what_is_edited_shows_and_is_saved(chromium, scene_file):
         assert still(page) == kept
 
 
+def test_the_wheel_zooms_to_what_lies_below_the_pointer(chromium, scene_file):
+    def camera(page):
+        page.wait_for_timeout(500)
+        words = page.locator("#options").inner_text().split()
+        number = {
+            name: [float(x) for x in words[words.index(name) + 1 :][:3] if x[0] != "-" or x[1].isdigit()]
+            for name in ("--target", "--azimuth", "--polar", "--radius", "--fov", "--width", "--height")
+        }
+        azimuth, polar, radius, fov, width, height = (number[name][0] for name in list(number)[1:])
+        return orbit(azimuth, polar, radius, fov, int(width), int(height), number["--target"])
+
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        before, box = camera(page), page.locator("#picture").bounding_box()
+        page.mouse.move(box["x"] + 100, box["y"] + 60)
+        page.mouse.wheel(0, -300)
+        after = camera(page)
+        distance = float(-before.viewmat[2, :3] @ before.position)  # of the target, which is the origin
+        ray = torch.linalg.inv(before.K) @ torch.tensor([100.0, 60.0, 1.0])
+        point = before.viewmat[:3, :3].T @ (distance * ray - before.viewmat[:3, 3])
+        seen = after.K @ (after.viewmat[:3, :3] @ point + after.viewmat[:3, 3])
+        assert float(after.position.norm()) < 0.9 * distance
+        torch.testing.assert_close(seen[:2] / seen[2], torch.tensor([100.0, 60.0]), atol=1.5, rtol=0)
+
+
 def test_the_camera_moves_and_stands_in_the_link(chromium, scene_file):
     with served(scene_file) as (_, address), opened(chromium, address) as page:
         first = shown(page)

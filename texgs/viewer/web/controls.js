@@ -40,7 +40,7 @@ export function control(canvas, camera, moved, goTo, isLocked = () => false) {
     event.preventDefault();
     if (isLocked()) return;
     const pixels = event.deltaY * [1, LINE, PAGE][event.deltaMode];
-    camera().dolly(Math.exp(NOTCH * Math.max(-PAGE, Math.min(PAGE, pixels))));
+    zoom(camera(), canvas, Math.exp(NOTCH * Math.max(-PAGE, Math.min(PAGE, pixels))), event);
     moved();
   }, { passive: false });
   canvas.addEventListener("keydown", (event) => {
@@ -55,6 +55,14 @@ function drag(camera, canvas, before, now) {
   const x = now.clientX - before.clientX, y = now.clientY - before.clientY;
   if (now.buttons > 1 || now.shiftKey) camera.pan(x / canvas.clientHeight, y / canvas.clientHeight);
   else camera.orbit(-TURN * x, TURN * y);
+}
+
+/** Come nearer, or go away, by a factor; what lies below the pointer, as far away as the target, stays there. */
+function zoom(camera, canvas, factor, { clientX, clientY }) {
+  const { left, top, width, height } = canvas.getBoundingClientRect(), before = camera.distance;
+  camera.dolly(factor);
+  const share = 1 - before / camera.distance;
+  camera.pan(share * (clientX - left - width / 2) / height, share * (clientY - top - height / 2) / height);
 }
 
 /** Two pointers: move with their middle, and come nearer as they part. */
