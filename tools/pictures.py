@@ -109,7 +109,7 @@ def copy(pattern: str) -> Callable[[Path], Image.Image]:
 
 
 def viewer(run: Path) -> Image.Image:
-    """Show an edited engine in the viewer, in a browser without a window."""
+    """Show an edited engine in the viewer, and a new function on its volume, in a browser without a window."""
     from playwright.sync_api import expect, sync_playwright
 
     scene, edited = run / "engine/scene/quick/compose/scene.yaml", run / "edited.yaml"
@@ -118,11 +118,13 @@ def viewer(run: Path) -> Image.Image:
     words = [PROGRAM, "view", edited, "--no-browser"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as player:
         browser = player.chromium.launch(executable_path=shutil.which("chromium"))
-        page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.goto(
-            server.stdout.readline().strip() + "#azimuth=-60&polar=20&distance=3.2&fov_y=30&target=0,0,0"
-        )
+        page = browser.new_page(viewport={"width": 1280, "height": 940})
+        page.goto(f"{server.stdout.readline().strip()}#azimuth=-60&polar=20")
         expect(page.locator("#pace")).to_contain_text("ms", timeout=60_000)
+        page.get_by_role("button", name="New", exact=True).click()
+        page.get_by_label("Opacity of the point").fill("0.1")
+        page.get_by_label("Colours of a preset").select_option("Viridis")
+        page.wait_for_timeout(10_000)  # until the whole frame is there
         page.screenshot(path=run / "viewer.png")
         server.terminate()
     return Image.open(run / "viewer.png")

@@ -39,7 +39,7 @@ def token_of(path: Path) -> str | None:
     """Return the token in such a file; None if others may have read it, or there is none."""
     try:
         is_private = os.name != "posix" or not path.stat().st_mode & 0o077
-        found = TOKEN.search(path.read_text(encoding="ascii")) if is_private else None
+        address = TOKEN.search(path.read_text(encoding="ascii")) if is_private else None
     except (OSError, UnicodeError):
         return None
-    return found[1] if found else None
+    return address[1] if address else None
