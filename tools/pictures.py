@@ -109,7 +109,7 @@ def copy(pattern: str) -> Callable[[Path], Image.Image]:
 
 
 def viewer(run: Path) -> Image.Image:
-    """Show an edited engine in the viewer, and a new function on its volume, in a browser without a window."""
+    """Show an edited engine in the viewer, with a new function on its volume, in a hidden browser."""
     from playwright.sync_api import expect, sync_playwright
 
     scene, edited = run / "engine/scene/quick/compose/scene.yaml", run / "edited.yaml"

@@ -9,10 +9,13 @@ import pytest
 import torch
 import yaml
 
+from tests.fields.surfels.test_composition import ball
 from texgs.core.camera import orbit
+from texgs.core.cuts import Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
+from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.session import Session
@@ -194,40 +197,49 @@ def peak(volume):
     return PEAK.scaled(low, max(values))
 
 
+def shows(scene, functions):
+    """What the twin of a scene shows with functions that are tried."""
+    palettes = [PALETTES[name] for name in scene.models]
+    return Twin(scene).render(CAMERA, scene, palettes, functions=functions)
+
+
+def low_of(volume, tf):
+    """A scene of one model, of a basic TF."""
+    return replace(scene_of(replace(volume, tfs={"low": tf})), models={"low": SceneModel(Path("x"))})
+
+
 def test_a_function_that_is_tried_takes_the_place_of_a_basic_one(volume):
-    tried = replace(scene_of(volume), functions={"low": peak(volume)})
-    one = Twin(tried).render(CAMERA, replace(tried, models={"low": tried.models["low"]}), [PALETTES["low"]])
-    basic = replace(volume, tfs={"low": peak(volume)})
-    alone = replace(scene_of(basic), models={"low": SceneModel(Path("x"))})
-    expected = Twin(alone).render(CAMERA, alone, [PALETTES["low"]])
-    assert torch.equal(one.color, expected.color)
+    one = shows(low_of(volume, volume.tfs["low"]), {"low": peak(volume)})
+    assert torch.equal(one.color, shows(low_of(volume, peak(volume)), {}).color)
 
 
 def test_functions_that_overlap_are_cast_together(volume):
     """A function beside the basic ones is seen where they are, as the same matter twice is twice as dense."""
-    scene = replace(scene_of(volume), functions={"new": peak(volume)})
-    palettes = [PALETTES[name] for name in scene.models]
-    seen = Twin(scene).render(CAMERA, scene, palettes).color
-    basic = Twin(scene).render(CAMERA, replace(scene, functions={}), palettes).color
+    seen, basic = (shows(scene_of(volume), tried).color for tried in ({"new": peak(volume)}, {}))
     assert (seen - basic).abs().max() > 0.02, "it lies below opaque matter"
-    twice = replace(scene_of(volume), functions={"again": volume.tfs["low"]})
-    dense = Twin(twice).render(CAMERA, replace(twice, models={"low": twice.models["low"]}), [PALETTES["low"]])
-    thick = {"low": SceneModel(Path("x"), PartEdit())}
     low = volume.tfs["low"]
     values = np.linspace(*low.support, 41)
     double = TransferFunction([*zip(values, 1 - (1 - low(values)[:, 3]) ** 2, strict=True)], low.color)
-    once = replace(scene_of(replace(volume, tfs={"low": double})), models=thick)
-    expected = Twin(once).render(CAMERA, once, [PALETTES["low"]])
+    dense, expected = shows(low_of(volume, low), {"again": low}), shows(low_of(volume, double), {})
     assert (dense.color - expected.color).abs().max() < 0.01
 
 
 def test_functions_of_hidden_models_are_hidden_and_others_are_shown(volume):
     scene = scene_of(volume, low=HIDDEN, high=HIDDEN)
-    palettes = [PALETTES[name] for name in scene.models]
-    hidden = replace(scene, functions={"low": peak(volume)})
-    assert float(Twin(hidden).render(CAMERA, hidden, palettes).alpha.max()) == 0
-    shown = replace(scene, functions={"new": peak(volume)})
-    assert float(Twin(shown).render(CAMERA, shown, palettes).alpha.max()) > 0.5
+    assert float(shows(scene, {"low": peak(volume)}).alpha.max()) == 0
+    assert float(shows(scene, {"new": peak(volume)}).alpha.max()) > 0.5
+
+
+def test_the_mode_volume_alone_shows_what_is_tried(volume, tmp_path):
+    file = write_model(tmp_path / "ball.safetensors", ball(1))
+    cut = Cuts([Plane([1.0, 0.2, 0.0], 0.1)])
+    scene = replace(scene_of(volume), models={name: SceneModel(file) for name in ("low", "high")}, cuts=cut)
+    tried, session = replace(scene, functions={"new": peak(volume)}), Session(scene)
+    assert not np.array_equal(*(session.frame(CAMERA, "volume", each) for each in (scene, tried)))
+    assert np.array_equal(*(session.frame(CAMERA, "shaded", each) for each in (scene, tried))), (
+        "also its faces"
+    )
+    assert torch.equal(*(session.beside(CAMERA, each)[1].color for each in (scene, tried)))
 
 
 def test_a_scene_file_keeps_the_functions_that_are_tried(volume, tmp_path):

@@ -41,10 +41,11 @@ def frame(
 ) -> np.ndarray:
     """Return one frame [H, W, 3], uint8.
 
-    The volume is that of the scene, with its edits, under the same light. Normals (world) are (n + 1) / 2,
-    depth is black at the nearest and light grey at the farthest point in the frame, both over the background;
-    alpha is white where opaque; texels are around grey; discs are surfels of one standard deviation, as if
-    opaque; factors of the material are grey over black, shininess divided by 100.
+    The volume is that of the scene, with its edits and the functions that it tries, under the same light.
+    Normals (world) are (n + 1) / 2, depth is black at the nearest and light grey at the farthest point in the
+    frame, both over the background; alpha is white where opaque; texels are around grey; discs are surfels of
+    one standard deviation, as if opaque; factors of the material are grey over black, shininess divided by
+    100.
 
     Args:
         composed: the scene's models.
@@ -65,7 +66,7 @@ def frame(
     if mode == "volume":
         if twin is None:
             raise ArgumentError("mode: expected a twin to show the volume, got none")
-        return quantized(twin.render(camera, scene, composed.palettes).color)
+        return quantized(twin.render(camera, scene, composed.palettes, functions=scene.functions).color)
     behind = torch.tensor(scene.background, device=composed.device)
     look: Look = mode if mode in get_args(Look) else "shaded"  # type: ignore[assignment]
     outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())

@@ -96,7 +96,7 @@ class Scene:
     cuts: Cuts = NO_CUTS
     volume: SceneVolume | None = None  # that it was made from, see `Twin`
     frame: Frame | None = None  # what is visible of the volume, where that is known
-    functions: Mapping[str, TransferFunction] = field(default_factory=dict)  # tried on the volume, see `Twin`
+    functions: Mapping[str, TransferFunction] = field(default_factory=dict)  # that the mode volume shows
 
     def __post_init__(self) -> None:
         if not self.models:

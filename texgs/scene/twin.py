@@ -79,27 +79,29 @@ class Twin:
         scene: Scene,
         palettes: Sequence[tuple[float, ...]],
         cut: CutRange | None = None,
+        functions: Mapping[str, TransferFunction] | None = None,
     ) -> Render:
         """Return what a scene's visible models show of the volume, on the device that casts.
 
         A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
         of light hold for the whole volume: those of the first visible model. A volume has no segments and no
-        looks. A function that the scene tries takes the place of the basic TF of its name, or joins them.
+        looks.
 
         Args:
             camera: from where.
             scene: of this volume, with any edits.
             palettes: of its models, as fitted: `Composed.palettes`.
             cut: what of the rays counts; by default what the scene's cuts leave, with their faces.
+            functions: that take the place of the basic TFs of their names, or join them; they may overlap.
         """
-        shown, factors = {}, list[dict[str, float]]()
+        shown, factors, functions = {}, list[dict[str, float]](), functions or {}
         look = self._volume.appearance
         for (name, model), palette in zip(scene.models.items(), palettes, strict=True):
             if model.edit.visible and model.edit.opacity > 0:
-                tf = scene.functions.get(name) or self._tf(name)
+                tf = functions.get(name) or self._tf(name)
                 shown[name] = edited(tf, model.edit, palette)
                 factors.append({key: getattr(look, key) * getattr(model.edit, key) for key in MATERIAL})
-        shown |= {name: tf for name, tf in scene.functions.items() if name not in scene.models}
+        shown |= {name: tf for name, tf in functions.items() if name not in scene.models}
         behind = torch.tensor(scene.background, device=self._device)
         if not shown:
             alpha = torch.zeros(camera.height, camera.width, device=self._device)
