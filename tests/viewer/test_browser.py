@@ -1,13 +1,7 @@
 """The page in a real browser: what it shows is what `texgs render` writes, and it finds a server again."""
 
-import io
 import json
-import os
 import re
-import signal
-import subprocess
-import sys
-from contextlib import contextmanager
 from urllib.parse import urlencode
 
 import numpy as np
@@ -18,84 +12,26 @@ from PIL import Image
 from tests.edit.lift_scenes import two_balls
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
+from tests.viewer.in_browser import (
+    JPEG,
+    LINK,
+    PLACE,
+    WAIT,
+    drag,
+    expect,
+    opened,
+    pixels,
+    rendered,
+    save_as,
+    served,
+    shown,
+    still,
+)
 from tests.viewer.training_views import write_results
-from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
-
-expect = pytest.importorskip("playwright.sync_api", reason="needs Playwright").expect
-
-PLACE = {"azimuth": 40, "polar": 10, "distance": 3.5, "fov_y": 35}
-LINK = "#" + "&".join(f"{key}={value}" for key, value in PLACE.items()) + "&target=0,0,0"
-WAIT = 60_000  # milliseconds, on a busy machine
-JPEG = 1.5  # levels of 255: what quality 95 costs on average
-
-
-@contextmanager
-def served(scene_file, port=0, **environment):
-    """A server in a process of its own, and its address."""
-    words = [sys.executable, "-m", "texgs.cli.main", "view", str(scene_file)]
-    words += ["--no-browser", "--port", str(port)]
-    env = {**os.environ, "TEXGS_CACHE": str(scene_file.parent / "cache"), **environment}
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env)
-    try:
-        yield process, process.stdout.readline().strip()
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=60)
-
-
-@contextmanager
-def opened(chromium, address, ratio=1):
-    """A page at a known camera, whose first whole frame is there. It must log no error."""
-    page = chromium.new_page(viewport={"width": 800, "height": 500}, device_scale_factor=ratio)
-    page.set_default_timeout(WAIT)
-    errors = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("dialog", lambda dialog: dialog.accept())
-    page.goto(address + LINK)
-    expect(page.locator("#pace")).to_contain_text("ms", timeout=WAIT)
-    page.wait_for_timeout(500)
-    yield page
-    page.close()
-    assert errors == []
-
-
-def rendered(scene_file, page, *words):
-    """What `texgs render` writes for the page's camera: bytes of a PNG."""
-    box, output = page.locator("#picture").bounding_box(), scene_file.parent / "render.png"
-    size = ["--width", str(round(box["width"])), "--height", str(round(box["height"]))]
-    camera = ["--azimuth", str(PLACE["azimuth"]), "--polar", str(PLACE["polar"])]
-    lens = ["--radius", str(PLACE["distance"]), "--fov", str(PLACE["fov_y"]), "--target", "0", "0", "0"]
-    assert main(["render", str(scene_file), "--output", str(output), *size, *camera, *lens, *words]) == 0
-    return output.read_bytes()
-
-
-def still(page):
-    """What the button writes: bytes of a PNG."""
-    with page.expect_download() as download:
-        page.get_by_role("button", name="Picture", exact=True).click()
-    with open(download.value.path(), "rb") as file:  # noqa: PTH123
-        return file.read()
-
-
-def pixels(png):
-    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
-
-
-def shown(page):
-    """Pixels of the picture on the screen, without what lies over its last rows."""
-    page.wait_for_timeout(500)
-    return pixels(page.locator("#picture").screenshot())[:-50]
-
-
-def save_as(page, name):
-    page.get_by_role("button", name="Save").click()
-    page.get_by_label("File name").fill(name)
-    page.keyboard.press("Enter")
-    expect(page.get_by_text(re.compile(f"^Saved as .*/{name}"))).to_be_visible(timeout=WAIT)
 
 
 def test_what_is_edited_shows_and_is_saved(chromium, scene_file):
@@ -190,19 +126,6 @@ def test_comparing_shows_the_scene_as_it_was_opened(chromium, scene_file):
         page.get_by_role("textbox", name="Palette of TF02").fill("#ff0000")
         expect(opened_as).to_be_hidden()
         assert still(page) != first, "who edits sees it"
-
-
-def drag(page, what, start, end):
-    """Drag on an element between two places, parts of its width and height."""
-    what.scroll_into_view_if_needed()
-    box = what.bounding_box()
-    (x, y), (to_x, to_y) = (
-        (box["x"] + u * box["width"], box["y"] + v * box["height"]) for u, v in (start, end)
-    )
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(to_x, to_y, steps=20)
-    page.mouse.up()
 
 
 def test_a_movement_is_one_step(chromium, scene_file):

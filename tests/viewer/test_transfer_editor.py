@@ -7,10 +7,11 @@ import pytest
 
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
-from tests.viewer.test_browser import (
+from tests.viewer.in_browser import (
     JPEG,
     WAIT,
     drag,
+    expect,
     opened,
     pixels,
     rendered,
@@ -22,8 +23,6 @@ from tests.viewer.test_browser import (
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
-
-expect = pytest.importorskip("playwright.sync_api", reason="needs Playwright").expect
 
 
 @pytest.fixture

@@ -81,7 +81,7 @@ export class TransferEditor {
   }
 
   #try(tried, step = 0) {
-    if (this.#page.shown.mode === "shaded") this.#page.show({ mode: "volume" });
+    if (this.#page.shown.mode !== "volume") this.#page.show({ mode: "volume" });
     this.#page.state.edit("", "functions", Object.keys(tried).length ? tried : null, step);
   }
 
