@@ -44,7 +44,7 @@ def test_opacities_and_colours_of_any(tfs):
     np.testing.assert_allclose(seen(OFF)[:, 3], opacity, atol=0.04)
     error = opacity[:, None] * np.abs(seen(OFF)[:, :3] - color)  # as far as it is seen
     assert np.nanmean(error) < 0.05
-    is_calm = np.max([tf(OFF)[:, 3] for tf in tfs], axis=0) < 0.8  # one that becomes opaque outweighs all at once
+    is_calm = np.max([tf(OFF)[:, 3] for tf in tfs], axis=0) < 0.8  # opaque ones outweigh all
     assert np.nanmax(error[is_calm], initial=0) < 0.2
 
 
