@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, peak, sphere_volume
 from tests.viewer.pages import on_page
@@ -11,6 +12,7 @@ from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.edit import function_model
 from texgs.edit.function_model import overlap_of, tried, with_model
+from texgs.fields.gaussians.files import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fit import now
@@ -61,10 +63,17 @@ def test_what_cannot_be_fitted(scene_file, capsys, words, message):
     assert not output.exists()
 
 
-def test_a_scene_without_a_volume_has_no_function_to_fit(scene_file, tmp_path):
+def test_a_scene_without_a_volume_has_no_function_to_fit(scene_file):
     bare = replace(read_scene(scene_file), volume=None)
     with pytest.raises(ArgumentError, match="volume: expected the volume that the function is of, got none"):
-        next(function_model.models_of(bare, "new", tmp_path, "bare"))
+        next(function_model.models_of(bare, "new"))
+
+
+def test_surfels_join_no_scene_of_other_fields(scene_file, tmp_path):
+    scene, file = read_scene(scene_file), write_gaussians(tmp_path / "g.safetensors", gaussians(20))
+    other = replace(scene, models={**scene.models, "high": SceneModel(file)})
+    with pytest.raises(ArgumentError, match=r"models\.high: expected surfels, which .* join, got gaussians"):
+        next(function_model.models_of(other, "new"))
 
 
 def test_the_command_line_writes_the_scene_and_one_model(scene_file, capsys):

@@ -67,6 +67,7 @@ def run_model(arguments: argparse.Namespace) -> int:
     from texgs.core.check import torch_device
     from texgs.core.errors import located
     from texgs.edit.function_model import models_of, overlap_of, tried, with_model
+    from texgs.fields.surfels.model_file import write_model
     from texgs.scene.scene_file import read_scene, write_scene
 
     require_scene(arguments.output)
@@ -76,13 +77,8 @@ def run_model(arguments: argparse.Namespace) -> int:
         raise ArgumentError(f"--size: expected at least 16, got {arguments.size}")
     with located(arguments.scene):
         tf = tried(scene, arguments.name)
-        made = models_of(
-            *(scene, arguments.name, output.parent, output.stem),
-            device=torch_device(arguments.device),
-            size=arguments.size,
-        )
-        first, file = made
-    first.unlink()
+        *_, model = models_of(scene, arguments.name, torch_device(arguments.device), arguments.size)
+    file = write_model(new_part_file("model", output.parent, output.stem, arguments.name), model)
     scene = with_model(scene, arguments.name, file, tf)
     print(f"{write_scene(output, scene)}{overlap_of(scene, arguments.name)}")
     return 0

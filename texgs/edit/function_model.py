@@ -9,8 +9,8 @@ from pathlib import Path
 import torch
 
 from texgs.core.errors import ArgumentError
-from texgs.core.names import new_part_file
-from texgs.fields.surfels.model_file import write_model
+from texgs.fields.files import kind_of
+from texgs.fields.surfels.model import Surfels
 from texgs.fit.now import fit_now
 from texgs.scene.scene import Scene, SceneModel
 from texgs.volume.caster import Caster
@@ -22,23 +22,25 @@ SIZE = 400  # pixels of either side of the views
 
 
 def models_of(
-    scene: Scene, name: str, folder: Path, stem: str, device: torch.device | str = "cpu", size: int = SIZE
-) -> Iterator[Path]:
-    """Yield the file of a first model of a function that a scene tries, then that of a finer one.
+    scene: Scene, name: str, device: torch.device | str = "cpu", size: int = SIZE
+) -> Iterator[Surfels]:
+    """Yield a first model of a function that a scene tries, then a finer one.
 
     Views show all of what the function shows, as the other models' views show theirs.
 
     Raises:
-        ArgumentError: if the scene tries no such function or names no volume, or nothing is to be seen.
+        ArgumentError: if the scene tries no such function, names no volume or has other fields than surfels,
+            or nothing is to be seen.
     """
     volume, tf = scene.volume, tried(scene, name)
     if volume is None:
         raise ArgumentError("volume: expected the volume that the function is of, got none")
+    for other, entry in scene.models.items():
+        if (kind := kind_of(entry.file).name) != "surfels":
+            raise ArgumentError(f"models.{other}: expected surfels, which a new model can join, got {kind}")
     grid, look = open_grid(volume.file), volume.appearance
     lens = frame_of(grid, [tf]).lens(width=size, height=size)
-    caster = Caster(grid, look, device)
-    for model in fit_now(caster, look, tf, lens, name):
-        yield write_model(new_part_file("model", folder, stem, name), model)
+    yield from fit_now(Caster(grid, look, device), look, tf, lens, name)
 
 
 def tried(scene: Scene, name: str) -> TransferFunction:

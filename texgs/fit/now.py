@@ -36,8 +36,6 @@ LEAST = 100  # points
 FAINT = 0.02  # alpha below which a pixel shows nothing to speak of
 HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of their own
 RATES = Rates(quats=0.016, scales=0.05, opacities=0.1)
-
-
 PASSES = (800, 1200)  # iterations of the first fit, and of the one that goes on from it
 TEXTURE = TextureKeys(sweeps=1)
 

@@ -13,6 +13,8 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.core.names import SCENES, file_name, label, new_part_file
 from texgs.edit.function_model import with_model
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.model_file import write_model
 from texgs.report.check import checked
 from texgs.scene.parts import part_names, with_textures
 from texgs.scene.scene import Scene, SceneModel
@@ -152,7 +154,7 @@ class SharedEdits:
 
     def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:
         """Write the file of a new segment, and add it."""
-        file = new_part_file("segment", self._folder, self.stem, part)
+        file = new_part_file("segment", self._folder, Path(self.name).stem, part)
         self._session.make_segment(part, mask, file, facts)
         self._session.name_step(f"{part} new")
         self._latest = None
@@ -163,25 +165,20 @@ class SharedEdits:
         self._session.name_step(f"{', '.join(textures)} {look}")
         self._latest = None
 
-    def give_model(self, name: str, file: Path, tf: TransferFunction, before: Path | None) -> bool:
-        """Put a model in the place of a function; whether it was still wanted: none, or that of `before`."""
+    def give_model(self, name: str, model: Surfels, tf: TransferFunction, before: Path | None) -> Path | None:
+        """Write a model and put it in the place of its function, or of the model in the file `before`.
+
+        Return its file; None where that is not there any more.
+        """
         entry = self.scene.models.get(name)
         is_there = self.scene.functions.get(name) == tf if before is None else entry and entry.file == before
-        if is_there:
-            self._session.set_scene(with_model(self.scene, name, file, tf))
-            self._session.name_step(f"{name} {'model' if before is None else 'finer model'}")
-            self._latest = None
-        return bool(is_there)
-
-    @property
-    def stem(self) -> str:
-        """Return how names of files that belong to the scene begin."""
-        return Path(self.name).stem
-
-    @property
-    def folder(self) -> Path:
-        """Return where scenes are saved."""
-        return self._folder
+        if not is_there:
+            return None
+        file = write_model(new_part_file("model", self._folder, Path(self.name).stem, name), model)
+        self._session.set_scene(with_model(self.scene, name, file, tf))
+        self._session.name_step(f"{name} {'model' if before is None else 'finer model'}")
+        self._latest = None
+        return file
 
     def path_of(self, name: str) -> Path:
         """Return the scene file of a name in the folder for saving."""
@@ -207,7 +204,8 @@ class SharedEdits:
 
     def new_folder(self, kind: str) -> Path:
         """Return a folder for the files of a new look that is not there yet."""
-        folders = (self._folder / f"{self.stem}-{kind}-{number}" for number in count(1))
+        stem = Path(self.name).stem
+        folders = (self._folder / f"{stem}-{kind}-{number}" for number in count(1))
         return next(folder for folder in folders if not folder.exists())
 
     def _edit(self, edit: Edit) -> None:

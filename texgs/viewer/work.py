@@ -20,6 +20,7 @@ from texgs.core.names import part_file, require_name
 from texgs.core.progress import watched
 from texgs.edit.function_model import models_of, overlap_of, tried
 from texgs.edit.task import parts_with_surfels
+from texgs.fields.surfels.model import Surfels
 from texgs.scene.parts import entry_of, require_new, split
 from texgs.viewer.downloads import Downloads, require_kind
 from texgs.viewer.frames import Frames
@@ -216,23 +217,22 @@ class Work:
         scene, name, edits = self._edits.scene, asked.function, self._edits
         tf, start, loop = tried(scene, name), monotonic(), asyncio.get_running_loop()
 
-        async def give(file: Path, before: Path | None) -> bool:
+        async def give(model: Surfels, before: Path | None) -> Path | None:
             async with self._changing:
-                is_wanted = await asyncio.to_thread(edits.give_model, name, file, tf, before)
+                file = await asyncio.to_thread(edits.give_model, name, model, tf, before)
             self._changed()
-            if is_wanted:
+            if file is not None:
                 what, more = ("finer model", "") if before else ("model", overlap_of(edits.scene, name))
                 took = f"{monotonic() - start:.0f} s; the scene is not saved yet."
                 page.tell(f"{name}: {what}, {took}{more}", level="info")
-            return is_wanted
+            return file
 
         def work() -> None:
             before = None
-            for file in models_of(scene, name, edits.folder, edits.stem, self._device):
-                if not asyncio.run_coroutine_threadsafe(give(file, before), loop).result():
-                    file.unlink()
+            for model in models_of(scene, name, self._device):
+                before = asyncio.run_coroutine_threadsafe(give(model, before), loop).result()
+                if before is None:
                     break
-                before = file
 
         await self._jobs.run(work, watch, is_urgent=True)
 
