@@ -8,13 +8,14 @@ from hypothesis import strategies as st
 
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
-from texgs.viewer.messages import Cancel, Edit, Mask, Redo, Remove, Save, Segment, Undo, View, parse
+from texgs.viewer.messages import Cancel, Edit, Mask, Pick, Redo, Remove, Save, Segment, Undo, View, parse
 
 ANGLES = {"azimuth": 30, "polar": 20, "distance": 3, "fov_y": 40}
 CAMERA = {"target": [0, 0, 0], **ANGLES, "width": 64, "height": 48}
-TYPES = ["view", "edit", "undo", "redo", "save", "mask", "segment", "look", "fit"]
+TYPES = ["view", "pick", "edit", "undo", "redo", "save", "mask", "segment", "look", "fit"]
 TYPES += ["export", "rename", "remove", "cancel"]
 VIEW = {"type": "view", "id": 7, "camera": CAMERA, "mode": "normal", "moving": True, "before": False}
+PICK = {"type": "pick", "view": VIEW, "pixel": [3, 4]}
 MASK = {"type": "mask", "model": "TF01", "camera": CAMERA}
 
 
@@ -22,6 +23,7 @@ def test_messages_are_read():
     view = parse(json.dumps(VIEW))
     assert isinstance(view, View)
     assert (view.id, view.mode, view.moving, view.before) == (7, "normal", True, False)
+    assert parse(json.dumps(PICK)) == Pick(view, (3, 4))
     edit = {"type": "edit", "part": "TF01", "key": "opacity", "value": 0.5, "step": 3}
     assert parse(json.dumps(edit)) == Edit("TF01", "opacity", 0.5, 3)
     assert parse('{"type": "undo"}') == Undo()
@@ -72,7 +74,7 @@ def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
     ("whole", "change", "message"),
     [
         (VIEW, {"type": "run"}, f"type: expected one of {', '.join(TYPES)}, got"),
-        (VIEW, {"type": ["view"]}, "type: expected one of view, edit, undo, redo,"),
+        (VIEW, {"type": ["view"]}, "type: expected one of view, pick, edit, undo,"),
         (VIEW, {"mode": "x"}, "mode: expected 'shaded', "),
         (VIEW, {"id": -1}, "id: expected greater than or equal to 0, got -1"),
         (VIEW, {"moving": 1}, "moving: expected a valid boolean, got 1"),
@@ -89,6 +91,9 @@ def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
         (VIEW, {"camera": {**CAMERA, "distance": "3"}}, "camera.distance: expected a valid number, got '3'"),
         (VIEW, {"only": None}, "only: expected a valid string, got None"),
         (VIEW, {"type": "undo"}, "message: no such key 'id'"),
+        (PICK, {"pixel": [3, -1]}, "pixel.1: expected greater than or equal to 0, got -1"),
+        (PICK, {"pixel": [3, 4096]}, "pixel.1: expected less than 4096, got 4096"),
+        (PICK, {"view": {**VIEW, "mode": "x"}}, "view.mode: expected 'shaded', "),
         (MASK, {"points": None}, "points: expected a valid array, got None"),
         (MASK, {"points": [[1, 2, True]] * 101}, "points: Tuple should have at most 100 items"),
         (MASK, {"points": [[1, 2]]}, "points.0.2: expected a value, got none"),
@@ -116,7 +121,7 @@ VALUES = st.recursive(
 
 
 KEYS = ("id", "camera", "mode", "moving", "before", "only", "part", "key", "value", "step", "name", "replace",
-        "model", "points")  # fmt: skip
+        "model", "points", "view", "pixel")  # fmt: skip
 
 
 @given(st.sampled_from(TYPES), st.dictionaries(st.sampled_from(KEYS), VALUES))

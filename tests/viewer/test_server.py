@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+import torch
 from aiohttp import WSCloseCode, WSMsgType, WSServerHandshakeError
 from PIL import Image
 
@@ -17,6 +18,7 @@ from texgs.core.io import write_json
 from texgs.report.check import checksum_of
 from texgs.scene.scene_file import read_scene
 from texgs.viewer import guard
+from texgs.viewer.messages import parse
 from texgs.viewer.segments import isolated
 
 # ---- Who may talk to it -----------------------------------------------------
@@ -130,6 +132,16 @@ async def test_a_still_without_a_view_says_so(browser, client):
         async with client.get(f"/{TOKEN}/still.png", params={"view": query}) as answer:
             assert answer.status == 400
             assert message in await answer.text()
+
+
+@on_page
+async def test_a_pixel_of_a_view_is_a_point_or_nothing(browser):
+    await browser.send(type="pick", view=VIEW, pixel=[32, 24])
+    point = torch.tensor((await browser.next("point"))["point"])
+    place, _ = parse(json.dumps(VIEW)).camera.camera().project(point)
+    torch.testing.assert_close(place, torch.tensor([32.5, 24.5]), atol=1e-3, rtol=0)
+    await browser.send(type="pick", view=VIEW, pixel=[0, 0])
+    assert (await browser.next("point"))["point"] is None
 
 
 @on_page

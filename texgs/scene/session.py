@@ -25,6 +25,7 @@ from texgs.raster import Render
 from texgs.scene.cut_view import beside
 from texgs.scene.frame import Mode, frame
 from texgs.scene.parts import entry_of, key_path, replaced, require_new, split, with_textures
+from texgs.scene.pick import point_at
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, cuts_of, functions_of, known, light_of, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
@@ -249,6 +250,11 @@ class Session:
         if twin is not None and step is not None:
             twin = twin.with_step(step)
         return frame(composition, camera, scene, mode, twin)
+
+    def point_at(self, camera: Camera, mode: str, scene: Scene, pixel: tuple[int, int]) -> list[float] | None:
+        """Return the point of a scene of the history that a pixel shows; see `texgs.scene.pick.point_at`."""
+        twin = self.twin_of(scene) if needs_twin(scene, mode) else None
+        return point_at(self._composition_of(scene), camera, scene, mode, twin, pixel)
 
     def twin_of(self, scene: Scene) -> Twin:
         """Return the twin of a scene of the history; kept as long as the volume is the same."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -80,6 +80,7 @@ class Twin:
         palettes: Sequence[tuple[float, ...]],
         cut: CutRange | None = None,
         functions: Mapping[str, TransferFunction] | None = None,
+        outputs: Collection[str] = (),
     ) -> Render:
         """Return what a scene's visible models show of the volume, on the device that casts.
 
@@ -93,6 +94,7 @@ class Twin:
             palettes: of its models, as fitted: `Composed.palettes`.
             cut: what of the rays counts; by default what the scene's cuts leave, with their faces.
             functions: that take the place of the basic TFs of their names, or join them; they may overlap.
+            outputs: `depth` and `median`, besides colour and alpha; none where no model is visible.
         """
         shown, factors, functions = {}, list[dict[str, float]](), functions or {}
         look = self._volume.appearance
@@ -109,13 +111,15 @@ class Twin:
         look = replace(look, **factors[0]) if factors else look
         caster = self._caster = self._caster.with_appearance(look)
         cut = range_of(scene.cuts, camera) if cut is None and scene.cuts else cut
-        rgba = caster.cast(
-            *(overlay(shown), camera, scene.light),
+        cast = caster.cast(
+            *(overlay(shown), camera, scene.light, outputs),
             depth_range=None if cut is None else cut.depth_range,
             faces=cut,
             lit_faces=scene.cuts.faces == "shaded",
-        ).rgba
-        return Render(rgba[..., :3] + (1 - rgba[..., 3:]) * behind, rgba[..., 3])
+        )
+        rgba = cast.rgba
+        color = rgba[..., :3] + (1 - rgba[..., 3:]) * behind
+        return Render(color, rgba[..., 3], cast.depth, cast.median)
 
     def _tf(self, name: str) -> TransferFunction:
         """Return the basic TF of a model."""

@@ -10,6 +10,7 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from math import sqrt
 
 import cv2
@@ -78,6 +79,11 @@ class Frames:
             save_png(file, self.pixels(view, scene), comment)
             return file.getvalue()
 
+        return await asyncio.get_running_loop().run_in_executor(self._thread, work)
+
+    async def point_at(self, view: View, scene: Scene, pixel: tuple[int, int]) -> list[float] | None:
+        """Return the point of the scene that a pixel of a view shows; None for the background."""
+        work = partial(self._session.point_at, view.camera.camera(), view.mode, scene, pixel)
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def pixels(self, view: View, scene: Scene) -> np.ndarray:

@@ -22,6 +22,7 @@ STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 Number = Annotated[int, Field(ge=0, le=2**53)]  # that comes back with what was asked for
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Pixels = Annotated[int, Field(ge=1, le=4096)]
+Place = Annotated[int, Field(ge=0, lt=4096)]  # of a pixel
 Click = tuple[Annotated[float, Field(ge=-4096, le=8192)], Annotated[float, Field(ge=-4096, le=8192)], bool]
 
 
@@ -63,6 +64,15 @@ class View:
     before: bool = False  # the scene as it was opened
     only: str = ""  # a model that is shown alone and unedited, to be clicked on
     type: Literal["view"] = tag("view")
+
+
+@dataclass(frozen=True, config=STRICT)
+class Pick:
+    """Tell which point of the scene a pixel of a view shows."""
+
+    view: View
+    pixel: tuple[Place, Place]  # to the right and down
+    type: Literal["pick"] = tag("pick")
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -186,7 +196,9 @@ class Cancel:
     type: Literal["cancel"] = tag("cancel")
 
 
-Message = View | Edit | Undo | Redo | Save | Mask | Segment | Look | Fit | Export | Rename | Remove | Cancel
+Message = (
+    View | Pick | Edit | Undo | Redo | Save | Mask | Segment | Look | Fit | Export | Rename | Remove | Cancel
+)
 MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 VIEWS = TypeAdapter(View)
 

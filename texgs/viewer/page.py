@@ -15,7 +15,7 @@ from aiohttp import web
 from texgs.core.errors import TexgsError, first_line
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames, Pace
-from texgs.viewer.messages import Mask, View
+from texgs.viewer.messages import Mask, Pick, View
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.work import Stopped, Work
 
@@ -46,6 +46,11 @@ class Page:
         """Send a frame of this view, in place of one that waits."""
         self._view = view
         self._wake.set()
+
+    async def pick(self, asked: Pick) -> None:
+        """Send which point a pixel shows."""
+        point = await self._frames.point_at(asked.view, self.shown(asked.view), asked.pixel)
+        self._tell_newest({"type": "point", "point": point})
 
     def show_mask(self, mask: Mask) -> None:
         """Send what these clicks select, in place of what others do."""

@@ -24,7 +24,7 @@ from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import add_headers, guard
 from texgs.viewer.looks import LARGEST, thumbnail
-from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Save, Segment, View, parse
+from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Pick, Save, Segment, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
@@ -170,6 +170,8 @@ class Server:
         """Do what a message asks for, or begin to."""
         if isinstance(message, View):
             page.show(message)
+        elif isinstance(message, Pick):
+            await page.pick(message)
         elif isinstance(message, Mask):
             page.show_mask(message)
         elif isinstance(message, Segment):

@@ -93,6 +93,13 @@ export class OrbitCamera {
     return { x: width / 2 + scale * x, y: height / 2 + scale * y, scale };
   }
 
+  /** The point that a place in a picture of this size shows at a depth. */
+  unproject([x, y], depth, width, height) {
+    const { right, down, forward } = this.axes(), unit = 2 * depth * Math.tan(this.fov_y / 2 * DEGREE) / height;
+    return this.target.map((t, i) => t + (depth - this.distance) * forward[i]
+      + unit * ((x - width / 2) * right[i] + (y - height / 2) * down[i]));
+  }
+
   /** As a renderer of frames needs it. */
   wire(width, height) {
     const { target, azimuth, polar, distance, fov_y } = this;

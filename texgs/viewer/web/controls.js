@@ -33,9 +33,6 @@ export function control(canvas, camera, moved, goTo, isLocked = () => false) {
     moved();
   });
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-  canvas.addEventListener("dblclick", () => {
-    if (!isLocked()) goTo("home");
-  });
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
     if (isLocked()) return;

@@ -12,6 +12,7 @@ export class Remote {
   #picture = null; // that frame: where two are compared, the other one is to its right
   #wipe = 0.5; // part of the width that shows the first of two
   #isPair = false;
+  #picked = () => {}; // takes the point that was asked for last
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -32,6 +33,7 @@ export class Remote {
     this.modes = scene.modes;
     connection.addEventListener("frame", ({ detail }) => this.#receive(detail));
     connection.addEventListener("message", ({ detail }) => {
+      if (detail.type === "point") this.#picked(detail.point);
       if (detail.frame === this.#asked) this.#refuse(detail.text);
       if (detail.frame === this.#asked || detail.refused) this.#next();
     });
@@ -49,14 +51,24 @@ export class Remote {
 
   /** Ask for a frame; of those that cannot be asked for at once, the newest is. */
   draw(camera, scene, { moving, mode = "shaded", before = false, only = "", gain = 1 }) {
-    this.#wanted = { camera: camera.wire(...this.size()), mode, moving, before, only, gain };
+    this.#wanted = { ...this.#view(camera, { mode, before, only, gain }), moving };
     if (this.#asked === null) this.#next();
+  }
+
+  /** The point of the scene [3] that a pixel shows; null for the background. */
+  pointAt(camera, scene, shown, pixel) {
+    this.#connection.send({ type: "pick", view: this.#view(camera, shown), pixel });
+    return new Promise((resolve) => { this.#picked = resolve; });
   }
 
   /** Move the line between two pictures. */
   wipe(part) {
     this.#wipe = part;
     if (this.#picture) this.#paint();
+  }
+
+  #view(camera, { mode, before, only, gain }) {
+    return { camera: camera.wire(...this.size()), mode, before, only, gain };
   }
 
   #next() {

@@ -1,6 +1,7 @@
 // What all pages of a scene share: a camera, the state, a renderer, and the inputs that choose what is shown.
 
 import { AXES, OrbitCamera } from "./camera.js";
+import { centerByDoubleClick } from "./center.js";
 import { control } from "./controls.js";
 import { Cuts } from "./cuts.js";
 import { capital, element } from "./inputs.js";
@@ -60,6 +61,7 @@ export class ScenePage {
     this.cuts = new Cuts(this);
     this.#inputs();
     control(this.canvas, () => this.camera, () => this.moved(), (name) => this.goTo(name), isLocked);
+    centerByDoubleClick(this, isLocked);
     state.addEventListener("edit", () => { // who edits wants to see it
       if (this.#shown.before) this.show({ before: false });
     });

@@ -76,6 +76,14 @@ export class WebglRenderer {
     this._ask();
   }
 
+  /** The point of the surfels [3] that a pixel shows; null for the background. */
+  pointAt(camera, scene, { before }, [x, y]) {
+    const view = this._view(camera), pixel = [x, y].map((side) => side + 0.5);
+    this._blend(view, before ? this._original : scene, "depth");
+    const depth = this._pass.depthAt(x, y);
+    return depth && camera.unproject(pixel, depth, view.width, view.height);
+  }
+
   /** The same picture as a canvas of its own. */
   still(camera, scene, { mode, before }) {
     const view = this._view(camera);
@@ -150,16 +158,21 @@ export class WebglRenderer {
     if (share === this._share && isOther) this._share = part;
   }
 
+  /** Blends the surfels; on the canvas nothing changes. */
+  _blend(camera, scene, mode) {
+    const view = viewOf(camera);
+    const table = partTable(scene.models, this._optics.models);
+    const light = scene.light && direction(scene.light.azimuth, scene.light.polar);
+    const look = { mode: MODES.indexOf(mode), light, planes: halfSpaces(scene.cuts) };
+    return this._pass.blend(view, look, table, this._sort(view, table));
+  }
+
   _frame(camera, scene, mode) {
     const gl = this._gl;
     const { width, height } = camera;
     if (this._canvas.width !== width) this._canvas.width = width;
     if (this._canvas.height !== height) this._canvas.height = height;
-    const view = viewOf(camera);
-    const table = partTable(scene.models, this._optics.models);
-    const light = scene.light && direction(scene.light.azimuth, scene.light.polar);
-    const look = { mode: MODES.indexOf(mode), light, planes: halfSpaces(scene.cuts) };
-    const picture = this._pass.blend(view, look, table, this._sort(view, table));
+    const picture = this._blend(camera, scene, mode);
     const range = mode === "depth" ? this._pass.depths() : [0, 0];
     const { program, uniforms } = this._present;
     gl.useProgram(program);

@@ -1,0 +1,59 @@
+"""A double click makes what is seen there the middle of the picture, in both pages."""
+
+import re
+
+import pytest
+import torch
+
+from tests.viewer.in_browser import WAIT, expect, opened, served
+from texgs.cli.main import main
+from texgs.core.camera import orbit
+from texgs.scene.scene_file import read_scene
+
+PLACE = {"azimuth": 40, "polar": 10, "distance": 3.5, "fov_y": 35}
+SEEN = (0.52, 0.44)  # parts of the picture
+BACKGROUND = "There is only background."
+
+
+def camera_of(page):
+    """The camera that the command of the view has."""
+    page.wait_for_timeout(800)
+    words = re.sub(r" -(\d)", r" =\1", page.locator("#options").inner_text()).split("--")[1:]
+    numbers = {name: [float(x.replace("=", "-")) for x in rest] for name, *rest in map(str.split, words)}
+    angles = [numbers[name][0] for name in ("azimuth", "polar", "radius", "fov")]
+    return orbit(*angles, *(int(numbers[name][0]) for name in ("width", "height")), numbers["target"])
+
+
+def turns_around_what_is_seen(page, scene):
+    """Double click on something and on the background; look at the command of the view before and after."""
+    before, box = camera_of(page), page.locator("#picture").bounding_box()
+    x, y = round(SEEN[0] * box["width"]), round(SEEN[1] * box["height"])
+    page.mouse.dblclick(box["x"] + x, box["y"] + y)
+    after = camera_of(page)
+    torch.testing.assert_close(after.viewmat[:3, :3], before.viewmat[:3, :3], atol=1e-5, rtol=0)
+    depth = scene.open().render(before, scene.light, scene.edits, outputs=("depth",)).depth
+    ratio = before.width / box["width"]
+    row, column = int(y * ratio), int(x * ratio)
+    distance = float(-before.viewmat[2, :3] @ before.position)  # of the target, which was near the origin
+    target = after.position + distance * after.viewmat[2, :3]
+    place, z = before.project(target)
+    torch.testing.assert_close(place, torch.tensor([column + 0.5, row + 0.5]), atol=0.2, rtol=0)
+    assert float(z) == pytest.approx(float(depth[row, column]), abs=5e-3), "of the page, surfels are rounded"
+    page.mouse.dblclick(box["x"] + 5, box["y"] + 5)
+    expect(page.get_by_text(BACKGROUND)).to_be_visible(timeout=WAIT)
+    assert camera_of(page).viewmat.equal(after.viewmat)
+
+
+def test_a_double_click_turns_the_viewer_around_what_is_seen(chromium, scene_file):
+    with served(scene_file) as (_, address), opened(chromium, address, ratio=2) as page:
+        turns_around_what_is_seen(page, read_scene(scene_file))
+
+
+def test_a_double_click_turns_the_standalone_page_around_what_is_seen(chromium, scene_file, tmp_path):
+    file = tmp_path / "scene.html"
+    assert main(["export", str(scene_file), "--to", str(file)]) == 0
+    page = chromium.new_page(viewport={"width": 800, "height": 500})
+    page.goto(f"{file.as_uri()}#azimuth=40&polar=10&distance=3.5&target=0,0,0")
+    page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
+    turns_around_what_is_seen(page, read_scene(scene_file))
+    page.close()
