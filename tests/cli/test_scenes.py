@@ -91,6 +91,33 @@ def test_paths_are_films(scene, tmp_path, path):
     assert all(np.abs(one - other).max() > 8 for one, other in pairwise(shown))
 
 
+def test_a_film_has_so_many_seconds(scene, tmp_path):
+    words = ["--path", "orbit", "--seconds", "0.5", "--fps", "8"]
+    assert render(scene, tmp_path / "turn", *words) == 0
+    assert len(list((tmp_path / "turn").iterdir())) == 4
+    assert render(scene, tmp_path / "turn.gif", *words) == 0
+    with Image.open(tmp_path / "turn.gif") as film:
+        assert film.n_frames == 4
+        assert film.info["duration"] in (120, 130)
+
+
+def test_a_transparent_picture_over_the_background_is_the_picture(scene, tmp_path, capsys):
+    assert edit(scene, "background=#204060") == 0
+    edited = scene.with_name("new.yaml")
+    for mode in ("shaded", "depth", "alpha"):
+        assert render(edited, tmp_path / "whole.png", "--mode", mode) == 0
+        assert render(edited, tmp_path / "clear.png", "--mode", mode, "--transparent") == 0
+        whole, clear = (np.asarray(Image.open(tmp_path / f"{name}.png")) / 255 for name in ("whole", "clear"))
+        behind = np.zeros(3) if mode == "alpha" else np.array([0x20, 0x40, 0x60]) / 255
+        alpha = clear[..., 3:]
+        assert clear[0, 0].tolist() == [0, 0, 0, 0]
+        assert alpha.max() > 0.9
+        assert np.abs(alpha * clear[..., :3] + (1 - alpha) * behind - whole).max() < 2 / 255
+    capsys.readouterr()
+    message = refused(capsys, "render", edited, "--transparent", "--caption")
+    assert "leave --compare and --caption out" in message
+
+
 @pytest.mark.parametrize("axis", ["x", "-y", "0.3,0.8,-0.5"])
 def test_a_plane_of_a_film_goes_through_what_is_visible(scene, tmp_path, axis):
     """It is smaller than the frame and beside its middle, and far from a model that is hidden."""
@@ -152,6 +179,8 @@ def test_a_mistake_in_an_edit_writes_nothing(request, capsys, of, word, message)
     ("words", "message"),
     [
         (["--frames", "0"], "--frames: expected at least 1, got 0"),
+        (["--seconds", "0.01"], "--frames: expected at least 1, got 0.25"),
+        (["--transparent"], "x.mp4; films have no alpha"),
         (["--radius", "0"], "radius: expected more than 0, got 0"),
         (["--fov", "0"], "fov_y: expected degrees between 0 and 180, got 0"),
         (["--height", "-4"], "height: expected at least 1 pixel, got -4"),

@@ -13,9 +13,9 @@ from tests.viewer.test_messages import CAMERA
 VIEW = {"camera": CAMERA, "mode": "shaded"}
 
 
-async def saved(browser, client, kind):
+async def saved(browser, client, kind, **length):
     """Name and bytes of an export."""
-    await browser.send(type="export", kind=kind, view=VIEW)
+    await browser.send(type="export", kind=kind, view=VIEW, **length)
     news = await browser.next("notice")
     assert news["level"] == "file", news
     async with client.get(f"/{TOKEN}/files/{news['name']}") as answer:
@@ -24,9 +24,8 @@ async def saved(browser, client, kind):
 
 
 @on_page
-async def test_a_turntable_begins_with_the_view(browser, client, monkeypatch):
-    monkeypatch.setattr("texgs.viewer.downloads.FRAMES", 4)
-    name, film = await saved(browser, client, "gif")
+async def test_a_turntable_begins_with_the_view(browser, client):
+    name, film = await saved(browser, client, "gif", seconds=0.5, fps=8)
     assert name == "scene.gif"
     pictures = ImageSequence.Iterator(Image.open(io.BytesIO(film)))
     frames = [np.asarray(each.convert("RGB")).astype(int) for each in pictures]

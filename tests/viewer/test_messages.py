@@ -15,6 +15,7 @@ CAMERA = {"target": [0, 0, 0], **ANGLES, "width": 64, "height": 48}
 TYPES = ["view", "pick", "edit", "undo", "redo", "save", "mask", "segment", "look", "fit"]
 TYPES += ["export", "rename", "remove", "cancel"]
 VIEW = {"type": "view", "id": 7, "camera": CAMERA, "mode": "normal", "moving": True, "before": False}
+EXPORT = {"type": "export", "kind": "mp4", "view": VIEW}
 PICK = {"type": "pick", "view": VIEW, "pixel": [3, 4]}
 MASK = {"type": "mask", "model": "TF01", "camera": CAMERA}
 
@@ -94,6 +95,9 @@ def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
         (PICK, {"pixel": [3, -1]}, "pixel.1: expected greater than or equal to 0, got -1"),
         (PICK, {"pixel": [3, 4096]}, "pixel.1: expected less than 4096, got 4096"),
         (PICK, {"view": {**VIEW, "mode": "x"}}, "view.mode: expected 'shaded', "),
+        (EXPORT, {"seconds": 1e9}, "seconds: expected less than or equal to 600, got 1000000000.0"),
+        (EXPORT, {"fps": 0}, "fps: expected greater than or equal to 1, got 0"),
+        (EXPORT, {"view": {**VIEW, "transparent": 1}}, "view.transparent: expected a valid boolean, got 1"),
         (MASK, {"points": None}, "points: expected a valid array, got None"),
         (MASK, {"points": [[1, 2, True]] * 101}, "points: Tuple should have at most 100 items"),
         (MASK, {"points": [[1, 2]]}, "points.0.2: expected a value, got none"),
@@ -121,7 +125,7 @@ VALUES = st.recursive(
 
 
 KEYS = ("id", "camera", "mode", "moving", "before", "only", "part", "key", "value", "step", "name", "replace",
-        "model", "points", "view", "pixel")  # fmt: skip
+        "model", "points", "view", "pixel", "kind", "seconds", "fps")  # fmt: skip
 
 
 @given(st.sampled_from(TYPES), st.dictionaries(st.sampled_from(KEYS), VALUES))

@@ -388,7 +388,7 @@ def test_a_damaged_page_keeps_its_picture_and_says_so(chromium, file, tmp_path):
 
 def test_pictures_are_saved_as_they_are_shown(page, file, tmp_path):
     with page.expect_download() as saved:
-        page.get_by_role("button", name="Picture").click()
+        page.get_by_role("button", name="Picture", exact=True).click()
     saved.value.save_as(tmp_path / "saved.png")
     assert saved.value.suggested_filename == "scene.png"
     picture = np.asarray(Image.open(tmp_path / "saved.png").convert("RGB")).astype(int)

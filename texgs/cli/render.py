@@ -6,6 +6,7 @@ import argparse
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
@@ -40,7 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     option(parser, "--mode", "shaded", modes)
     option(parser, "--path", "view", "of the camera, the light, or the last plane that cuts", choices=PATHS)
-    parser.add_argument("--frames", type=int, help="default test 181, orbit 72, light and cut 61")
+    length = parser.add_mutually_exclusive_group()
+    length.add_argument("--frames", type=int, help="default test 181, orbit 72, light and cut 61")
+    length.add_argument("--seconds", type=float, help="length of a film, in place of a number of frames")
     add_lens(parser, "pixels", "pixels; default the width")
     azimuth = "azimuth of the camera, not for path test, on an orbit of the first frame, degrees"
     option(parser, "--azimuth", 30.0, azimuth)
@@ -49,6 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     compare = "show the scene, its volume or what it was as fitted, and their difference, with PSNR and SSIM"
     parser.add_argument("--compare", nargs="?", const="volume", choices=("volume", "fitted"), help=compare)
     option(parser, "--gain", 4.0, f"factor on differences, 1 to {MOST_GAIN:g}")
+    words = "PNG with alpha in place of the background"
+    parser.add_argument("--transparent", action="store_true", help=words)
     parser.add_argument("--caption", action="store_true", help="write below what texgs check has found")
     add_device(parser)
 
@@ -68,8 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise ArgumentError(f"--mode: expected one of {', '.join(get_args(Mode))}, got {arguments.mode}")
     scene = read_scene(arguments.scene)
     count = frames_of(arguments)
-    suffix = ".png" if count == 1 else ".mp4"
-    output = arguments.output or Path(f"{arguments.scene.stem}{suffix}")
+    output = output_of(arguments, count)
     with located(arguments.scene):
         composition = scene.open(torch_device(arguments.device))
     shots = shots_of(arguments, scene, count, composition)
@@ -79,7 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         with located(arguments.scene):
             twin = twin_of(scene, composition.device, arguments.mode)
-        frames = (frame(composition, camera, shown, arguments.mode, twin) for camera, shown in shots)
+        shows = partial(frame, mode=arguments.mode, twin=twin, transparent=arguments.transparent)
+        frames = (shows(composition, camera, shown) for camera, shown in shots)
     words = checked(arguments.scene, scene)
     if arguments.caption:
         if not words:
@@ -137,13 +142,25 @@ def pair_of(
     return lambda camera, shown: beside(composition, camera, shown, twin)
 
 
+def output_of(arguments: argparse.Namespace, count: int) -> Path:
+    """Return where to write so many frames."""
+    output = arguments.output or Path(f"{arguments.scene.stem}{'.png' if count == 1 else '.mp4'}")
+    if arguments.transparent and output.suffix not in ("", ".png"):
+        raise ArgumentError(f"--transparent: expected .png or a folder, got {output}; films have no alpha")
+    if arguments.transparent and (arguments.compare or arguments.caption):
+        raise ArgumentError("--transparent: expected the scene alone; leave --compare and --caption out")
+    return output
+
+
 def frames_of(arguments: argparse.Namespace) -> int:
     """Return how many frames to render."""
-    count = PATHS[arguments.path] if arguments.frames is None else int(arguments.frames)
+    count = PATHS[arguments.path] if arguments.frames is None else arguments.frames
+    if arguments.seconds is not None:
+        count = arguments.seconds * arguments.fps
     if not 1 <= count <= MOST_FRAMES:
         bound = "at least 1" if count < 1 else f"at most {MOST_FRAMES}"
         raise ArgumentError(f"--frames: expected {bound}, got {count}")
-    return count
+    return round(count)
 
 
 def shots_of(

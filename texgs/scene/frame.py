@@ -10,6 +10,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.image import to_pillow
 from texgs.core.memory import require_memory
 from texgs.fields.field import Composed, Look
 from texgs.raster import Render
@@ -32,14 +33,21 @@ Mode = Literal[
     "specular",
     "shininess",
 ]
+OVER_BLACK = ("alpha", *MATERIAL)
 SHININESS = 100.0  # shown as white
 BYTES = 64  # of memory for a pixel: the images of the rasterizer, over a background, clamped and rounded
 
 
 def frame(
-    composed: Composed, camera: Camera, scene: Scene, mode: Mode = "shaded", twin: Twin | None = None
+    composed: Composed,
+    camera: Camera,
+    scene: Scene,
+    mode: Mode = "shaded",
+    twin: Twin | None = None,
+    *,
+    transparent: bool = False,
 ) -> np.ndarray:
-    """Return one frame [H, W, 3], uint8.
+    """Return one frame [H, W, 3], uint8; [H, W, 4] with straight alpha, where its background is transparent.
 
     The volume is that of the scene, with its edits and the functions that it tries, under the same light.
     Normals (world) are (n + 1) / 2, depth is black at the nearest and light grey at the farthest point in the
@@ -53,6 +61,7 @@ def frame(
         scene: whose edits, light, background and cuts count.
         mode: what to show.
         twin: of the scene's volume, which the mode volume and faces of cuts show; see `twin_of`.
+        transparent: whether to leave the background out.
 
     Raises:
         ArgumentError: if the mode is unknown, or shows a volume and there is no twin.
@@ -66,13 +75,17 @@ def frame(
     if mode == "volume":
         if twin is None:
             raise ArgumentError("mode: expected a twin to show the volume, got none")
-        return quantized(twin.render(camera, scene, composed.palettes, functions=scene.functions).color)
-    behind = torch.tensor(scene.background, device=composed.device)
-    look: Look = mode if mode in get_args(Look) else "shaded"  # type: ignore[assignment]
-    outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())
-    background = None if mode in MATERIAL else behind
-    render = cut_view(composed, camera, scene, twin, look=look, background=background, outputs=outputs)
-    return quantized(pixels(render, mode, behind))
+        render = twin.render(camera, scene, composed.palettes, functions=scene.functions)
+    else:
+        look: Look = mode if mode in get_args(Look) else "shaded"  # type: ignore[assignment]
+        outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())
+        background = None if mode in MATERIAL else torch.tensor(scene.background, device=composed.device)
+        render = cut_view(composed, camera, scene, twin, look=look, background=background, outputs=outputs)
+    behind = render.color.new_tensor((0.0,) * 3 if mode in OVER_BLACK else scene.background)
+    colors = pixels(render, mode, behind)
+    if not transparent:
+        return quantized(colors)
+    return np.asarray(to_pillow(colors - (1 - render.alpha[..., None]) * behind, render.alpha))
 
 
 def quantized(colors: Tensor) -> np.ndarray:

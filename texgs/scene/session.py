@@ -232,9 +232,15 @@ class Session:
         return self._composition_of(self.scene)
 
     def frame(
-        self, camera: Camera, mode: Mode = "shaded", scene: Scene | None = None, step: float | None = None
+        self,
+        camera: Camera,
+        mode: Mode = "shaded",
+        scene: Scene | None = None,
+        step: float | None = None,
+        *,
+        transparent: bool = False,
     ) -> np.ndarray:
-        """Return one frame [H, W, 3], uint8; see `texgs.scene.frame.frame`.
+        """Return one frame [H, W, 3 or 4], uint8; see `texgs.scene.frame.frame`.
 
         Changes may be made in one thread while another one renders the scene that it was given.
 
@@ -243,13 +249,14 @@ class Session:
             mode: what to show.
             scene: one of the history; default as it is now.
             step: of rays through the volume, voxels; default that of its views.
+            transparent: whether to leave the background out.
         """
         scene = self.scene if scene is None else scene
         composition = self._composition_of(scene)
         twin = self.twin_of(scene) if needs_twin(scene, mode) else None
         if twin is not None and step is not None:
             twin = twin.with_step(step)
-        return frame(composition, camera, scene, mode, twin)
+        return frame(composition, camera, scene, mode, twin, transparent=transparent)
 
     def point_at(self, camera: Camera, mode: str, scene: Scene, pixel: tuple[int, int]) -> list[float] | None:
         """Return the point of a scene of the history that a pixel shows; see `texgs.scene.pick.point_at`."""

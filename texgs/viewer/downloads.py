@@ -16,13 +16,12 @@ from texgs.fields.kinds import Kind
 from texgs.scene import export
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames
-from texgs.viewer.messages import Export, View
+from texgs.viewer.messages import Export
 from texgs.viewer.scratch import scratch_folder
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.standalone import write_page
 
 FILMS = ("mp4", "gif")
-FRAMES = 72  # of a turntable, as `texgs render` has it
 
 
 class Downloads:
@@ -40,7 +39,7 @@ class Downloads:
         path = Path(self._folder.name, f"{stem}.{ending}")
         if asked.kind in FILMS:
             words = self._edits.checked(scene)
-            return write_frames(path, self._turntable(scene, asked.view), comment=words)
+            return write_frames(path, self._turntable(scene, asked), asked.fps, comment=words)
         if asked.kind == "html":
             return write_page(path, scene, name, self._edits.checked(scene)).path
         return export.export_scene(path, scene, export.Export(asked.kind))
@@ -53,10 +52,11 @@ class Downloads:
         """Remove all files."""
         self._folder.cleanup()
 
-    def _turntable(self, scene: Scene, view: View) -> Iterator[np.ndarray]:
+    def _turntable(self, scene: Scene, asked: Export) -> Iterator[np.ndarray]:
         """Yield frames of a turn around what the camera looks at, from where it is."""
-        for index in progress(range(FRAMES), title="turntable", unit="frame"):
-            place = replace(view.camera, azimuth=view.camera.azimuth + 360 * index / FRAMES)
+        view, count = replace(asked.view, transparent=False), max(1, round(asked.seconds * asked.fps))
+        for index in progress(range(count), title="turntable", unit="frame"):
+            place = replace(view.camera, azimuth=view.camera.azimuth + 360 * index / count)
             yield self._frames.pixels(replace(view, camera=place), scene)
 
 

@@ -87,7 +87,7 @@ class Frames:
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def pixels(self, view: View, scene: Scene) -> np.ndarray:
-        """Return what a view shows [H, W, 3], uint8."""
+        """Return what a view shows [H, W, 3 or 4], uint8."""
         return self._shown(view, scene, 1.0)[0]
 
     def close(self) -> None:
@@ -99,13 +99,14 @@ class Frames:
         if view.mode == "truth" or view.mode == "difference" or view.mode == "wipe":
             return self._beside.frame(view, scene, scale)
         step = STEPS.get(view.mode, COARSE) if view.moving else None
-        return self._session.frame(view.camera.camera(scale), view.mode, scene, step), {}
+        camera, transparent = view.camera.camera(scale), view.transparent
+        return self._session.frame(camera, view.mode, scene, step, transparent=transparent), {}
 
 
 def packed(view: View, pixels: np.ndarray, seconds: float, scores: Mapping[str, float]) -> bytes:
     """Return the length of a header (4 bytes, little-endian), the header (JSON), a JPEG picture."""
     quality, sampling = MOVING if view.moving else STILL
     options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, sampling]
-    _, picture = cv2.imencode(".jpg", cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR), options)
+    _, picture = cv2.imencode(".jpg", cv2.cvtColor(pixels[..., :3], cv2.COLOR_RGB2BGR), options)
     header = json.dumps({"id": view.id, "ms": round(1000 * seconds, 1), **scores}).encode()
     return struct.pack("<I", len(header)) + header + picture.tobytes()

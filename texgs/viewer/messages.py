@@ -62,6 +62,7 @@ class View:
     )
     moving: bool = False  # another one follows at once: speed counts more than quality
     before: bool = False  # the scene as it was opened
+    transparent: bool = False  # without its background; of pictures of the scene or its volume alone
     only: str = ""  # a model that is shown alone and unedited, to be clicked on
     type: Literal["view"] = tag("view")
 
@@ -168,6 +169,8 @@ class Export:
 
     kind: str  # mp4 or gif, a turntable; html; or as `texgs.scene.export.Export` has it
     view: View  # that a turntable begins with
+    seconds: Annotated[float, Field(ge=0.1, le=600)] = 2.88  # of a film
+    fps: Annotated[float, Field(ge=1, le=240)] = 25.0  # frames per second
     type: Literal["export"] = tag("export")
 
 

@@ -1,6 +1,6 @@
 // How large pictures are.
 
-const MOST_PIXELS = 4096; // of a side, as the server has it
+export const MOST_PIXELS = 4096; // of a side, as the server has it
 
 /** Width and height of a canvas in pixels of the screen. */
 export function sizeOf({ clientWidth, clientHeight }) {

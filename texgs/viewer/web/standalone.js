@@ -5,6 +5,7 @@ import { download, toHex } from "./inputs.js";
 import { Notices } from "./notices.js";
 import { Panel } from "./panel.js";
 import { ScenePage } from "./scene_page.js";
+import { PictureDialog } from "./size_inputs.js";
 import { State, difference } from "./state.js";
 import { WebglRenderer } from "./webgl.js";
 
@@ -16,6 +17,7 @@ class StandalonePage extends ScenePage {
     new Panel(this.state, { models: get("models"), background: get("background"), steps: get("steps") });
     new EditHistory(this);
     get("still").onclick = () => this.#save();
+    new PictureDialog(this, (how) => this.#save(how));
     this.state.addEventListener("change", () => this.#tellWords());
     this.follow();
   }
@@ -27,9 +29,9 @@ class StandalonePage extends ScenePage {
     get("words").querySelector("textarea").value = words.join(" ");
   }
 
-  /** Save a picture of the view, in the pixels of the screen. */
-  #save() {
-    const canvas = this.renderer.still(this.camera, this.state.scene, this.shown);
+  /** Save a picture of the view, by default in the pixels of the screen. */
+  #save(how) {
+    const canvas = this.renderer.still(this.camera, this.state.scene, { ...this.shown, ...how });
     canvas.toBlob((blob) => download(blob, `${this.state.scene.name}.png`));
   }
 }

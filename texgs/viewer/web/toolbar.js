@@ -1,7 +1,9 @@
 // Picture and saving, beside the history.
 
 import { EditHistory } from "./history.js";
+import { FilmInputs } from "./film.js";
 import { ask, download } from "./inputs.js";
+import { PictureDialog } from "./size_inputs.js";
 
 const EXPORTS = {
   mp4: "Turntable, MP4", gif: "Turntable, GIF", html: "Web page", "3dgs": "3D Gaussians, PLY",
@@ -10,7 +12,7 @@ const EXPORTS = {
 const get = (id) => document.getElementById(id);
 
 export class Toolbar {
-  #page;
+  #page; #film;
 
   /**
    * @param {object} page - with camera, job, notices, renderer, shown and state
@@ -20,7 +22,9 @@ export class Toolbar {
     this.#page = page;
     new EditHistory(page, { s: () => this.#askForName() });
     get("still").onclick = () => this.#still();
+    new PictureDialog(page, (how) => this.#still(how));
     get("export-kind").append(...exports.map((kind) => new Option(EXPORTS[kind] ?? kind, kind)));
+    this.#film = new FilmInputs(page.renderer);
     get("export").onclick = () => this.#export();
     get("save").onclick = () => this.#askForName();
     window.addEventListener("beforeunload", (event) => {
@@ -56,19 +60,22 @@ export class Toolbar {
   }
 
   async #export() {
+    this.#film.show();
     const kind = await ask(get("export-dialog"), get("export-kind").value);
-    if (kind !== null && this.#page.mayBegin()) this.#page.job.begin({ type: "export", kind, view: this.#view() });
+    if (kind === null || !this.#page.mayBegin()) return;
+    const { size, ...length } = this.#film.values;
+    this.#page.job.begin({ type: "export", kind, view: this.#view(size), ...length });
   }
 
   /** What is shown, as the server has it. */
-  #view() {
-    const { camera, renderer, shown } = this.#page;
-    return { camera: camera.wire(...renderer.size()), ...shown };
+  #view(size = this.#page.renderer.size()) {
+    const { camera, shown } = this.#page;
+    return { camera: camera.wire(...size), ...shown };
   }
 
-  /** Save a picture of the view, in the pixels of the screen. */
-  async #still() {
-    const { notices, number, state } = this.#page, view = JSON.stringify(this.#view());
+  /** Save a picture of the view, by default in the pixels of the screen. */
+  async #still({ size, transparent = false } = {}) {
+    const { notices, number, state } = this.#page, view = JSON.stringify({ ...this.#view(size), transparent });
     try {
       const answer = await fetch(`still.png?${new URLSearchParams({ view, page: number })}`);
       if (!answer.ok) throw new Error(await answer.text());

@@ -9,6 +9,7 @@ import { DepthOrder } from "./sort.js";
 import { NEAR, SurfelPass, bind } from "./surfel_pass.js";
 import { joinSurfels } from "./surfels.js";
 import { unpack } from "./tensors.js";
+import { withAlpha } from "./transparent.js";
 
 const OVER_BLACK = ["alpha", "ambient", "diffuse", "specular", "shininess"];
 const SLOW = 40; // milliseconds of a frame above which those of a moving scene have fewer rows and columns
@@ -84,11 +85,13 @@ export class WebglRenderer {
     return depth && camera.unproject(pixel, depth, view.width, view.height);
   }
 
-  /** The same picture as a canvas of its own. */
-  still(camera, scene, { mode, before }) {
-    const view = this._view(camera);
-    const { width, height } = view;
-    const pixels = this.pixels(view, before ? this._original : scene, mode);
+  /** The same picture as a canvas of its own; of another size, or without its background, if need be. */
+  still(camera, scene, { mode, before, size = this.size(), transparent = false }) {
+    const [width, height] = size, view = { ...this._view(camera), width, height };
+    const shown = before ? this._original : scene;
+    const over = (grey) => this.pixels(view, { ...shown, background: [grey, grey, grey] }, mode);
+    const pixels = transparent ? withAlpha(over(0), over(1)) : this.pixels(view, shown, mode);
+    if (this._wanted) this._frame(this._wanted.view, this._wanted.scene, this._wanted.mode); // on screen again
     const canvas = Object.assign(document.createElement("canvas"), { width, height });
     canvas.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0);
     return canvas;
