@@ -4,11 +4,14 @@ import io
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image, ImageSequence
 from plyfile import PlyData
 
 from tests.viewer.pages import TOKEN, on_page
 from tests.viewer.test_messages import CAMERA
+from texgs.viewer.downloads import way_of
+from texgs.viewer.messages import Export, Orbit, View
 
 VIEW = {"camera": CAMERA, "mode": "shaded"}
 
@@ -34,6 +37,18 @@ async def test_a_turntable_begins_with_the_view(browser, client):
     assert len(frames) == 4
     assert np.abs(frames[0] - shown).mean() < 5  # of the colours of a GIF
     assert np.abs(frames[2] - shown).mean() > 5
+
+
+def test_a_film_passes_its_stops_evenly_and_the_short_way():
+    places = [(170.0, 0.0, 3.0), (-170.0, 90.0, 6.0), (-100.0, -20.0, 3.0)]
+    camera = {"target": (0.0, 0.0, 0.0), "fov_y": 40.0, "width": 8, "height": 4}
+    stops = tuple(Orbit(azimuth=a, polar=p, distance=d, **camera) for a, p, d in places)
+    way = way_of(Export("mp4", View(stops[0]), stops, seconds=0.5, fps=10))
+    for index, stop in zip((0, 2, 4), stops, strict=True):
+        torch.testing.assert_close(way[index].camera().viewmat, stop.camera().viewmat, atol=1e-5, rtol=0)
+    assert 170 < way[1].azimuth < 190
+    assert 0 < way[1].polar < 90
+    assert {(each.width, each.height) for each in way} == {(8, 4)}
 
 
 @on_page

@@ -96,6 +96,7 @@ def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
         (PICK, {"pixel": [3, 4096]}, "pixel.1: expected less than 4096, got 4096"),
         (PICK, {"view": {**VIEW, "mode": "x"}}, "view.mode: expected 'shaded', "),
         (EXPORT, {"seconds": 1e9}, "seconds: expected less than or equal to 600, got 1000000000.0"),
+        (EXPORT, {"stops": [CAMERA] * 21}, "stops: Tuple should have at most 20 items"),
         (EXPORT, {"fps": 0}, "fps: expected greater than or equal to 1, got 0"),
         (EXPORT, {"view": {**VIEW, "transparent": 1}}, "view.transparent: expected a valid boolean, got 1"),
         (MASK, {"points": None}, "points: expected a valid array, got None"),
@@ -125,7 +126,7 @@ VALUES = st.recursive(
 
 
 KEYS = ("id", "camera", "mode", "moving", "before", "only", "part", "key", "value", "step", "name", "replace",
-        "model", "points", "view", "pixel", "kind", "seconds", "fps")  # fmt: skip
+        "model", "points", "view", "pixel", "kind", "stops", "seconds", "fps")  # fmt: skip
 
 
 @given(st.sampled_from(TYPES), st.dictionaries(st.sampled_from(KEYS), VALUES))

@@ -1,9 +1,10 @@
-"""Files of a scene that a page saves: turntables, and what `texgs export` writes."""
+"""Files of a scene that a page saves: films, and what `texgs export` writes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from math import exp, log
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from texgs.fields.kinds import Kind
 from texgs.scene import export
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames
-from texgs.viewer.messages import Export
+from texgs.viewer.messages import Export, Orbit
 from texgs.viewer.scratch import scratch_folder
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.standalone import write_page
@@ -39,7 +40,7 @@ class Downloads:
         path = Path(self._folder.name, f"{stem}.{ending}")
         if asked.kind in FILMS:
             words = self._edits.checked(scene)
-            return write_frames(path, self._turntable(scene, asked), asked.fps, comment=words)
+            return write_frames(path, self._film(scene, asked), asked.fps, comment=words)
         if asked.kind == "html":
             return write_page(path, scene, name, self._edits.checked(scene)).path
         return export.export_scene(path, scene, export.Export(asked.kind))
@@ -52,12 +53,31 @@ class Downloads:
         """Remove all files."""
         self._folder.cleanup()
 
-    def _turntable(self, scene: Scene, asked: Export) -> Iterator[np.ndarray]:
-        """Yield frames of a turn around what the camera looks at, from where it is."""
-        view, count = replace(asked.view, transparent=False), max(1, round(asked.seconds * asked.fps))
-        for index in progress(range(count), title="turntable", unit="frame"):
-            place = replace(view.camera, azimuth=view.camera.azimuth + 360 * index / count)
-            yield self._frames.pixels(replace(view, camera=place), scene)
+    def _film(self, scene: Scene, asked: Export) -> Iterator[np.ndarray]:
+        """Yield frames of a film."""
+        view = replace(asked.view, transparent=False)
+        for camera in progress(way_of(asked), title="film", unit="frame"):
+            yield self._frames.pixels(replace(view, camera=camera), scene)
+
+
+def way_of(asked: Export) -> list[Orbit]:
+    """Return the cameras of a film: one turn from its view on, or a smooth way through its stops."""
+    from scipy.interpolate import PchipInterpolator
+
+    start, count = asked.view.camera, max(1, round(asked.seconds * asked.fps))
+    if len(asked.stops) < 2:
+        return [replace(start, azimuth=start.azimuth + 360 * index / count) for index in range(count)]
+    azimuths = np.unwrap([each.azimuth for each in asked.stops], period=360)
+    stops = [
+        [azimuth, each.polar, log(each.distance), each.fov_y, *each.target]
+        for azimuth, each in zip(azimuths, asked.stops, strict=True)
+    ]
+    way = PchipInterpolator(range(len(stops)), stops)  # it stays between two stops: no pole is passed
+    places = way(np.linspace(0, len(stops) - 1, count)).round(9).tolist()
+    return [
+        Orbit(tuple(target), azimuth, polar, exp(distance), fov_y, start.width, start.height)
+        for azimuth, polar, distance, fov_y, *target in places
+    ]
 
 
 def exports_of(kind: Kind) -> list[str]:

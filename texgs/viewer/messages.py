@@ -167,8 +167,9 @@ class Fit:
 class Export:
     """Write a file for the page to save."""
 
-    kind: str  # mp4 or gif, a turntable; html; or as `texgs.scene.export.Export` has it
+    kind: str  # mp4 or gif, a film; html; or as `texgs.scene.export.Export` has it
     view: View  # that a turntable begins with
+    stops: Annotated[tuple[Orbit, ...], Field(max_length=20)] = ()  # of a film; of fewer than 2, a turntable
     seconds: Annotated[float, Field(ge=0.1, le=600)] = 2.88  # of a film
     fps: Annotated[float, Field(ge=1, le=240)] = 25.0  # frames per second
     type: Literal["export"] = tag("export")

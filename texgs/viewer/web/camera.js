@@ -100,10 +100,15 @@ export class OrbitCamera {
       + unit * ((x - width / 2) * right[i] + (y - height / 2) * down[i]));
   }
 
+  /** Where it is, as `place` takes it. */
+  get pose() {
+    const { target, azimuth, polar, distance, fov_y } = this;
+    return { target, azimuth, polar, distance, fov_y };
+  }
+
   /** As a renderer of frames needs it. */
   wire(width, height) {
-    const { target, azimuth, polar, distance, fov_y } = this;
-    return { target, azimuth, polar, distance, fov_y, width, height };
+    return { ...this.pose, width, height };
   }
 
   /** As options of `texgs render`. */

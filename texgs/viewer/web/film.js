@@ -1,4 +1,4 @@
-// What a film is like: its size, how long it is, and how many frames a second it has.
+// What a film is like: the way of its camera, its size, how long it is, and how many frames a second it has.
 
 import { element } from "./inputs.js";
 import { numberInput, sizeInputs } from "./size_inputs.js";
@@ -7,27 +7,34 @@ const KINDS = ["mp4", "gif"];
 const get = (id) => document.getElementById(id);
 
 export class FilmInputs {
-  #renderer;
+  #page;
   #size = sizeInputs();
   #seconds = numberInput("Length, seconds", { min: 0.1, max: 600, value: 2.88 }); // 72 frames
   #fps = numberInput("Frames a second", { min: 1, max: 240, value: 25 });
 
-  constructor(renderer) {
-    this.#renderer = renderer;
+  #way = element("select", {}, new Option("One turn", "turn"), new Option("Through the bookmarks", "bookmarks"));
+
+  /** @param {ScenePage} page */
+  constructor(page) {
+    this.#page = page;
     const length = element("div", { className: "pair" }, this.#seconds.row, this.#fps.row);
-    get("film").append(this.#size.row, length);
+    get("film").append(element("label", { className: "row" }, "Camera", this.#way), this.#size.row, length);
     get("export-kind").addEventListener("change", () => this.#hide());
   }
 
   /** Begin with the size on the screen. */
   show() {
-    this.#size.show(this.#renderer.size());
+    this.#size.show(this.#page.renderer.size());
+    this.#way.options[1].disabled = this.#page.bookmarks.poses.length < 2;
+    if (this.#way.options[1].disabled) this.#way.value = "turn";
     this.#hide();
   }
 
   get values() {
-    const length = { seconds: this.#seconds.input.valueAsNumber, fps: this.#fps.input.valueAsNumber };
-    return get("film").disabled ? {} : { size: this.#size.value, ...length };
+    if (get("film").disabled) return {};
+    const { value: size } = this.#size, isTurn = this.#way.value === "turn";
+    const stops = isTurn ? [] : this.#page.bookmarks.poses.map((pose) => ({ ...pose, width: size[0], height: size[1] }));
+    return { size, stops, seconds: this.#seconds.input.valueAsNumber, fps: this.#fps.input.valueAsNumber };
   }
 
   /** What is no film has no inputs that a form could require. */

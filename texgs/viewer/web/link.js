@@ -51,11 +51,16 @@ export function editsOf(text, scene, wrong) {
   }) : [];
 }
 
-/** Numbers in a link, so many by commas; undefined where there are none. What is none is added to `wrong`. */
+/** So many numbers by commas; undefined where a text is none. */
+export function numbersIn(text, count) {
+  const numbers = text.split(",").map((each) => each.trim() ? Number(each) : NaN);
+  return numbers.length === count && numbers.every((each) => isNumber(each)) ? numbers : undefined;
+}
+
+/** The same of a link, by a key; where there is one and it is none, it is added to `wrong`. */
 export function numbersOf(words, key, count, wrong) {
-  const text = words.get(key), numbers = (text ?? "").split(",").map((each) => each.trim() ? Number(each) : NaN);
-  if (text === null) return undefined;
-  if (numbers.length === count && numbers.every((each) => isNumber(each))) return numbers;
-  wrong.push(key);
-  return undefined;
+  if (!words.has(key)) return undefined;
+  const numbers = numbersIn(words.get(key), count);
+  if (!numbers) wrong.push(key);
+  return numbers;
 }

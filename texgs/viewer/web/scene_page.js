@@ -1,5 +1,6 @@
 // What all pages of a scene share: a camera, the state, a renderer, and the inputs that choose what is shown.
 
+import { Bookmarks } from "./bookmarks.js";
 import { AXES, OrbitCamera } from "./camera.js";
 import { centerByDoubleClick } from "./center.js";
 import { control } from "./controls.js";
@@ -59,6 +60,7 @@ export class ScenePage {
     this.notices = notices;
     this.#isLocked = isLocked;
     this.cuts = new Cuts(this);
+    this.bookmarks = new Bookmarks(this);
     this.#inputs();
     control(this.canvas, () => this.camera, () => this.moved(), (name) => this.goTo(name), isLocked);
     centerByDoubleClick(this, isLocked);
@@ -104,6 +106,13 @@ export class ScenePage {
     this.draw(true);
   }
 
+  /** Put the camera somewhere; what is not named stays. */
+  place(pose) {
+    if (this.#isLocked()) return;
+    this.camera.place(pose);
+    this.moved();
+  }
+
   /** Go to a named view: "home", an axis, or one of the scene's. */
   goTo(name) {
     if (this.#isLocked()) return;
@@ -126,6 +135,7 @@ export class ScenePage {
     const mode = words.get("mode") ?? "shaded", wrong = modes.includes(mode) ? [] : ["mode"];
     this.camera.goHome(this.canvas.clientWidth, this.canvas.clientHeight);
     this.camera.follow(words, wrong);
+    this.bookmarks.follow(words, wrong);
     this.show({ mode: modes.includes(mode) ? mode : "shaded" });
     const isOfAnother = (words.get("scene") ?? scene.name) !== scene.name;
     const edits = isOfAnother ? [] : editsOf(words.get("edits"), scene, wrong);
@@ -140,11 +150,12 @@ export class ScenePage {
     for (const { part, key, value } of edits) this.state.edit(part, key, value);
   }
 
-  /** Camera, mode and edits as the link has them. */
+  /** Camera, mode, bookmarks and edits as the link has them. */
   get #fragment() {
     const { mode } = this.#shown, edits = difference(this.state.original, this.state.scene);
     const words = new URLSearchParams();
     if (mode !== "shaded") words.set("mode", mode);
+    if (this.bookmarks.words) words.set("bookmarks", this.bookmarks.words);
     if (edits.length) {
       words.set("scene", this.state.scene.name); // edits of one scene are none of another
       words.set("edits", JSON.stringify(edits));

@@ -6,7 +6,7 @@ import { ask, download } from "./inputs.js";
 import { PictureDialog } from "./size_inputs.js";
 
 const EXPORTS = {
-  mp4: "Turntable, MP4", gif: "Turntable, GIF", html: "Web page", "3dgs": "3D Gaussians, PLY",
+  mp4: "Film, MP4", gif: "Film, GIF", html: "Web page", "3dgs": "3D Gaussians, PLY",
   "2dgs": "2D Gaussians, PLY", points: "Points, PLY", mesh: "Mesh, PLY",
 };
 const get = (id) => document.getElementById(id);
@@ -24,7 +24,7 @@ export class Toolbar {
     get("still").onclick = () => this.#still();
     new PictureDialog(page, (how) => this.#still(how));
     get("export-kind").append(...exports.map((kind) => new Option(EXPORTS[kind] ?? kind, kind)));
-    this.#film = new FilmInputs(page.renderer);
+    this.#film = new FilmInputs(page);
     get("export").onclick = () => this.#export();
     get("save").onclick = () => this.#askForName();
     window.addEventListener("beforeunload", (event) => {
@@ -63,8 +63,8 @@ export class Toolbar {
     this.#film.show();
     const kind = await ask(get("export-dialog"), get("export-kind").value);
     if (kind === null || !this.#page.mayBegin()) return;
-    const { size, ...length } = this.#film.values;
-    this.#page.job.begin({ type: "export", kind, view: this.#view(size), ...length });
+    const { size, ...film } = this.#film.values;
+    this.#page.job.begin({ type: "export", kind, view: this.#view(size), ...film });
   }
 
   /** What is shown, as the server has it. */
