@@ -35,6 +35,7 @@ def told(*words):
         ("name: x\nimage: 2026-11-20\n", 2, "dataset.image: expected an integer, got '2026-11-20'"),
         ("- name: x\n", 1, "dataset: expected keys with values, got a list"),
         ("12\n", 1, "dataset: expected keys with values, got a single value"),
+        ("name: x\nvolume:\n", 2, "dataset.volume: expected keys with values, got null"),
         ("name: x\nvolume: [1, 2]\n", 2, "dataset.volume: expected keys with values, got a list"),
         ("name: x\nbasic_tfs:\n  - a\n", 3, "dataset.basic_tfs: expected keys with values, got a list"),
         ("name: x\nbasic_tfs:\n  A: [1]\n", 3, "dataset.basic_tfs.A: expected keys with values, got a list"),
