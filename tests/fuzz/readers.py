@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import lzma
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -14,6 +15,7 @@ import numpy as np
 import torch
 from PIL import Image
 
+from tests.config.kept import project
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import sample
@@ -23,6 +25,7 @@ from tests.volume.test_netcdf import FIELD, write_netcdf
 from tests.volume.test_text_columns import LINES, write_lines
 from tests.volume.test_tf_files import RAMP, TENT, preset
 from tests.volume.volume_files import WRITERS, sample_values
+from texgs.config.kept_function import keep
 from texgs.core.camera import orbit
 from texgs.core.io import read_json, write_json
 from texgs.core.lens import Frame
@@ -179,6 +182,21 @@ def picture(name: str, folder: Path, **options: Any) -> Path:
     return folder / name
 
 
+def data_set(folder: Path) -> Path:
+    write_scene(folder / "scene.yaml", project(folder))
+    return folder / "conf" / "dataset" / "mine.yaml"
+
+
+def keep_function(path: Path) -> None:
+    """Write it into the file, in the folder of the project; the file is as before when it is read again."""
+    os.chdir(path.parents[2])
+    before = path.read_bytes()
+    try:
+        keep(read_scene(path.parents[2] / "scene.yaml"), "TF03")
+    finally:
+        path.write_bytes(before)
+
+
 def checkpoint(folder: Path) -> Path:
     from safetensors.torch import save_file
 
@@ -220,6 +238,8 @@ READERS: dict[str, Reader] = {
         lambda path: read_segment(path, sample()),
     ),
     "scene": Reader(scene, read_whole_scene),
+    "data set": Reader(data_set, keep_function),
+    "data set's metrics": Reader(data_set, keep_function, "results/mine/volume/metrics.json"),
     "2dgs.ply": Reader(partial(ply, "2dgs", False), read_ply),
     "3dgs.ply text": Reader(partial(ply, "3dgs", True), read_ply),
     "release.ply": Reader(partial(ply, "release", False), read_ply),

@@ -8,11 +8,25 @@ from hypothesis import strategies as st
 
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
-from texgs.viewer.messages import Cancel, Edit, Mask, Pick, Redo, Remove, Save, Segment, Undo, View, parse
+from texgs.viewer.messages import (
+    Cancel,
+    Edit,
+    Fit,
+    Keep,
+    Mask,
+    Pick,
+    Redo,
+    Remove,
+    Save,
+    Segment,
+    Undo,
+    View,
+    parse,
+)
 
 ANGLES = {"azimuth": 30, "polar": 20, "distance": 3, "fov_y": 40}
 CAMERA = {"target": [0, 0, 0], **ANGLES, "width": 64, "height": 48}
-TYPES = ["view", "pick", "edit", "undo", "redo", "save", "mask", "segment", "look", "fit"]
+TYPES = ["view", "pick", "edit", "undo", "redo", "save", "mask", "segment", "look", "fit", "keep"]
 TYPES += ["export", "rename", "remove", "cancel"]
 VIEW = {"type": "view", "id": 7, "camera": CAMERA, "mode": "normal", "moving": True, "before": False}
 EXPORT = {"type": "export", "kind": "mp4", "view": VIEW}
@@ -31,6 +45,8 @@ def test_messages_are_read():
     assert parse('{"type": "redo"}') == Redo()
     assert parse('{"type": "save", "name": "a.yaml"}') == Save("a.yaml", False)
     assert parse('{"type": "cancel"}') == Cancel()
+    assert parse('{"type": "fit", "function": "TF03"}') == Fit("TF03")
+    assert parse('{"type": "keep", "function": "TF03"}') == Keep("TF03")
     assert parse('{"type": "remove", "part": "TF01/a"}') == Remove("TF01/a")
     clicks = {"camera": CAMERA, "points": [[1, 2.5, True], [3, 4, False]]}
     clicked = (view.camera, ((1, 2.5, True), (3, 4, False)))
@@ -99,6 +115,8 @@ def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
         (EXPORT, {"stops": [CAMERA] * 21}, "stops: Tuple should have at most 20 items"),
         (EXPORT, {"fps": 0}, "fps: expected greater than or equal to 1, got 0"),
         (EXPORT, {"view": {**VIEW, "transparent": 1}}, "view.transparent: expected a valid boolean, got 1"),
+        ({"type": "fit"}, {}, "function: expected a value, got none"),
+        ({"type": "keep"}, {"function": ["TF03"]}, "function: expected a valid string, got ['TF03']"),
         (MASK, {"points": None}, "points: expected a valid array, got None"),
         (MASK, {"points": [[1, 2, True]] * 101}, "points: Tuple should have at most 100 items"),
         (MASK, {"points": [[1, 2]]}, "points.0.2: expected a value, got none"),
@@ -126,7 +144,7 @@ VALUES = st.recursive(
 
 
 KEYS = ("id", "camera", "mode", "moving", "before", "only", "part", "key", "value", "step", "name", "replace",
-        "model", "points", "view", "pixel", "kind", "stops", "seconds", "fps")  # fmt: skip
+        "model", "points", "function", "view", "pixel", "kind", "stops", "seconds", "fps")  # fmt: skip
 
 
 @given(st.sampled_from(TYPES), st.dictionaries(st.sampled_from(KEYS), VALUES))

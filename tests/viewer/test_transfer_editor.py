@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from tests.config.kept import project
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
 from tests.viewer.in_browser import (
@@ -136,3 +137,16 @@ def test_a_model_of_a_function_is_begun_and_cancelled(chromium, sphere_file):
         expect(page.get_by_text("it was cancelled; nothing has changed")).to_be_visible(timeout=WAIT)
         expect(page.get_by_role("listitem")).to_have_text(["functions TF03"])
         assert not list(sphere_file.parent.glob("*TF03*"))
+
+
+def test_a_function_is_kept_in_its_data_set(chromium, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scene = write_scene(tmp_path / "scene.yaml", project(tmp_path))
+    with served(scene) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("button", name="over *", exact=True).click()
+        page.get_by_role("button", name="Keep in data set").click()
+        expect(page.get_by_text(re.compile("over on .* overlaps TF02 on"))).to_be_visible(timeout=WAIT)
+        page.get_by_role("button", name="TF03 *", exact=True).click()
+        page.get_by_role("button", name="Keep in data set").click()
+        expect(page.get_by_text("TF03 is a basic transfer function")).to_be_visible(timeout=WAIT)
+    assert "\n    TF03:\n" in (tmp_path / "conf" / "dataset" / "mine.yaml").read_text()

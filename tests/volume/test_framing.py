@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Frame
-from texgs.volume.framing import frame_of, shown_cells, shown_values, smallest_ball
+from texgs.volume.framing import frame_of, out_of_frame, shown_cells, shown_values, smallest_ball
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 
@@ -102,6 +102,14 @@ def test_all_basic_transfer_functions_are_framed_in_the_world():
     corners = [world(7 + i, 6 + j, 5 + k) for i, j, k in product((-1, 1), repeat=3)]
     corners += [world(10 + i, 20 + j, 35 + k) for i, j, k in product((-1, 1), repeat=3)]
     assert both.radius == pytest.approx(radius_by_brute_force(np.array(corners)), rel=1e-6)
+    assert (
+        out_of_frame(grid, low, both)
+        == out_of_frame(grid, high, both)
+        == out_of_frame(grid, high, alone)
+        == ""
+    )
+    far = max(np.linalg.norm(corner - alone.target) for corner in corners[:8]) - alone.radius
+    assert out_of_frame(grid, low, alone).startswith(f"reaches {far:.2g} out of the frame of radius 0.046: ")
 
 
 def test_slabs_do_not_matter(monkeypatch):

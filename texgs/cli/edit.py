@@ -56,20 +56,24 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, help="scene.yaml, whose key functions has functions to try")
     parser.add_argument("name", help="of the function, which becomes that of the model")
     option(parser, "--size", 400, "of the views, pixels")
-    parser.add_argument(
-        "--output", type=Path, required=True, help="the new scene.yaml; models are put beside it"
-    )
+    goal = parser.add_mutually_exclusive_group(required=True)
+    goal.add_argument("--output", type=Path, help="the new scene.yaml; models are put beside it")
+    goal.add_argument("--keep", action="store_true", help="put the function into the file of its data set")
     add_device(parser)
 
 
 def run_model(arguments: argparse.Namespace) -> int:
     """Fit a model of a transfer function that a scene tries, in seconds, and put it into the scene."""
+    from texgs.config.kept_function import keep
     from texgs.core.check import torch_device
     from texgs.core.errors import located
     from texgs.edit.function_model import models_of, overlap_of, tried, with_model
     from texgs.fields.surfels.model_file import write_model
     from texgs.scene.scene_file import read_scene, write_scene
 
+    if arguments.keep:
+        print(keep(read_scene(arguments.scene), arguments.name))
+        return 0
     require_scene(arguments.output)
     scene, output = read_scene(arguments.scene), arguments.output
     require_name(arguments.name, "NAME")

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import math
 import re
 import sys
-import tempfile
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from texgs.config.compose import compose
-from texgs.core.errors import ArgumentError, ConfigError
+from texgs.config.dataset_text import as_yaml, require_read
+from texgs.core.errors import ArgumentError
 from texgs.core.io import is_there, read_json, write_bytes
 
 if TYPE_CHECKING:
@@ -51,6 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.config.dataset import BasicTF
     from texgs.config.project import check_name, members, own_folder, shown
     from texgs.volume.tf_files import read_tf
+    from texgs.workflow.checks import check_basic_tfs
     from texgs.workflow.stage_table import STAGES
 
     name = arguments.name or re.sub(r"[^A-Za-z0-9_]+", "_", arguments.file.name.split(".")[0])
@@ -70,7 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     config = replace(config, dataset=replace(config.dataset, basic_tfs=listed))
     ensure(STAGES["transfer"], config)
     text = document(config, ["file", *changed(arguments.overrides)])
-    check_document(text, config)
+    check_basic_tfs(config.dataset)
+    require_read(text, config.dataset)
     write_bytes(target, text.encode())
     picture = Path(config.results, name, "transfer", "transfer.png")
     print(f"{shown(target)}: {len(basic)} transfer functions to edit; {picture} shows them")
@@ -117,7 +118,7 @@ def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> di
                 f"parts of [{low:g}, {high:g}], and are taken for labels; if one of them stands for missing "
                 "samples, write NaN in its place and add nan_value=...\n"
             )
-        return {name: rounded(tf, low, high) for name, tf in suggested.items()}
+        return {name: tf.rounded(low, high) for name, tf in suggested.items()}
     basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
     check_disjoint(basic)
     for path, tf in zip(files, basic.values(), strict=True):
@@ -130,48 +131,13 @@ def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> di
     return basic
 
 
-def rounded(tf: TransferFunction, low: float, high: float) -> TransferFunction:
-    """Return a TF with numbers that are short to read and keep a millionth of the range of the data."""
-    from texgs.volume.transfer import TransferFunction
-
-    digits = 6 + math.ceil(math.log10(max(max(abs(low), abs(high)) / (high - low), 1)))
-
-    def short(points: tuple[tuple[float, ...], ...]) -> tuple[Any, ...]:
-        return tuple(tuple(float(f"{number:.{digits}g}") for number in point) for point in points)
-
-    return TransferFunction(short(tf.opacity), short(tf.color))
-
-
 def document(config: Config, keys: list[str]) -> str:
     """Return the YAML of a data set, with some keys of its volume; a line per list of points."""
-    import yaml
-
-    class Dumper(yaml.SafeDumper):
-        """Lists on one line each."""
-
-    Dumper.add_representer(
-        list, lambda dumper, items: dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=True)
-    )
     dataset = asdict(config.dataset)
     written = {key: dataset[key] for key in ("name", "title", "volume", "basic_tfs")}
     written["volume"] = {key: dataset["volume"][key] for key in keys}
     note = "# Points are [value, opacity] and [value, r, g, b]; the ranges of basic TFs must not overlap.\n"
-    return note + yaml.dump(written, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=10**6)
-
-
-def check_document(text: str, config: Config) -> None:
-    """Require that the configuration reads a document as the data set that it was written for."""
-    from texgs.workflow.checks import check_basic_tfs
-
-    name = config.dataset.name
-    with tempfile.TemporaryDirectory() as folder:
-        write_bytes(Path(folder, "dataset", f"{name}.yaml"), text.encode())
-        read = compose((f"dataset={name}",), first=Path(folder)).dataset
-    check_basic_tfs(read)
-    if read != config.dataset:
-        raise ConfigError(
-            f"{name}: expected to read {config.dataset} from the new file, got {read}; nothing was written"
-        )
+    return note + as_yaml(written)
 
 
 def add_init_arguments(parser: argparse.ArgumentParser) -> None:

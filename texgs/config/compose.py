@@ -36,6 +36,11 @@ def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> Confi
     return _composed(overrides, places, os.environ.get("TEXGS_DATA"))
 
 
+def recompose(overrides: Words) -> Config:
+    """Return the same of files that may have changed since this process has read them."""
+    return _composed.__wrapped__(overrides, folders(), os.environ.get("TEXGS_DATA"))
+
+
 @lru_cache(maxsize=1024)
 def _composed(overrides: Words, places: tuple[Path, ...], _data_folder: str | None) -> Config:
     from texgs.config.composition import composition
@@ -46,7 +51,7 @@ def _composed(overrides: Words, places: tuple[Path, ...], _data_folder: str | No
     with told():
         config = lit(typed(Config, composition(overrides, places)))
     check_names(config)
-    check_meshes(config)
+    check_basic_tfs(config)
     check_chosen(overrides, config)
     return config
 
@@ -86,17 +91,18 @@ def check_names(config: Config) -> None:
             raise ConfigError(str(mismatch(key, expected, value)))
 
 
-def check_meshes(config: Config) -> None:
-    """Require of the basic TFs with meshes that the data set has them, and a volume to compare with."""
+def check_basic_tfs(config: Config) -> None:
+    """Require of basic TFs that are named that the data set has them, and of meshes a volume beside them."""
     known = list(config.dataset.basic_tfs)
     if config.mesh.tfs and config.dataset.views_folder is not None:
         raise ConfigError(
             f"mesh.tfs: data set {config.dataset.name} starts from views and has no volume to compare with; "
             "leave mesh.tfs empty"
         )
-    for tf in config.mesh.tfs:
-        if tf not in known:
-            raise ConfigError(f"mesh.tfs: expected some of {', '.join(known)}, got {tf}{close(tf, known)}")
+    for key, tfs in (("mesh.tfs", config.mesh.tfs), ("dataset.framed_by", config.dataset.framed_by)):
+        for tf in tfs:
+            if tf not in known:
+                raise ConfigError(f"{key}: expected some of {', '.join(known)}, got {tf}{close(tf, known)}")
 
 
 def check_chosen(overrides: Words, config: Config) -> None:

@@ -89,11 +89,17 @@ class Dataset:
         default_factory=dict,
         metadata={"help": "basic transfer functions by name; their ranges must not overlap"},
     )
+    framed_by: list[str] = key([], "basic TFs that frame the views of all; default all of them")
     looks: dict[str, LookKeys] = field(
         default_factory=dict,
         metadata={"help": "what edits with edit.looks make of each basic TF"},
     )
     part: PartKeys = key(PartKeys, "what the edit `part` makes a segment of")
+
+    @property
+    def framing(self) -> list[str]:
+        """Return the names of the basic TFs that frame the views of all."""
+        return self.framed_by or list(self.basic_tfs)
 
 
 @dataclass(frozen=True)

@@ -87,9 +87,7 @@ def origin(key: str, value: Any) -> str:
     group, *below = key.split(".")
     for path in (path for folder in folders() for path in sorted(folder.rglob("*.yaml")) if path.is_file()):
         node = node_at(path, below if package(path) == group else [group, *below])
-        if node is not None and str(yaml.constructor.SafeConstructor().construct_document(node)) == str(
-            value
-        ):
+        if node is not None and str(yaml.SafeLoader("").construct_document(node)) == str(value):
             return f"{shown(path)}:{node.start_mark.line + 1}: "
     return ""
 
@@ -126,7 +124,7 @@ def deepest(node: yaml.Node) -> yaml.Node:
     """Return the smallest part of a document that OmegaConf does not take."""
     for _, child in children(node):
         try:
-            OmegaConf.create([yaml.constructor.SafeConstructor().construct_document(child)])
+            OmegaConf.create([yaml.SafeLoader("").construct_document(child)])
         except Exception:  # what it raises has been told
             return deepest(child)
     return node

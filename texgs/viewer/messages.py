@@ -164,6 +164,14 @@ class Fit:
 
 
 @dataclass(frozen=True, config=STRICT)
+class Keep:
+    """Write a function into the file of its data set."""
+
+    function: str
+    type: Literal["keep"] = tag("keep")
+
+
+@dataclass(frozen=True, config=STRICT)
 class Export:
     """Write a file for the page to save."""
 
@@ -200,9 +208,8 @@ class Cancel:
     type: Literal["cancel"] = tag("cancel")
 
 
-Message = (
-    View | Pick | Edit | Undo | Redo | Save | Mask | Segment | Look | Fit | Export | Rename | Remove | Cancel
-)
+Making = Mask | Segment | Look | Fit | Keep | Export
+Message = View | Pick | Edit | Undo | Redo | Save | Making | Rename | Remove | Cancel
 MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 VIEWS = TypeAdapter(View)
 

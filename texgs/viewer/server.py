@@ -180,6 +180,8 @@ class Server:
             await self.work.begin_look(message, page)
         elif isinstance(message, Fit):
             self.work.begin_fit(message, page)
+        elif isinstance(message, messages.Keep):
+            self.work.begin_keep(message, page)
         elif isinstance(message, Export):
             self.work.begin_export(message, page)
         elif isinstance(message, Cancel):

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import torch
 
+from texgs.config.kept_function import keep
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.names import part_file, require_name
 from texgs.core.progress import watched
@@ -25,7 +26,7 @@ from texgs.scene.parts import entry_of, require_new, split
 from texgs.viewer.downloads import Downloads, require_kind
 from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks, Styles
-from texgs.viewer.messages import Export, Fit, Look, Mask, Segment
+from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
 
@@ -126,6 +127,15 @@ class Work:
         tried(self._edits.scene, asked.function)
         require_name(asked.function, "function")
         self._begin(page, partial(self._fit, asked, page))
+
+    def begin_keep(self, asked: Keep, page: Page) -> None:
+        """Begin to write a function into the file of its data set."""
+
+        async def write(watch: Watch) -> None:
+            kept = partial(keep, self._edits.scene, asked.function)
+            page.tell(await self._jobs.run(kept, watch), level="info")
+
+        self._begin(page, write)
 
     def begin_export(self, asked: Export, page: Page) -> None:
         """Begin to write a file."""

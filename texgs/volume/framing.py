@@ -19,11 +19,25 @@ INSIDE = 1 + 1e-7  # times a squared radius: rounding, of points that nearly lie
 def frame_of(grid: Grid, tfs: Iterable[TransferFunction]) -> Frame:
     """Return the smallest ball around all cells in which a basic transfer function shows something.
 
-    A cell shows the values between the least and the largest of its eight samples.
-
     Raises:
         ArgumentError: if nothing is visible.
     """
+    return smallest_ball(shown_corners(grid, tfs))
+
+
+def out_of_frame(grid: Grid, tf: TransferFunction, frame: Frame) -> str:
+    """Return how far a function reaches out of a frame, in half a sentence; nothing where it does not."""
+    reach = float(np.linalg.norm(shown_corners(grid, [tf]) - frame.target, axis=1).max())
+    if reach <= frame.radius * INSIDE:
+        return ""
+    return (
+        f"reaches {reach - frame.radius:.2g} out of the frame of radius {frame.radius:.2g}: what views do "
+        "not show is not fitted; to frame it and make all views and models anew, add it to dataset.framed_by"
+    )
+
+
+def shown_corners(grid: Grid, tfs: Iterable[TransferFunction]) -> np.ndarray:
+    """Return the outermost corners [N, 3], world units, of rows of cells with values that functions show."""
     seen = [each for tf in tfs for each in shown_values(tf)]
     corners = []
     for start, stop in slab_bounds(ArraySource(grid), 0, grid.dims[2] - 1):
@@ -32,7 +46,7 @@ def frame_of(grid: Grid, tfs: Iterable[TransferFunction]) -> Frame:
     if not len(indices):
         raise ArgumentError("transfer functions: expected some of the volume to be visible, got nothing")
     middle = 0.5 * (np.array(grid.dims) - 1)
-    return smallest_ball((indices - middle) * grid.spacing * grid.scale)
+    return np.asarray((indices - middle) * grid.spacing * grid.scale)
 
 
 def shown_values(tf: TransferFunction) -> list[tuple[np.float64, np.float64]]:

@@ -1,7 +1,8 @@
 """Transfer functions: what colour and opacity a scalar value has; and basic ones, which share a volume."""
 
+import math
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from numbers import Real
@@ -73,10 +74,21 @@ class TransferFunction:
                         "do not scale a transfer function that is in data values"
                     )
 
-        def scale(points: Iterable[tuple[float, ...]]) -> Any:
-            return tuple(((1 - t) * low + t * high, *rest) for t, *rest in points)
+        return self.with_values(lambda t: (1 - t) * low + t * high)
 
-        return TransferFunction(scale(self.opacity), scale(self.color))
+    def with_values(self, of: Callable[[float], float]) -> "TransferFunction":
+        """Return the function whose points are at other values, in the same order."""
+        points = {key: [[of(value), *rest] for value, *rest in each] for key, each in self.to_dict().items()}
+        return TransferFunction.from_dict(points)
+
+    def rounded(self, low: float, high: float) -> "TransferFunction":
+        """Return the function with numbers that are short to read and keep a millionth of a range of data."""
+        digits = 6 + math.ceil(math.log10(max(max(abs(low), abs(high)) / (high - low), 1)))
+        short = {
+            key: [[float(f"{x:.{digits}g}") for x in point] for point in points]
+            for key, points in self.to_dict().items()
+        }
+        return TransferFunction.from_dict(short)
 
     def without_steps(self, ramp: float | None = None) -> "TransferFunction":
         """Return the same function with strictly ascending points and opacity 0 at both ends.

@@ -157,13 +157,16 @@ export class TransferEditor {
     this.#parts.make = button("Make model", "Fit a model of this function: a first one in seconds", () => {
       if (this.#page.mayBegin() && this.#page.job.begin({ type: "fit", function: this.#name })) this.#making = this.#name;
     });
+    const keep = button("Keep in data set", "Write this function into the file of its data set, for texgs run", () => {
+      if (this.#page.mayBegin()) this.#page.job.begin({ type: "keep", function: this.#name });
+    });
     const presets = element("select", { "aria-label": "Colours of a preset", onchange: () => {
       this.#set(colored(this.#edited, this.#presets[presets.value]));
       presets.value = "";
     } }, new Option("Colours…", ""), ...Object.keys(this.#presets).map((name) => new Option(name, name)));
     this.#parts.tools.append(
       button("New", "Try one more function", () => this.#add(fresh(this.#picture.range, fromHex(FIRST)))),
-      button("Copy", "Try a copy of this function", () => this.#add(this.#edited)), this.#parts.back, this.#parts.make, presets);
+      button("Copy", "Try a copy of this function", () => this.#add(this.#edited)), this.#parts.back, this.#parts.make, keep, presets);
   }
 
   #read(value) {

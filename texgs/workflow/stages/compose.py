@@ -27,6 +27,7 @@ class Settings(OfVolume):
     opacity_unit: float = read("views.opacity_unit")
     image: int = read("dataset.image")
     fov_y: float = read("views.fov_y")  # degrees
+    framing: list[str] = read("dataset.framing")
     fit: FitLabel
 
 
@@ -48,8 +49,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         name.removeprefix(MODEL): SceneModel(path) for name, path in inputs.items() if name.startswith(MODEL)
     }
     volume = volume_of(settings, inputs["volume"]) if "volume" in inputs else None
-    framed = frame_of(open_grid(volume.file), volume.tfs.values()) if volume else None
-    scene = Scene(models, volume=volume, frame=framed)
+    framing = [tf for name, tf in volume.tfs.items() if name in settings.framing] if volume else []
+    scene = Scene(models, volume=volume, frame=frame_of(open_grid(volume.file), framing) if volume else None)
     write_scene(output / "scene.yaml", scene)
     composition = scene.open(torch_device(settings.fit.device))
     camera = orbit(AZIMUTH, POLAR, *scene.framed(composition).lens(settings.fov_y).square(settings.image))

@@ -39,10 +39,10 @@ TURNTABLE = 320  # pixels of its longer side
 
 def framed_tfs(config: Config) -> dict[str, BasicTF]:
     """Return where basic TFs show something, which frames views; none where their distance is given."""
-    shown = config.dataset.basic_tfs if config.views.radius is None else {}
+    dataset, names = config.dataset, config.dataset.framing if config.views.radius is None else []
     return {
-        name: BasicTF([shows(point) for point in tf.opacity], [[0.0, 1.0, 1.0, 1.0]])
-        for name, tf in shown.items()
+        name: BasicTF([*map(shows, dataset.basic_tfs[name].opacity)], [[0.0, 1.0, 1.0, 1.0]])
+        for name in names
     }
 
 
@@ -58,7 +58,7 @@ class Settings(OfTF):
 
     tf_values: str = read("dataset.tf_values")
     points: BasicTF = read(basic_tf)
-    framed: dict[str, BasicTF] = read(framed_tfs)  # what all views show together
+    framed: dict[str, BasicTF] = read(framed_tfs)  # what all views show, perhaps with parts of others
     views: ViewKeys = read(view_settings)
     vtk_frames: int = read("metric.vtk_frames")
 
@@ -72,7 +72,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     It reads `volume`, the volume.nrrd; volume.json is beside it.
     """
     from texgs.volume.caster import Caster
-    from texgs.volume.framing import frame_of
+    from texgs.volume.framing import frame_of, out_of_frame
     from texgs.volume.nrrd_file import open_grid
     from texgs.volume.render import Times, render_views
     from texgs.volume.view_set import write_transforms
@@ -83,8 +83,11 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     appearance = appearance_of(views)
     renderer = renderer_for(views.renderer, grid, appearance)
     times, coverages = Times(output / TIMES), []
-    framed = basic_tfs_of(inputs["volume"], settings.framed, settings.tf_values).values()
-    lens = views.lens(frame_of(grid, framed) if framed else None)
+    framed = basic_tfs_of(inputs["volume"], settings.framed, settings.tf_values)
+    frame = frame_of(grid, framed.values()) if framed else None
+    if frame and settings.tf not in framed and (far := out_of_frame(grid, tf, frame)):
+        print(f"basic TF {title} {far}", file=sys.stderr)
+    lens = views.lens(frame)
     shots = views_of(views, lens, output)
     for split, shot in shots.items():
         render_views(renderer, tf, shot, f"{title}: {split} views", times)

@@ -1,0 +1,212 @@
+"""A function of a scene goes into the file of its data set, where everything else stays as it is."""
+
+import difflib
+import json
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.config.kept import DATA_SET, TRIED, project
+from tests.viewer.pages import on_page
+from texgs.cli.main import main
+from texgs.config.compose import recompose
+from texgs.config.kept_function import keep
+from texgs.config.project import ROOT
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.edit.function_model import with_model
+from texgs.scene.scene_file import write_scene
+from texgs.workflow.checks import check_basic_tfs
+from texgs.workflow.stages.settings import basic_tfs_of
+
+IN_DATA = DATA_SET.replace("tf_values: fraction\n", "")
+FLOW = "basic_tfs: {TF01: {opacity: [[0.3, 0.0], [0.4, 0.1]], color: [[0.3, 0, 0, 1]]}}\n"
+INHERITED = "defaults: [jets, _self_]\nname: mine\n"
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def scene_file(here):
+    return write_scene(here / "scene.yaml", project(here))
+
+
+def file_of(folder):
+    return folder / "conf" / "dataset" / "mine.yaml"
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        *((DATA_SET, name) for name in ("TF03", "touching")),
+        (IN_DATA, "TF03"),
+        (DATA_SET.replace("\n", "\r\n"), "TF03"),
+        (DATA_SET[: DATA_SET.index("\n\n# How")], "TF03"),  # no break at the end
+        (DATA_SET.replace("# How edits look.\n", ""), "TF03"),
+        (DATA_SET + "framed_by: [TF01]\n", "TF03"),
+    ],
+)
+def test_one_function_is_added_and_nothing_else_changes(here, text, name):
+    scene = project(here, text)
+    before = yaml.safe_load(text)
+    said = keep(scene, name)
+    assert (
+        said == f"conf/dataset/mine.yaml: {name} is a basic transfer function; then: texgs run dataset=mine"
+    )
+    written = file_of(here).read_bytes().decode()
+    changes = difflib.ndiff(text.splitlines(), written.splitlines())
+    assert [line for line in changes if line[0] == "-"] == []
+    assert written.count("\r") == (written.count("\n") if "\r" in text else 0)
+    after = yaml.safe_load(written)
+    added = after["basic_tfs"].pop(name)
+    assert after == {"framed_by": ["TF01", "TF02"], **before}
+    width = 1.0 if "fraction" in text else 0.9674606
+    assert np.array(added["opacity"]) == pytest.approx(np.array(TRIED[name]) * (width, 1), abs=1e-6)
+    assert added["color"] == [[0, 0.2, 0.4, 0.6]]
+
+
+def test_comments_stay_with_what_they_are_about(here):
+    keep(project(here), "TF03")
+    lines = file_of(here).read_text().splitlines()
+    at = lines.index("    TF03:")
+    assert lines[at - 1] == "        # its colours are from elsewhere"
+    assert lines[at + 3 : at + 6] == ["framed_by: [TF01, TF02]", "", "# How edits look."]
+
+
+def test_the_workflow_has_the_function_as_the_scene_shows_it(here):
+    scene = project(here)
+    keep(scene, "TF03")
+    dataset = recompose(("dataset=mine",)).dataset
+    check_basic_tfs(dataset)
+    read = basic_tfs_of(scene.volume.file, dataset.basic_tfs, dataset.tf_values)["TF03"]
+    values = np.linspace(0, 1, 1001)
+    assert read(values) == pytest.approx(scene.functions["TF03"](values), abs=2e-5)
+    assert dataset.framing == ["TF01", "TF02"]
+
+
+def test_a_second_function_moves_no_views_either_and_may_be_a_model(here):
+    """A server that runs all day reads the file anew."""
+    scene = project(here)
+    keep(scene, "TF03")
+    with pytest.raises(ArgumentError, match=r"touching on .* overlaps TF03 on"):
+        keep(scene, "touching")
+    made = with_model(scene, "outer", scene.models["TF01"].file, scene.functions["outer"])
+    assert "outer" not in made.functions
+    said = keep(made, "outer")
+    dataset = recompose(("dataset=mine",)).dataset
+    assert list(dataset.basic_tfs) == ["TF01", "TF02", "TF03", "outer"]
+    assert dataset.framed_by == ["TF01", "TF02"]
+    assert "It reaches 0." in said
+    assert said.endswith("add it to dataset.framed_by.")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("none", DATA_SET, "functions: expected one of a volume (TF01, TF03, touching, outer, over, TF02, "),
+        ("no name", DATA_SET, "function: expected a letter and then letters, digits, _ or -, got 'no name'"),
+        ("TF02", DATA_SET, "conf/dataset/mine.yaml: basic_tfs: TF02 is there already; copy the function"),
+        (
+            "over",
+            DATA_SET,
+            "conf/dataset/mine.yaml: basic_tfs: a scene is composed of functions that do not ",
+        ),
+        (
+            "over",
+            DATA_SET,
+            "overlaps TF02 on (0.773968458, 0.967460573); cut one of them, or leave it to the",
+        ),
+        ("beyond", DATA_SET, "opacity[2]: expected a fraction of the data range in [0, 1], got 1.5"),
+        ("nowhere", IN_DATA, "expected some of the volume to be visible"),
+        ("TF03", "name: mine\n" + FLOW, "basic_tfs: expected a line for the name of each and lines below"),
+        (
+            "outer",
+            INHERITED,
+            "basic_tfs: expected a line for the name of each and lines below for its points",
+        ),
+        ("TF03", DATA_SET.replace("mine", "yours", 2), "mine"),
+        ("TF03", DATA_SET + "colour: 1\n", "colour: no such key"),
+        ("TF03", DATA_SET + "a: [\n", "conf/dataset/mine.yaml:25: expected the node content"),
+        ("TF03", DATA_SET + "framed_by: []\n", "framed_by"),
+        ("TF03", DATA_SET + "framed_by: [TF3]\n", "dataset.framed_by: expected some of TF01, TF02, got TF3"),
+    ],
+)
+def test_what_cannot_be_kept_is_told_and_nothing_is_written(here, name, text, message):
+    scene = project(here, text)
+    with pytest.raises(TexgsError) as error:
+        keep(scene, name)
+    assert message in str(error.value)
+    assert file_of(here).read_bytes() == text.encode()
+    assert [path.name for path in file_of(here).parent.iterdir()] == ["mine.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("facts", "message"),
+    [
+        (
+            {"dataset": "engine"},
+            "conf/dataset/engine.yaml: expected the data set of the scene in this project",
+        ),
+        ({"dataset": "engine"}, f"got that of texgs; copy {ROOT / 'conf' / 'dataset' / 'engine.yaml'}"),
+        ({"dataset": "yours"}, "got none; start in the folder of the project"),
+        ({"dataset": "../../x"}, "its name: expected a letter"),
+        ([], "its name: expected a letter"),
+        (None, "volume: expected one that texgs volume has made of a data set: "),
+    ],
+)
+def test_a_volume_of_another_data_set(here, facts, message):
+    scene = project(here)
+    metrics = scene.volume.file.with_name("metrics.json")
+    metrics.unlink() if facts is None else metrics.write_text(json.dumps(facts))
+    with pytest.raises(TexgsError) as error:
+        keep(scene, "TF03")
+    assert message in str(error.value)
+    assert file_of(here).read_text() == DATA_SET
+
+
+def test_a_file_that_is_read_only_stays(here, monkeypatch):
+    scene = project(here)
+    monkeypatch.setattr(os, "access", lambda path, mode: path.suffix != ".yaml")
+    with pytest.raises(TexgsError, match=r"mine\.yaml: expected a file that can be written, got a read-only"):
+        keep(scene, "TF03")
+    assert file_of(here).read_text() == DATA_SET
+
+
+def test_a_scene_without_a_volume(here):
+    with pytest.raises(ArgumentError, match=r"functions: expected one of a volume \(none\), got TF03"):
+        keep(replace(project(here), volume=None), "TF03")
+
+
+def test_the_command_line(here, scene_file, capsys):
+    assert main(["model", str(scene_file), "over", "--keep"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("texgs model: conf/dataset/mine.yaml: basic_tfs: a scene is composed of functions")
+    assert file_of(here).read_text() == DATA_SET
+    assert main(["model", str(scene_file), "TF03", "--keep"]) == 0
+    assert capsys.readouterr().out.endswith("then: texgs run dataset=mine\n")
+    assert "TF03" in yaml.safe_load(file_of(here).read_text())["basic_tfs"]
+    for words in ([], ["--keep", "--output", "new.yaml"]):
+        with pytest.raises(SystemExit, match="2"):
+            main(["model", str(scene_file), "outer", *words])
+
+
+@on_page
+async def test_the_viewer(browser, client, scene_file, here):
+    await browser.send(type="keep", function="over")
+    notice = await browser.next("notice")
+    assert notice["level"] == "error"
+    assert "over on (0.58047" in notice["text"]
+    while (await browser.next("job"))["done"] is not None:
+        pass
+    assert file_of(here).read_text() == DATA_SET
+    await browser.send(type="keep", function="TF03")
+    notice = await browser.next("notice")
+    assert (notice["level"], notice["text"][:28]) == ("info", "conf/dataset/mine.yaml: TF03")
+    assert client.server_side.edits.scene.functions.keys() == TRIED.keys()
+    assert "TF03" in yaml.safe_load(file_of(here).read_text())["basic_tfs"]

@@ -1,0 +1,79 @@
+"""A function of a scene, kept as a basic transfer function in the file of the data set of its volume."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from texgs.config.compose import recompose
+from texgs.config.dataset import BasicTF
+from texgs.config.dataset_text import require_read, with_basic_tf
+from texgs.config.project import ROOT, check_name, own_folder, shown
+from texgs.core.errors import ArgumentError, ConfigError, located
+from texgs.core.io import read_json, write_bytes
+from texgs.scene.scene import Scene
+from texgs.volume.framing import frame_of, out_of_frame
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.transfer import TransferFunction, overlapping, row_text
+
+
+def keep(scene: Scene, name: str) -> str:
+    """Write a function of a scene into the file of its data set, and return what that means, in sentences.
+
+    Views stay framed as they are, so that the workflow makes those of the function and refits nothing else.
+    """
+    volume = scene.volume
+    known = {} if volume is None else {**volume.tfs, **scene.functions}
+    if volume is None or name not in known:
+        raise ArgumentError(f"functions: expected one of a volume ({', '.join(known) or 'none'}), got {name}")
+    check_name("function", name)
+    file = file_of(volume.file)
+    dataset, text = recompose((f"dataset={file.stem}",)).dataset, file.read_bytes().decode()
+    low, high = map(read_json(volume.file.with_name("volume.json")).get, ("minimum", "maximum"))
+    with located(shown(file)):
+        if name in dataset.basic_tfs:
+            raise ArgumentError(f"basic_tfs: {name} is there already; copy the function, or edit the file")
+        tf = known[name].rounded(low, high)
+        if is_scaled := dataset.tf_values == "fraction":
+            tf = known[name].with_values(lambda value: (value - low) / (high - low)).rounded(0, 1)
+        basic_tfs = {**dataset.basic_tfs, name: BasicTF(**tf.to_dict())}
+        tfs = {key: TransferFunction.from_dict(vars(points)) for key, points in basic_tfs.items()}
+        tfs = {key: tf.scaled(low, high) for key, tf in tfs.items()} if is_scaled else tfs
+        require_composable(tfs)
+        framing, grid = dataset.framing, open_grid(volume.file)
+        far = out_of_frame(grid, tfs[name], frame_of(grid, [tfs[key] for key in framing]))
+        text = with_basic_tf(text, name, basic_tfs[name], [] if dataset.framed_by else framing)
+        require_read(text, replace(dataset, basic_tfs=basic_tfs, framed_by=framing))
+    write_bytes(file, text.encode())
+    done = f"{shown(file)}: {name} is a basic transfer function; then: texgs run dataset={dataset.name}"
+    return f"{done}. It {far}." if far else done
+
+
+def file_of(volume: Path) -> Path:
+    """Return the file of the data set of a prepared volume: one of this project, that can be written."""
+    with located("volume: expected one that texgs volume has made of a data set"):
+        facts = read_json(volume.with_name("metrics.json"))
+        check_name("its name", name := str(facts.get("dataset") if isinstance(facts, dict) else facts))
+    file, shipped = (folder / "dataset" / f"{name}.yaml" for folder in (own_folder(), ROOT / "conf"))
+    if not file.is_file():
+        got = (
+            f"that of texgs; copy {shipped}"
+            if shipped.is_file()
+            else "none; start in the folder of the project"
+        )
+        raise ConfigError(f"{shown(file)}: expected the data set of the scene in this project, got {got}")
+    if not (os.access(file, os.W_OK) and os.access(file.parent, os.W_OK)):
+        raise ConfigError(
+            f"{shown(file)}: expected a file that can be written, got a read-only one; allow it"
+        )
+    return file
+
+
+def require_composable(tfs: Mapping[str, TransferFunction]) -> None:
+    """Require that no two functions of a data set show the same values: their models make one scene."""
+    if pair := overlapping(tfs):
+        one, two = (f"{name} on {row_text(tfs[name].support)}" for name in pair)
+        raise ArgumentError(
+            f"basic_tfs: a scene is composed of functions that do not overlap, but {two} overlaps {one}; cut "
+            "one of them, or leave it to the scene that tries it, where models may overlap"
+        )
