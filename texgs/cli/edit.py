@@ -63,7 +63,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run_model(arguments: argparse.Namespace) -> int:
-    """Fit a model of a transfer function that a scene tries, in seconds, and put it into the scene."""
+    """Fit a model of a function that a scene tries, in seconds, into the scene; or keep it in a data set."""
     from texgs.config.kept_function import keep
     from texgs.core.check import torch_device
     from texgs.core.errors import located
