@@ -19,6 +19,7 @@ expect = pytest.importorskip("playwright.sync_api", reason="needs Playwright").e
 PLACE = {"azimuth": 40, "polar": 10, "distance": 3.5, "fov_y": 35}
 LINK = "#" + "&".join(f"{key}={value}" for key, value in PLACE.items()) + "&target=0,0,0"
 WAIT = 60_000  # milliseconds, on a busy machine
+HIDE = "marks => { marks.style.visibility = 'hidden'; }"  # what lies over the picture
 JPEG = 1.5  # levels of 255: what quality 95 costs on average
 
 
@@ -77,6 +78,7 @@ def pixels(png):
 def shown(page):
     """Pixels of the picture on the screen, without what lies over its last rows."""
     page.wait_for_timeout(500)
+    page.locator("#marks").evaluate(HIDE)
     return pixels(page.locator("#picture").screenshot())[:-50]
 
 

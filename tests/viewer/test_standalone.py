@@ -14,6 +14,7 @@ from PIL import Image
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
 from tests.viewer.drawing import rendered
+from tests.viewer.in_browser import HIDE
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.cuts import NO_CUTS, Box, Cuts, Plane
@@ -81,6 +82,7 @@ def settle(page):
 
 def shown(page):
     """What the canvas shows [H, W, 3]."""
+    page.locator("#marks").evaluate(HIDE)
     picture = page.locator("#picture").screenshot(type="png")
     return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"))
 

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import asdict, fields
 from typing import Any, get_args
 
+import numpy as np
+
+from texgs.core.errors import TexgsError
 from texgs.core.lens import Frame, Lens
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import NEEDS, PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.raster.shading import MATERIAL
+from texgs.scene.bounds import STRAYS, models_of, span_of
 from texgs.scene.frame import Mode
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import plain_functions
+from texgs.volume.nrrd_file import open_grid
 
 LENS = Lens()
 HOME = {"azimuth": 30.0, "polar": 20.0}  # degrees, as `texgs render` has them
@@ -43,8 +49,27 @@ def presets() -> dict[str, list[list[float]]]:
     return {name: [[x, *colormaps[key](x)[:3]] for x in shares] for name, key in PRESETS.items()}
 
 
-def describe(name: str, scene: Scene, composed: Composed, framed: Frame | None = None) -> dict[str, Any]:
-    """Return a scene as a page needs it; `framed`, which its first view shows, may take a while to find."""
+def bounds(scene: Scene, composed: Composed) -> dict[str, Any]:
+    """Return the ball that the first view shows, the corners of a box, and its world units per physical unit.
+
+    The box is that of the scene's volume, else that of the models: these have no physical units.
+    """
+    framed = scene.framed(composed)
+    ball = {"center": list(framed.target), "radius": framed.radius}
+    with suppress(TexgsError):  # who looks at the volume is told
+        if scene.volume is not None:
+            grid = open_grid(scene.volume.file)
+            return {**ball, "low": grid.aabb[0], "high": grid.aabb[1], "scale": grid.scale}
+    low, high = zip(
+        *(span_of(models_of(composed), framed, axis, STRAYS) for axis in np.eye(3).tolist()), strict=True
+    )
+    return {**ball, "low": low, "high": high, "scale": None}
+
+
+def describe(
+    name: str, scene: Scene, composed: Composed, known: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return a scene as a page needs it; its `bounds` may take a while to find."""
     kind = kind_of(next(iter(scene.models.values())).file)
     segments = ["segments"] if "segments" in kind.can else []
     keys = [each.name for each in fields(PartEdit) if NEEDS.get(each.name, "relight") in kind.can]
@@ -55,8 +80,9 @@ def describe(name: str, scene: Scene, composed: Composed, framed: Frame | None =
         # Only what has a palette has a texture, which can get a new look.
         can = [*keys, "look"] if is_textured else [key for key in keys if key != "palette"]
         models.append(describe_model(model, entry, kind.name, palette, [*can, *segments]))
-    framed = framed or scene.framed(composed)
-    light, target, distance = scene.light, list(framed.target), framed.lens(LENS.fov_y).radius
+    known = known or bounds(scene, composed)
+    light, target = scene.light, known["center"]
+    distance = Frame(target, known["radius"]).lens(LENS.fov_y).radius
     return {
         "name": name,
         "background": list(scene.background),
@@ -66,8 +92,7 @@ def describe(name: str, scene: Scene, composed: Composed, framed: Frame | None =
         "functions": plain_functions(scene.functions),
         "tfs": plain_functions(scene.volume.tfs) if scene.volume else {},
         "modes": [mode for mode in get_args(Mode) if MODES.get(mode, "") in ("", *kind.can)],
-        "bounds": {"center": target, "radius": framed.radius},
-        "up": [0.0, 1.0, 0.0],
+        "bounds": known,
         "fov_y": LENS.fov_y,
         "views": [{"name": "home", "target": target, "distance": distance, **HOME}],
     }

@@ -67,11 +67,8 @@ def way_of(asked: Export) -> list[Orbit]:
     start, count = asked.view.camera, max(1, round(asked.seconds * asked.fps))
     if len(asked.stops) < 2:
         return [replace(start, azimuth=start.azimuth + 360 * index / count) for index in range(count)]
-    azimuths = np.unwrap([each.azimuth for each in asked.stops], period=360)
-    stops = [
-        [azimuth, each.polar, log(each.distance), each.fov_y, *each.target]
-        for azimuth, each in zip(azimuths, asked.stops, strict=True)
-    ]
+    stops = np.array([[s.azimuth, s.polar, log(s.distance), s.fov_y, *s.target] for s in asked.stops])
+    stops[:, 0] = np.unwrap(stops[:, 0], period=360)
     way = PchipInterpolator(range(len(stops)), stops)  # it stays between two stops: no pole is passed
     places = way(np.linspace(0, len(stops) - 1, count)).round(9).tolist()
     return [

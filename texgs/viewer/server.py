@@ -19,7 +19,7 @@ from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer import messages
 from texgs.viewer.beside import Beside
-from texgs.viewer.description import describe, presets
+from texgs.viewer.description import bounds, describe, presets
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import add_headers, guard
@@ -45,7 +45,7 @@ class Server:
     def __init__(self, opened: Opened, device: torch.device | str = "cpu") -> None:
         session = Session(opened.scene, device)
         self._title, composed = title_of(opened.source), session.composition
-        self._framed, self._device = opened.scene.framed(composed), device
+        self._bounds, self._device = bounds(opened.scene, composed), device
         self._opened = self._latest = (files_of_models(opened.scene), composed)  # models as they were fitted
         kind = kind_of(next(iter(opened.scene.models.values())).file)
         self._choices = {
@@ -240,7 +240,7 @@ class Server:
         if files not in (self._opened[0], self._latest[0]):
             self._latest = (files, scene.as_fitted.open(self._device))
         composed = self._opened[1] if files == self._opened[0] else self._latest[1]
-        return describe(self._title, scene, composed, self._framed)
+        return describe(self._title, scene, composed, self._bounds)
 
     async def _say_goodbye(self, app: web.Application) -> None:
         """Close all connections."""

@@ -3,6 +3,7 @@
 
 import { cross, dot } from "./camera.js";
 import { gesture } from "./inputs.js";
+import { addShape, path } from "./svg.js";
 
 const LENGTH = 0.5; // of a plane's arrow, in radii of the scene
 const SIDE_LENGTH = 0.15; // of that of a side of the box
@@ -10,8 +11,6 @@ const SHORT = 0.25; // of its length in the picture: below this it is seen from 
 const TURN = 5; // degrees a key
 const CORNERS = 48; // of the rim
 const HEAD = [[8, 0], [-8, 7], [-8, -7]]; // pixels along and across
-const SPACE = "http://www.w3.org/2000/svg";
-const path = (points) => `M${points.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join("L")}`;
 
 export class PlaneHandles {
   #cuts; #page; #svg;
@@ -61,15 +60,10 @@ export class PlaneHandles {
   }
 
   #make(index) {
-    const add = (parent, tag, values) => {
-      const made = parent.appendChild(document.createElementNS(SPACE, tag));
-      for (const [name, value] of Object.entries(values)) made.setAttribute(name, value);
-      return made;
-    };
     const label = this.#cuts.name(index);
-    const group = add(this.#svg, "g", { class: "plane", tabindex: 0, role: "slider", "aria-label": label });
+    const group = addShape(this.#svg, "g", { class: "plane", tabindex: 0, role: "slider", "aria-label": label });
     const [rim, reach, under, line, tip] = ["rim", "reach", "under", "line", "tip"].map(
-      (name) => add(group, "path", { class: name }));
+      (name) => addShape(group, "path", { class: name }));
     const place = (plane) => {
       const { from, isSeen } = this.#pixels(plane), { radius } = this.#page.state.scene.bounds;
       const at = this.#cuts.middle(plane), reaches = (plane.corners ? SIDE_LENGTH : LENGTH) * radius;

@@ -1,10 +1,12 @@
 // What all pages of a scene share: a camera, the state, a renderer, and the inputs that choose what is shown.
 
 import { Bookmarks } from "./bookmarks.js";
+import { BoundingBox } from "./bounding_box.js";
 import { AXES, OrbitCamera } from "./camera.js";
 import { centerByDoubleClick } from "./center.js";
 import { control } from "./controls.js";
 import { Cuts } from "./cuts.js";
+import { Gizmo } from "./gizmo.js";
 import { capital, element } from "./inputs.js";
 import { LightControl } from "./light.js";
 import { editsOf } from "./link.js";
@@ -44,6 +46,7 @@ export class ScenePage {
   #resting = 0; // timer
   #shown = { mode: "shaded", before: false, only: "", gain: 4, wipe: 0.5 };
   #isLocked;
+  #marks; // what lies over the picture
 
   /**
    * @param {State} state - of the scene
@@ -60,6 +63,7 @@ export class ScenePage {
     this.notices = notices;
     this.#isLocked = isLocked;
     this.cuts = new Cuts(this);
+    this.#marks = [this.cuts, new BoundingBox(this), new Gizmo(this)];
     this.bookmarks = new Bookmarks(this);
     this.#inputs();
     control(this.canvas, () => this.camera, () => this.moved(), (name) => this.goTo(name), isLocked);
@@ -92,7 +96,7 @@ export class ScenePage {
   /** Draw a frame; while something moves, a fast one now and a whole one at rest. */
   draw(moving = false) {
     this.renderer.draw(this.camera, this.state.scene, { moving, ...this.#shown });
-    this.cuts.draw();
+    for (const each of this.#marks) each.draw();
     clearTimeout(this.#resting);
     this.#resting = setTimeout(() => this.#rest(moving), Math.max(REST, 2 * (this.renderer.took ?? 0)));
   }

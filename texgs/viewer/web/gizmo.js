@@ -1,0 +1,44 @@
+// The axes of the world in a corner of the picture; a click on an end looks along it.
+
+import { AXES, direction, dot } from "./camera.js";
+import { addShape } from "./svg.js";
+
+const REACH = 32, MARGIN = 50; // CSS pixels from the middle to an end, and to the sides of the picture
+const RADIUS = { "+": 9, "−": 6 }; // of ends
+const COLORS = { x: "#c62828", y: "#2e7d32", z: "#1565c0" };
+
+export class Gizmo {
+  #page; #root; #ends;
+
+  /** @param {ScenePage} page - keys and a list do the same as this, so it is hidden from readers of screens */
+  constructor(page) {
+    this.#page = page;
+    this.#root = addShape(document.getElementById("marks"), "g", { class: "gizmo" });
+    this.#ends = Object.entries(AXES).map(([name, angles]) => this.#make(name, direction(...angles)));
+  }
+
+  /** Draw the axes as the camera sees them, the farthest end first. */
+  draw() {
+    const { camera, canvas } = this.#page, { right, down, forward } = camera.axes();
+    this.#root.setAttribute("transform", `translate(${canvas.clientWidth - MARGIN} ${MARGIN})`);
+    this.#ends.sort((one, other) => dot(forward, other.axis) - dot(forward, one.axis));
+    for (const { axis, group, line, end } of this.#ends) {
+      const x = REACH * dot(right, axis), y = REACH * dot(down, axis);
+      this.#root.append(group);
+      line.setAttribute("x2", x);
+      line.setAttribute("y2", y);
+      end.setAttribute("transform", `translate(${x} ${y})`);
+    }
+  }
+
+  #make(name, axis) {
+    const [sign, letter] = name, color = COLORS[letter];
+    const group = addShape(this.#root, "g", { class: sign === "+" ? "ahead" : "behind", stroke: color, fill: color });
+    const line = addShape(group, "line"), end = addShape(group, "g", { class: "end" });
+    addShape(end, "title").textContent = `From ${name}`;
+    addShape(end, "circle", { r: RADIUS[sign] });
+    if (sign === "+") addShape(end, "text", { y: 4 }).textContent = letter;
+    end.addEventListener("click", () => this.#page.goTo(name));
+    return { axis, group, line, end };
+  }
+}
