@@ -1,7 +1,9 @@
 """What lies over the picture: axes that lead to views, and a box around the scene or its volume."""
 
+import math
 import re
 from contextlib import contextmanager
+from urllib.parse import unquote
 
 import pytest
 import torch
@@ -67,6 +69,39 @@ def test_a_box_is_where_the_camera_sees_the_corners_of_the_volume(
     distances = torch.cdist(camera.project(corners)[0], numbers)
     assert float(distances.amin(dim=1).max()) < 0.2
     assert (distances < 0.2).sum(dim=1).tolist() == [3] * 8
+
+
+@PAGES
+def test_the_bar_is_as_long_as_it_says_in_the_units_of_the_volume(
+    chromium, scene_file, opened_page, tmp_path
+):
+    volume = sphere_volume(tmp_path, TF01=LOW, TF02=HIGH)
+    scene = read_scene(scene_file)
+    named = write_scene(tmp_path / "named.yaml", type(scene)(scene.models, volume=volume))
+    for file, name, scale in ((named, "volume", open_grid(volume.file).scale), (scene_file, "world", 1.0)):
+        with opened_page(chromium, file) as page:
+            length, *words = page.locator(".scale text").text_content().split()
+            ends = re.findall(r"[\d.]+", page.locator(".scale path").get_attribute("d"))
+            height = page.locator("#picture").bounding_box()["height"]
+        assert words == [name, "units"]
+        unit = height / 2 / PLACE["distance"] / math.tan(math.radians(PLACE["fov_y"] / 2)) * scale
+        assert float(ends[4]) - float(ends[0]) == pytest.approx(float(length) * unit, abs=0.2)
+        assert 50 < float(length) * unit <= 140
+
+
+@PAGES
+def test_a_link_is_copied_that_has_the_edits(chromium, scene_file, opened_page):
+    with opened_page(chromium, scene_file) as page:
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        page.get_by_role("checkbox", name="TF01").uncheck()
+        page.get_by_role("button", name="Copy link").click()
+        expect(page.get_by_text("Copied a link to this view")).to_be_visible()
+        link = page.evaluate("navigator.clipboard.readText()")
+        assert link.startswith(page.url.split("#")[0] + "#azimuth=40&polar=10&")
+        assert '"part":"TF01","key":"visible","value":false' in unquote(link)
+        page.evaluate("() => { navigator.clipboard.writeText = () => Promise.reject(new Error()); }")
+        page.get_by_role("button", name="Copy link").click()
+        expect(page.get_by_text("take the link from the address bar")).to_be_visible()
 
 
 def test_without_a_volume_the_box_holds_the_models(scene_file):

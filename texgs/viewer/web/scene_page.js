@@ -5,11 +5,13 @@ import { BoundingBox } from "./bounding_box.js";
 import { AXES, OrbitCamera } from "./camera.js";
 import { centerByDoubleClick } from "./center.js";
 import { control } from "./controls.js";
+import { copyLinkBy } from "./copy_link.js";
 import { Cuts } from "./cuts.js";
 import { Gizmo } from "./gizmo.js";
 import { capital, element } from "./inputs.js";
 import { LightControl } from "./light.js";
 import { editsOf } from "./link.js";
+import { ScaleBar } from "./scale_bar.js";
 import { difference, edited } from "./state.js";
 
 const REST = 100; // milliseconds after the last movement until a whole frame is drawn
@@ -63,10 +65,11 @@ export class ScenePage {
     this.notices = notices;
     this.#isLocked = isLocked;
     this.cuts = new Cuts(this);
-    this.#marks = [this.cuts, new BoundingBox(this), new Gizmo(this)];
+    this.#marks = [this.cuts, new BoundingBox(this), new Gizmo(this), new ScaleBar(this)];
     this.bookmarks = new Bookmarks(this);
     this.#inputs();
     control(this.canvas, () => this.camera, () => this.moved(), (name) => this.goTo(name), isLocked);
+    copyLinkBy(get("link"), this);
     centerByDoubleClick(this, isLocked);
     state.addEventListener("edit", () => { // who edits wants to see it
       if (this.#shown.before) this.show({ before: false });
@@ -152,6 +155,11 @@ export class ScenePage {
   /** Make edits that a link has and the scene has not. */
   makeEdits(edits) {
     for (const { part, key, value } of edits) this.state.edit(part, key, value);
+  }
+
+  /** The address that leads back to what is shown. */
+  get link() {
+    return `${location.href.split("#")[0]}#${this.#fragment}`;
   }
 
   /** Camera, mode, bookmarks and edits as the link has them. */
