@@ -115,7 +115,7 @@ def test_a_transparent_picture_over_the_background_is_the_picture(scene, tmp_pat
         assert np.abs(alpha * clear[..., :3] + (1 - alpha) * behind - whole).max() < 2 / 255
     capsys.readouterr()
     message = refused(capsys, "render", edited, "--transparent", "--caption")
-    assert "leave --compare and --caption out" in message
+    assert "expected PNG without --compare and --caption" in message
 
 
 @pytest.mark.parametrize("axis", ["x", "-y", "0.3,0.8,-0.5"])
@@ -180,7 +180,7 @@ def test_a_mistake_in_an_edit_writes_nothing(request, capsys, of, word, message)
     [
         (["--frames", "0"], "--frames: expected at least 1, got 0"),
         (["--seconds", "0.01"], "--frames: expected at least 1, got 0.25"),
-        (["--transparent"], "x.mp4; films have no alpha"),
+        (["--transparent"], "--transparent: expected PNG without --compare and --caption, got "),
         (["--radius", "0"], "radius: expected more than 0, got 0"),
         (["--fov", "0"], "fov_y: expected degrees between 0 and 180, got 0"),
         (["--height", "-4"], "height: expected at least 1 pixel, got -4"),

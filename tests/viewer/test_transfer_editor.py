@@ -108,7 +108,7 @@ def test_points_and_functions_are_added_and_removed(chromium, sphere_file):
         expect(page.get_by_role("slider", name=re.compile("^Colour"))).to_have_count(9)
         page.get_by_role("slider", name="Colour 2 of high").focus()
         page.get_by_label("Colour of the point").fill("#ff0000")
-        page.get_by_role("button", name="Copy").click()
+        page.get_by_role("button", name="Copy", exact=True).click()
         page.get_by_role("button", name="New", exact=True).click()
         save_as(page, "more.yaml")
         functions = read_scene(sphere_file.parent / "more.yaml").functions

@@ -145,10 +145,9 @@ def pair_of(
 def output_of(arguments: argparse.Namespace, count: int) -> Path:
     """Return where to write so many frames."""
     output = arguments.output or Path(f"{arguments.scene.stem}{'.png' if count == 1 else '.mp4'}")
-    if arguments.transparent and output.suffix not in ("", ".png"):
-        raise ArgumentError(f"--transparent: expected .png or a folder, got {output}; films have no alpha")
-    if arguments.transparent and (arguments.compare or arguments.caption):
-        raise ArgumentError("--transparent: expected the scene alone; leave --compare and --caption out")
+    is_alone = not arguments.compare and not arguments.caption
+    if arguments.transparent and not (is_alone and output.suffix in ("", ".png")):
+        raise ArgumentError(f"--transparent: expected PNG without --compare and --caption, got {output}")
     return output
 
 
