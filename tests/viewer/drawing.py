@@ -20,13 +20,13 @@ from texgs.viewer.standalone import joined_modules
 START = """
 const { WebglRenderer } = modules["webgl.js"];
 Object.assign(globalThis, modules["sort.js"], modules["tensors.js"]);
-globalThis.start = async (packed, scene) => {
+globalThis.start = async (packed, scene, volume) => {
   const canvas = document.body.appendChild(document.createElement("canvas"));
   globalThis.renderer = new WebglRenderer(canvas, (text) => console.log(text));
-  await renderer.open(packed, scene);
+  await renderer.open(packed, scene, volume);
 };
-globalThis.shoot = (camera, scene, mode) => {
-  const pixels = renderer.pixels(camera, scene, mode);
+globalThis.shoot = (camera, scene, shown) => {
+  const pixels = renderer.pixels(camera, scene, shown);
   let text = "";
   for (let i = 0; i < pixels.length; i += 4096) text += String.fromCharCode(...pixels.subarray(i, i + 4096));
   return btoa(text);
@@ -34,19 +34,19 @@ globalThis.shoot = (camera, scene, mode) => {
 """
 
 
-def open_renderer(page, packed, description):
-    """Give a blank page the renderer with a scene."""
+def open_renderer(page, packed, description, volume=""):
+    """Give a blank page the renderer with a scene, and its volume."""
     page.set_content(f"<!doctype html><body><script type=module>{joined_modules('webgl.js')}{START}</script>")
     page.wait_for_function("globalThis.start !== undefined")
-    page.evaluate("([packed, scene]) => start(packed, scene)", [packed, description])
+    page.evaluate("(words) => start(...words)", [packed, description, volume])
 
 
-def drawn(page, camera, description, mode="shaded"):
+def drawn(page, camera, description, mode="shaded", **shown):
     """What the renderer draws [H, W, 3], uint8."""
     fov_y = 2 * np.degrees(np.arctan(0.5 * camera.height / float(camera.K[1, 1])))
     size = {"width": camera.width, "height": camera.height}
     seen = {"viewmat": camera.viewmat[:3].tolist(), "fov_y": fov_y, **size}
-    text = page.evaluate("([camera, scene, mode]) => shoot(camera, scene, mode)", [seen, description, mode])
+    text = page.evaluate("(words) => shoot(...words)", [seen, description, {"mode": mode, **shown}])
     return np.frombuffer(b64decode(text), np.uint8).reshape(camera.height, camera.width, 4)[..., :3]
 
 

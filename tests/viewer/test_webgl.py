@@ -222,7 +222,7 @@ def test_half_precision_is_used_where_floats_cannot_be_blended(chromium, packed,
     page = chromium.new_page()
     page.evaluate(WITHOUT_FLOAT_BLEND)
     open_renderer(page, packed, description)
-    assert page.evaluate("renderer._pass._format === WebGL2RenderingContext.RGBA16F")
+    assert page.evaluate("renderer._pass.target.format[0] === WebGL2RenderingContext.RGBA16F")
     for camera in CAMERAS:
         assert difference(page, packed, description, scene, camera, light=SIDE) <= LEVELS
     faint = [PartEdit(opacity=0.1)] * 5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 from texgs.cli.options import add_device, option
 from texgs.core.errors import ArgumentError
 from texgs.core.names import SCENES
+from texgs.viewer import PAGE_VOLUME
 
 if TYPE_CHECKING:
     from texgs.scene.scene import Scene, SceneModel
@@ -36,6 +38,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="one model of a scene, with the textures that it has there; other edits of it only in html",
     )
+    parser.add_argument(
+        "--volume",
+        type=float,
+        nargs="?",
+        const=PAGE_VOLUME,
+        metavar="MB",
+        help=f"html: with the volume of the scene in so many MB ({PAGE_VOLUME:g}), to show any transfer "
+        "function, the volume beside the scene, and faces of cuts",
+    )
     option(parser, "--opacity", 0.5, "points: leave out surfels with less opacity")
     option(parser, "--voxel", 1 / 256, "edge of a cell of a mesh, world units")
     option(parser, "--views", 92, "number of views that a mesh is made from")
@@ -53,6 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.scene.scene_file import read_scene
 
     kind = kind_of(arguments)
+    if arguments.volume is not None and kind != "html":
+        raise ArgumentError(f"--volume: expected --to a page, .html, got {arguments.to}; leave it out")
     scene = read_scene(arguments.source) if arguments.source.suffix in SCENES else None
     if kind == "html":
         print(of_page(arguments, scene))
@@ -101,6 +114,7 @@ def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
     from texgs.report.check import checked
     from texgs.scene.export import require_export
     from texgs.scene.scene import Scene, SceneModel
+    from texgs.viewer.page_volume import page_volume
     from texgs.viewer.standalone import write_page
 
     source: Path = arguments.source
@@ -110,4 +124,8 @@ def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
         scene = replace(scene, models={arguments.model: chosen(scene, arguments.model)})
     for entry in scene.models.values():
         require_export(files.kind_of(entry.file), "html")
-    return write_page(arguments.to, scene, arguments.to.stem, checked(source, scene)).path
+    volume = None
+    if arguments.volume is not None:
+        volume = page_volume(scene, arguments.volume)
+        print(f"Volume in the page: {volume}", file=sys.stderr)
+    return write_page(arguments.to, scene, arguments.to.stem, checked(source, scene), volume).path

@@ -13,16 +13,17 @@ from texgs.core.errors import ArgumentError
 from texgs.core.movie import write_frames
 from texgs.core.progress import progress
 from texgs.fields.files import kind_of
-from texgs.fields.kinds import Kind
 from texgs.scene import export
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames
 from texgs.viewer.messages import Export, Orbit
+from texgs.viewer.page_volume import page_volume
 from texgs.viewer.scratch import scratch_folder
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.standalone import write_page
 
 FILMS = ("mp4", "gif")
+PAGES = ("html", "volume")  # the second has the volume of its scene
 
 
 class Downloads:
@@ -35,14 +36,15 @@ class Downloads:
     def write(self, scene: Scene, asked: Export, name: str) -> Path:
         """Return the file of a scene as it is shown; the name is without its ending."""
         require_kind(scene, asked.kind)
-        ending = asked.kind if asked.kind in (*FILMS, "html") else "ply"
+        ending = asked.kind if asked.kind in FILMS else "html" if asked.kind in PAGES else "ply"
         stem = f"{name}-{asked.kind}" if ending == "ply" else name  # there are several kinds of these
         path = Path(self._folder.name, f"{stem}.{ending}")
         if asked.kind in FILMS:
             words = self._edits.checked(scene)
             return write_frames(path, self._film(scene, asked), asked.fps, comment=words)
-        if asked.kind == "html":
-            return write_page(path, scene, name, self._edits.checked(scene)).path
+        if ending == "html":
+            volume = page_volume(scene) if asked.kind == "volume" else None
+            return write_page(path, scene, name, self._edits.checked(scene), volume).path
         return export.export_scene(path, scene, export.Export(asked.kind))
 
     def file(self, name: str) -> Path | None:
@@ -77,13 +79,15 @@ def way_of(asked: Export) -> list[Orbit]:
     ]
 
 
-def exports_of(kind: Kind) -> list[str]:
-    """Return what scenes of a kind of field can be written as."""
-    return [*FILMS, *(name for name in kind.exports if name not in export.OF_MODELS)]
+def exports_of(scene: Scene) -> list[str]:
+    """Return what a scene can be written as."""
+    kind = kind_of(next(iter(scene.models.values())).file)
+    able = [*FILMS, *(each for each in kind.exports if each not in export.OF_MODELS)]
+    return [*able, "volume"] if "html" in able and scene.volume is not None else able
 
 
 def require_kind(scene: Scene, kind: str) -> None:
     """Require that a scene can be written as something."""
-    able = exports_of(kind_of(next(iter(scene.models.values())).file))
+    able = exports_of(scene)
     if kind not in able:
         raise ArgumentError(f"export: expected one of {', '.join(able)}, got {kind!r:.100}")

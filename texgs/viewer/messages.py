@@ -175,7 +175,7 @@ class Keep:
 class Export:
     """Write a file for the page to save."""
 
-    kind: str  # mp4 or gif, a film; html; or as `texgs.scene.export.Export` has it
+    kind: str  # of `exports_of`
     view: View  # that a turntable begins with
     stops: Annotated[tuple[Orbit, ...], Field(max_length=20)] = ()  # of a film; of fewer than 2, a turntable
     seconds: Annotated[float, Field(ge=0.1, le=600)] = 2.88  # of a film

@@ -13,7 +13,6 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.edit.pictures import PICTURES
-from texgs.fields.files import kind_of
 from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
@@ -47,11 +46,10 @@ class Server:
         self._title, composed = title_of(opened.source), session.composition
         self._bounds, self._device = bounds(opened.scene, composed), device
         self._opened = self._latest = (files_of_models(opened.scene), composed)  # models as they were fitted
-        kind = kind_of(next(iter(opened.scene.models.values())).file)
         self._choices = {
             "styles": list(PICTURES),
             "words": list(WORDS),
-            "exports": exports_of(kind),
+            "exports": exports_of(opened.scene),
             "presets": presets(),
         }
         self.edits = SharedEdits(session, opened)

@@ -25,7 +25,10 @@ from texgs.fields.surfels.compact import STEP, compact_tensors
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
-from texgs.viewer.description import describe
+from texgs.scene.twin import Twin, twin_of
+from texgs.viewer.description import describe, presets
+from texgs.viewer.origins import Origins
+from texgs.viewer.page_volume import PageVolume
 
 LARGEST = 256 * 2**20  # bytes; browsers hold a text of twice as many
 MOST_STEPS = 2**15 - 1  # of a texel, on a graphics card
@@ -42,13 +45,22 @@ class WrittenPage:
     path: Path
     surfels: int
     poster: bytes  # a JPEG of the first view
+    volume: PageVolume | None
 
 
-def write_page(path: Path, scene: Scene, name: str, checked: str = "") -> WrittenPage:
+def write_page(
+    path: Path, scene: Scene, name: str, checked: str = "", volume: PageVolume | None = None
+) -> WrittenPage:
     """Create or replace the page of a scene of surfels in one step; the same scene gives the same bytes.
 
     The surfels are rounded as in compact model files. Hidden models are in the page: they can be shown there.
-    The name of the scene is the title; what `texgs check` has found stands in the metadata, and below.
+
+    Args:
+        path: of the page.
+        scene: to show.
+        name: of the scene, the title.
+        checked: what `texgs check` has found; it stands in the metadata, and below.
+        volume: of the scene, which the page then shows with any transfer function, and behind cuts.
     """
     composed = scene.open()
     if not isinstance(composed, Composition):
@@ -60,12 +72,18 @@ def write_page(path: Path, scene: Scene, name: str, checked: str = "") -> Writte
             f"{len(composed)} of them; export fewer models"
         )
     description = describe(name, scene, composed)
-    picture = poster(scene, composed, description["views"][0], description["fov_y"])
-    write_bytes(path, page_of(description, surfels, picture, checked).encode())
-    return WrittenPage(path, len(composed), picture)
+    if volume is not None:
+        description |= {"volume": volume.describe(scene), "presets": presets()}
+        description["transfer"] = Origins(scene).transfer
+    twin = twin_of(scene) if volume is not None else None
+    picture = poster(scene, composed, description["views"][0], description["fov_y"], twin)
+    write_bytes(path, page_of(description, surfels, picture, checked, volume).encode())
+    return WrittenPage(path, len(composed), picture, volume)
 
 
-def page_of(description: dict[str, Any], surfels: str, picture: bytes, checked: str) -> str:
+def page_of(
+    description: dict[str, Any], surfels: str, picture: bytes, checked: str, volume: PageVolume | None = None
+) -> str:
     """Return the page of a description, see `describe`, packed surfels, and a JPEG that is shown first.
 
     Nothing but its own script and style may run in it, and it may load nothing: names of a scene are text.
@@ -88,16 +106,20 @@ def page_of(description: dict[str, Any], surfels: str, picture: bytes, checked: 
             style=Markup(style),
             scene=Markup(json.dumps(description).replace("<", r"\u003c")),
             surfels=Markup(surfels),
+            volume=Markup(b64encode(volume.packed).decode()) if volume else "",
+            volume_words=f"The page has the volume in {volume}." if volume else "",
             poster=b64encode(picture).decode(),
         )
     )
 
 
-def poster(scene: Scene, composed: Composition, view: dict[str, Any], fov_y: float) -> bytes:
-    """Return a view of a scene, see `describe`, as JPEG."""
+def poster(
+    scene: Scene, composed: Composition, view: dict[str, Any], fov_y: float, twin: Twin | None
+) -> bytes:
+    """Return a view of a scene, see `describe`, as JPEG; cuts have faces where there is a twin."""
     place = (view["azimuth"], view["polar"], view["distance"], fov_y, POSTER, POSTER)
     camera = orbit(*place, target=view["target"])
-    shown = frame(composed, camera, scene)  # without faces, as the page
+    shown = frame(composed, camera, scene, twin=twin)
     file = BytesIO()
     Image.fromarray(shown).save(file, "JPEG", quality=QUALITY, optimize=True)
     return file.getvalue()

@@ -29,8 +29,9 @@ export function makeProgram(gl, vertex, fragment) {
  * @param {number[]} format internal format, format and type.
  * @param {number[]} size width, height, and layers of an array of textures.
  * @param {ArrayBufferView|null} data null leaves it empty.
+ * @param {number} filter of shaders that do not fetch single ones.
  */
-export function makeTexture(gl, format, size, data) {
+export function makeTexture(gl, format, size, data, filter = gl.NEAREST) {
   const [internal, channels, type] = format;
   const target = size.length === 3 ? gl.TEXTURE_2D_ARRAY : gl.TEXTURE_2D;
   const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
@@ -42,6 +43,6 @@ export function makeTexture(gl, format, size, data) {
   gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
   const upload = size.length === 3 ? gl.texImage3D : gl.texImage2D;
   upload.call(gl, target, 0, internal, ...size, 0, channels, type, data);
-  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(target, filter, gl.NEAREST);
+  for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(target, side, filter);
   return { texture, target };
 }

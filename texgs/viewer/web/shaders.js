@@ -6,6 +6,7 @@ import { LAYERS, WIDTH } from "./surfels.js";
 export const MODES = ["shaded", "unshaded", "normal", "depth", "alpha", "texture", "discs", "ambient", "diffuse",
   "specular", "shininess"];
 
+export const PAIRS = ["none", "difference", "wipe"]; // how two pictures are shown
 export const MOST_PLANES = 12; // six and a box
 const numbered = (names) => names.map((name, k) => `const int ${name.toUpperCase()} = ${k};`).join("\n");
 const layers = numbered(LAYERS);
@@ -182,6 +183,8 @@ uniform float low_pass, near;
 uniform vec2 focal, size;        // pixels
 uniform int n_planes;
 uniform vec4 planes[${MOST_PLANES}]; // normal and offset in the camera's axes: what is beyond is cut away
+uniform sampler2D weights;       // of faces
+uniform float reach;             // of a slab behind faces, world units, which hides what is in it
 
 flat in vec2 centre;
 flat in vec4 forms;
@@ -215,9 +218,15 @@ void main() {
   float of_surfel = in_front ? dot(uv, uv) : 1e30, rho = min(of_surfel, low_pass * dot(d, d));
   float alpha = min(exp2(base.w - 0.5 * LOG2_E * rho), ALPHA_MAX);
   float depth = of_surfel <= rho ? perspective.z / w : perspective.z;
-  vec3 place = depth * vec3((gl_FragCoord.xy - 0.5 * size) / focal, 1.0);
-  for (int k = 0; k < n_planes; k++) if (dot(planes[k].xyz, place) > planes[k].w) discard;
+  vec3 ray = vec3((gl_FragCoord.xy - 0.5 * size) / focal, 1.0);
+  float enters = 0.0;
+  for (int k = 0; k < n_planes; k++) {
+    float away = dot(planes[k].xyz, ray);
+    if (depth * away > planes[k].w) discard;
+    if (away < 0.0) enters = max(enters, planes[k].w / away);
+  }
   if (alpha < ALPHA_MIN) discard;
+  if (reach > 0.0 && enters > 0.0 && (depth - enters) * length(ray) < reach * texture(weights, gl_FragCoord.xy / size).r) discard;
   vec3 color = gain == 0.0 ? base.xyz : base.xyz + gain * texel(uv);
   if (look == LOOK_DEPTH) color = vec3(depth);
   fragment = vec4(alpha * color, alpha);
@@ -233,17 +242,37 @@ void main() { // one triangle over the whole screen
 export const PRESENT_FRAGMENT = `#version 300 es
 precision highp float;
 precision highp sampler2D;
-uniform sampler2D picture;
+${numbered(PAIRS)}
+uniform sampler2D picture, other;
+uniform int pair;                // how two pictures are shown
+uniform float gain, wipe;        // of differences, and the part of the width that shows the first picture
 uniform vec3 background;
 uniform vec2 range;              // of depths, which are shown where it is not empty
 out vec4 shown;
+
+vec3 behind(vec4 a) { return a.rgb + (1.0 - a.a) * background; }
+
+// The largest difference of a channel: red above 0, blue below.
+vec3 difference(vec3 one, vec3 two) {
+  vec3 d = clamp(one, 0.0, 1.0) - clamp(two, 0.0, 1.0), a = abs(d);
+  float x = gain * (a.r >= max(a.g, a.b) ? d.r : a.g >= a.b ? d.g : d.b);
+  return vec3(1.0 + min(x, 0.0), 1.0 - abs(x), 1.0 - max(x, 0.0));
+}
+
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
-  vec4 blended = texelFetch(picture, ivec2(at.x, textureSize(picture, 0).y - 1 - at.y), 0);
+  at.y = textureSize(picture, 0).y - 1 - at.y;
+  vec4 blended = texelFetch(picture, at, 0);
+  if (pair != NONE) {
+    vec4 second = texelFetch(other, at, 0);
+    bool is_first = gl_FragCoord.x < wipe * float(textureSize(picture, 0).x);
+    if (pair == WIPE && !is_first) blended = second;
+    if (pair == DIFFERENCE) blended = vec4(difference(behind(blended), behind(second)), 1.0);
+  }
   if (range.y > 0.0) {
     float depth = blended.r / max(blended.a, 1e-12), place = (depth - range.x) / max(range.y - range.x, 1e-6);
     blended.rgb = vec3(0.9 * clamp(place, 0.0, 1.0) * blended.a);
   }
-  shown = vec4(blended.rgb + (1.0 - blended.a) * background, 1.0);
+  shown = vec4(behind(blended), 1.0);
 }
 `;

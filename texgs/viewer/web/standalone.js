@@ -1,5 +1,6 @@
 // The page of `texgs export --to scene.html`: camera, state and renderer of one scene, without a server.
 
+import { Compare } from "./compare.js";
 import { EditHistory } from "./history.js";
 import { download, toHex } from "./inputs.js";
 import { Notices } from "./notices.js";
@@ -7,6 +8,7 @@ import { Panel } from "./panel.js";
 import { ScenePage } from "./scene_page.js";
 import { PictureDialog } from "./size_inputs.js";
 import { State, difference } from "./state.js";
+import { TransferEditor } from "./transfer.js";
 import { WebglRenderer } from "./webgl.js";
 
 const get = (id) => document.getElementById(id);
@@ -18,15 +20,24 @@ class StandalonePage extends ScenePage {
     new EditHistory(this);
     get("still").onclick = () => this.#save();
     new PictureDialog(this, (how) => this.#save(how));
+    if (scene.volume) {
+      this.compare = new Compare(this);
+      new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
+    }
     this.state.addEventListener("change", () => this.#tellWords());
     this.follow();
   }
 
+  draw(moving) {
+    super.draw(moving);
+    this.compare?.show();
+  }
+
   #tellWords() {
-    const { original, scene } = this.state;
-    const words = difference(original, scene).flatMap(wordsOf).map(quoted);
-    get("words").hidden = !words.length;
-    get("words").querySelector("textarea").value = words.join(" ");
+    const { original, scene } = this.state, edits = difference(original, scene);
+    const isFunctions = ({ key }) => key === "functions", words = edits.filter((edit) => !isFunctions(edit)).flatMap(wordsOf);
+    tell("words", words.map(quoted).join(" "));
+    if (scene.volume) tell("functions", edits.filter(isFunctions).map(({ value }) => `functions: ${JSON.stringify(value)}`).join());
   }
 
   /** Save a picture of the view, by default in the pixels of the screen. */
@@ -34,6 +45,12 @@ class StandalonePage extends ScenePage {
     const canvas = this.renderer.still(this.camera, this.state.scene, { ...this.shown, ...how });
     canvas.toBlob((blob) => download(blob, `${this.state.scene.name}.png`));
   }
+}
+
+/** Show a text to copy, if there is one. */
+function tell(id, text) {
+  get(id).hidden = !text;
+  get(id).querySelector("textarea").value = text;
 }
 
 /** An edit as `texgs edit` takes it. */
@@ -58,7 +75,7 @@ async function start() {
   notices.keep("Unpacking the scene.");
   try {
     const renderer = new WebglRenderer(get("picture"), (text) => notices.keep(text));
-    await renderer.open(get("surfels").textContent, scene);
+    await renderer.open(get("surfels").textContent, scene, get("volume")?.textContent);
     get("poster").hidden = true;
     get("picture").hidden = false;
     new StandalonePage(scene, renderer, notices);

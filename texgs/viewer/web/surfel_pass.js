@@ -5,6 +5,7 @@ import { COLUMNS } from "./parts.js";
 import { makeProgram, makeTexture } from "./program.js";
 import { SURFEL_FRAGMENT, SURFEL_VERTEX } from "./shaders.js";
 import { LAYERS, WIDTH } from "./surfels.js";
+import { Target } from "./target.js";
 
 const FAINT = 0.1; // alpha below which a pixel counts as background, as the server has it
 const BEYOND = 1e9; // a depth that nothing has
@@ -24,7 +25,8 @@ export class SurfelPass {
       throw new Error("The graphics driver draws no floating-point pictures, which this scene needs: update it.");
     }
     // Half precision stops adding up faint fragments; where floats cannot be blended it is what there is.
-    this._format = gl.getExtension("EXT_float_blend") ? gl.RGBA32F : gl.RGBA16F;
+    const [format, type] = gl.getExtension("EXT_float_blend") ? [gl.RGBA32F, gl.FLOAT] : [gl.RGBA16F, gl.HALF_FLOAT];
+    this.target = new Target(gl, [format, gl.RGBA, type]);
     this._gl = gl;
     this._optics = optics;
     this._shaders = makeProgram(gl, SURFEL_VERTEX, SURFEL_FRAGMENT);
@@ -39,7 +41,6 @@ export class SurfelPass {
       order: makeTexture(gl, [gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT], [WIDTH, height], null),
       parts: makeTexture(gl, floats, [COLUMNS, rows], null),
     };
-    this._target = gl.createFramebuffer();
     this._makeCorners(count);
   }
 
@@ -50,25 +51,25 @@ export class SurfelPass {
    * @param {object} look `mode` (a number), `light`, a direction [3] or null for a headlight, and `planes` that cut.
    * @param {Float32Array} table of parts.
    * @param {Uint32Array} order of the surfels, in a buffer of whole rows of the texture.
+   * @param {object|null} slab that hides them behind faces: its `reach` in world units, and a texture of `weights`.
    * @returns {object} the picture, a texture whose first row is on top: premultiplied colour and alpha.
    */
-  blend(view, { mode, light, planes }, table, order) {
+  blend(view, { mode, light, planes }, table, order, slab = null) {
     const gl = this._gl;
     const { program, uniforms } = this._shaders;
-    this._resize(view.size);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this._target);
-    gl.viewport(0, 0, ...view.size);
-    gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
+    this.target.begin(view.size);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.useProgram(program);
     this._upload(table, order);
-    Object.entries(this._textures).forEach(([name, texture], unit) => bind(gl, unit, texture, uniforms[name]));
+    const textures = { ...this._textures, weights: slab?.weights ?? this._textures.parts };
+    Object.entries(textures).forEach(([name, texture], unit) => bind(gl, unit, texture, uniforms[name]));
     setView(gl, uniforms, view);
     setPlanes(gl, uniforms, view, planes);
     gl.uniform1i(uniforms.headlight, light ? 0 : 1);
     gl.uniform3fv(uniforms.light, light ?? [0, 0, 1]);
     gl.uniform1i(uniforms.look, mode);
+    gl.uniform1f(uniforms.reach, slab?.reach ?? 0);
     gl.uniform1f(uniforms.low_pass, this._optics.low_pass);
     gl.uniform1f(uniforms.near, NEAR);
     gl.uniform1f(uniforms.texel_step, this._optics.step);
@@ -76,26 +77,26 @@ export class SurfelPass {
     gl.drawElements(gl.TRIANGLES, 6 * order.length, gl.UNSIGNED_INT, 0);
     gl.bindVertexArray(null);
     gl.disable(gl.BLEND);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    return this._picture;
+    this.target.end();
+    return this.target.picture;
   }
 
   /** The mean depth of a pixel, where depth was blended; null for the background. */
   depthAt(x, y) {
     const gl = this._gl, pixel = new Float32Array(4);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this._target);
+    this.target.bind();
     gl.readPixels(x, y, 1, 1, gl.RGBA, gl.FLOAT, pixel);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    this.target.end();
     return pixel[3] < FAINT ? null : pixel[0] / pixel[3];
   }
 
   /** The least and the largest mean depth of pixels that are not faint, where depth was blended; BEYOND if none is. */
   depths() {
-    const gl = this._gl, [width, height] = this._size;
+    const gl = this._gl, [width, height] = this.target.size;
     const pixels = new Float32Array(4 * width * height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this._target);
+    this.target.bind();
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, pixels);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    this.target.end();
     let low = Infinity, high = 0;
     for (let i = 0; i < pixels.length; i += 4) {
       const alpha = pixels[i + 3], depth = pixels[i] / alpha;
@@ -123,17 +124,6 @@ export class SurfelPass {
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
   }
-
-  _resize(size) {
-    const gl = this._gl;
-    if (this._picture && this._size.every((side, k) => side === size[k])) return;
-    if (this._picture) gl.deleteTexture(this._picture.texture);
-    const type = this._format === gl.RGBA32F ? gl.FLOAT : gl.HALF_FLOAT;
-    this._size = [...size];
-    this._picture = makeTexture(gl, [this._format, gl.RGBA, type], size, null);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this._target);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this._picture.texture, 0);
-  }
 }
 
 /** Lets a sampler read a texture. */
@@ -154,7 +144,8 @@ function setPlanes(gl, uniforms, { viewmat }, planes) {
   if (planes.length) gl.uniform4fv(uniforms["planes[0]"], inCamera);
 }
 
-function setView(gl, uniforms, { viewmat, focal, size }) {
+/** Sets the camera. */
+export function setView(gl, uniforms, { viewmat, focal, size }) {
   const [a, b, c, x, d, e, f, y, g, h, i, z] = viewmat;
   gl.uniformMatrix3fv(uniforms.rotation, true, [a, b, c, d, e, f, g, h, i]);
   gl.uniform3f(uniforms.translation, x, y, z);

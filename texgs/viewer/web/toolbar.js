@@ -6,8 +6,8 @@ import { ask, download } from "./inputs.js";
 import { PictureDialog } from "./size_inputs.js";
 
 const EXPORTS = {
-  mp4: "Film, MP4", gif: "Film, GIF", html: "Web page", "3dgs": "3D Gaussians, PLY",
-  "2dgs": "2D Gaussians, PLY", points: "Points, PLY", mesh: "Mesh, PLY",
+  mp4: "Film, MP4", gif: "Film, GIF", html: "Web page", volume: "Web page with the volume, 2 MB more",
+  "3dgs": "3D Gaussians, PLY", "2dgs": "2D Gaussians, PLY", points: "Points, PLY", mesh: "Mesh, PLY",
 };
 const get = (id) => document.getElementById(id);
 

@@ -20,7 +20,7 @@ export class TransferEditor {
 
   /**
    * @param {Element} place
-   * @param {object} page - with job, mayBegin(), shown, show() and state
+   * @param {object} page - with shown, show() and state; where models can be made also job and mayBegin()
    * @param {{minimum: number, maximum: number, histogram: number[]}} transfer - of the volume
    * @param {object} presets - colours by name
    */
@@ -34,7 +34,7 @@ export class TransferEditor {
     this.#buildTools();
     this.#listen(this.#picture.svg);
     page.state.addEventListener("change", () => this.show());
-    page.job.addEventListener("end", () => { this.#making = ""; });
+    page.job?.addEventListener("end", () => { this.#making = ""; });
     this.show();
     this.#read();
   }
@@ -160,6 +160,7 @@ export class TransferEditor {
     const keep = button("Keep in data set", "Write this function into the file of its data set, for texgs run", () => {
       if (this.#page.mayBegin()) this.#page.job.begin({ type: "keep", function: this.#name });
     });
+    keep.hidden = this.#parts.make.hidden = !this.#page.job;
     const presets = element("select", { "aria-label": "Colours of a preset", onchange: () => {
       this.#set(colored(this.#edited, this.#presets[presets.value]));
       presets.value = "";

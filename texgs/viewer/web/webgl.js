@@ -3,13 +3,15 @@
 import { direction } from "./camera.js";
 import { COLUMNS, firstRows, partTable } from "./parts.js";
 import { makeProgram } from "./program.js";
-import { MODES, PRESENT_FRAGMENT, PRESENT_VERTEX } from "./shaders.js";
+import { MODES, PAIRS, PRESENT_FRAGMENT, PRESENT_VERTEX } from "./shaders.js";
 import { sizeOf } from "./size.js";
 import { DepthOrder } from "./sort.js";
 import { NEAR, SurfelPass, bind } from "./surfel_pass.js";
 import { joinSurfels } from "./surfels.js";
 import { unpack } from "./tensors.js";
 import { withAlpha } from "./transparent.js";
+import { OF_TWIN, Twin, alone } from "./twin.js";
+import { samplesOf } from "./samples.js";
 
 const OVER_BLACK = ["alpha", "ambient", "diffuse", "specular", "shininess"];
 const SLOW = 40; // milliseconds of a frame above which those of a moving scene have fewer rows and columns
@@ -49,13 +51,16 @@ export class WebglRenderer {
    *
    * @param {string} packed their tensors, see tensors.js.
    * @param {object} scene its description; models and segments may not change later, their edits may.
+   * @param {string} volume its samples, where the page has them.
    */
-  async open(packed, scene) {
+  async open(packed, scene, volume = "") {
     const { tensors, metadata } = await unpack(packed);
     this._original = scene;
     this._optics = JSON.parse(metadata.optics);
     this._surfels = joinSurfels(tensors, this._optics.models, firstRows(scene.models));
     this._order = new DepthOrder(this._surfels.lookups.length / 4);
+    this._samples = volume ? samplesOf((await unpack(volume)).tensors) : null;
+    if (volume) this.modes = MODES.toSpliced(1, 0, ...OF_TWIN);
     this._upload();
   }
 
@@ -70,28 +75,34 @@ export class WebglRenderer {
    * @param {OrbitCamera} camera
    * @param {object} scene description with its edits, light and background.
    * @param {object} how `mode`; whether to show the scene as it was `before`; whether something is `moving`: then
-   *   slow frames are coarser.
+   *   slow frames are coarser; `gain` of a difference, and the part of the width before the line of a `wipe`.
    */
-  draw(camera, scene, { mode = "shaded", moving = false, before = false } = {}) {
-    this._wanted = { view: this._view(camera), scene: before ? this._original : scene, mode, moving };
+  draw(camera, scene, { before = false, ...shown } = {}) {
+    this._wanted = { view: this._view(camera), scene: before ? this._original : scene, shown };
+    this._ask();
+  }
+
+  /** Moves the line between two pictures. */
+  wipe(part) {
+    if (this._wanted) this._wanted.shown.wipe = part;
     this._ask();
   }
 
   /** The point of the surfels [3] that a pixel shows; null for the background. */
   pointAt(camera, scene, { before }, [x, y]) {
-    const view = this._view(camera), pixel = [x, y].map((side) => side + 0.5);
-    this._blend(view, before ? this._original : scene, "depth");
+    const view = this._view(camera), pixel = [x, y].map((side) => side + 0.5), shown = before ? this._original : scene;
+    this._blend(viewOf(view), shown, lookOf(shown), "depth");
     const depth = this._pass.depthAt(x, y);
     return depth && camera.unproject(pixel, depth, view.width, view.height);
   }
 
   /** The same picture as a canvas of its own; of another size, or without its background, if need be. */
-  still(camera, scene, { mode, before, size = this.size(), transparent = false }) {
+  still(camera, scene, { before, size = this.size(), transparent = false, ...how }) {
     const [width, height] = size, view = { ...this._view(camera), width, height };
-    const shown = before ? this._original : scene;
-    const over = (grey) => this.pixels(view, { ...shown, background: [grey, grey, grey] }, mode);
-    const pixels = transparent ? withAlpha(over(0), over(1)) : this.pixels(view, shown, mode);
-    if (this._wanted) this._frame(this._wanted.view, this._wanted.scene, this._wanted.mode); // on screen again
+    const shown = before ? this._original : scene, still = { ...how, moving: false };
+    const over = (grey) => this.pixels(view, { ...shown, background: [grey, grey, grey] }, still);
+    const pixels = transparent ? withAlpha(over(0), over(1)) : this.pixels(view, shown, still);
+    if (this._wanted) this._frame(this._wanted.view, this._wanted.scene, this._wanted.shown); // on screen again
     const canvas = Object.assign(document.createElement("canvas"), { width, height });
     canvas.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0);
     return canvas;
@@ -101,10 +112,11 @@ export class WebglRenderer {
    * Draws now.
    *
    * @param {object} view viewmat [3, 4] world to camera (OpenCV axes), fov_y in degrees, width and height.
+   * @param {object} shown as `draw` has it.
    * @returns {Uint8ClampedArray} the picture [H, W, 4], first row on top.
    */
-  pixels(view, scene, mode = "shaded") {
-    this._frame(view, scene, mode);
+  pixels(view, scene, shown) {
+    this._frame(view, scene, shown);
     const gl = this._gl;
     const { width, height } = view;
     const upside = new Uint8Array(4 * width * height);
@@ -140,11 +152,11 @@ export class WebglRenderer {
     if (this._begun) this._request = requestAnimationFrame(() => this._tick());
   }
 
-  _begin({ view, scene, mode, moving }) {
-    const gl = this._gl, share = moving ? this._share : 1, at = performance.now();
+  _begin({ view, scene, shown }) {
+    const gl = this._gl, { moving } = shown, share = moving ? this._share : 1, at = performance.now();
     const [width, height] = [view.width, view.height].map((side) => Math.ceil(share * side));
     this._isAsked = false;
-    this._frame({ ...view, width, height }, scene, mode);
+    this._frame({ ...view, width, height }, scene, shown);
     this._begun = { at, share, moving, fence: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) };
     gl.flush();
   }
@@ -153,7 +165,7 @@ export class WebglRenderer {
   _note({ at, share, moving, fence }) {
     const took = Math.min(performance.now() - at, LONGEST);
     const part = Math.min(1, Math.max(LEAST, share * Math.sqrt(SLOW / took)));
-    const isOther = part === 1 || part < 0.8 * share || part > 1.25 * share; // else sharpness would waver
+    const isOther = part === 1 || part === LEAST || part < 0.8 * share || part > 1.25 * share; // else sharpness would waver
     this._gl.deleteSync(fence);
     this._begun = null;
     if (moving) this.took = took;
@@ -161,28 +173,37 @@ export class WebglRenderer {
     if (share === this._share && isOther) this._share = part;
   }
 
-  /** Blends the surfels; on the canvas nothing changes. */
-  _blend(camera, scene, mode) {
-    const view = viewOf(camera);
-    const table = partTable(scene.models, this._optics.models);
-    const light = scene.light && direction(scene.light.azimuth, scene.light.polar);
-    const look = { mode: MODES.indexOf(mode), light, planes: halfSpaces(scene.cuts) };
-    return this._pass.blend(view, look, table, this._sort(view, table));
-  }
-
-  _frame(camera, scene, mode) {
+  _frame(camera, scene, { mode = "shaded", moving = false, gain = 1, wipe = 1 } = {}) {
     const gl = this._gl;
     const { width, height } = camera;
     if (this._canvas.width !== width) this._canvas.width = width;
     if (this._canvas.height !== height) this._canvas.height = height;
-    const picture = this._blend(camera, scene, mode);
+    const { first, second, pair } = this._pictures(viewOf(camera), scene, mode, moving);
     const range = mode === "depth" ? this._pass.depths() : [0, 0];
     const { program, uniforms } = this._present;
+    gl.viewport(0, 0, width, height);
     gl.useProgram(program);
-    bind(gl, 0, picture, uniforms.picture);
+    bind(gl, 0, first, uniforms.picture);
+    bind(gl, 1, second, uniforms.other);
+    gl.uniform1i(uniforms.pair, PAIRS.indexOf(pair));
+    gl.uniform1f(uniforms.gain, gain);
+    gl.uniform1f(uniforms.wipe, wipe);
     gl.uniform2fv(uniforms.range, range);
     gl.uniform3fv(uniforms.background, OVER_BLACK.includes(mode) ? [0, 0, 0] : scene.background);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** The picture of a mode, or two and how they are shown. */
+  _pictures(view, scene, mode, moving) {
+    const look = lookOf(scene), draw = (slab) => this._blend(view, scene, look, mode, slab);
+    if (!this._twin || (mode !== "shaded" && !OF_TWIN.includes(mode))) return alone(draw());
+    return this._twin.pictures(view, scene, look, { mode, moving }, { draw, target: this._pass.target });
+  }
+
+  /** Blends the surfels; on the canvas nothing changes. */
+  _blend(view, scene, look, mode, slab) {
+    const table = partTable(scene.models, this._optics.models), of = OF_TWIN.includes(mode) ? "shaded" : mode;
+    return this._pass.blend(view, { ...look, mode: MODES.indexOf(of) }, table, this._sort(view, table), slab);
   }
 
   /** Surfels beyond the near plane whose part is visible, far to near, by depths rounded as the rasterizer's. */
@@ -206,8 +227,14 @@ export class WebglRenderer {
   _upload() {
     const rows = partTable(this._original.models, this._optics.models).length / (4 * COLUMNS);
     this._pass = new SurfelPass(this._gl, this._surfels, this._optics, rows);
+    this._twin = this._samples && new Twin(this._gl, this._samples, this._original.volume);
     this._present = makeProgram(this._gl, PRESENT_VERTEX, PRESENT_FRAGMENT);
   }
+}
+
+/** Direction to the light, null for a headlight, and planes that cut. */
+function lookOf({ light, cuts }) {
+  return { light: light && direction(light.azimuth, light.polar), planes: halfSpaces(cuts) };
 }
 
 /** All planes of cuts, with the sides of a box. */

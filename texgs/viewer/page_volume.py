@@ -1,0 +1,188 @@
+"""The volume of a scene as a page carries it: fewer samples, in 8 bits at most, packed."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import asdict, dataclass
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from texgs.core.errors import ArgumentError, located
+from texgs.scene.scene import Scene
+from texgs.viewer import PAGE_VOLUME
+from texgs.volume.grid import Grid, Triple
+from texgs.volume.nrrd_file import MAKES, open_grid
+
+MEGABYTE = 10**6
+LEVELS = 255  # the largest code of 8 bits
+STEPS = (1, 3, 5, 7)  # between codes, of which the closest is taken
+TURNS = 5.0  # codes that a turn of slopes by a right angle counts as
+STEEP = 0.5  # codes by the sample, from which on a slope has a direction
+PLANES = 24  # that are compared
+TYPICAL = 6  # samples in a byte of a packed one, at first guess
+CLOSE = 0.92  # part of a budget that is used well
+TRIES = 8
+MOST = 2**26  # samples, so many bytes on a graphics card
+LONGEST = 1024  # samples of a side, which all graphics cards hold
+
+
+@dataclass(frozen=True, eq=False)
+class PageVolume:
+    """Samples on a coarser lattice between the same corners, as codes of values from `low` to `high`."""
+
+    codes: np.ndarray  # [Z, Y, X] uint8
+    step: int  # between codes
+    low: float
+    high: float
+    half: Triple  # half the sides of the box between the corners, x, y, z, world units
+    packed: bytes
+
+    def __str__(self) -> str:
+        """Say how much is left of a volume."""
+        z, y, x = self.codes.shape
+        step = self.step * (self.high - self.low) / LEVELS
+        return f"{x} x {y} x {z} samples in steps of {step:.3g}, {len(self.packed) / MEGABYTE:.2f} MB"
+
+    def describe(self, scene: Scene) -> dict[str, Any]:
+        """Return what a page needs beside the samples to draw the volume of a scene."""
+        look = asdict(scene.volume.appearance) if scene.volume else {}
+        facts = {"low": self.low, "high": self.high, "half": self.half, "looks": scene.has_looks}
+        return {**facts, "appearance": look}
+
+
+def page_volume(scene: Scene, budget: float = PAGE_VOLUME) -> PageVolume:
+    """Return the volume that a scene names, with as many samples as a budget in MB holds.
+
+    Raises:
+        ArgumentError: if the scene names no volume, it cannot be read, or the budget is none.
+    """
+    if not 0 < budget < np.inf:
+        raise ArgumentError(f"volume: expected a size in MB above 0, got {budget:g}")
+    if scene.volume is None:
+        raise ArgumentError(
+            "volume: expected the volume that the scene was made from, got none; make the scene again by "
+            "texgs compose"
+        )
+    with located("volume"):
+        return within(open_grid(scene.volume.file), budget * MEGABYTE)
+
+
+def within(grid: Grid, most: float) -> PageVolume:
+    """Return a volume in `most` bytes: few samples in many steps, or more in fewer, whichever is closer."""
+    ends, best, least = extremes(grid.values), None, np.inf
+    for step in STEPS:
+        volume = finest(grid, most, ends, step)
+        if volume is None:
+            continue
+        if step == STEPS[0] and is_finest(volume, grid):
+            return volume
+        if (loss := loss_of(volume, grid)) < least:
+            best, least = volume, loss
+    if best is None:
+        raise ArgumentError(f"expected room for at least 2 samples a side, got {most:.0f} bytes; allow more")
+    return best
+
+
+def finest(grid: Grid, most: float, ends: tuple[float, float], step: int) -> PageVolume | None:
+    """Return the finest of few tries in `most` bytes: what a lattice takes is not known before."""
+    share, best = min(1.0, (TYPICAL * step**0.5 * most / prod(grid.dims)) ** (1 / 3)), None
+    for _ in range(TRIES):
+        volume = reduced(grid, share, ends, step)
+        size = len(volume.packed)
+        if size <= most and (best is None or size > len(best.packed)):
+            best = volume
+        if CLOSE * most <= size <= most or (size < most and is_finest(volume, grid)):
+            break
+        share *= ((1 + CLOSE) / 2 * most / size) ** (1 / 3)
+    return best
+
+
+def loss_of(volume: PageVolume, grid: Grid) -> float:
+    """Return by how much values of some planes are off, in codes, and by how much their slopes turn.
+
+    Few steps keep values of noise, but make terraces of what is smooth.
+    """
+    depth, *sides = grid.values.shape
+    loss = []
+    for z in np.linspace(0, depth - 1, PLANES).round().astype(int):
+        made = plane_at(volume.codes, z * (len(volume.codes) - 1) / (depth - 1), sides)
+        truth = (grid.values[z].astype(np.float32) - volume.low) * (LEVELS / (volume.high - volume.low))
+        slopes, truths = (np.stack(np.gradient(x)) for x in (made, truth))
+        lengths = np.linalg.norm(slopes, axis=0) * np.linalg.norm(truths, axis=0)
+        turned = 1 - (slopes * truths).sum(axis=0) / np.maximum(lengths, 1e-6)
+        is_steep = np.linalg.norm(truths, axis=0) > STEEP
+        loss.append([((made - truth) ** 2).sum(), turned[is_steep].sum(), truth.size, is_steep.sum()])
+    squares, turns, count, steep = np.sum(loss, axis=0)
+    return float(np.sqrt(squares / count) + TURNS * turns / max(steep, 1))
+
+
+def is_finest(volume: PageVolume, grid: Grid) -> bool:
+    """Return whether no lattice with more samples may be in a page."""
+    return volume.codes.shape == sizes_of(grid, 1.0)
+
+
+def sizes_of(grid: Grid, share: float) -> tuple[int, ...]:
+    """Return the sizes [3] of an array whose sides have a share of a grid's cells; cards hold them."""
+    cells = [size - 1 for size in grid.values.shape]
+    most = min(LONGEST / max(grid.values.shape), (MOST / grid.values.size) ** (1 / 3), 1.0)
+    return tuple(max(round(min(share, most) * size), 1) + 1 for size in cells)
+
+
+def extremes(values: np.ndarray) -> tuple[float, float]:
+    """Return the least and the largest value of a prepared volume, which are finite and differ."""
+    ends = [(plane.min(), plane.max()) for plane in values]  # a whole volume may be larger than memory
+    low, high = (float(end) for end in (np.min(ends), np.max(ends)))
+    if not -np.inf < low < high < np.inf:
+        raise ArgumentError(
+            f"expected finite samples of two values at least, got {low:g} to {high:g}; {MAKES}"
+        )
+    return low, high
+
+
+def reduced(grid: Grid, share: float, ends: tuple[float, float], step: int) -> PageVolume:
+    """Return the trilinear values of a grid at a coarser lattice as codes, multiples of a step.
+
+    Means of all samples around a place would show fewer of the values that a thin wall has.
+    """
+    (low, high), (depth, *sides) = ends, sizes_of(grid, share)
+    places = np.linspace(0, grid.values.shape[0] - 1, depth)
+    planes = np.stack([plane_at(grid.values, place, sides) for place in places])
+    codes = ((planes - low) * (LEVELS / step / (high - low))).round() * step
+    codes = codes.clip(0, LEVELS).astype(np.uint8)
+    return PageVolume(codes, step, low, high, grid.aabb[1], pack(codes))
+
+
+def plane_at(values: np.ndarray, place: float, sides: list[int]) -> np.ndarray:
+    """Return the plane [Y, X] of an array at a place along its first axis, with other sides, float32."""
+    first, t = int(place), np.float32(place % 1)
+    plane = values[first].astype(np.float32)
+    if t:
+        plane += t * (values[first + 1].astype(np.float32) - plane)
+    return stretched(stretched(plane, sides[0], 0), sides[1], 1)
+
+
+def stretched(plane: np.ndarray, size: int, axis: int) -> np.ndarray:
+    """Return a plane with another size along an axis, by linear interpolation between the same ends."""
+    most = plane.shape[axis] - 1
+    if size == most + 1:
+        return plane
+    places = np.linspace(0, most, size)
+    first = places.astype(int).clip(max=most - 1)
+    t = np.expand_dims((places - first).astype(np.float32), 1 - axis)
+    one, other = (plane.take(each, axis) for each in (first, first + 1))
+    return one + t * (other - one)
+
+
+def pack(codes: np.ndarray) -> bytes:
+    """Return codes [Z, Y, X] as a zlib stream of safetensors: their differences along all axes.
+
+    Deflate packs these a quarter to a third smaller, and sums undo them.
+    """
+    from safetensors.numpy import save
+
+    steps = codes
+    for axis in range(3):
+        steps = np.diff(steps, axis=axis, prepend=np.uint8(0))
+    return zlib.compress(save({"steps": np.ascontiguousarray(steps)}))

@@ -1,0 +1,54 @@
+// How much of the face of a cut each pixel shows, falling to 0 around it, as texgs/scene/cut_view.py finds it.
+
+import { makeProgram } from "./program.js";
+import { PRESENT_VERTEX } from "./shaders.js";
+import { bind } from "./surfel_pass.js";
+import { Target } from "./target.js";
+import { WINDOW_FRAGMENT } from "./volume_shaders.js";
+
+const UNITS = 3, OPAQUE = 0.05; // a face is where so many units of length behind a cut have at least this alpha
+const RIM = 0.0125; // of the smaller side of the picture
+const ALPHA = 3; // a channel
+
+export class Faces {
+  #gl; #volume; #shaders; #seen; #weights;
+
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {VolumePass} volume
+   */
+  constructor(gl, volume) {
+    this.#gl = gl;
+    this.#volume = volume;
+    this.#shaders = makeProgram(gl, PRESENT_VERTEX, WINDOW_FRAGMENT);
+    this.#seen = new Target(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT]);
+    this.#weights = [0, 1].map(() => new Target(gl, [gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE], gl.LINEAR));
+  }
+
+  /** A texture of weights in [0, 1], with half of the pixels of a view. */
+  weights(view, scene, look) {
+    const size = view.size.map((side) => Math.ceil(side / 2)), focal = view.focal.map((x) => x / 2);
+    const radius = Math.ceil(RIM * Math.min(...size)), [one, other] = this.#weights;
+    this.#volume.cast(this.#seen, { ...view, size, focal }, scene, look,
+      { step: 1, reach: UNITS * this.#volume.unit });
+    this.#window(this.#seen, one, { channel: ALPHA, radius: 2 * radius, axis: [0, 1], gain: 1 / OPAQUE, isMean: 0 });
+    this.#window(one, other, { channel: 0, radius: 2 * radius, axis: [1, 0], gain: 1, isMean: 0 });
+    this.#window(other, one, { channel: 0, radius, axis: [0, 1], gain: 1, isMean: 1 });
+    this.#window(one, other, { channel: 0, radius, axis: [1, 0], gain: 1, isMean: 1 });
+    return other.picture;
+  }
+
+  #window(from, to, { channel, radius, axis, gain, isMean }) {
+    const gl = this.#gl, { program, uniforms } = this.#shaders;
+    to.begin(from.size);
+    gl.useProgram(program);
+    bind(gl, 0, from.picture, uniforms.picture);
+    gl.uniform1i(uniforms.channel, channel);
+    gl.uniform1i(uniforms.radius, radius);
+    gl.uniform2iv(uniforms.axis, axis);
+    gl.uniform1f(uniforms.gain, gain);
+    gl.uniform1i(uniforms.is_mean, isMean);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    to.end();
+  }
+}

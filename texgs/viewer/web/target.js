@@ -1,0 +1,44 @@
+// A picture that is drawn into, which has the size of the latest view.
+
+import { makeTexture } from "./program.js";
+
+export class Target {
+  size = [0, 0];
+  picture = null; // a texture whose first row is on top
+  #gl; #filter; #framebuffer;
+
+  /** @param {number[]} format internal format, format and type. */
+  constructor(gl, format, filter = gl.NEAREST) {
+    this.#gl = gl;
+    this.format = format;
+    this.#filter = filter;
+    this.#framebuffer = gl.createFramebuffer();
+  }
+
+  /** Draw into it from now on; it is empty, or holds what was drawn before. */
+  begin(size, holds = false) {
+    const gl = this.#gl;
+    this.bind();
+    if (size.some((side, k) => side !== this.size[k])) this.#resize(size);
+    gl.viewport(0, 0, ...size);
+    if (!holds) gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
+  }
+
+  /** Draw into it, or read it. */
+  bind() {
+    this.#gl.bindFramebuffer(this.#gl.FRAMEBUFFER, this.#framebuffer);
+  }
+
+  /** Draw on the screen again. */
+  end() {
+    this.#gl.bindFramebuffer(this.#gl.FRAMEBUFFER, null);
+  }
+
+  #resize(size) {
+    const gl = this.#gl;
+    if (this.picture) gl.deleteTexture(this.picture.texture);
+    this.size = [...size];
+    this.picture = makeTexture(gl, this.format, size, null, this.#filter);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.picture.texture, 0);
+  }
+}

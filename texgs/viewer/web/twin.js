@@ -1,0 +1,51 @@
+// The volume of a scene beside its models, and behind the faces of cuts, as texgs/scene/cut_view.py has them.
+
+import { Faces } from "./faces.js";
+import { Target } from "./target.js";
+import { VolumePass } from "./volume_pass.js";
+
+export const OF_TWIN = ["volume", "difference", "wipe"]; // modes
+const SLAB = 30; // units of length behind a face, which hide most of what is beyond
+const STILL = 0.5, MOVING = 1; // voxels between samples
+
+/** A picture that nothing is shown beside. */
+export const alone = (picture) => ({ first: picture, second: picture, pair: "none" });
+
+export class Twin {
+  #volume; #faces; #target; #hasLooks;
+
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {object} samples see samples.js.
+   * @param {object} facts `volume` of the description of a scene.
+   */
+  constructor(gl, samples, facts) {
+    this.#volume = new VolumePass(gl, samples, facts);
+    this.#faces = new Faces(gl, this.#volume);
+    this.#target = new Target(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT]);
+    this.#hasLooks = facts.looks;
+  }
+
+  /**
+   * The picture of a mode, or two and how they are shown: see PAIRS.
+   *
+   * @param {object} models - what draws them: `target`, and `draw`, which takes the slab that hides them.
+   */
+  pictures(view, scene, look, { mode, moving }, models) {
+    const step = moving ? MOVING : STILL, shown = mode === "volume" ? scene : { ...scene, functions: {} }; // no others have models
+    const cast = (target, slab) => {
+      this.#volume.cast(target, view, shown, look, { step, ...slab });
+      return target.picture;
+    };
+    const seen = () => {
+      if (!look.planes.length) return models.draw();
+      if (!this.#hasLooks) return cast(this.#target);
+      const slab = { reach: SLAB * this.#volume.unit, weights: this.#faces.weights(view, shown, look) };
+      models.draw(slab);
+      return cast(models.target, { ...slab, isOver: true });
+    };
+    if (mode === "volume") return alone(cast(this.#target));
+    if (mode === "shaded") return alone(seen());
+    return { first: seen(), second: cast(this.#target), pair: mode };
+  }
+}

@@ -1,0 +1,99 @@
+// Casts rays through the volume of a page into a picture: all that is on the graphics card for it.
+
+import { Bricks } from "./bricks.js";
+import { SIZE, functionTable, integralsOf, materialOf } from "./function_table.js";
+import { makeProgram, makeTexture } from "./program.js";
+import { PRESENT_VERTEX } from "./shaders.js";
+import { bind, setView } from "./surfel_pass.js";
+import { VOLUME_FRAGMENT } from "./volume_shaders.js";
+
+export class VolumePass {
+  #gl; #facts; #shaders; #bricks; #textures;
+  #shown = ""; // what the table and the distances show
+
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {object} samples `codes` and their `sizes` x, y, z, see samples.js.
+   * @param {object} facts range of the values, box and appearance: `volume` of the description of a scene.
+   * @throws {Error} where the volume is too large for the card.
+   */
+  constructor(gl, { codes, sizes }, facts) {
+    const most = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE), longest = Math.max(...sizes);
+    if (longest > most) throw new Error(`This volume has ${longest} samples a side; the graphics driver has at most ${most}.`);
+    this.#gl = gl;
+    this.#facts = facts;
+    this.#bricks = new Bricks(codes, sizes);
+    this.#shaders = makeProgram(gl, PRESENT_VERTEX, VOLUME_FRAGMENT);
+    this.#textures = {
+      samples: solid(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], sizes, codes, gl.LINEAR),
+      bricks: solid(gl, [gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE], this.#bricks.size, null, gl.NEAREST),
+      table: makeTexture(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT], [SIZE, 2], null),
+      weights: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], [1, 1], new Uint8Array([255])),
+    };
+    this.voxel = Math.min(...sizes.map((size, axis) => 2 * facts.half[axis] / (size - 1))); // world units
+    this.unit = facts.appearance.opacity_unit;
+  }
+
+  /**
+   * Casts.
+   *
+   * @param {Target} target that the picture is in: premultiplied colour and alpha, first row on top.
+   * @param {object} view viewmat [12], focal and size [2].
+   * @param {object} scene description with its edits.
+   * @param {object} look `light`, a direction [3] or null for a headlight, and `planes` that cut.
+   * @param {object} how `step`, in voxels; and to show only what is behind faces, its `reach` in world units, and
+   *   what part of that each pixel shows, a texture of `weights`; by default all;
+   *   `isOver`: over what is in the target.
+   */
+  cast(target, view, scene, { light, planes }, { step, reach = 0, weights = this.#textures.weights, isOver = false }) {
+    const gl = this.#gl, { program, uniforms } = this.#shaders, viewer = view.viewmat.slice(8, 11).map((x) => -x);
+    this.#show(scene);
+    target.begin(view.size, isOver);
+    gl.useProgram(program);
+    Object.entries({ ...this.#textures, weights }).forEach(([name, each], unit) => bind(gl, unit, each, uniforms[name]));
+    setView(gl, uniforms, view);
+    gl.uniform3fv(uniforms.box, this.#facts.half);
+    gl.uniform1f(uniforms.interval, step * this.voxel);
+    gl.uniform1f(uniforms.unit, this.unit);
+    gl.uniform1f(uniforms.reach, reach);
+    gl.uniform3fv(uniforms.viewer, viewer);
+    gl.uniform3fv(uniforms.light, light ?? viewer);
+    gl.uniform4fv(uniforms.material, materialOf(scene, this.#facts.appearance));
+    gl.uniform1i(uniforms.are_faces_lit, scene.cuts.faces === "shaded" ? 1 : 0);
+    gl.uniform1i(uniforms.n_planes, planes.length);
+    if (planes.length) gl.uniform4fv(uniforms["planes[0]"], planes.flatMap(unitPlane));
+    if (isOver) gl.enable(gl.BLEND);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.BLEND);
+    target.end();
+  }
+
+  /** Take what a scene shows, where that is something else than before. */
+  #show(scene) {
+    const gl = this.#gl, { models, functions } = scene, shown = JSON.stringify([models.map(({ edit }) => edit), functions]);
+    if (shown === this.#shown) return;
+    this.#shown = shown;
+    const table = functionTable(scene, this.#facts);
+    gl.bindTexture(gl.TEXTURE_2D, this.#textures.table.texture);
+    [table, integralsOf(table)].forEach((row, y) => gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, y, SIZE, 1, gl.RGBA, gl.FLOAT, row));
+    gl.bindTexture(gl.TEXTURE_3D, this.#textures.bricks.texture);
+    gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, ...this.#bricks.size, gl.RED_INTEGER, gl.UNSIGNED_BYTE,
+      this.#bricks.distances(table));
+  }
+}
+
+function solid(gl, [internal, channels, type], sizes, data, filter) {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_3D, texture);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+  gl.texImage3D(gl.TEXTURE_3D, 0, internal, ...sizes, 0, channels, type, data);
+  for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T, gl.TEXTURE_WRAP_R]) gl.texParameteri(gl.TEXTURE_3D, side, gl.CLAMP_TO_EDGE);
+  for (const each of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_3D, each, filter);
+  return { texture, target: gl.TEXTURE_3D };
+}
+
+/** A plane with a normal of length 1. */
+function unitPlane({ normal, offset }) {
+  const length = Math.hypot(...normal);
+  return [...normal, offset].map((x) => x / length);
+}
