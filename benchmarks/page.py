@@ -35,6 +35,7 @@ from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
 FUNCTIONS, SIZE, SMALL = 50, 400, 200  # pixels of a picture, and those of one that moves
+OPENINGS = 5  # of a page
 SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SCRIPT = """
@@ -87,12 +88,7 @@ def of_volume(browser: Any, file: Path, folder: Path) -> dict[str, object]:
     volume = page_volume(scene)
     packed_in = perf_counter() - start
     written = write_page(folder / "page.html", scene, NAME, volume=volume)
-    page = browser.new_page()
-    start = perf_counter()
-    page.goto(written.path.as_uri())
-    page.wait_for_selector("#picture:not([hidden])")
-    opened_in = perf_counter() - start
-    page.close()
+    opened_in = [opened(browser, written.path) for _ in range(OPENINGS)]
     page, renderer, description = opened_renderer(browser, scene, volume)
     closeness = compared(page, description, scene, file)
     turning, changing = times(page, description, file)
@@ -110,6 +106,17 @@ def of_volume(browser: Any, file: Path, folder: Path) -> dict[str, object]:
         },
         "moving_ms": {"turning": spread(turning), "new_function": spread(changing)},
     }
+
+
+def opened(browser: Any, file: Path) -> float:
+    """Return the seconds until a page shows its scene."""
+    page = browser.new_page()
+    start = perf_counter()
+    page.goto(file.as_uri())
+    page.wait_for_selector("#picture:not([hidden])")
+    seconds = perf_counter() - start
+    page.close()
+    return seconds
 
 
 def opened_renderer(browser: Any, scene: Scene, volume: PageVolume) -> tuple[Any, str, dict[str, Any]]:
