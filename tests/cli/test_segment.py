@@ -17,7 +17,7 @@ from texgs.fields.surfels.variants import write_texture
 from texgs.fit.texels import textured
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
-from texgs.scene.segment_file import write_segment
+from texgs.scene.segment_file import read_segment, write_segment
 
 SIZE = 120
 LENS = ("--radius", "4", "--fov", "22", "--width", str(SIZE))
@@ -73,6 +73,14 @@ def test_a_segment_is_made_edited_and_taken_back(scene, tmp_path, capsys):
     assert yaml.safe_load(back.read_text()) == yaml.safe_load(scene.read_text())
 
 
+def test_a_box_selects_what_is_in_it(scene, tmp_path):
+    box = [*pixel((-0.62, 0.35, 0.0)).split(","), *pixel((-0.02, -0.35, 0.0)).split(",")]
+    assert segment(scene, "--box", *box) == 0
+    model, number = two_balls()
+    mask = read_segment(tmp_path / "new-balls-red.safetensors", model)
+    assert (mask == (number == 0)).float().mean() > 0.97
+
+
 def test_a_second_segment_gets_what_the_first_left(scene, tmp_path, capsys):
     assert segment(scene, "--point", LEFT, "--not", RIGHT) == 0
     again = (tmp_path / "new.yaml", "--point", LEFT, "--not", RIGHT)
@@ -104,7 +112,10 @@ def test_what_is_clicked_on_has_the_textures_of_the_scene(tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ([], "--point: expected one at least, got none"),
+        ([], "--point: expected one at least, or --box, got none"),
+        (["--box", "9", "9", "200", "20"], "outline: expected corners in 120 x 120 pixels, got (201, 9)"),
+        (["--box", "nan", "9", "20", "20"], "outline: expected corners in 120 x 120 pixels, got (nan, 9)"),
+        (["--box", "0", "0", "3", "3"], "outline: expected an object, got none"),
         (["--point", LEFT, "--model", "TF01"], "--model: expected one of balls, got TF01"),
         (
             ["--point", LEFT, "--masks", "none"],

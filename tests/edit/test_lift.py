@@ -7,7 +7,7 @@ from tests.edit.lift_scenes import BLUE, RED, cameras, joined, nested, overlap, 
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import HEADLIGHT
-from texgs.edit.clicks import Clicks, is_visible, places_of
+from texgs.edit.clicks import Clicks, inside_of, is_visible, places_of
 from texgs.edit.lift import Lifted, components_at, lift, middle_of, view_mask
 from texgs.edit.new_segment import preview
 from texgs.models.masks import GrabCut
@@ -24,9 +24,11 @@ class Alike:
     def __init__(self):
         self.images, self.clicked = [], []
 
-    def __call__(self, image, points, positive):
+    def __call__(self, image, points, positive, held=None):
         self.images.append(image)
         self.clicked.append((points, positive))
+        if not len(points):
+            return held
         x, y = points[positive][0].long().tolist()
         hue = image[..., 0] - image[..., 2]
         sign = torch.sign(hue[y, x])
@@ -40,6 +42,13 @@ def pixel_of(place, camera=FRONT):
 def clicks(*places, negative=(), camera=FRONT):
     points = torch.stack([pixel_of(place, camera) for place in (*places, *negative)])
     return Clicks(camera, points, torch.arange(len(points)) < len(places))
+
+
+def drawn(outline, *, negative=()):
+    """What an outline in space selects, seen from the front."""
+    points = torch.stack([pixel_of(place) for place in negative]) if negative else torch.zeros(0, 2)
+    held = inside_of(torch.stack([pixel_of(place) for place in outline]), FRONT)
+    return Clicks(FRONT, points, torch.zeros(len(points), dtype=torch.bool), held)
 
 
 @pytest.fixture(scope="module")
@@ -143,8 +152,8 @@ def test_the_mask_model_sees_what_the_view_shows_and_clicks_move_along(balls):
 
 def test_a_mask_that_contradicts_the_others_has_no_vote(balls):
     class Confused(Alike):
-        def __call__(self, image, points, positive):
-            right = super().__call__(image, points, positive)
+        def __call__(self, image, points, positive, held=None):
+            right = super().__call__(image, points, positive, held)
             return ~right if len(self.images) % 4 == 0 else right
 
     segment = lift(balls[0], clicks((-0.3, 0.0, 0.25)), cameras(), Confused())
@@ -152,8 +161,70 @@ def test_a_mask_that_contradicts_the_others_has_no_vote(balls):
     assert segment.left_out >= 10
 
 
+LEFT, RIGHT = -0.6, 0.62  # of both balls
+
+
+def rectangle(left, right, bottom=-0.4, top=0.5):
+    return [(left, bottom, 0.0), (right, bottom, 0.0), (right, top, 0.0), (left, top, 0.0)]
+
+
+def test_a_box_selects_what_it_holds_on_all_sides(balls):
+    model, is_red = balls
+    some = cameras(size=128, frequency=1)
+    red = lift(model, drawn(rectangle(LEFT, 0.0)), some, GrabCut())
+    assert agreement(red, model, is_red, some) > 0.95
+    both = lift(model, drawn(rectangle(LEFT, RIGHT)), some, GrabCut())
+    assert agreement(both, model, torch.ones_like(is_red), some) > 0.95
+    other = lift(model, drawn(rectangle(LEFT, RIGHT), negative=[(-0.3, 0.0, 0.25)]), some, GrabCut())
+    assert agreement(other, model, ~is_red, some) > 0.95
+
+
+@pytest.mark.parametrize("masks", [GrabCut(), Alike()])
+def test_an_outline_cuts_an_object_in_space(balls, masks):
+    """Of one colour, which no mask model parts."""
+    model, is_red = balls
+    some = cameras(size=128, frequency=1)
+    half = lift(model, drawn(rectangle(LEFT, 0.0, bottom=0.0)), some, masks)
+    upper = is_red & (model.parameters["means"][:, 1] > 0)
+    assert agreement(half, model, upper, some) > 0.9
+
+
+def test_pixels_are_inside_of_an_outline_whose_rays_cross_it_an_odd_number_of_times():
+    held = inside_of(torch.tensor([(10.0, 20.0), (30.0, 20.0), (30.0, 25.0), (10.0, 25.0)]), FRONT)
+    assert held[20:25, 10:30].all()
+    assert held.sum() == 5 * 20
+    generator = torch.Generator().manual_seed(0)
+    star = torch.rand(9, 2, generator=generator) * SIZE  # it crosses itself
+    held = inside_of(star, FRONT)
+    for row, column in torch.randint(SIZE, (300, 2), generator=generator).tolist():
+        x, y, count = column + 0.5, row + 0.5, 0
+        for (x0, y0), (x1, y1) in zip(star.tolist(), star.roll(-1, 0).tolist(), strict=True):
+            count += (y0 <= y) != (y1 <= y) and x0 + (y - y0) / (y1 - y0) * (x1 - x0) < x
+        assert bool(held[row, column]) == (count % 2 == 1)
+
+
+@pytest.mark.parametrize(
+    ("outline", "message"),
+    [
+        ([(1, 1), (9, 1), (121, 9)], r"outline: expected corners in 120 x 120 pixels, got \(121, 9\)"),
+        ([(1, 1), (-1, 1), (9, 9)], r"outline: expected corners in 120 x 120 pixels, got \(-1, 1\)"),
+        ([(1, 1), (float("nan"), 1), (9, 9)], r"outline: expected corners .* got \(nan, 1\)"),
+        ([(1, 1), (9, 9), (20, 20)], "outline: expected pixels inside of it, got none"),
+        ([(5, 5)] * 4, "outline: expected pixels inside of it, got none"),
+    ],
+)
+def test_outlines_that_hold_nothing(outline, message):
+    with pytest.raises(ArgumentError, match=message):
+        inside_of(torch.tensor(outline, dtype=torch.float32), FRONT)
+
+
+def test_an_outline_of_the_background_is_an_error(balls):
+    with pytest.raises(ArgumentError, match="outline: expected an object, got none"):
+        lift(balls[0], drawn(rectangle(-0.7, 0.7, top=-0.35)), cameras(), GrabCut())
+
+
 def test_a_segment_without_surfels_is_an_error(balls):
-    def blind(image, points, positive):
+    def blind(image, points, positive, held):
         return torch.zeros(image.shape[:2], dtype=torch.bool)
 
     with pytest.raises(ArgumentError, match="expected surfels that most masks of 1 views hold, got none"):

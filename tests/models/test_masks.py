@@ -65,6 +65,57 @@ def test_grabcut_finds_an_object_that_fills_a_picture_without_a_plain_border():
     assert overlap(GrabCut()(noisy, *click((48, 48), (40, 40))), mask) > 0.9
 
 
+NOWHERE = (torch.zeros(0, 2), torch.zeros(0, dtype=torch.bool))
+
+
+def box(left, top, right, bottom):
+    held = torch.zeros(SIZE, SIZE, dtype=torch.bool)
+    held[top:bottom, left:right] = True
+    return held
+
+
+TOUCHING = ((40, 48, 22, YELLOW), (62, 48, 18, BLUE))
+APART = ((25, 30, 15, YELLOW), (65, 30, 15, YELLOW), (50, 70, 15, YELLOW))
+WITHIN = ((48, 48, 36, RED), (50, 46, 14, BLUE))
+
+
+@pytest.mark.parametrize(
+    ("discs", "held", "expected"),
+    [
+        (APART, box(5, 10, 55, 50), [0]),
+        (APART, box(5, 10, 85, 50), [0, 1]),
+        (TOUCHING, box(40, 28, 84, 68), [1]),
+        (WITHIN, box(32, 28, 68, 64), [1]),
+    ],
+)
+def test_grabcut_finds_what_an_outline_holds_and_not_what_touches_it(discs, held, expected):
+    image, masks = picture(*discs)
+    mask = GrabCut()(image, *NOWHERE, held)
+    assert overlap(mask & held, torch.stack([masks[index] for index in expected]).any(0)) > 0.97
+
+
+def test_clicks_refine_what_an_outline_holds():
+    image, masks = picture(*APART)
+    held = box(5, 10, 85, 50)
+    assert overlap(GrabCut()(image, *click(negative=[(65, 30)]), held), masks[0]) > 0.97
+    both = GrabCut()(image, *click((25, 30), (65, 30)), held)
+    assert overlap(both, masks[0] | masks[1]) > 0.97
+    image, (yellow, blue) = picture(*TOUCHING)
+    mask = GrabCut()(image, *click((30, 48), negative=[(64, 48)]), held := box(10, 20, 90, 76))
+    assert overlap(mask & held, yellow & ~blue) > 0.9
+
+
+def test_a_part_of_what_looks_the_same_all_over_is_what_the_outline_holds_of_it():
+    image, (disc,) = picture((48, 48, 36, RED))
+    for held in (box(0, 0, 48, 96), box(36, 36, 60, 60)):
+        assert overlap(GrabCut()(image, *NOWHERE, held), disc & held) > 0.97
+
+
+def test_an_outline_of_nothing_is_an_error():
+    with pytest.raises(ArgumentError, match="outline: expected an object, got none"):
+        GrabCut()(picture()[0], *NOWHERE, box(0, 0, 0, 0))
+
+
 @pytest.mark.parametrize(
     ("points", "positive", "error", "message"),
     [
@@ -96,7 +147,7 @@ def stub(best=1, size=32):
         asked.append(pixels)
         return pixels
 
-    def decode(features, points, labels, several):
+    def decode(features, points, labels, box, several):
         at = torch.arange(size) * 1.0
         x, y = points[0, 0].tolist()
         near = torch.maximum((at[None] - x).abs(), (at[:, None] - y).abs())
@@ -173,6 +224,13 @@ def test_a_sam_folder_agrees_with_the_pipeline_of_transformers(tiny_sam):
         outputs = SamModel.from_pretrained(tiny_sam).eval()(pixel_values=pixels.float(), **prompts)
     logits = torch.nn.functional.interpolate(outputs.pred_masks[0], (64, 64), mode="bilinear")[0, 0]
     assert torch.equal(sam(image, points, torch.tensor([True, False])), logits > 0)
+    held = torch.zeros(64, 64, dtype=torch.bool)
+    held[20:44, 6:34] = True
+    prompts = {"input_boxes": torch.tensor([[[6.0, 20.0, 34.0, 44.0]]]) - 0.5, "multimask_output": False}
+    with torch.no_grad():
+        outputs = SamModel.from_pretrained(tiny_sam).eval()(pixel_values=pixels.float(), **prompts)
+    logits = torch.nn.functional.interpolate(outputs.pred_masks[0], (64, 64), mode="bilinear")[0, 0]
+    assert torch.equal(sam(image, *NOWHERE, held), logits > 0)
 
 
 def test_what_holds_no_sam(tmp_path):
@@ -219,6 +277,13 @@ def test_a_published_sam_of_another_size_gives_the_masks_of_kornia(tmp_path, mon
     theirs = prompter.predict(torch.tensor([[(30.0, 30.0)]]) - 0.5, torch.ones(1, 1))
     expected = theirs.binary_masks[0, theirs.scores[0].argmax()]
     assert overlap(ours(image, *click((30.0, 30.0))), expected) > 0.99
+    network = kornia.Sam.from_config(replace(small, checkpoint=str(tmp_path / "random.pth"))).eval()
+    boxes = torch.tensor([[10.0, 12.0, 50.0, 44.0]]) * 1024 / 96 - 0.5
+    with torch.no_grad():
+        answer = network(ours.prepared(image), [{"boxes": boxes}], multimask_output=False)[0].logits
+    logits = torch.nn.functional.interpolate(answer, (1024, 1024), mode="bilinear")
+    expected = torch.nn.functional.interpolate(logits, (96, 96), mode="bilinear")[0, 0] > 0
+    assert overlap(ours(image, *NOWHERE, box(10, 12, 50, 44)), expected) > 0.99
 
 
 def test_mobile_sam_finds_the_disc_clicked_on():
@@ -226,3 +291,6 @@ def test_mobile_sam_finds_the_disc_clicked_on():
     image, masks = picture((30, 30, 16, YELLOW), (70, 40, 14, BLUE), (45, 74, 14, RED))
     for place, mask in zip(((30, 30), (70, 40), (45, 74)), masks, strict=True):
         assert overlap(sam(image, *click(place)), mask) > 0.9
+    for (x, y, radius), mask in zip(((30, 30, 20), (70, 40, 18), (45, 74, 18)), masks, strict=True):
+        held = box(x - radius, y - radius, x + radius, y + radius)
+        assert overlap(sam(image, *NOWHERE, held) & held, mask) > 0.9

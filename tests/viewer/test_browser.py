@@ -32,6 +32,7 @@ from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.segment_file import read_segment
 
 
 def test_what_is_edited_shows_and_is_saved(chromium, scene_file):
@@ -292,6 +293,58 @@ def test_a_click_makes_a_segment(chromium, tmp_path):
         for _ in range(3):
             page.get_by_role("button", name="Undo").click()
         expect(page.get_by_role("button", name="Nothing to undo")).to_be_disabled()
+
+
+@pytest.mark.parametrize("shape", ["Box", "Lasso"])
+def test_what_is_drawn_around_becomes_a_segment(chromium, tmp_path, shape):
+    model, number = two_balls()
+    file = write_model(tmp_path / "balls.safetensors", model)
+    scene_file = write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(file)}))
+    weights = {"TEXGS_WEIGHTS": str(tmp_path)}  # GrabCut, wherever this runs
+    with served(scene_file, **weights) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("button", name="New segment of balls").click()
+        page.get_by_role("radio", name=shape).check()
+        box, url = page.locator("#picture").bounding_box(), page.url
+        camera = orbit(*list(PLACE.values()), round(box["width"]), round(box["height"]))
+        x, y = (
+            camera.project(torch.tensor([0.3, 0.1, 0.1]))[0].add(torch.tensor([box["x"], box["y"]])).tolist()
+        )
+        radius = 0.3 * float(camera.K[0, 0]) / PLACE["distance"]
+        angles = np.linspace(0, 2 * np.pi, 40) if shape == "Lasso" else np.radians([225, 45])
+        reach = radius if shape == "Lasso" else radius * 2**0.5
+        path = [(x + reach * np.cos(angle), y + reach * np.sin(angle)) for angle in angles]
+        page.mouse.move(*path[0])
+        page.mouse.down()
+        for place in path[1:]:
+            page.mouse.move(*place)
+        page.mouse.up()
+        expect(page.get_by_text("Mask by GrabCut.")).to_be_visible(timeout=WAIT)
+        expect(page.get_by_text("Clicks inside add to it")).to_be_visible()
+        page.keyboard.press("Home")  # the camera stays
+        page.get_by_role("button", name="Make segment").click()
+        expect(page.get_by_role("checkbox", name="part1")).to_be_visible(timeout=WAIT)
+        assert page.url == url
+        save_as(page, "parts.yaml")
+    segment = read_scene(tmp_path / "parts.yaml").models["balls"].segments["part1"]
+    mask, is_blue = read_segment(segment.file, model), number == 1
+    assert float((mask & is_blue).sum() / (mask | is_blue).sum()) > 0.95
+
+
+def test_an_outline_on_nothing_is_taken_back(chromium, tmp_path):
+    file = write_model(tmp_path / "balls.safetensors", two_balls()[0])
+    scene_file = write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(file)}))
+    with served(scene_file, TEXGS_WEIGHTS=str(tmp_path)) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("button", name="New segment of balls").click()
+        page.get_by_role("radio", name="Box").check()
+        clear = page.get_by_role("button", name="Clear")
+        drag(page, page.locator("#picture"), (0.02, 0.02), (0.2, 0.2))
+        expect(page.get_by_text("outline: expected an object, got none")).to_be_visible(timeout=WAIT)
+        expect(clear).to_be_disabled()
+        drag(page, page.locator("#picture"), (0.02, 0.02), (0.98, 0.98))
+        expect(page.get_by_text("Mask by GrabCut.")).to_be_visible(timeout=WAIT)
+        clear.click()
+        expect(page.get_by_text("Drag a box around what belongs to the segment.")).to_be_visible()
+        expect(clear).to_be_disabled()
 
 
 def test_a_model_gets_the_style_of_a_picture(chromium, scene_file):

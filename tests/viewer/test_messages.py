@@ -32,6 +32,7 @@ VIEW = {"type": "view", "id": 7, "camera": CAMERA, "mode": "normal", "moving": T
 EXPORT = {"type": "export", "kind": "mp4", "view": VIEW}
 PICK = {"type": "pick", "view": VIEW, "pixel": [3, 4]}
 MASK = {"type": "mask", "model": "TF01", "camera": CAMERA}
+DRAWN = {"points": []}
 
 
 def test_messages_are_read():
@@ -53,6 +54,9 @@ def test_messages_are_read():
     mask, segment = {"type": "mask", "id": 4, "model": "TF01"}, {"type": "segment", "part": "TF01/a"}
     assert parse(json.dumps(mask | clicks)) == Mask(*clicked, "TF01", 4)
     assert parse(json.dumps(segment | clicks)) == Segment(*clicked, "TF01/a")
+    drawn = mask | {"camera": CAMERA, "points": [], "outline": [[0, 0], [9, 0], [9, 9.5]]}
+    corners = ((0, 0), (9, 0), (9, 9.5))
+    assert parse(json.dumps(drawn)) == Mask(view.camera, (), "TF01", 4, outline=corners)
 
 
 @pytest.mark.parametrize(
@@ -121,6 +125,14 @@ def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
         (MASK, {"points": [[1, 2, True]] * 101}, "points: Tuple should have at most 100 items"),
         (MASK, {"points": [[1, 2]]}, "points.0.2: expected a value, got none"),
         (MASK, {"points": [[1, "2", True]]}, "points.0.1: expected a valid number, got '2'"),
+        (MASK, {**DRAWN, "outline": [[1, 2], [3, 4]]}, "outline: Tuple should have at least 3 items"),
+        (MASK, {**DRAWN, "outline": [[1, 2]] * 501}, "outline: Tuple should have at most 500 items"),
+        (MASK, {**DRAWN, "outline": [[1, 2, 3]] * 3}, "outline.0: Tuple should have at most 2 items"),
+        (MASK, {**DRAWN, "outline": [[1]] * 3}, "outline.0.1: expected a value, got none"),
+        (MASK, {**DRAWN, "outline": [[1, None]] * 3}, "outline.0.1: expected a valid number, got None"),
+        (MASK, {**DRAWN, "outline": [[1, 1e9]] * 3}, "outline.0.1: expected less than or equal to 8192"),
+        (MASK, {**DRAWN, "outline": [[float("nan"), 1]] * 3}, "outline.0.0: expected a finite number"),
+        (MASK, {**DRAWN, "outline": "box"}, "outline: expected a valid array, got 'box'"),
         (MASK, {"points": [[1, 2, 1]]}, "points.0.2: expected a valid boolean, got 1"),
     ],
 )
@@ -144,7 +156,8 @@ VALUES = st.recursive(
 
 
 KEYS = ("id", "camera", "mode", "moving", "before", "only", "part", "key", "value", "step", "name", "replace",
-        "model", "points", "function", "view", "pixel", "kind", "stops", "seconds", "fps")  # fmt: skip
+        "model", "points", "outline", "function", "view", "pixel", "kind", "stops", "seconds",
+        "fps")  # fmt: skip
 
 
 @given(st.sampled_from(TYPES), st.dictionaries(st.sampled_from(KEYS), VALUES))

@@ -55,15 +55,22 @@ def clicked(*points):
     return {"camera": asdict(FRONT) | {"target": [0, 0, 0]}, "points": points}
 
 
+def outlined(*places):
+    return {"camera": asdict(FRONT) | {"target": [0, 0, 0]}, "points": [], "outline": [at(x) for x in places]}
+
+
+BOX = [(-0.6, -0.35, 0.0), (0.0, -0.35, 0.0), (0.0, 0.35, 0.0), (-0.6, 0.35, 0.0)]
+
+
 async def ended(browser):
     """The notices of a job, until it has ended."""
     while (await browser.next("job"))["done"] is not None:
         pass
 
 
-async def masked(browser):
-    """What a click selects [H, W]."""
-    await browser.send(type="mask", id=3, model="balls", **clicked((RED, True)))
+async def masked(browser, asked=None):
+    """What a click selects [H, W], by default."""
+    await browser.send(type="mask", id=3, model="balls", **(asked or clicked((RED, True))))
     message = await browser.next("mask")
     assert (message["id"], message["by"]) == (3, "GrabCut")
     png = base64.b64decode(message["picture"].removeprefix("data:image/png;base64,"))
@@ -80,6 +87,33 @@ async def test_clicks_show_their_mask(browser):
     assert abs(middle[1] - y) < 2
     radius = 0.25 * 120 / (2 * 4 * np.tan(np.radians(11)))  # pixels
     assert mask.sum() == pytest.approx(np.pi * radius**2, rel=0.15)  # its surfels reach beyond its outline
+
+
+@on_page
+async def test_an_outline_shows_the_mask_of_what_it_holds_and_makes_a_segment(browser, scene_file):
+    assert (await masked(browser, outlined(*BOX)) == await masked(browser)).mean() > 0.995
+    assert (await masked(browser, outlined(*BOX[:3]))).sum() < (await masked(browser)).sum()
+    await browser.send(type="segment", part="balls/red", **outlined(*BOX))
+    await ended(browser)
+    (file,) = scene_file.parent.glob("scene-balls-red*")
+    model, red = two_balls()
+    mask = read_segment(file, model)
+    assert (mask == (red == 0)).float().mean() > 0.97
+
+
+@pytest.mark.parametrize(
+    ("places", "message"),
+    [
+        ([BESIDE, (0.5, -0.7, 0.0), (0.5, -0.6, 0.0)], "outline: expected an object, got none"),
+        ([BESIDE, BESIDE, BESIDE], "outline: expected pixels inside of it, got none"),
+        ([BESIDE, RED, (0.0, 2.0, 0.0)], "outline: expected corners in 120 x 120 pixels, got"),
+        ([BESIDE, RED], "outline: Tuple should have at least 3 items"),
+    ],
+)
+@on_page
+async def test_outlines_that_select_nothing_are_told(browser, places, message):
+    await browser.send(type="mask", model="balls", **outlined(*places))
+    assert message in (await browser.next("notice"))["text"]
 
 
 @on_page
@@ -138,7 +172,7 @@ async def test_a_segment_replaces_no_file(browser, scene_file):
         ("other/red", [(RED, True)], "expected a model of the scene (balls), got other"),
         ("balls/red", [(BESIDE, True)], "expected a place on the model, got background"),
         ("balls/red", [(RED, False)], "points: expected a positive one at least, got none"),
-        ("balls/red", [], "points: Tuple should have at least 1 item"),
+        ("balls/red", [], "points: expected a positive one at least, got none"),
     ],
 )
 @on_page
@@ -154,12 +188,12 @@ class Waiting(GrabCut):
     def __init__(self):
         self.reached, self.go_on, self.calls = threading.Event(), threading.Event(), 0
 
-    def __call__(self, image, points, positive):
+    def __call__(self, image, points, positive, held=None):
         self.calls += 1
         if self.calls == 2:
             self.reached.set()
             self.go_on.wait(30)
-        return super().__call__(image, points, positive)
+        return super().__call__(image, points, positive, held)
 
 
 @on_page

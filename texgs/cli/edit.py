@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from texgs.edit.clicks import Clicks
 
-KEPT = ("view", "point", "other", "masks", "vote", "connected")  # arguments that a segment's file says
+KEPT = ("view", "point", "other", "box", "masks", "vote", "connected")  # arguments that a segment's file says
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -122,6 +122,7 @@ def add_clicks(parser: argparse.ArgumentParser) -> None:
     seen, other = "pixel on the object, counted from 0,0", "pixel that is not of the object"
     parser.add_argument("--point", **pixels, help=f"{seen}; repeat for several")
     parser.add_argument("--not", dest="other", **pixels, help=f"{other}; repeat for several")
+    parser.add_argument("--box", nargs=4, type=float, metavar=("X0", "Y0", "X1", "Y1"), help="box around it")
 
 
 def numbers(text: str) -> tuple[float, float]:
@@ -168,15 +169,20 @@ def clicks_of(arguments: argparse.Namespace, lens: Lens, device: torch.device) -
     import torch
 
     from texgs.core.camera import orbit
-    from texgs.edit.clicks import Clicks
+    from texgs.edit.clicks import Clicks, inside_of
 
-    if not arguments.point:
-        raise ArgumentError("--point: expected one at least, got none; name a pixel on the object")
+    if not arguments.point and not arguments.box:
+        raise ArgumentError("--point: expected one at least, or --box, got none; name a pixel on the object")
     azimuth, polar = arguments.view
     camera = orbit(azimuth, polar, *lens).to(device)
-    pixels = torch.tensor([*arguments.point, *arguments.other], device=device)
+    pixels = torch.tensor([*arguments.point, *arguments.other], device=device).reshape(-1, 2)
     positive = torch.arange(len(pixels), device=device) < len(arguments.point)
-    return Clicks(camera, pixels + 0.5, positive)
+    held = None
+    if arguments.box:
+        x0, y0, x1, y1 = arguments.box
+        corners = [(x0, y0), (x1 + 1, y0), (x1 + 1, y1 + 1), (x0, y1 + 1)]
+        held = inside_of(torch.tensor(corners, device=device), camera)
+    return Clicks(camera, pixels + 0.5, positive, held)
 
 
 def require_output(arguments: argparse.Namespace) -> None:

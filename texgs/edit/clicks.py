@@ -1,4 +1,4 @@
-"""Clicks on a view as points in space, and where other views see these points."""
+"""Clicks on a view as points in space, or an outline, and where other views see these points."""
 
 from __future__ import annotations
 
@@ -21,17 +21,35 @@ TOLERANCE = 0.02  # of the model's extent, by which a point may be behind what h
 
 @dataclass(frozen=True, eq=False)
 class Clicks:
-    """What a user clicked on in a rendered view; all tensors on the model's device."""
+    """What a user clicked on in a rendered view, or drew around; all tensors on the model's device."""
 
     camera: Camera  # of the view
     points: Tensor  # [P, 2] right and down in pixels; the centre of the first pixel is (0.5, 0.5)
     positive: Tensor  # [P] bool, whether a point is on the object or beside it
+    held: Tensor | None = None  # [H, W] bool, pixels inside of an outline that was drawn around the object
 
     def __post_init__(self) -> None:
         count = check.shape("points", self.points, "P 2")["P"]
         check.shape("positive", self.positive, "P", P=count)
-        if not bool(self.positive.any()):
+        if self.held is None and not bool(self.positive.any()):
             raise ArgumentError("points: expected a positive one at least, got none; click on the object")
+
+
+def inside_of(outline: Tensor, camera: Camera) -> Tensor:
+    """Return the pixels [H, W] bool of a view whose centres an outline [V, 2] holds, by the even-odd rule."""
+    width, height, ends = camera.width, camera.height, outline.double()
+    for x, y in ends.tolist():
+        if not (0 <= x <= width and 0 <= y <= height):
+            raise ArgumentError(f"outline: expected corners in {width} x {height} pixels, got ({x:g}, {y:g})")
+    (x0, y0), (x1, y1) = (each.T[..., None] for each in (ends, ends.roll(-1, 0)))
+    middle = torch.arange(height, device=ends.device) + 0.5
+    edge, row = ((y0 <= middle) != (y1 <= middle)).nonzero(as_tuple=True)  # that cross, left of the column
+    column = (x0 + (middle - y0) * (x1 - x0) / (y1 - y0) - 0.5)[edge, row].ceil().clamp(0, width).long()
+    crossed = ends.new_zeros(height, width + 1).index_put_((row, column), ends.new_ones(()), accumulate=True)
+    inside = crossed.cumsum(dim=1)[:, :width] % 2 == 1
+    if not bool(inside.any()):
+        raise ArgumentError("outline: expected pixels inside of it, got none; draw it around the object")
+    return inside
 
 
 @torch.no_grad()
@@ -41,7 +59,8 @@ def places_of(model: Surfels, clicks: Clicks) -> Tensor:
     Behind a layer that lets through more than it shows, a click is on what shows through.
     """
     thickness = TOLERANCE * extent(model)
-    return torch.stack([_place(model, clicks.camera, x, y, thickness) for x, y in clicks.points.tolist()])
+    places = [_place(model, clicks.camera, x, y, thickness) for x, y in clicks.points.tolist()]
+    return torch.stack(places) if places else clicks.points.new_zeros(0, 3)
 
 
 def _place(model: Surfels, camera: Camera, x: float, y: float, thickness: float) -> Tensor:

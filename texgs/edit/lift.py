@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -14,7 +14,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.progress import progress
-from texgs.edit.clicks import TOLERANCE, Clicks, extent, is_visible, places_of
+from texgs.edit.clicks import FAINT, TOLERANCE, Clicks, extent, is_visible, places_of
 from texgs.edit.votes import CentreVotes, ContributionVotes, Vote
 from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
@@ -24,7 +24,9 @@ WHOLE = 0.9  # share of a model, from which a segment may be more than what was 
 CERTAIN = 0.8  # share of votes from which surfels stand in for clicks that a view does not see
 AGREEMENT = 0.5  # least overlap of a mask with what other views say, or the mask model lost the object
 TOUCH = 2.0  # standard deviations of two surfels together, within which they touch
+PIECE = 0.1  # of the largest piece of what an outline selects, from which one is looked for in other views
 NEIGHBOURS = 16  # surfels that one is compared with to connect them
+Find = Callable[[Clicks], Tensor]  # the mask [H, W] of a view
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +66,7 @@ def lift(
     The views are visited from the one clicked on outwards. Clicks become places in space; a view gets those
     that it sees (more than half of the light reaches them), and if it sees no positive one, a place of what
     the views before it agree on, so that the far side of an object is found as well. A mask that contradicts
-    the views before it has no vote.
+    the views before it has no vote. An outline holds a cone in space, which cuts all masks.
 
     Args:
         model: of any stage; masks are found in its own colours and textures.
@@ -77,9 +79,13 @@ def lift(
         connected: whether only the connected components that hold a positive click are kept.
         title: of the progress bar.
     """
-    places, camera = places_of(model, clicks), clicks.camera
-    find = partial(view_mask, model, masks=masks, light=light)
+    camera, find = clicks.camera, partial(view_mask, model, masks=masks, light=light)
     reference = find(clicks)
+    held = torch.ones_like(model.parameters["opacities"])  # by the cone of the outline
+    if clicks.held is not None:
+        (cone := CentreVotes(model)).add(camera, clicks.held)
+        held, clicks = cone.inside, with_middles(clicks, reference)
+    places = places_of(model, clicks)
     votes = (ContributionVotes if vote == "contribution" else CentreVotes)(model, threshold)
     so_far = votes if isinstance(votes, ContributionVotes) else ContributionVotes(model, rounds=0)
     counted = [votes] if so_far is votes else [votes, so_far]
@@ -88,7 +94,7 @@ def lift(
     used = 1
     outwards = sorted(cameras, key=lambda other: -float(camera.viewmat[2, :3] @ other.viewmat[2, :3]))
     for other in progress(outwards, title=title, unit="view"):
-        mask = _mask(find, so_far, places, clicks.positive, other)
+        mask = _mask(find, so_far, held, places, clicks.positive, other)
         if mask is not None:
             for each in counted:
                 each.add(other, mask)
@@ -113,27 +119,26 @@ def view_mask(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light) ->
     camera = clicks.camera
     box = screen_box(model.parameters, model.shading.options, camera).within(camera.width, camera.height)
     cut = camera.crop(*box)
-    image = model.render(cut, light).color.clamp(0, 1)
+    shown = model.render(cut, light)
+    image = shown.color.clamp(0, 1)
     moved = clicks.points.to(image) - image.new_tensor(box[:2])
     inside = (moved >= 0).all(1) & (moved < moved.new_tensor([cut.width, cut.height])).all(1)
     mask = torch.zeros(camera.height, camera.width, dtype=torch.bool, device=image.device)
-    if bool(clicks.positive[inside].any()):
-        part = masks(image, moved[inside], clicks.positive[inside])
-        mask[box.top : box.bottom, box.left : box.right] = part
+    part = slice(box.top, box.bottom), slice(box.left, box.right)
+    held = None if clicks.held is None else clicks.held[part] & (shown.alpha >= FAINT)
+    if held is not None or bool(clicks.positive[inside].any()):
+        found = masks(image, moved[inside], clicks.positive[inside], held)
+        mask[part] = found if held is None else found & held
     return mask
 
 
 def _mask(
-    find: Callable[[Clicks], Tensor],
-    so_far: ContributionVotes,
-    places: Tensor,
-    positive: Tensor,
-    camera: Camera,
+    find: Find, so_far: ContributionVotes, held: Tensor, places: Tensor, positive: Tensor, camera: Camera
 ) -> Tensor | None:
     """Return the mask of a view; None where it sees nothing of the object or contradicts the views before."""
-    values = torch.stack([so_far.seen.float(), so_far.shares], dim=1)
+    values = torch.stack([so_far.seen.float(), so_far.shares, held], dim=1)
     shown = so_far.shown(camera, values, ("median",))
-    (has_votes, is_object), alpha = shown.color.unbind(2), shown.alpha
+    (has_votes, is_object, is_held), alpha = shown.color.unbind(2), shown.alpha
     pixels, depths = camera.project(places)
     seen = is_visible(pixels, depths, shown.median, TOLERANCE * extent(so_far.model))  # type: ignore[arg-type]
     points, positive = pixels[seen], positive[seen]
@@ -143,11 +148,23 @@ def _mask(
             return None
         points = torch.cat([points, points.new_tensor([inner])])
         positive = torch.cat([positive, positive.new_ones(1)])
-    mask = find(Clicks(camera, points, positive))
+    mask = find(Clicks(camera, points, positive)) & (is_held >= 0.5 * alpha)
     known = has_votes > 0.5 * alpha.clamp_min(1e-6)
     expected = (is_object > 0.5 * has_votes) & known
     overlap = (mask & expected).sum() / (mask & known | expected).sum().clamp_min(1)
     return mask if bool(mask.any()) and float(overlap) >= AGREEMENT else None
+
+
+def with_middles(clicks: Clicks, mask: Tensor) -> Clicks:
+    """Return clicks with the middles of the larger pieces of their mask [H, W], for other views."""
+    from scipy.ndimage import label
+
+    numbers, count = label(mask.cpu().numpy())
+    pieces = [torch.from_numpy(numbers == 1 + index) for index in range(count)]
+    least = PIECE * max((int(piece.sum()) for piece in pieces), default=0)
+    middles = clicks.points.new_tensor([middle_of(piece) for piece in pieces if int(piece.sum()) >= least])
+    positive = torch.cat([clicks.positive, clicks.positive.new_ones(len(middles))])
+    return replace(clicks, points=torch.cat([clicks.points, middles]), positive=positive)
 
 
 def middle_of(mask: Tensor) -> tuple[float, float] | None:

@@ -22,6 +22,7 @@ SEED = 0.01  # radius of what a click marks for certain, of the longer side
 ALIKE = 16  # largest difference per channel of 255 of what is probably the same object as a click
 PLAIN = 20  # largest difference per channel within an empty background; less parts objects that nearly touch
 ROUNDS = 5
+FEW = 0.1  # of what an outline holds: less is found where what is outside looks the same, and says nothing
 
 
 class MaskModel(Protocol):
@@ -29,22 +30,23 @@ class MaskModel(Protocol):
 
     name: str  # for tables and files
 
-    def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
+    def __call__(self, image: Tensor, points: Tensor, positive: Tensor, held: Tensor | None = None) -> Tensor:
         """Return the object in an image [H, W, 3] as shown on a screen, [H, W] bool, on its device.
 
         Points [P, 2] are right and down in pixels; the centre of the first pixel is (0.5, 0.5). At least one
-        is positive [P] bool.
+        is positive [P] bool, unless an outline says which pixels [H, W] bool the object is among.
         """
 
 
-def check_clicks(image: Tensor, points: Tensor, positive: Tensor) -> None:
+def check_clicks(image: Tensor, points: Tensor, positive: Tensor, held: Tensor | None) -> None:
     """Require what every mask model takes."""
     size = check.shape("image", image, "H W 3")
     count = check.shape("points", points, "P 2")["P"]
     check.shape("positive", positive, "P", P=count)
     check.finite(image=image, points=points)
-    if positive.dtype != torch.bool or not bool(positive.any()):
-        raise ArgumentError("points: expected a positive one at least, got none; click on the object")
+    if positive.dtype != torch.bool or not bool((positive if held is None else held).any()):
+        what = "points: expected a positive one at least" if held is None else "outline: expected an object"
+        raise ArgumentError(f"{what}, got none; click on the object, or draw around it")
     for x, y in points.tolist():
         if not (0 <= x < size["W"] and 0 <= y < size["H"]):
             raise ArgumentError(
@@ -78,14 +80,14 @@ class GrabCut:
     It separates objects by colour and contrast. A plain border of the image is background, and so is what
     this separates from all positive clicks. Of the rest, what is connected to a click and of its colour is
     taken for the object at first, or not, as the click says; Gaussian mixtures of the colours of both and a
-    minimal cut then move the outline.
+    minimal cut then move the outline. What a user drew around is taken at first, all of it.
     """
 
     name = "GrabCut"
 
-    def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
+    def __call__(self, image: Tensor, points: Tensor, positive: Tensor, held: Tensor | None = None) -> Tensor:
         """Return the object [H, W] bool in an image, on the image's device; see `MaskModel`."""
-        check_clicks(image, points, positive)
+        check_clicks(image, points, positive, held)
         shape = (image.shape[0], image.shape[1])
         scale = min(SIZE / max(shape), 1.0)
         height, width = (max(round(side * scale), 1) for side in shape)
@@ -94,36 +96,45 @@ class GrabCut:
         pixels = planes[0].clamp(0, 1).mul(255).round().to(torch.uint8).permute(1, 2, 0).contiguous().numpy()
         shrink = points.new_tensor([width / shape[1], height / shape[0]])
         places = np.floor((points * shrink).cpu().numpy()).astype(int).clip(0, (width - 1, height - 1))
-        foreground = cut(pixels, places, positive.cpu().numpy())
+        if held is not None:
+            held = F.interpolate(held[None, None].cpu().float(), (height, width), mode="area")[0, 0] > 0
+        foreground = cut(pixels, places, positive.cpu().numpy(), None if held is None else held.numpy())
         mask = torch.from_numpy(foreground).float()[None, None]
         return (F.interpolate(mask, shape, mode="bilinear")[0, 0] > 0.5).to(image.device)
 
 
-def cut(pixels: np.ndarray, places: np.ndarray, positive: np.ndarray) -> np.ndarray:
-    """Return the object [H, W] bool in an 8-bit image with clicks at pixels [P, 2]."""
-    plain = plain_border(pixels)
-    clicked = connected(~plain, places[positive])
+def cut(pixels: np.ndarray, places: np.ndarray, positive: np.ndarray, held: np.ndarray | None) -> np.ndarray:
+    """Return the object [H, W] bool in an 8-bit image with clicks at pixels [P, 2], or all in an outline."""
+    plain, on_it = plain_border(pixels), places[positive]
+    if held is not None:
+        held &= ~plain
+        rest = held & (connected(held, places[positive]) | ~connected(held, places[~positive]))
+        held = rest if rest.any() else held  # without the parts that only negative clicks are on
+        on_it = np.argwhere(held)[:, ::-1]
+    clicked = connected(~plain, on_it)
     # Other objects would teach the mixture of the background their colours, which may be those of this one.
     emptied = np.where(clicked[..., None], pixels, np.median(pixels[plain], axis=0) if plain.any() else 0)
     emptied = emptied.astype(np.uint8)
-    labels = first_guess(emptied, clicked, places, positive)
+    labels = first_guess(emptied, clicked if held is None else held, places, positive, held is not None)
     is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
     if is_object.any() and not is_object.all():
         cv2.setRNGSeed(0)
         models = np.zeros((2, 1, 65))
         cv2.grabCut(emptied, labels, (0, 0, 0, 0), models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
         is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
-    return connected(is_object, places[positive])
+    found = connected(is_object, on_it)
+    return found if held is None or found.sum() > FEW * held.sum() else held
 
 
 def first_guess(
-    pixels: np.ndarray, clicked: np.ndarray, places: np.ndarray, positive: np.ndarray
+    pixels: np.ndarray, clicked: np.ndarray, places: np.ndarray, positive: np.ndarray, is_drawn: bool
 ) -> np.ndarray:
     """Return the labels [H, W] that GrabCut starts from: certain at clicks and outside, else probable."""
     smooth = cv2.GaussianBlur(pixels, (3, 3), 0)
-    labels = np.where(clicked, cv2.GC_PR_BGD, cv2.GC_BGD).astype(np.uint8)
-    edge = np.concatenate([clicked[0], clicked[-1], clicked[:, 0], clicked[:, -1]])
-    if not edge.any():  # what a plain border surrounds is the object, but for what looks like negative clicks
+    probable = cv2.GC_PR_BGD if positive.any() else cv2.GC_PR_FGD
+    labels = np.where(clicked, probable, cv2.GC_BGD).astype(np.uint8)
+    is_inside = is_drawn or not (clicked[[0, -1]].any() or clicked[:, [0, -1]].any())  # of a plain border
+    if is_inside and positive.any():  # all of it is the object, but for what looks like negative clicks
         colors = smooth[places[:, 1], places[:, 0]].astype(int)  # [P, 3]
         nearest = np.abs(smooth[..., None, :].astype(int) - colors).sum(axis=-1).argmin(axis=-1)  # [H, W]
         labels[clicked & positive[nearest]] = cv2.GC_PR_FGD
@@ -149,7 +160,7 @@ def plain_border(pixels: np.ndarray) -> np.ndarray:
 def connected(mask: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return the connected parts of a mask that places lie on."""
     _, parts = cv2.connectedComponents(mask.astype(np.uint8))
-    return np.isin(parts, list({parts[y, x] for x, y in places} - {0}))
+    return np.isin(parts, np.setdiff1d(parts[places[:, 1], places[:, 0]], 0))
 
 
 def flooded(pixels: np.ndarray, place: tuple[int, int] | np.ndarray, most: int) -> np.ndarray:

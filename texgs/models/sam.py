@@ -23,17 +23,18 @@ PUBLISHED = {  # title, and name of the architecture in kornia, by name in the c
 }
 
 Encode = Callable[[Tensor], Tensor]  # [1, 3, S, S] to features of the image
-Decode = Callable[[Tensor, Tensor, Tensor, bool], tuple[Tensor, Tensor]]
-"""Features, points [1, P, 2], labels [1, P] and whether there may be several masks, to logits [K, L, L] and
-the quality [K] that the model expects of each."""
+Masks = tuple[Tensor, Tensor]
+Decode = Callable[[Tensor, Tensor, Tensor, Tensor | None, bool], Masks]
+"""Features, points [1, P, 2], labels [1, P], a box [1, 4] and whether there may be several masks, to logits
+[K, L, L] and the quality [K] that the model expects of each."""
 
 
 class Sam:
     """A mask model; the features of an image are computed once for all clicks on it.
 
     One click is ambiguous (a wheel, or the car): of the three masks that the model offers for it, the one
-    that it thinks best is taken. For several clicks it gives one mask. The encoder takes square images of so
-    many pixels a side.
+    that it thinks best is taken. For several clicks, or the box around an outline, it gives one mask. The
+    encoder takes square images of so many pixels a side.
     """
 
     def __init__(
@@ -59,15 +60,19 @@ class Sam:
         return max(int(height * scale + 0.5), 1), max(int(width * scale + 0.5), 1)
 
     @torch.no_grad()
-    def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
+    def __call__(self, image: Tensor, points: Tensor, positive: Tensor, held: Tensor | None = None) -> Tensor:
         """Return the object [H, W] bool in an image, on the image's device; see `MaskModel`."""
-        check_clicks(image, points, positive)
+        check_clicks(image, points, positive, held)
         shape = (image.shape[0], image.shape[1])
         height, width = self.fitted(*shape)
         scale = points.new_tensor([width / shape[1], height / shape[0]])
         places = (points * scale - 0.5).to(self.device)[None]  # the models count from centres of pixels
         labels = positive.to(self.device).long()[None]
-        logits, quality = self._decode(self._features(image), places, labels, len(points) == 1)
+        box, several = None, len(points) == 1 and held is None
+        if held is not None:
+            at = held.nonzero().flip(1)
+            box = (torch.stack([at.amin(0), at.amax(0) + 1]) * scale - 0.5).to(self.device).reshape(1, 4)
+        logits, quality = self._decode(self._features(image), places, labels, box, several)
         best = logits[quality.argmax()][None, None].float()
         square = F.interpolate(best, (self.size, self.size), mode="bilinear")[..., :height, :width]
         return (F.interpolate(square, shape, mode="bilinear")[0, 0] > 0).to(image.device)
@@ -106,8 +111,8 @@ def _kornia(network: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
         features: Tensor = network.image_encoder(pixels.to(dtype)).float()
         return features
 
-    def decode(features: Tensor, points: Tensor, labels: Tensor, several: bool) -> tuple[Tensor, Tensor]:
-        sparse, dense = network.prompt_encoder((points, labels), None, None)
+    def decode(features: Tensor, points: Tensor, labels: Tensor, box: Tensor | None, several: bool) -> Masks:
+        sparse, dense = network.prompt_encoder((points, labels) if labels.numel() else None, box, None)
         places = network.prompt_encoder.get_dense_pe()
         logits, quality = network.mask_decoder(features, places, sparse, dense, several)
         return logits[0], quality[0]
@@ -133,11 +138,12 @@ def _transformers(model: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
         features: Tensor = model.get_image_embeddings(pixels.to(dtype)).float()
         return features
 
-    def decode(features: Tensor, points: Tensor, labels: Tensor, several: bool) -> tuple[Tensor, Tensor]:
+    def decode(features: Tensor, points: Tensor, labels: Tensor, box: Tensor | None, several: bool) -> Masks:
         answer = model(
             image_embeddings=features,
-            input_points=points[:, None],
-            input_labels=labels[:, None],
+            input_points=points[:, None] if labels.numel() else None,
+            input_labels=labels[:, None] if labels.numel() else None,
+            input_boxes=None if box is None else box[:, None],
             multimask_output=several,
         )
         return answer.pred_masks[0, 0], answer.iou_scores[0, 0]

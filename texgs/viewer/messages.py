@@ -15,7 +15,7 @@ from texgs.scene.frame import Mode
 
 Compared = Literal["truth", "difference", "wipe"]  # the volume, the scene's difference from it, or both
 LARGEST = 1 << 16  # bytes of a message; a page's own have a few hundred
-MOST_POINTS = 100
+MOST_POINTS, MOST_CORNERS = 100, 500
 MOST_PARTS = 1000
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -23,7 +23,9 @@ Number = Annotated[int, Field(ge=0, le=2**53)]  # that comes back with what was 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Pixels = Annotated[int, Field(ge=1, le=4096)]
 Place = Annotated[int, Field(ge=0, lt=4096)]  # of a pixel
-Click = tuple[Annotated[float, Field(ge=-4096, le=8192)], Annotated[float, Field(ge=-4096, le=8192)], bool]
+Spot = Annotated[float, Field(ge=-4096, le=8192)]  # in pixels, to the right or down
+Click = tuple[Spot, Spot, bool]
+Outline = Annotated[tuple[tuple[Spot, Spot], ...], Field(min_length=3, max_length=MOST_CORNERS)]
 
 
 def tag(name: str) -> Any:
@@ -57,9 +59,7 @@ class View:
     id: Number = 0  # comes back with the frame
     mode: Mode | Compared = "shaded"
     gain: Annotated[float, Field(ge=1, le=16)] = 4.0  # of differences
-    wipe: Annotated[float, Field(ge=0, le=1)] | None = (
-        None  # part of the width that is the scene; none: beside it
-    )
+    wipe: Annotated[float, Field(ge=0, le=1)] | None = None  # share of the width; none: beside it
     moving: bool = False  # another one follows at once: speed counts more than quality
     before: bool = False  # the scene as it was opened
     transparent: bool = False  # without its background; of pictures of the scene or its volume alone
@@ -124,7 +124,8 @@ class Clicked:
     """Clicks on a view of a model alone: pixels to the right and down, and whether they are on the object."""
 
     camera: Orbit
-    points: Annotated[tuple[Click, ...], Field(min_length=1, max_length=MOST_POINTS)]
+    points: Annotated[tuple[Click, ...], Field(max_length=MOST_POINTS)]
+    outline: Outline | None = field(default=None, kw_only=True)  # around the object: pixels, too
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import TexgsError
-from texgs.edit.clicks import Clicks, places_of
+from texgs.edit.clicks import Clicks, inside_of, places_of
 from texgs.edit.lift import Lifted, lift, view_mask
 from texgs.edit.new_segment import clicked_model
 from texgs.fields.part_edit import PartEdit
@@ -59,17 +59,17 @@ class Segmenter:
     def facts(self, asked: Segment) -> dict[str, Any]:
         """Return what a segment comes from, for its file."""
         name = "" if self._masks is None else self._masks.name
-        points = {
-            key: [[x, y] for x, y, is_on in asked.points if is_on == sign]
-            for key, sign in (("point", True), ("other", False))
-        }
-        return {"camera": asdict(asked.camera), **points, "masks": name, "vote": "contribution"}
+        on, off = ([[x, y] for x, y, is_on in asked.points if is_on == sign] for sign in (True, False))
+        shown = {"camera": asdict(asked.camera), "point": on, "other": off, "outline": asked.outline}
+        return {**shown, "masks": name, "vote": "contribution"}
 
     def _clicks(self, clicked: Clicked) -> Clicks:
         """Return the clicks of a page."""
-        points = torch.tensor([point[:2] for point in clicked.points], device=self._device)
-        positive = torch.tensor([point[2] for point in clicked.points], device=self._device)
-        return Clicks(clicked.camera.camera().to(self._device), points, positive)
+        points = torch.tensor([point[:2] for point in clicked.points], device=self._device).reshape(-1, 2)
+        positive = torch.tensor([point[2] for point in clicked.points], dtype=torch.bool, device=self._device)
+        camera, outline = clicked.camera.camera().to(self._device), clicked.outline
+        held = inside_of(torch.tensor(outline, device=self._device), camera) if outline else None
+        return Clicks(camera, points, positive, held)
 
     def _model(self, scene: Scene, name: str) -> Surfels:
         """Return a model with its textures, kept for the next click."""

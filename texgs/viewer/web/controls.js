@@ -25,11 +25,12 @@ export function control(canvas, camera, moved, goTo, isLocked = () => false) {
   }
   canvas.addEventListener("pointermove", (event) => {
     const before = pointers.get(event.pointerId);
-    if (!before || isLocked()) return;
+    if (!before) return;
+    pointers.set(event.pointerId, event);
+    if (isLocked()) return;
     const others = [...pointers.values()].filter((each) => each.pointerId !== event.pointerId);
     if (others.length) pinch(camera(), canvas, before, event, others[0]);
     else drag(camera(), canvas, before, event);
-    pointers.set(event.pointerId, event);
     moved();
   });
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());

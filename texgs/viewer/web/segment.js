@@ -1,18 +1,28 @@
-// A new segment: clicks on a model alone, the mask that they select, and the wait until it is found in space.
+// A new segment: clicks on a model alone or an outline, the mask that they select, and the wait until it is found.
 
 const get = (id) => document.getElementById(id);
 const STILL = 4; // CSS pixels that a click may move
-const MOST_POINTS = 100; // as the server has it
+const MOST_POINTS = 100, MOST_CORNERS = 500; // as the server has it
+const HINTS = { // before anything is chosen
+  points: "Turn the model as you like, and click on what belongs to the segment.",
+  box: "Drag a box around what belongs to the segment.",
+  lasso: "Draw around what belongs to the segment.",
+};
 const COLORS = { true: "#0a8f2f", false: "#1540d0" }; // of points on the object, and beside it
 
 export class SegmentTool {
   #page; #model = null; #points = []; #confirmed = 0; #asked = 0; #picture = null; #down = null;
+  #outline = null; #good = null; // corners around the object, and those that a mask has been found for
+  #stroke = null; // corners, while they are drawn
 
   /** @param {object} page - with camera, canvas, connection, notices, renderer, state, and show() */
   constructor(page) {
     this.#page = page;
     const { canvas, connection, job } = page;
-    canvas.addEventListener("pointerdown", (event) => { this.#down = event; });
+    canvas.addEventListener("pointerdown", (event) => this.#begin(event));
+    canvas.addEventListener("pointermove", (event) => this.#extend(event));
+    canvas.addEventListener("pointerup", () => this.#close());
+    canvas.addEventListener("pointercancel", () => this.#begin());
     canvas.addEventListener("click", (event) => this.#click(event));
     canvas.addEventListener("keydown", (event) => {
       if (!this.#model) return;
@@ -24,6 +34,7 @@ export class SegmentTool {
       event.preventDefault();
       this.#make();
     });
+    get("segment").addEventListener("change", () => this.#show());
     get("segment-clear").onclick = () => this.#clear();
     get("segment-cancel").onclick = () => this.leave();
     connection.addEventListener("message", ({ detail }) => this.#receive(detail));
@@ -33,9 +44,9 @@ export class SegmentTool {
       detail.kind !== "segment" || detail.hasFailed ? this.#show() : this.#end());
   }
 
-  /** Whether the camera has to stay: points belong to one view. */
+  /** Whether the camera has to stay: points and outlines belong to one view. */
   get isLocked() {
-    return this.#points.length > 0;
+    return this.#points.length > 0 || Boolean(this.#outline ?? this.#stroke);
   }
 
   /** Begin with a model. */
@@ -51,9 +62,42 @@ export class SegmentTool {
     this.#page.canvas.focus();
   }
 
+  /** Begin to draw, with the only button or finger: a second finger moves the camera instead. */
+  #begin(event) {
+    this.#down = event;
+    const isDrawn = this.#model && this.#shape !== "points" && !this.#page.job.isAtWork;
+    this.#stroke = isDrawn && event?.isPrimary && event.button === 0 ? [[event.offsetX, event.offsetY]] : null;
+    this.#draw();
+  }
+
+  #extend({ isPrimary, offsetX, offsetY }) {
+    if (!this.#stroke || !isPrimary) return;
+    const { clientWidth, clientHeight } = this.#page.canvas, [[left, top]] = this.#stroke;
+    const x = Math.min(Math.max(offsetX, 0), clientWidth), y = Math.min(Math.max(offsetY, 0), clientHeight);
+    const [lastX, lastY] = this.#stroke.at(this.#shape === "box" ? 0 : -1);
+    if (Math.hypot(x - lastX, y - lastY) <= STILL) return;
+    if (this.#shape === "box") this.#stroke = [[left, top], [x, top], [x, y], [left, y]];
+    else this.#stroke.push([x, y]);
+    this.#draw();
+  }
+
+  #close() {
+    const stroke = this.#stroke ?? [], step = Math.ceil(stroke.length / MOST_CORNERS);
+    this.#stroke = null;
+    this.#draw();
+    if (stroke.length < 3) return;
+    this.#down = null; // what ends is no click
+    this.#outline = stroke.filter((_, index) => index % step === 0);
+    this.#ask();
+  }
+
+  get #shape() {
+    return get("segment").elements.shape.value;
+  }
+
   #click(event) {
     const { clientX, clientY, shiftKey, offsetX, offsetY } = event;
-    const moved = Math.hypot(clientX - this.#down?.clientX, clientY - this.#down?.clientY);
+    const moved = Math.hypot(clientX - this.#down?.clientX, clientY - this.#down?.clientY); // NaN: was drawn
     if (this.#model && !this.#page.job.isAtWork && moved <= STILL) this.#add(offsetX, offsetY, shiftKey);
   }
 
@@ -83,6 +127,7 @@ export class SegmentTool {
 
   #clear() {
     this.#points = [];
+    this.#outline = this.#good = this.#stroke = null;
     this.#confirmed = 0; // of the points, from the first on, a mask has been found for
     get("segment-negative").checked = false;
     this.#picture = null;
@@ -111,17 +156,18 @@ export class SegmentTool {
     this.#page.show({ only: "" });
   }
 
-  /** The clicks, in pixels of the picture. */
+  /** The clicks and the outline, in pixels of the picture. */
   #clicked() {
     const { camera, canvas, renderer } = this.#page, [width, height] = renderer.size();
-    const points = this.#points.map(([x, y, positive]) =>
-      [x * width / canvas.clientWidth, y * height / canvas.clientHeight, positive]);
-    return { camera: camera.wire(width, height), points };
+    const scaled = ([x, y, ...more]) => [x * width / canvas.clientWidth, y * height / canvas.clientHeight, ...more];
+    const [points, outline] = [this.#points, this.#outline].map((places) => places?.map(scaled));
+    return { camera: camera.wire(width, height), points, outline };
   }
 
   #receive(message) {
     if (message.type === "mask" && message.id === this.#asked) {
       this.#confirmed = this.#points.length;
+      this.#good = this.#outline;
       const picture = new Image();
       picture.onload = () => {
         if (message.id !== this.#asked) return;
@@ -130,6 +176,9 @@ export class SegmentTool {
       };
       picture.src = message.picture;
       get("segment-by").textContent = `Mask by ${message.by}.`;
+    } else if (message.mask === this.#asked && this.#outline !== this.#good) {
+      this.#outline = this.#good;
+      this.#ask();
     } else if (message.mask === this.#asked && this.#confirmed < this.#points.length) {
       this.#points.splice(this.#confirmed, 1); // the notice says what is wrong; the first new one may be it
       this.#ask();
@@ -138,8 +187,8 @@ export class SegmentTool {
 
   #show() {
     get("segment-hint").textContent = this.isLocked
-      ? "Clicks add to it, with Shift they take away. The camera stays until you clear the points."
-      : `Turn ${this.#model} as you like, and click on what belongs to the segment.`;
+      ? `Clicks${this.#outline ? " inside" : ""} add to it, with Shift they take away. The camera stays until you clear.`
+      : HINTS[this.#shape];
     get("segment-make").disabled = get("segment-clear").disabled = !this.isLocked || this.#page.job.isAtWork;
     this.#draw();
   }
@@ -150,6 +199,7 @@ export class SegmentTool {
     overlay.width = Math.round(clientWidth * ratio);
     overlay.height = Math.round(clientHeight * ratio);
     if (this.#picture) context.drawImage(this.#picture, 0, 0, overlay.width, overlay.height);
+    this.#drawOutline(context, ratio);
     context.lineWidth = 2 * ratio;
     context.strokeStyle = "white";
     for (const [x, y, positive] of this.#points) {
@@ -157,6 +207,17 @@ export class SegmentTool {
       context.beginPath();
       context.arc(x * ratio, y * ratio, 6 * ratio, 0, 2 * Math.PI);
       context.fill();
+      context.stroke();
+    }
+  }
+
+  #drawOutline(context, ratio) {
+    context.beginPath();
+    for (const [x, y] of this.#stroke ?? this.#outline ?? []) context.lineTo(x * ratio, y * ratio);
+    context.closePath();
+    for (const [width, color] of [[4, "white"], [2, COLORS.true]]) {
+      context.lineWidth = width * ratio;
+      context.strokeStyle = color;
       context.stroke();
     }
   }
