@@ -1,9 +1,12 @@
 """A model of a function in seconds: where its surfels start, and what comes of them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.scene.test_twin import HIGH, LOOK, LOW
 from texgs.core.camera import orbit
@@ -74,14 +77,26 @@ def test_the_finer_model_is_closer_to_the_volume_in_a_view_between_others(small,
     assert quality[1] > least
 
 
-def test_what_is_too_faint_for_rays_to_lose_half_starts_at_their_mean_depth(small, grid):
-    faint = of_range(replace(LOW, opacity=((0.2, 0), (0.3, 0.004), (0.4, 0))), grid)
-    caster = Caster(grid, LOOK)
-    images = now.cast_views(caster, faint, LENS, "faint", 0)
-    assert int(images.planes[:, 3].max()) < 100
-    points = now.ends_of_rays(caster, LOOK, faint, images, 0)
-    assert len(points.places) == now.SURFELS
-    assert points.places.norm(dim=1).max() < 0.9
+@pytest.mark.parametrize("height", [0.01, 0.1])
+def test_surfels_start_where_views_see_something_also_behind_other_layers(small, grid, height):
+    """Of a shell, as many start on its far side as that side adds to the picture."""
+    shell = of_range(replace(LOW, opacity=((0.2, 0), (0.3, height), (0.4, 0))), grid)
+    caster, camera = Caster(grid, LOOK), orbit(20, 10, *LENS)
+    points = now.ends_of_rays(caster, LOOK, shell, SimpleNamespace(cameras=[camera] * 60), 0)
+    assert len(points.places) > 1000
+    depth = (points.places @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3])[:, 2]
+    middle = torch.stack([torch.zeros(64, 64), torch.full((64, 64), LENS.radius)])
+    whole = caster.cast(shell, camera, HEADLIGHT).rgba[..., 3].sum()
+    front = caster.cast(shell, camera, HEADLIGHT, depth_range=middle).rgba[..., 3].sum()
+    share = float((depth > LENS.radius).float().mean())
+    assert share == pytest.approx(float(1 - front / whole), abs=0.04)
+    assert 0.1 < share < 0.51
+
+
+@given(st.floats(0, 0.999), st.floats(0.1, 50))
+def test_thicker_matter_lets_a_power_of_the_light_through(alpha, factor):
+    tf = TransferFunction(((0, alpha), (1, 0.5)), ((0, 1, 1, 1),))
+    assert 1 - now.thickened(tf, factor).opacity[0][1] == pytest.approx((1 - alpha) ** factor, abs=1e-12)
 
 
 def test_a_function_that_shows_nothing_is_told(small, grid):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
@@ -30,9 +31,9 @@ from texgs.volume.transfer import TransferFunction
 
 FREQUENCY = 4  # of the icosphere of cameras, of which it has 162
 STEP = 0.5  # voxels between the samples of views
-SURFELS, OPACITY = 20_000, 0.2
-PIXELS = 250  # of each view, of which surfels are drawn
-LEAST = 100  # points
+SURFELS, OPACITY = 20_000, 0.05
+PIXELS = 4000  # of each view, of which surfels are drawn
+LEAST, DENSEST = 100, 1 - 1e-6  # points
 FAINT = 0.02  # alpha below which a pixel shows nothing to speak of
 HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of their own
 RATES = Rates(quats=0.016, scales=0.05, opacities=0.1)
@@ -102,29 +103,47 @@ def cast_views(caster: Caster, tf: TransferFunction, lens: Lens, title: str, see
 
 
 def ends_of_rays(caster: Caster, look: Appearance, tf: TransferFunction, images: Images, seed: int) -> Points:
-    """Return where rays of random pixels of all views lose half of their light, else its mean depth."""
+    """Return where rays of random pixels lose some part of their light, another one in each view.
+
+    So there are as many ends on a layer as it shows, also behind others.
+    """
     unlit = caster.with_appearance(replace(look, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
     generator = torch.Generator().manual_seed(seed)
-    for depth in ("median", "depth"):  # rays through faint matter never lose half of it
-        parts = [ends_of(unlit, tf, smaller(camera, 2), depth, generator) for camera in images.cameras]
-        points = Points(*map(torch.cat, zip(*parts, strict=True)))
-        if len(points.places) > LEAST:
-            chosen = torch.randperm(len(points.places), generator=generator)[:SURFELS]
-            ordered = chosen[z_order_of(points.places[chosen])]
-            return Points(*(x[ordered] for x in points))
-    raise ArgumentError("function: expected to see something of the volume, got nothing; raise its opacity")
+    parts = []
+    for camera, left in zip(images.cameras, shares_of_light(len(images.cameras), generator), strict=True):
+        thick = thickened(tf, math.log(0.5) / math.log(left))  # half of its light is left where `left` was
+        parts.append(ends_of(unlit, thick, smaller(camera, 2), generator))
+    points = Points(*map(torch.cat, zip(*parts, strict=True)))
+    if len(points.places) < LEAST:
+        raise ArgumentError(
+            "function: expected to see something of the volume, got nothing; raise its opacity"
+        )
+    chosen = torch.randperm(len(points.places), generator=generator)[:SURFELS]
+    ordered = chosen[z_order_of(points.places[chosen])]
+    return Points(*(x[ordered] for x in points))
 
 
-def ends_of(
-    caster: Caster, tf: TransferFunction, camera: Camera, depth: str, generator: torch.Generator
-) -> Points:
-    """Return the ends of rays of random pixels of one view, by a kind of depth that the caster has."""
-    seen = caster.cast(tf, camera, HEADLIGHT, (depth, "normal"))
-    z: Tensor = getattr(seen, depth)
+def shares_of_light(count: int, generator: torch.Generator) -> list[float]:
+    """Return shares between 0 and 1 that are spread evenly, in random order."""
+    return ((torch.randperm(count, generator=generator) + 0.5) / count).tolist()
+
+
+def thickened(tf: TransferFunction, factor: float) -> TransferFunction:
+    """Return a function of a factor's extinction."""
+    through = [(value, math.log1p(-min(alpha, DENSEST))) for value, alpha in tf.opacity]
+    return TransferFunction(tuple((value, -math.expm1(factor * x)) for value, x in through), tf.color)
+
+
+def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: torch.Generator) -> Points:
+    """Return where rays of random pixels of one view lose half of their light, as far as they do."""
+    seen = caster.cast(tf, camera, HEADLIGHT, ("median", "normal"))
+    z: Tensor = seen.median  # type: ignore[assignment]
     normals: Tensor = seen.normal  # type: ignore[assignment]
-    rows, columns = ((z > 0) & (seen.rgba[..., 3] > FAINT)).nonzero(as_tuple=True)
+    rows, columns = (seen.rgba[..., 3] > FAINT).nonzero(as_tuple=True)
     some = torch.randperm(len(rows), generator=generator)[:PIXELS]
-    at = rows[some], columns[some]
+    rows, columns = rows[some], columns[some]
+    ends = z[rows, columns] > 0
+    at = rows[ends], columns[ends]
     rgba = seen.rgba[at]
     return Points(places_of(camera, z, *at), normals[at], (rgba[:, :3] / rgba[:, 3:]).clamp(0, 1))
 
