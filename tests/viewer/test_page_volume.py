@@ -43,7 +43,7 @@ from texgs.volume.grid import Grid
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
-from texgs.volume.transfer import TransferFunction
+from texgs.volume.transfer import TransferFunction, combine
 
 CAMERA = orbit(20, 10, 4, 30, 96, 80)
 FROM_BELOW = orbit(-130, -40, 2.5, 40, 64, 90)
@@ -182,6 +182,26 @@ def test_scene_and_volume_beside_each_other(page, scene, mode):
     expected = shown_beside(replace(VIEW, mode=mode, gain=4.0, wipe=0.4), image.color, truth.color)
     got = drawn(page, CAMERA, described(page, scene), mode, gain=4, wipe=0.4)
     assert closeness(got, expected) > LEAST - 12 * (mode == "difference"), "differences are enlarged"
+
+
+DEPTH = """([camera, scene, mode, pixel]) => {
+  const view = { ...camera, viewmat: () => camera.viewmat, unproject: (place, depth) => depth };
+  renderer.size = () => [camera.width, camera.height];
+  return renderer.pointAt(view, scene, { mode }, pixel);
+}"""
+
+
+def test_depths_of_the_volume_are_those_of_the_caster(page, scene):
+    """A double click turns around what the mode shows: the volume here, or the models."""
+    size = {"width": CAMERA.width, "height": CAMERA.height}
+    seen = {"viewmat": CAMERA.viewmat[:3].tolist(), "fov_y": 30, **size}
+    volume = Twin(scene)._caster.cast(combine(scene.volume.tfs), CAMERA, HEADLIGHT, ("depth",))
+    models = scene.open().render(CAMERA, HEADLIGHT, scene.edits, outputs=("depth",))
+    row, column = divmod(int(volume.rgba[..., 3].argmax()), CAMERA.width)
+    for mode, expected in (("volume", volume), ("shaded", models)):
+        words = [seen, described(page, scene), mode, [column, row]]
+        assert page.evaluate(DEPTH, words) == pytest.approx(float(expected.depth[row, column]), abs=5e-3)
+        assert page.evaluate(DEPTH, [*words[:3], [0, 0]]) is None, "the background"
 
 
 def test_moving_pictures_have_longer_steps(page, scene):

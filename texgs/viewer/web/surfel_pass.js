@@ -7,7 +7,6 @@ import { SURFEL_FRAGMENT, SURFEL_VERTEX } from "./shaders.js";
 import { LAYERS, WIDTH } from "./surfels.js";
 import { Target } from "./target.js";
 
-const FAINT = 0.1; // alpha below which a pixel counts as background, as the server has it
 const BEYOND = 1e9; // a depth that nothing has
 
 export const NEAR = 0.2; // camera z, world units, as the rasterizer has it
@@ -79,15 +78,6 @@ export class SurfelPass {
     gl.disable(gl.BLEND);
     this.target.end();
     return this.target.picture;
-  }
-
-  /** The mean depth of a pixel, where depth was blended; null for the background. */
-  depthAt(x, y) {
-    const gl = this._gl, pixel = new Float32Array(4);
-    this.target.bind();
-    gl.readPixels(x, y, 1, 1, gl.RGBA, gl.FLOAT, pixel);
-    this.target.end();
-    return pixel[3] < FAINT ? null : pixel[0] / pixel[3];
   }
 
   /** The least and the largest mean depth of pixels that are not faint, where depth was blended; BEYOND if none is. */

@@ -2,6 +2,8 @@
 
 import { makeTexture } from "./program.js";
 
+const FAINT = 0.1; // alpha below which a pixel counts as background, as the server has it
+
 export class Target {
   size = [0, 0];
   picture = null; // a texture whose first row is on top
@@ -32,6 +34,15 @@ export class Target {
   /** Draw on the screen again. */
   end() {
     this.#gl.bindFramebuffer(this.#gl.FRAMEBUFFER, null);
+  }
+
+  /** The mean depth of a pixel, where depths were drawn; null for the background. */
+  depthAt(x, y) {
+    const gl = this.#gl, pixel = new Float32Array(4);
+    this.bind();
+    gl.readPixels(x, y, 1, 1, gl.RGBA, gl.FLOAT, pixel);
+    this.end();
+    return pixel[3] < FAINT ? null : pixel[0] / pixel[3];
   }
 
   #resize(size) {

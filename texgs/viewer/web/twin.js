@@ -12,7 +12,7 @@ const STILL = 0.5, MOVING = 1; // voxels between samples
 export const alone = (picture) => ({ first: picture, second: picture, pair: "none" });
 
 export class Twin {
-  #volume; #faces; #target; #hasLooks;
+  #volume; #faces; #hasLooks;
 
   /**
    * @param {WebGL2RenderingContext} gl
@@ -22,7 +22,7 @@ export class Twin {
   constructor(gl, samples, facts) {
     this.#volume = new VolumePass(gl, samples, facts);
     this.#faces = new Faces(gl, this.#volume);
-    this.#target = new Target(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT]);
+    this.target = new Target(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT]);
     this.#hasLooks = facts.looks;
   }
 
@@ -39,13 +39,18 @@ export class Twin {
     };
     const seen = () => {
       if (!look.planes.length) return models.draw();
-      if (!this.#hasLooks) return cast(this.#target);
+      if (!this.#hasLooks) return cast(this.target);
       const slab = { reach: SLAB * this.#volume.unit, weights: this.#faces.weights(view, shown, look) };
       models.draw(slab);
       return cast(models.target, { ...slab, isOver: true });
     };
-    if (mode === "volume") return alone(cast(this.#target));
+    if (mode === "volume") return alone(cast(this.target));
     if (mode === "shaded") return alone(seen());
-    return { first: seen(), second: cast(this.#target), pair: mode };
+    return { first: seen(), second: cast(this.target), pair: mode };
+  }
+
+  /** Draw depths of the volume into the target. */
+  drawDepths(view, scene, look) {
+    this.#volume.cast(this.target, view, scene, look, { step: STILL, isDepth: true });
   }
 }

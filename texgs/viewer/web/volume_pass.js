@@ -43,9 +43,9 @@ export class VolumePass {
    * @param {object} look `light`, a direction [3] or null for a headlight, and `planes` that cut.
    * @param {object} how `step`, in voxels; and to show only what is behind faces, its `reach` in world units, and
    *   what part of that each pixel shows, a texture of `weights`; by default all;
-   *   `isOver`: over what is in the target.
+   *   `isOver`: over what is in the target; `isDepth`: depths in place of colours.
    */
-  cast(target, view, scene, { light, planes }, { step, reach = 0, weights = this.#textures.weights, isOver = false }) {
+  cast(target, view, scene, { light, planes }, { step, reach = 0, weights = this.#textures.weights, isOver = false, isDepth = false }) {
     const gl = this.#gl, { program, uniforms } = this.#shaders, viewer = view.viewmat.slice(8, 11).map((x) => -x);
     this.#show(scene);
     target.begin(view.size, isOver);
@@ -56,6 +56,7 @@ export class VolumePass {
     gl.uniform1f(uniforms.interval, step * this.voxel);
     gl.uniform1f(uniforms.unit, this.unit);
     gl.uniform1f(uniforms.reach, reach);
+    gl.uniform1i(uniforms.is_depth, isDepth ? 1 : 0);
     gl.uniform3fv(uniforms.viewer, viewer);
     gl.uniform3fv(uniforms.light, light ?? viewer);
     gl.uniform4fv(uniforms.material, materialOf(scene, this.#facts.appearance));

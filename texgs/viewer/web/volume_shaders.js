@@ -26,7 +26,7 @@ uniform float interval, unit;    // distance of samples, and the length that opa
 uniform float reach;             // behind faces, world units; 0: no end
 uniform vec3 viewer, light;      // directions to them
 uniform vec4 material;
-uniform bool are_faces_lit;
+uniform bool are_faces_lit, is_depth;
 uniform int n_planes;
 uniform vec4 planes[${MOST_PLANES}]; // normals and offsets in the world
 
@@ -109,6 +109,7 @@ void main() {
       float of_face = face < 0 ? 0.0 : clamp((face_end - near) / interval - k, 0.0, 1.0);
       vec3 color = of_face < 1.0 ? lit(look.rgb, normal_at((place + 0.5) * texel, texel)) : vec3(0.0);
       if (of_face > 0.0) color = mix(color, are_faces_lit ? lit(look.rgb, planes[face].xyz) : look.rgb, of_face);
+      if (is_depth) color = vec3((near + (k + 0.5) * interval) / length(camera));
       sum += clear * alpha * color;
       clear *= 1.0 - alpha;
     }

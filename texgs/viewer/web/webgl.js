@@ -88,11 +88,13 @@ export class WebglRenderer {
     this._ask();
   }
 
-  /** The point of the surfels [3] that a pixel shows; null for the background. */
-  pointAt(camera, scene, { before }, [x, y]) {
+  /** The point [3] that a pixel shows; null for the background. */
+  pointAt(camera, scene, { before, mode }, [x, y]) {
     const view = this._view(camera), pixel = [x, y].map((side) => side + 0.5), shown = before ? this._original : scene;
-    this._blend(viewOf(view), shown, lookOf(shown), "depth");
-    const depth = this._pass.depthAt(x, y);
+    const look = lookOf(shown), isVolume = this._twin && mode === "volume";
+    if (isVolume) this._twin.drawDepths(viewOf(view), shown, look);
+    else this._blend(viewOf(view), shown, look, "depth");
+    const depth = (isVolume ? this._twin : this._pass).target.depthAt(x, y);
     return depth && camera.unproject(pixel, depth, view.width, view.height);
   }
 
