@@ -16,8 +16,10 @@ GIT = ("git", "-c", "user.name=x", "-c", "user.email=x@x.org", "-c", "commit.gpg
 
 
 def test_each_result_and_picture_is_in_the_index():
-    files = {path.name for path in (*RESULTS.iterdir(), *DOCS.glob("*.png"))} - {INDEX.name}
-    assert set(results.index().index) == files, f"enter what is new: {REMEDY} --help"
+    files = [*RESULTS.iterdir(), *DOCS.glob("*.png"), *DOCS.glob("*.webp")]
+    assert set(results.index().index) == {path.name for path in files} - {INDEX.name}, (
+        f"enter what is new: {REMEDY} --help"
+    )
 
 
 @pytest.mark.parametrize("file", results.index().index)
