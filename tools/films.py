@@ -27,7 +27,7 @@ WINDOW, SIZE = {"width": 1120, "height": 700}, (720, 450)  # of the browser, and
 SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 FASTER = 8
 LAST = 2000  # milliseconds that the last frame stays
-WAIT = 60_000  # milliseconds at most, on a busy machine
+WAIT = 240_000  # milliseconds at most, on a busy machine
 QUALITY = 55
 VIEW = "#azimuth=-60&polar=20"
 
@@ -94,8 +94,9 @@ def made(page: Any) -> Film:
     page.wait_for_timeout(1000)
     film.shoot()
     page.get_by_role("button", name="Make model").click()
+    page.wait_for_timeout(500)
     end = monotonic() + WAIT / 1000
-    while monotonic() < end and not page.get_by_text("finer model").is_visible():
+    while monotonic() < end and page.locator("#job").is_visible():
         page.wait_for_timeout(400)
         film.shoot()
     page.wait_for_timeout(1500)
