@@ -85,13 +85,12 @@ def lift(
     if clicks.held is not None:
         (cone := CentreVotes(model)).add(camera, clicks.held)
         held, clicks = cone.inside, with_middles(clicks, reference)
-    places = places_of(model, clicks)
+    places, used = places_of(model, clicks), 1  # views
     votes = (ContributionVotes if vote == "contribution" else CentreVotes)(model, threshold)
     so_far = votes if isinstance(votes, ContributionVotes) else ContributionVotes(model, rounds=0)
     counted = [votes] if so_far is votes else [votes, so_far]
     for each in counted:
         each.add(camera, reference)
-    used = 1
     outwards = sorted(cameras, key=lambda other: -float(camera.viewmat[2, :3] @ other.viewmat[2, :3]))
     for other in progress(outwards, title=title, unit="view"):
         mask = _mask(find, so_far, held, places, clicks.positive, other)
