@@ -28,6 +28,8 @@ LEAST = 1 / 3  # part of them that stays
 STEPS = {"volume": 0.5}  # voxels between samples of a volume while something moves, by mode
 COARSE = 1.0  # the same of faces of cuts
 MOVING = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
+SMALL = 300 * 300  # pixels of a picture that is enlarged on the page, and cheap to send as it is
+ENLARGED = (92, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 STILL = (95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 
 
@@ -105,7 +107,8 @@ class Frames:
 
 def packed(view: View, pixels: np.ndarray, seconds: float, scores: Mapping[str, float]) -> bytes:
     """Return the length of a header (4 bytes, little-endian), the header (JSON), a JPEG picture."""
-    quality, sampling = MOVING if view.moving else STILL
+    rows, columns, _ = pixels.shape
+    quality, sampling = (ENLARGED if rows * columns <= SMALL else MOVING) if view.moving else STILL
     options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, sampling]
     _, picture = cv2.imencode(".jpg", cv2.cvtColor(pixels[..., :3], cv2.COLOR_RGB2BGR), options)
     header = json.dumps({"id": view.id, "ms": round(1000 * seconds, 1), **scores}).encode()
