@@ -7,9 +7,8 @@ of `benchmarks.functions`. Chromium draws in software, and opens the page as a f
 from __future__ import annotations
 
 import json
-import shutil
 import sys
-from base64 import b64decode, b64encode
+from base64 import b64encode
 from itertools import islice
 from pathlib import Path
 from statistics import median, quantiles
@@ -21,14 +20,16 @@ import numpy as np
 import torch
 
 from benchmarks import machine
+from benchmarks.browser import SOFTWARE, browser_path
 from benchmarks.functions import COUNT, COVER, NAME, SEED, functions, opened_scene, psnr
 from benchmarks.results import note
+from tests.viewer.drawing import drawn, open_renderer, view_of
 from texgs.core.camera import Camera, orbit
 from texgs.scene.frame import quantized
 from texgs.scene.scene import Scene
 from texgs.viewer.description import describe
 from texgs.viewer.page_volume import PageVolume, page_volume
-from texgs.viewer.standalone import joined_modules, pack, write_page
+from texgs.viewer.standalone import pack, write_page
 from texgs.volume.caster import Caster
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.render import Appearance
@@ -36,25 +37,15 @@ from texgs.volume.transfer import TransferFunction
 
 FUNCTIONS, SIZE, SMALL = 50, 400, 200  # pixels of a picture, and those of one that moves
 OPENINGS = 5  # of a page
-SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-SCRIPT = """
-const { WebglRenderer } = modules["webgl.js"];
-globalThis.start = async (...words) => {
-  const canvas = document.body.appendChild(document.createElement("canvas"));
-  globalThis.renderer = new WebglRenderer(canvas, (text) => console.log(text));
-  await renderer.open(...words);
-  const gl = canvas.getContext("webgl2");
+NAME_OF_CARD = """() => {
+  const gl = renderer._gl;
   return gl.getParameter(gl.getExtension("WEBGL_debug_renderer_info").UNMASKED_RENDERER_WEBGL);
-};
-globalThis.shoot = (view, scene, shown) => {
-  const start = performance.now(), pixels = renderer.pixels(view, scene, shown);
-  const took = performance.now() - start;
-  let text = "";
-  for (let i = 0; i < pixels.length; i += 4096) text += String.fromCharCode(...pixels.subarray(i, i + 4096));
-  return [took, btoa(text)];
-};
-"""
+}"""
+TIME = """(words) => {
+  const start = performance.now();
+  renderer.pixels(...words); // reads them, so that all is drawn
+  return performance.now() - start;
+}"""
 
 
 def main(output: str, *volumes: str) -> None:
@@ -62,9 +53,8 @@ def main(output: str, *volumes: str) -> None:
     from playwright.sync_api import sync_playwright
 
     measured = {}
-    path = next(filter(None, map(shutil.which, BROWSERS)))
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=SOFTWARE)
+        browser = playwright.chromium.launch(executable_path=browser_path(), args=SOFTWARE)
         for name, _, file in (words.partition("=") for words in volumes):
             with machine.Load() as load, TemporaryDirectory() as folder:
                 measured[name] = of_volume(browser, Path(file), Path(folder))
@@ -89,14 +79,14 @@ def of_volume(browser: Any, file: Path, folder: Path) -> dict[str, object]:
     packed_in = perf_counter() - start
     written = write_page(folder / "page.html", scene, NAME, volume=volume)
     opened_in = [opened(browser, written.path) for _ in range(OPENINGS)]
-    page, renderer, description = opened_renderer(browser, scene, volume)
+    page, description = opened_renderer(browser, scene, volume)
     closeness = compared(page, description, scene, file)
     turning, changing = times(page, description, file)
     return {
         "samples": volume.codes.shape,
         "mb": len(volume.packed) / 1e6,
         "page_mb": written.path.stat().st_size / 1e6,
-        "renderer": renderer,
+        "renderer": page.evaluate(NAME_OF_CARD),
         "seconds": {"packed": packed_in, "opened": opened_in},
         "functions": len(closeness),
         "db": {
@@ -119,17 +109,12 @@ def opened(browser: Any, file: Path) -> float:
     return seconds
 
 
-def opened_renderer(browser: Any, scene: Scene, volume: PageVolume) -> tuple[Any, str, dict[str, Any]]:
-    """Return a page that draws a scene where it is told to, what draws it, and the description."""
-    composed = scene.open()
+def opened_renderer(browser: Any, scene: Scene, volume: PageVolume) -> tuple[Any, dict[str, Any]]:
+    """Return a page that draws a scene as it is told, and the description of the scene."""
+    composed, page = scene.open(), browser.new_page()
     description = describe(NAME, scene, composed) | {"volume": volume.describe(scene)}
-    page = browser.new_page()
-    page.set_content(
-        f"<!doctype html><body><script type=module>{joined_modules('webgl.js')}{SCRIPT}</script>"
-    )
-    page.wait_for_function("globalThis.start !== undefined")
-    words = [pack(Path(NAME), composed), description, b64encode(volume.packed).decode()]
-    return page, page.evaluate("(words) => start(...words)", words), description
+    open_renderer(page, pack(Path(NAME), composed), description, b64encode(volume.packed).decode())
+    return page, description
 
 
 def compared(page: Any, description: dict[str, Any], scene: Scene, file: Path) -> list[float]:
@@ -140,7 +125,7 @@ def compared(page: Any, description: dict[str, Any], scene: Scene, file: Path) -
         rgba = caster.cast(tf, camera, scene.light).rgba
         whole = quantized(rgba[..., :3] + 1 - rgba[..., 3:])
         if (whole != 255).any(axis=2).mean() >= COVER:
-            picture = shot(page, description, tf, camera)[1]
+            picture = drawn(page, camera, tried(description, tf), "volume")
             closeness.append(psnr(picture, whole))
         if len(closeness) == FUNCTIONS:
             break
@@ -151,8 +136,9 @@ def times(page: Any, description: dict[str, Any], file: Path) -> tuple[list[floa
     """Return milliseconds of moving frames from new cameras, and of those with new functions."""
     turning, changing = list[float](), list[float]()
     for tf in some_functions(file, COUNT):
-        changing.append(shot(page, description, tf, camera_of(0, SMALL), moving=True)[0])
-        turning.append(shot(page, description, tf, camera_of(len(turning), SMALL), moving=True)[0])
+        scene, how = tried(description, tf), {"mode": "volume", "moving": True}
+        for milliseconds, place in ((changing, 0), (turning, 1 + len(turning))):
+            milliseconds.append(page.evaluate(TIME, [view_of(camera_of(place, SMALL)), scene, how]))
     return turning, changing
 
 
@@ -168,17 +154,9 @@ def camera_of(number: int, size: int) -> Camera:
     return orbit(15 * number % 360 - 180, 20, 4, 30, size, size)
 
 
-def shot(
-    page: Any, description: dict[str, Any], tf: TransferFunction, camera: Camera, **shown: object
-) -> tuple[float, np.ndarray]:
-    """Return milliseconds and the picture [H, W, 3], uint8, of the volume with a function."""
-    size = {"width": camera.width, "height": camera.height}
-    view = {"viewmat": camera.viewmat[:3].tolist(), "fov_y": 30, **size}
-    scene = {**description, "functions": {NAME: tf.to_dict()}}
-    words = [view, scene, {"mode": "volume", **shown}]
-    took, text = page.evaluate("(words) => shoot(...words)", words)
-    picture = np.frombuffer(b64decode(text), np.uint8).reshape(camera.height, camera.width, 4)
-    return took, picture[..., :3]
+def tried(description: dict[str, Any], tf: TransferFunction) -> dict[str, Any]:
+    """Return the description of a scene that tries a function."""
+    return {**description, "functions": {NAME: tf.to_dict()}}
 
 
 def spread(milliseconds: list[float]) -> dict[str, float]:

@@ -7,7 +7,6 @@ that of the model is faster by `FASTER`.
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,12 +18,12 @@ from typing import Any
 
 from PIL import Image
 
+from benchmarks.browser import SOFTWARE, browser_path
 from benchmarks.command import call
 from benchmarks.results import add
 from tools.pictures import DOCS, PROGRAM
 
 WINDOW, SIZE = {"width": 1120, "height": 700}, (720, 450)  # of the browser, and of a film, pixels
-SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 FASTER = 8
 LAST = 2000  # milliseconds that the last frame stays
 WAIT = 240_000  # milliseconds at most, on a busy machine
@@ -135,7 +134,7 @@ def main(source: str) -> None:
     from playwright.sync_api import expect, sync_playwright
 
     with sync_playwright() as playwright, TemporaryDirectory() as folder:
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=SOFTWARE)
+        browser = playwright.chromium.launch(executable_path=browser_path(), args=SOFTWARE)
         context = browser.new_context(viewport=WINDOW)
         for name, show in (("drag", dragged), ("model", made)):
             with served(Path(source)) as address:

@@ -8,7 +8,6 @@ the paper's views, without which three pictures cannot be made, and VGG-16 and a
 from __future__ import annotations
 
 import shlex
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -19,6 +18,7 @@ import numpy as np
 import pandas as pd
 from PIL import Image
 
+from benchmarks.browser import browser_path
 from benchmarks.results import RESULTS, ROOT, add
 from texgs.core.camera import orbit
 from texgs.core.figures import Cell, Row, as_picture, content, grid_rows, lay_out, new_figure, words
@@ -117,7 +117,7 @@ def viewer(run: Path) -> Image.Image:
     subprocess.run([PROGRAM, "edit", scene, *changes, "--output", edited], check=True)
     words = [PROGRAM, "view", edited, "--no-browser"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as player:
-        browser = player.chromium.launch(executable_path=shutil.which("chromium"))
+        browser = player.chromium.launch(executable_path=browser_path())
         page = browser.new_page(viewport={"width": 1280, "height": 940})
         page.goto(f"{server.stdout.readline().strip()}#azimuth=-60&polar=20")
         expect(page.locator("#pace")).to_contain_text("ms", timeout=60_000)

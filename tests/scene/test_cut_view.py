@@ -8,15 +8,15 @@ import torch
 from scipy.ndimage import distance_transform_cdt
 
 from tests.fields.surfels.test_composition import ball
+from tests.scene.balls import ball_models
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
 from texgs.core.camera import orbit
 from texgs.core.cuts import Box, Cuts, Plane
-from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.changes import apply_all
 from texgs.scene.cut_view import OPAQUE, SLAB, UNITS, cut_view, face_weights, softly_grown
 from texgs.scene.frame import frame
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin, range_of
 from texgs.volume.nrrd_file import open_grid
@@ -30,11 +30,7 @@ HALF = Cuts([TOWARDS])
 def scene(tmp_path_factory):
     """Two balls with a sphere as their volume, cut by a plane that faces the camera."""
     folder = tmp_path_factory.mktemp("scene")
-    files = {
-        name: write_model(folder / f"{name}.safetensors", ball(n))
-        for n, name in enumerate(("low", "high"), 1)
-    }
-    models = {name: SceneModel(file) for name, file in files.items()}
+    models = ball_models(folder, "low", "high")
     return Scene(models, cuts=HALF, volume=sphere_volume(folder, low=LOW, high=HIGH))
 
 

@@ -1,14 +1,11 @@
 """A scene of two small balls, and a browser that draws WebGL2 in software; tests skip where there is none."""
 
-import shutil
-
 import pytest
 
+from benchmarks.browser import NAMES, SOFTWARE, browser_path
 from tests.scene.balls import write_balls
 
 MISSING = "needs Playwright: pip install '.[browser]'"
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 
 
 @pytest.fixture
@@ -21,9 +18,9 @@ def chromium():
     playwright = pytest.importorskip(
         "playwright.sync_api", reason="needs Playwright: pip install '.[browser]'"
     )
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    path = browser_path()
     if path is None:
-        pytest.skip(f"needs a browser on the PATH: {', '.join(BROWSERS)}")
+        pytest.skip(f"needs a browser on the PATH: {', '.join(NAMES)}")
     with playwright.sync_playwright() as started:
         launched = started.chromium.launch(executable_path=path, args=SOFTWARE)
         try:

@@ -41,12 +41,17 @@ def open_renderer(page, packed, description, volume=""):
     page.evaluate("(words) => start(...words)", [packed, description, volume])
 
 
-def drawn(page, camera, description, mode="shaded", **shown):
-    """What the renderer draws [H, W, 3], uint8."""
+def view_of(camera):
+    """A camera as the renderer takes it."""
     fov_y = 2 * np.degrees(np.arctan(0.5 * camera.height / float(camera.K[1, 1])))
     size = {"width": camera.width, "height": camera.height}
-    seen = {"viewmat": camera.viewmat[:3].tolist(), "fov_y": fov_y, **size}
-    text = page.evaluate("(words) => shoot(...words)", [seen, description, {"mode": mode, **shown}])
+    return {"viewmat": camera.viewmat[:3].tolist(), "fov_y": fov_y, **size}
+
+
+def drawn(page, camera, description, mode="shaded", **shown):
+    """What the renderer draws [H, W, 3], uint8."""
+    words = [view_of(camera), description, {"mode": mode, **shown}]
+    text = page.evaluate("(words) => shoot(...words)", words)
     return np.frombuffer(b64decode(text), np.uint8).reshape(camera.height, camera.width, 4)[..., :3]
 
 

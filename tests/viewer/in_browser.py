@@ -53,6 +53,18 @@ def opened(chromium, address, ratio=1):
     assert errors == []
 
 
+@contextmanager
+def standalone(chromium, scene_file, ratio=1):
+    """The page of an export at the known camera."""
+    file = scene_file.with_suffix(".html")
+    assert main(["export", str(scene_file), "--to", str(file)]) == 0
+    page = chromium.new_page(viewport={"width": 800, "height": 500}, device_scale_factor=ratio)
+    page.goto(file.as_uri() + LINK)
+    page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
+    yield page
+    page.close()
+
+
 def rendered(scene_file, page, *words):
     """What `texgs render` writes for the page's camera: bytes of a PNG."""
     box, output = page.locator("#picture").bounding_box(), scene_file.parent / "render.png"

@@ -5,8 +5,7 @@ import re
 import numpy as np
 from PIL import Image, ImageSequence
 
-from tests.viewer.in_browser import WAIT, expect, opened, pixels, served, still
-from texgs.cli.main import main
+from tests.viewer.in_browser import WAIT, expect, opened, pixels, served, standalone, still
 
 FIRST, SECOND = "azimuth 40°, polar 10°", "azimuth 60°, polar 10°"
 
@@ -56,20 +55,15 @@ def test_a_film_goes_through_the_bookmarks_of_the_viewer(chromium, scene_file):
             assert 2 * (first, last)[k] < min(middle, (last, first)[k])
 
 
-def test_bookmarks_stay_in_the_link_of_the_standalone_page(chromium, scene_file, tmp_path):
-    file = tmp_path / "scene.html"
-    assert main(["export", str(scene_file), "--to", str(file)]) == 0
-    page = chromium.new_page(viewport={"width": 800, "height": 500})
-    page.goto(f"{file.as_uri()}#azimuth=40&polar=10")
-    page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
-    kept = keep_two(page)
-    page.reload()
-    expect(kept).to_have_count(2)
-    page.get_by_role("button", name="Remove bookmark 1").click()
-    expect(kept).to_have_text([f"{SECOND}×"])
-    kept.get_by_role("button", name=SECOND).click()
-    expect(page).to_have_url(re.compile("#azimuth=60&.*&bookmarks=60%2C10%2C"), timeout=WAIT)
-    page.evaluate("() => { location.hash = 'bookmarks=1,2;60,10,3,30,0,0,0'; }")
-    expect(page.get_by_text("This page cannot use of the link: bookmarks.")).to_be_visible()
-    expect(kept).to_have_count(1)
-    page.close()
+def test_bookmarks_stay_in_the_link_of_the_standalone_page(chromium, scene_file):
+    with standalone(chromium, scene_file) as page:
+        kept = keep_two(page)
+        page.reload()
+        expect(kept).to_have_count(2)
+        page.get_by_role("button", name="Remove bookmark 1").click()
+        expect(kept).to_have_text([f"{SECOND}×"])
+        kept.get_by_role("button", name=SECOND).click()
+        expect(page).to_have_url(re.compile("#azimuth=60&.*&bookmarks=60%2C10%2C"), timeout=WAIT)
+        page.evaluate("() => { location.hash = 'bookmarks=1,2;60,10,3,30,0,0,0'; }")
+        expect(page.get_by_text("This page cannot use of the link: bookmarks.")).to_be_visible()
+        expect(kept).to_have_count(1)

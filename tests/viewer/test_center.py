@@ -5,12 +5,10 @@ import re
 import pytest
 import torch
 
-from tests.viewer.in_browser import WAIT, expect, opened, served
-from texgs.cli.main import main
+from tests.viewer.in_browser import WAIT, expect, opened, served, standalone
 from texgs.core.camera import orbit
 from texgs.scene.scene_file import read_scene
 
-PLACE = {"azimuth": 40, "polar": 10, "distance": 3.5, "fov_y": 35}
 SEEN = (0.52, 0.44)  # parts of the picture
 BACKGROUND = "There is only background."
 
@@ -49,11 +47,6 @@ def test_a_double_click_turns_the_viewer_around_what_is_seen(chromium, scene_fil
         turns_around_what_is_seen(page, read_scene(scene_file))
 
 
-def test_a_double_click_turns_the_standalone_page_around_what_is_seen(chromium, scene_file, tmp_path):
-    file = tmp_path / "scene.html"
-    assert main(["export", str(scene_file), "--to", str(file)]) == 0
-    page = chromium.new_page(viewport={"width": 800, "height": 500})
-    page.goto(f"{file.as_uri()}#azimuth=40&polar=10&distance=3.5&target=0,0,0")
-    page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
-    turns_around_what_is_seen(page, read_scene(scene_file))
-    page.close()
+def test_a_double_click_turns_the_standalone_page_around_what_is_seen(chromium, scene_file):
+    with standalone(chromium, scene_file) as page:
+        turns_around_what_is_seen(page, read_scene(scene_file))

@@ -3,14 +3,14 @@
 import math
 import re
 from contextlib import contextmanager
+from dataclasses import replace
 from urllib.parse import unquote
 
 import pytest
 import torch
 
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
-from tests.viewer.in_browser import PLACE, WAIT, expect, opened, served
-from texgs.cli.main import main
+from tests.viewer.in_browser import PLACE, WAIT, expect, opened, served, standalone
 from texgs.core.camera import orbit
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.viewer.description import bounds
@@ -20,25 +20,19 @@ FROM = {"From +x": (0, 0), "From −z": (90, 0), "From +y": (-90, 90)}
 
 
 @contextmanager
-def standalone(chromium, scene_file, ratio=1):
-    """The page of an export at the camera of `in_browser.PLACE`."""
-    file = scene_file.with_suffix(".html")
-    assert main(["export", str(scene_file), "--to", str(file)]) == 0
-    page = chromium.new_page(viewport={"width": 800, "height": 500}, device_scale_factor=ratio)
-    place = "&".join(f"{key}={value}" for key, value in PLACE.items())
-    page.goto(f"{file.as_uri()}#{place}&target=0,0,0")
-    page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
-    yield page
-    page.close()
-
-
-@contextmanager
 def viewer(chromium, scene_file):
     with served(scene_file) as (_, address), opened(chromium, address, ratio=2) as page:
         yield page
 
 
 PAGES = pytest.mark.parametrize("opened_page", [viewer, standalone])
+
+
+def with_sphere(scene_file, folder):
+    """A scene file that names a volume, and the volume."""
+    volume = sphere_volume(folder, TF01=LOW, TF02=HIGH)
+    scene = replace(read_scene(scene_file), volume=volume)
+    return write_scene(folder / "named.yaml", scene), volume
 
 
 @PAGES
@@ -53,9 +47,7 @@ def test_ends_of_axes_lead_to_views(chromium, scene_file, opened_page):
 def test_a_box_is_where_the_camera_sees_the_corners_of_the_volume(
     chromium, scene_file, opened_page, tmp_path
 ):
-    volume = sphere_volume(tmp_path, TF01=LOW, TF02=HIGH)
-    scene = read_scene(scene_file)
-    named = write_scene(tmp_path / "named.yaml", type(scene)(scene.models, volume=volume))
+    named, volume = with_sphere(scene_file, tmp_path)
     with opened_page(chromium, named) as page:
         assert page.locator(".box path").first.get_attribute("d") == ""
         page.get_by_label("Bounds of the scene").check()
@@ -75,9 +67,7 @@ def test_a_box_is_where_the_camera_sees_the_corners_of_the_volume(
 def test_the_bar_is_as_long_as_it_says_in_the_units_of_the_volume(
     chromium, scene_file, opened_page, tmp_path
 ):
-    volume = sphere_volume(tmp_path, TF01=LOW, TF02=HIGH)
-    scene = read_scene(scene_file)
-    named = write_scene(tmp_path / "named.yaml", type(scene)(scene.models, volume=volume))
+    named, volume = with_sphere(scene_file, tmp_path)
     for file, name, scale in ((named, "volume", open_grid(volume.file).scale), (scene_file, "world", 1.0)):
         with opened_page(chromium, file) as page:
             length, *words = page.locator(".scale text").text_content().split()

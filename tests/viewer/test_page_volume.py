@@ -16,8 +16,9 @@ from safetensors.numpy import load
 from scipy.ndimage import map_coordinates
 
 from tests.fields.surfels.test_composition import ball
+from tests.scene.balls import ball_models
 from tests.scene.test_twin import HIGH, LOOK, LOW
-from tests.viewer.drawing import drawn, open_renderer
+from tests.viewer.drawing import drawn, open_renderer, view_of
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.cuts import Box, Cuts, Plane
@@ -25,11 +26,10 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.cut_view import beside
 from texgs.scene.frame import frame
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import SceneVolume, Twin
 from texgs.viewer.beside import shown as shown_beside
@@ -82,11 +82,7 @@ def scene(request, tmp_path_factory):
         "waves": waves(),
         "flat": waves((24, 2, 20), (1, 3, 1)),
     }
-    files = {
-        name: write_model(folder / f"{name}.safetensors", ball(n))
-        for n, name in enumerate(("low", "high"), 1)
-    }
-    models = {name: SceneModel(file) for name, file in files.items()}
+    models = ball_models(folder, "low", "high")
     return Scene(models, volume=volume_of(folder, grids[request.param]))
 
 
@@ -193,13 +189,11 @@ DEPTH = """([camera, scene, mode, pixel]) => {
 
 def test_depths_of_the_volume_are_those_of_the_caster(page, scene):
     """A double click turns around what the mode shows: the volume here, or the models."""
-    size = {"width": CAMERA.width, "height": CAMERA.height}
-    seen = {"viewmat": CAMERA.viewmat[:3].tolist(), "fov_y": 30, **size}
     volume = Twin(scene)._caster.cast(combine(scene.volume.tfs), CAMERA, HEADLIGHT, ("depth",))
     models = scene.open().render(CAMERA, HEADLIGHT, scene.edits, outputs=("depth",))
     row, column = divmod(int(volume.rgba[..., 3].argmax()), CAMERA.width)
     for mode, expected in (("volume", volume), ("shaded", models)):
-        words = [seen, described(page, scene), mode, [column, row]]
+        words = [view_of(CAMERA), described(page, scene), mode, [column, row]]
         assert page.evaluate(DEPTH, words) == pytest.approx(float(expected.depth[row, column]), abs=5e-3)
         assert page.evaluate(DEPTH, [*words[:3], [0, 0]]) is None, "the background"
 
@@ -279,11 +273,7 @@ def test_no_room_is_a_sentence():
 def source(tmp_path_factory):
     """A scene file with a volume, as the workflow makes it."""
     folder = tmp_path_factory.mktemp("whole")
-    files = {
-        name: write_model(folder / f"{name}.safetensors", ball(n))
-        for n, name in enumerate(("low", "high"), 1)
-    }
-    models = {name: SceneModel(file) for name, file in files.items()}
+    models = ball_models(folder, "low", "high")
     return write_scene(folder / "scene.yaml", Scene(models, volume=volume_of(folder, waves())))
 
 

@@ -51,12 +51,7 @@ class Twin:
     """
 
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
-        if scene.volume is None:
-            raise ArgumentError(
-                "volume: expected the volume that the scene was made from, got none; make the scene again by "
-                "texgs compose"
-            )
-        self._volume, self._device = scene.volume, torch.device(device)
+        self._volume, self._device = volume_of(scene), torch.device(device)
         with located("volume"):
             self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
         for name in scene.models:
@@ -127,6 +122,16 @@ class Twin:
             known = ", ".join(self._volume.tfs) or "none"
             raise ArgumentError(f"volume.tfs: expected the basic TF of model {name}, got {known}; add it")
         return self._volume.tfs[name]
+
+
+def volume_of(scene: Scene) -> SceneVolume:
+    """Return the volume that a scene names; require that it names one."""
+    if scene.volume is None:
+        raise ArgumentError(
+            "volume: expected the volume that the scene was made from, got none; make the scene again by "
+            "texgs compose"
+        )
+    return scene.volume
 
 
 def twin_of(scene: Scene, device: torch.device | str = "cpu", mode: str = "shaded") -> Twin | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError, located
 from texgs.scene.scene import Scene
+from texgs.scene.twin import volume_of
 from texgs.viewer import PAGE_VOLUME
 from texgs.volume.grid import Grid, Triple
 from texgs.volume.nrrd_file import MAKES, open_grid
@@ -47,9 +48,8 @@ class PageVolume:
 
     def describe(self, scene: Scene) -> dict[str, Any]:
         """Return what a page needs beside the samples to draw the volume of a scene."""
-        look = asdict(scene.volume.appearance) if scene.volume else {}
         facts = {"low": self.low, "high": self.high, "half": self.half, "looks": scene.has_looks}
-        return {**facts, "appearance": look}
+        return {**facts, "appearance": asdict(volume_of(scene).appearance)}
 
 
 def page_volume(scene: Scene, budget: float = PAGE_VOLUME) -> PageVolume:
@@ -60,13 +60,9 @@ def page_volume(scene: Scene, budget: float = PAGE_VOLUME) -> PageVolume:
     """
     if not 0 < budget < np.inf:
         raise ArgumentError(f"volume: expected a size in MB above 0, got {budget:g}")
-    if scene.volume is None:
-        raise ArgumentError(
-            "volume: expected the volume that the scene was made from, got none; make the scene again by "
-            "texgs compose"
-        )
+    source = volume_of(scene)
     with located("volume"):
-        return within(open_grid(scene.volume.file), budget * MEGABYTE)
+        return within(open_grid(source.file), budget * MEGABYTE)
 
 
 def within(grid: Grid, most: float) -> PageVolume:

@@ -45,7 +45,6 @@ class WrittenPage:
     path: Path
     surfels: int
     poster: bytes  # a JPEG of the first view
-    volume: PageVolume | None
 
 
 def write_page(
@@ -72,13 +71,14 @@ def write_page(
             f"{len(composed)} of them; export fewer models"
         )
     description = describe(name, scene, composed)
+    twin = None
     if volume is not None:
         description |= {"volume": volume.describe(scene), "presets": presets()}
         description["transfer"] = Origins(scene).transfer
-    twin = twin_of(scene) if volume is not None else None
+        twin = twin_of(scene)
     picture = poster(scene, composed, description["views"][0], description["fov_y"], twin)
     write_bytes(path, page_of(description, surfels, picture, checked, volume).encode())
-    return WrittenPage(path, len(composed), picture, volume)
+    return WrittenPage(path, len(composed), picture)
 
 
 def page_of(

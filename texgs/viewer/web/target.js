@@ -49,7 +49,7 @@ export class Target {
     const gl = this.#gl;
     if (this.picture) gl.deleteTexture(this.picture.texture);
     this.size = [...size];
-    this.picture = makeTexture(gl, this.format, size, null, this.#filter);
+    this.picture = makeTexture(gl, this.format, size, null, { filter: this.#filter });
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.picture.texture, 0);
   }
 }

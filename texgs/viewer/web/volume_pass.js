@@ -18,15 +18,13 @@ export class VolumePass {
    * @throws {Error} where the volume is too large for the card.
    */
   constructor(gl, { codes, sizes }, facts) {
-    const most = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE), longest = Math.max(...sizes);
-    if (longest > most) throw new Error(`This volume has ${longest} samples a side; the graphics driver has at most ${most}.`);
     this.#gl = gl;
     this.#facts = facts;
     this.#bricks = new Bricks(codes, sizes);
     this.#shaders = makeProgram(gl, PRESENT_VERTEX, VOLUME_FRAGMENT);
     this.#textures = {
-      samples: solid(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], sizes, codes, gl.LINEAR),
-      bricks: solid(gl, [gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE], this.#bricks.size, null, gl.NEAREST),
+      samples: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], sizes, codes, { filter: gl.LINEAR, isSolid: true }),
+      bricks: makeTexture(gl, [gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE], this.#bricks.size, null, { isSolid: true }),
       table: makeTexture(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT], [SIZE, 2], null),
       weights: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], [1, 1], new Uint8Array([255])),
     };
@@ -81,16 +79,6 @@ export class VolumePass {
     gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, ...this.#bricks.size, gl.RED_INTEGER, gl.UNSIGNED_BYTE,
       this.#bricks.distances(table));
   }
-}
-
-function solid(gl, [internal, channels, type], sizes, data, filter) {
-  const texture = gl.createTexture();
-  gl.bindTexture(gl.TEXTURE_3D, texture);
-  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-  gl.texImage3D(gl.TEXTURE_3D, 0, internal, ...sizes, 0, channels, type, data);
-  for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T, gl.TEXTURE_WRAP_R]) gl.texParameteri(gl.TEXTURE_3D, side, gl.CLAMP_TO_EDGE);
-  for (const each of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_3D, each, filter);
-  return { texture, target: gl.TEXTURE_3D };
 }
 
 /** A plane with a normal of length 1. */

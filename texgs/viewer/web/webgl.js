@@ -3,6 +3,7 @@
 import { direction } from "./camera.js";
 import { COLUMNS, firstRows, partTable } from "./parts.js";
 import { makeProgram } from "./program.js";
+import { samplesOf } from "./samples.js";
 import { MODES, PAIRS, PRESENT_FRAGMENT, PRESENT_VERTEX } from "./shaders.js";
 import { sizeOf } from "./size.js";
 import { DepthOrder } from "./sort.js";
@@ -11,7 +12,6 @@ import { joinSurfels } from "./surfels.js";
 import { unpack } from "./tensors.js";
 import { withAlpha } from "./transparent.js";
 import { OF_TWIN, Twin, alone } from "./twin.js";
-import { samplesOf } from "./samples.js";
 
 const OVER_BLACK = ["alpha", "ambient", "diffuse", "specular", "shininess"];
 const SLOW = 40; // milliseconds of a frame above which those of a moving scene have fewer rows and columns
