@@ -47,7 +47,14 @@ def test_light_changes_nothing_and_the_background_is_white_unless_told(field):
 
 @pytest.mark.parametrize(
     "edit",
-    [{"palette": (1, 0, 0)}, {"ambient": 0.5}, {"diffuse": 0.5}, {"specular": 0.5}, {"shininess": 2.0}],
+    [
+        {"palette": (1, 0, 0)},
+        {"ambient": 0.5},
+        {"diffuse": 0.5},
+        {"specular": 0.5},
+        {"shininess": 2.0},
+        {"tint": (1, 1, 0)},
+    ],
 )
 def test_other_edits_are_refused(field, edit):
     message = f"{next(iter(edit))}: expected a model that can .*, got {field.kind}; fit surfels"

@@ -35,7 +35,8 @@ def halved():
 
 
 def scene_in(folder):
-    edit, style = PartEdit(palette=(0.1, 0.2, 0.3), opacity=0.5), folder / "a" / "style.safetensors"
+    edit = PartEdit(palette=(0.1, 0.2, 0.3), opacity=0.5, tint=(1, 0.5, 0))
+    style = folder / "a" / "style.safetensors"
     first = SceneModel(folder / "a" / "model.safetensors", edit, style)
     second = SceneModel(folder / "b" / "model.safetensors", PartEdit(visible=False))
     light, frame = Light("directional", 30, -10), Frame([0.1, 0.0, -0.25], 0.5)

@@ -11,6 +11,7 @@ from texgs.core.light import Light
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.changes import apply_all
+from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment
@@ -164,18 +165,18 @@ def test_a_new_segment_replaces_the_file_of_another_session(session, tmp_path):
         assert torch.equal(other.scene.models["left"].open()[1][0], mask)
 
 
-def test_several_textures_are_one_step(session, tmp_path):
+def test_several_looks_are_one_step(session, tmp_path):
     files = {
         name: write_texture(tmp_path / f"texture{seed}", ball(seed))
         for seed, name in enumerate(session.scene.models, 1)
     }
-    session.set_textures(files)
+    session.set_looks({name: NewLook(file) for name, file in files.items()})
     assert [entry.texture for entry in session.scene.models.values()] == list(files.values())
     assert session.undo()
     assert [entry.texture for entry in session.scene.models.values()] == [None, None]
     files["v1.2/right"] = write_texture(tmp_path / "c", ball(3, n=9))
     with pytest.raises(ArgumentError, match="expected a texture of this model"):
-        session.set_textures(files)
+        session.set_looks({name: NewLook(file) for name, file in files.items()})
     assert session.scene.models["left"].texture is None
 
 

@@ -119,6 +119,19 @@ def test_the_twin_is_the_volume_as_views_show_it(volume, twin):
     np.testing.assert_allclose(render(twin, light, low=HIDDEN), alone, atol=1e-6)
 
 
+@pytest.mark.parametrize("tint", [(1.0, 0.5, 0.2), (0.5, 0.5, 0.0)])
+def test_each_channel_has_its_share_of_the_highlight(twin, tint):
+    """Bit by bit that of a white highlight which is as much weaker."""
+    edit, light = PartEdit(specular=3.0, shininess=2.0, tint=tint), Light("directional", 110, 20)
+    shown = render(twin, light, low=edit, high=edit)
+    for channel, share in enumerate(tint):
+        weaker = PartEdit(specular=3.0 * share, shininess=2.0)
+        expected = render(twin, light, low=weaker, high=weaker)
+        np.testing.assert_allclose(shown[..., channel], expected[..., channel], atol=1e-7)
+        np.testing.assert_array_equal(shown[..., 3], expected[..., 3])
+    assert np.abs(shown - render(twin, light, low=replace(edit, tint=(1, 1, 1)))).max() > 0.1
+
+
 def test_no_opacity_is_hidden(twin):
     np.testing.assert_array_equal(render(twin, low=PartEdit(opacity=0)), render(twin, low=HIDDEN))
 

@@ -14,6 +14,8 @@ from tests.fields.surfels.test_composition import ball
 from tests.viewer.pages import TOKEN, on_page, origin, page
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
+from texgs.edit.material import MATERIALS
+from texgs.fields.part_edit import PartEdit
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.looks import Looks, ScratchFolders, Styles, ThrottledPreview
 from texgs.viewer.messages import Look
@@ -70,13 +72,18 @@ async def test_a_preview_shows_on_its_page_alone_and_changes_nothing(browser, cl
 @on_page
 async def test_a_look_is_one_step_and_written_beside_the_scene(browser, scene_file):
     before = await picture(browser)
-    await browser.send(**look(parts=["TF01"], instruction="turn it into gold"))
+    gold = look(parts=["TF01"], instruction="turn it into gold")
+    await browser.send(**{**gold, "preview": True})
+    await ended(browser)
+    tried = await picture(browser)
+    await browser.send(**gold)
     news = await browser.next("notice")
     assert news["level"] == "info"
     assert "turn it into gold: procedural filters" in news["text"]
     await browser.past("TF01 turn it into gold")
     after = await picture(browser)
     assert np.abs(after - before).mean() > 1
+    assert (after == tried).all(), "the preview has the highlights of gold, too"
     await browser.send(type="save", name="gold.yaml")
     await browser.next("notice")
     await browser.send(type="undo")
@@ -85,6 +92,9 @@ async def test_a_look_is_one_step_and_written_beside_the_scene(browser, scene_fi
     assert (await picture(browser) == after).all()
     models = read_scene(scene_file.parent / "gold.yaml").models
     assert models["TF01"].texture.parent.name == "scene-text-1"
+    assert models["TF01"].edit.tint == MATERIALS["gold"].tint
+    assert models["TF01"].edit.specular != 1
+    assert models["TF02"].edit == PartEdit()
     assert models["TF02"].texture is None
 
 
@@ -251,7 +261,7 @@ async def test_many_previews_of_one_part_leave_that_of_another(browser, client, 
         await browser.send(**look(parts=[part], style="glass", preview=True))
         await ended(browser)
     (own,) = client.server_side._pages
-    assert all(texture.is_file() for texture in own._trial.values())
+    assert all(look.texture.is_file() for look in own._trial.values())
     assert sorted(own._trial) == ["TF01", "TF02"]
 
 

@@ -73,7 +73,7 @@ def test_a_description_has_all_parts_and_what_they_can_show(tmp_path):
     assert first["segments"][0]["edit"]["opacity"] == 0.5
     assert first["fitted_palette"] == pytest.approx(model.parameters["palette"].tolist())
     numbers = ["opacity", "ambient", "diffuse", "specular", "shininess"]
-    assert first["can"] == ["visible", "palette", *numbers, "look", "segments"]
+    assert first["can"] == ["visible", "palette", *numbers, "tint", "look", "segments"]
     assert "palette" not in second["can"], "there is none without a texture"
     assert told["light"] == {"azimuth": 10, "polar": 20}
     assert told["modes"][0] == "shaded"

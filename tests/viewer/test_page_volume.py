@@ -136,6 +136,7 @@ def test_the_volume_is_that_of_the_caster(page, scene, camera, light):
         {"opacity": 0.3},
         {"opacity": 5.0, "palette": (0.1, 0.8, 0.2)},
         {"ambient": 0.2, "diffuse": 1.5, "specular": 3.0, "shininess": 0.3},
+        {"specular": 3.0, "shininess": 0.3, "tint": (1.0, 0.5, 0.1)},
     ],
     ids=lambda edit: next(iter(edit)),
 )

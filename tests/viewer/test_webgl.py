@@ -120,6 +120,7 @@ EDITS = {
     "faint": (PartEdit(opacity=0.15), {}),
     "opaque": (PartEdit(opacity=20.0), {}),
     "recoloured": (PartEdit(palette=(0.9, 0.1, 0.3)), {}),
+    "tinted": (PartEdit(specular=4.0, shininess=0.2, tint=(1.0, 0.7, 0.2)), {"tint": (0.2, 0.4, 1.0)}),
     "material": (PartEdit(ambient=0.3, diffuse=1.7, specular=4.0, shininess=0.2), {}),
 }
 

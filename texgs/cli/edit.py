@@ -27,9 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         metavar="KEY=VALUE",
         help="MODEL.KEY=VALUE with visible, palette (r,g,b from 0 to 1, or #rrggbb), opacity, ambient, "
-        "diffuse, specular, shininess (factors), texture (a file) or file (another model); light=headlight "
-        "or light=AZIMUTH,POLAR; background=#rrggbb; cut=AXIS,POSITION (x, -x, y, ...; world units, or "
-        "samples as in 64v) or cut=NX,NY,NZ,OFFSET adds a plane, cut.1=... replaces it, cut= takes all back; "
+        "diffuse, specular, shininess (factors), tint (a colour, of highlights), texture (a file) or file "
+        "(another model); light=headlight or light=AZIMUTH,POLAR; background=#rrggbb; cut=AXIS,POSITION "
+        "(x, -x, y, ...; world units, or samples as in 64v) or cut=NX,NY,NZ,OFFSET adds a plane, cut.1=... "
+        "replaces it, cut= takes all back; "
         "cut.box=X0,Y0,Z0,X1,Y1,Z1; cut.faces=shaded or unlit; MODEL.KEY= takes an edit back; "
         "MODEL/SEGMENT.KEY=VALUE edits a segment, MODEL/SEGMENT=FILE adds one from a file and MODEL/SEGMENT= "
         "removes it",

@@ -19,7 +19,7 @@ from texgs.fields.field import Field
 from texgs.fields.kinds import kinds
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import labels_of, write_texture
-from texgs.scene.parts import part_names, replaced, split, with_textures
+from texgs.scene.parts import NewLook, part_names, replaced, split, with_looks
 from texgs.scene.scene import Scene
 from texgs.volume.view_set import View, read_views
 
@@ -105,12 +105,16 @@ class Task(Generic[Settings]):
             )
         return read_views(self.views[model].parent).train
 
-    def each_part(self, one: Callable[[str, Surfels, Tensor | None, Sequence[View]], Surfels]) -> Scene:
-        """Edit the parts one after the other, each alone, and return the scene with their new textures.
+    def each_part(
+        self,
+        one: Callable[[str, Surfels, Tensor | None, Sequence[View]], Surfels],
+        values: Callable[[str, Surfels, Tensor | None], Mapping[str, Any]] = lambda *part: {},
+    ) -> Scene:
+        """Edit the parts one after the other, each alone, and return the scene with their new looks.
 
         Palettes that were edited before are gone: these were of other texels. The edit of one part is from
         its name, its model with the textures that it has, the surfels that may change (None: all) and
-        training views, to the edited model.
+        training views, to the edited model; `values` of the part's `PartEdit` may follow from this model.
         """
         scene = self.scene
         for part in parts_of(scene, self.edit.parts):
@@ -119,7 +123,7 @@ class Task(Generic[Settings]):
             surfels = None if surfels is None else surfels.to(self.device)
             edited = one(part, model.to(self.device), surfels, self.training_views(split(scene, part)[0]))
             path = write_texture(file, edited, {"part": part})
-            scene = with_textures(scene, {part: path}, own_colors=True)
+            scene = with_looks(scene, {part: NewLook(path, values(part, edited, surfels))})
         return scene
 
     def each_model(self, one: Callable[[str, Field, Sequence[View]], Field]) -> Scene:

@@ -46,6 +46,7 @@ class TextRecipe:
     target: Target = "colors"  # what is wanted at each opacity: colours that edited views show, or the images
     fills: bool = True  # whether texels that no view shows take colours of those nearest to them, or stay
     is_textured: bool = True  # whether each texel follows, or each surfel one colour: the paper's ablation
+    material: bool = True  # whether an instruction that names a material also sets its highlights
 
 
 RECIPES = {
@@ -59,6 +60,7 @@ RECIPES = {
         final=1.0,
         target="images",
         fills=False,
+        material=False,
     ),
 }
 
@@ -87,8 +89,8 @@ def edit_by_text(
 ) -> Edited:
     """Restyle a model by an instruction (the paper's sections Text-Driven NPSE and Text prompt refinement).
 
-    Geometry, material, lighting and palette stay as they are: views of any angle agree, however the
-    edits differ. The model may be the result of an edit: its views show that (text prompt refinement). The
+    Geometry, material, lighting and palette of the model stay: views of any angle agree, however the edits
+    differ. The model may be the result of an edit: its views show that (text prompt refinement). The
     opacity factors of the recipe are those of the search only; the model keeps its own.
 
     Args:

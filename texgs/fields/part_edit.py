@@ -30,13 +30,15 @@ class PartEdit:
     diffuse: float = 1.0
     specular: float = 1.0
     shininess: float = 1.0
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)  # colour of highlights in [0, 1]
 
     def __post_init__(self) -> None:
         if not isinstance(self.visible, bool):
             raise ArgumentError(f"visible: expected true or false, got {self.visible!r}")
         if self.palette is not None:
             object.__setattr__(self, "palette", color("palette", self.palette))
-        for each in fields(self)[2:]:
+        object.__setattr__(self, "tint", color("tint", self.tint))
+        for each in fields(self)[2:-1]:
             value = getattr(self, each.name)
             if not is_number(value) or not 0 <= value <= MOST:
                 raise ArgumentError(f"{each.name}: expected a factor from 0 to {MOST:g}, got {value!r}")

@@ -20,6 +20,7 @@ WORDS = {  # for a filter, by its name
     "cartoon": ("cartoon", "comic", "cel shading", "cel shaded", "toon"),
     "marble": ("marble", "stone"),
     "wood": ("wood", "wooden"),
+    "glass": ("glass",),
     "mosaic": ("mosaic", "tiles", "tiled"),
     "gold": ("gold", "golden"),
     "silver": ("silver", "chrome", "steel"),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from texgs.core.errors import ArgumentError
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
@@ -59,16 +60,30 @@ def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
     return replace(scene, models={**scene.models, model: entry})
 
 
-def with_textures(scene: Scene, files: Mapping[str, Path | None], own_colors: bool = False) -> Scene:
-    """Return the scene with other texture files for some of its parts; None: what a part was fitted with.
+@dataclass(frozen=True)
+class NewLook:
+    """What is another about a part that was given a look."""
 
-    With `own_colors`, their palettes go back to the fitted ones, which texels were made for.
+    texture: Path | None  # file; None: what the part was fitted with
+    edit: Mapping[str, Any] = field(default_factory=dict)  # values of a `PartEdit`
+
+
+def with_looks(scene: Scene, looks: Mapping[str, NewLook]) -> Scene:
+    """Return the scene with new looks of some of its parts.
+
+    Their palettes go back to the fitted ones, which texels were made for.
     """
-    for part, file in files.items():
+    for part, look in looks.items():
         entry = entry_of(scene, part)
-        edit = replace(entry.edit, palette=None) if own_colors else entry.edit
-        scene = replaced(scene, part, replace(entry, texture=file, edit=edit))
+        edit = replace(entry.edit, **{"palette": None, **look.edit})
+        scene = replaced(scene, part, replace(entry, texture=look.texture, edit=edit))
     return scene
+
+
+def look_of(scene: Scene, part: str, before: Scene) -> NewLook:
+    """Return the look of a part, as far as it had another one before."""
+    entry, old = entry_of(scene, part), vars(entry_of(before, part).edit)
+    return NewLook(entry.texture, {key: x for key, x in vars(entry.edit).items() if x != old[key]})
 
 
 def key_path(part: str) -> str:

@@ -98,9 +98,11 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
 def _plain(entry: SceneModel | SceneSegment, relative: Callable[[Path], str]) -> dict[str, Any]:
     """Return the file, texture and what is edited, as a scene file has them."""
     unedited = asdict(PartEdit())
-    changed = {key: value for key, value in asdict(entry.edit).items() if value != unedited[key]}
-    if "palette" in changed:
-        changed["palette"] = list(changed["palette"])
+    changed = {
+        key: list(value) if isinstance(value, tuple) else value
+        for key, value in asdict(entry.edit).items()
+        if value != unedited[key]
+    }
     variant = {} if entry.texture is None else {"texture": relative(entry.texture)}
     return {"file": relative(entry.file), **variant, **changed}
 

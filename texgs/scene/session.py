@@ -24,7 +24,7 @@ from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.raster import Render
 from texgs.scene.cut_view import beside
 from texgs.scene.frame import Mode, frame
-from texgs.scene.parts import entry_of, key_path, replaced, require_new, split, with_textures
+from texgs.scene.parts import NewLook, entry_of, key_path, replaced, require_new, split, with_looks
 from texgs.scene.pick import point_at
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, cuts_of, functions_of, known, light_of, read_scene, write_scene
@@ -100,12 +100,13 @@ class Session:
 
     def set_texture(self, part: str, file: Path | None) -> None:
         """Give a part the texels of a texture file; None: those that it was fitted with."""
-        self.set_textures({part: file})
+        scene = replaced(self.scene, part, replace(entry_of(self.scene, part), texture=file))
+        self._push_read(scene, {split(self.scene, part)[0]})
 
-    def set_textures(self, files: Mapping[str, Path | None], own_colors: bool = False) -> None:
-        """Give several parts other texels in one step; see `with_textures` for palettes."""
-        models = {split(self.scene, part)[0] for part in files}
-        self._push_read(with_textures(self.scene, files, own_colors), models)
+    def set_looks(self, looks: Mapping[str, NewLook]) -> None:
+        """Give several parts new looks in one step; see `with_looks` for palettes."""
+        models = {split(self.scene, part)[0] for part in looks}
+        self._push_read(with_looks(self.scene, looks), models)
 
     def set_file(self, part: str, file: Path) -> None:
         """Put another file in the place of a model or a segment."""

@@ -80,8 +80,8 @@ class Twin:
         """Return what a scene's visible models show of the volume, on the device that casts.
 
         A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
-        of light hold for the whole volume: those of the first visible model. A volume has no segments and no
-        looks.
+        and tint of light hold for the whole volume: those of the first visible model. A volume has no
+        segments and no looks. A tint costs a cast for each different channel.
 
         Args:
             camera: from where.
@@ -91,30 +91,34 @@ class Twin:
             functions: that take the place of the basic TFs of their names, or join them; they may overlap.
             outputs: `depth` and `median`, besides colour and alpha; none where no model is visible.
         """
-        shown, factors, functions = {}, list[dict[str, float]](), functions or {}
+        shown, edits, functions = {}, list[PartEdit](), functions or {}
         look = self._volume.appearance
         for (name, model), palette in zip(scene.models.items(), palettes, strict=True):
             if model.edit.visible and model.edit.opacity > 0:
                 tf = functions.get(name) or self._tf(name)
                 shown[name] = edited(tf, model.edit, palette)
-                factors.append({key: getattr(look, key) * getattr(model.edit, key) for key in MATERIAL})
+                edits.append(model.edit)
         shown |= {name: tf for name, tf in functions.items() if name not in scene.models}
         behind = torch.tensor(scene.background, device=self._device)
         if not shown:
             alpha = torch.zeros(camera.height, camera.width, device=self._device)
             return Render(behind.expand(*alpha.shape, 3), alpha)
-        look = replace(look, **factors[0]) if factors else look
-        caster = self._caster = self._caster.with_appearance(look)
+        edit = edits[0] if edits else PartEdit()
+        look = replace(look, **{key: getattr(look, key) * getattr(edit, key) for key in MATERIAL})
         cut = range_of(scene.cuts, camera) if cut is None and scene.cuts else cut
-        cast = caster.cast(
-            *(overlay(shown), camera, scene.light, outputs),
-            depth_range=None if cut is None else cut.depth_range,
-            faces=cut,
-            lit_faces=scene.cuts.faces == "shaded",
-        )
-        rgba = cast.rgba
-        color = rgba[..., :3] + (1 - rgba[..., 3:]) * behind
-        return Render(color, rgba[..., 3], cast.depth, cast.median)
+        casts = {}
+        for share in dict.fromkeys(edit.tint):  # all channels are lit alike but for that
+            self._caster = self._caster.with_appearance(replace(look, specular=share * look.specular))
+            casts[share] = self._caster.cast(
+                *(overlay(shown), camera, scene.light, outputs),
+                depth_range=None if cut is None else cut.depth_range,
+                faces=cut,
+                lit_faces=scene.cuts.faces == "shaded",
+            )
+        cast = casts[edit.tint[0]]
+        color = torch.stack([casts[share].rgba[..., c] for c, share in enumerate(edit.tint)], dim=-1)
+        color += (1 - cast.rgba[..., 3:]) * behind
+        return Render(color, cast.rgba[..., 3], cast.depth, cast.median)
 
     def _tf(self, name: str) -> TransferFunction:
         """Return the basic TF of a model."""

@@ -7,12 +7,12 @@ import json
 import logging
 from collections import deque
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from aiohttp import web
 
 from texgs.core.errors import TexgsError, first_line
+from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames, Pace
 from texgs.viewer.messages import Mask, Pick, View
@@ -37,7 +37,7 @@ class Page:
         self._view: View | None = None
         self._mask: Mask | None = None
         self._masking: asyncio.Task[None] | None = None
-        self._trial: dict[str, Path | None] = {}
+        self._trial: dict[str, NewLook] = {}
         self._pace = Pace()
         self.answered = 0  # messages that change the scene
         self._wake = asyncio.Event()
@@ -66,9 +66,9 @@ class Page:
         before = self._news.get("scene", {"scene": {}})
         self._tell_newest({**before, **message, "scene": {**before["scene"], **message["scene"]}})
 
-    def try_on(self, textures: Mapping[str, Path | None] | None) -> None:
-        """Show parts with other textures on this page alone, beside those before; None: as all pages do."""
-        self._trial = {} if textures is None else {**self._trial, **textures}
+    def try_on(self, looks: Mapping[str, NewLook] | None) -> None:
+        """Show parts with new looks on this page alone, beside those before; None: as all pages do."""
+        self._trial = {} if looks is None else {**self._trial, **looks}
         self._tell_newest({"type": "trial", "parts": list(self._trial)})
 
     def tell(self, text: str, **more: Any) -> None:

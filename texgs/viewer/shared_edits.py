@@ -16,7 +16,7 @@ from texgs.edit.function_model import with_model
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.check import checked
-from texgs.scene.parts import part_names, with_textures
+from texgs.scene.parts import NewLook, part_names, with_looks
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.session import SCENE_KEYS, Session, files_of, state_of
@@ -101,18 +101,17 @@ class SharedEdits:
         """Return whether a file holds the scene as it is now."""
         return self.scene == self._saved
 
-    def shown(self, view: View, trial: Mapping[str, Path | None] | None = None) -> Scene:
+    def shown(self, view: View, trial: Mapping[str, NewLook] | None = None) -> Scene:
         """Return what a view shows: the scene now, as it was opened, or one model alone.
 
-        The scene as it is now has the textures of a trial, as far as it has such parts.
+        The scene as it is now has the looks of a trial, as far as it has such parts.
         """
         if view.only:
             return isolated(self.scene, view.only)
         if view.before:
             return self.original
-        names, textures = part_names(self.scene), trial or {}
-        tried = {part: textures[part] for part in names if part in textures}
-        return with_textures(self.scene, tried, own_colors=True)
+        names, looks = part_names(self.scene), trial or {}
+        return with_looks(self.scene, {part: looks[part] for part in names if part in looks})
 
     def state(self) -> dict[str, Any]:
         """Return what pages show of the history, JSON."""
@@ -159,10 +158,10 @@ class SharedEdits:
         self._session.name_step(f"{part} new")
         self._latest = None
 
-    def give_textures(self, textures: Mapping[str, Path | None], look: str) -> None:
-        """Give parts the textures of a new look, and back the palettes that these were made for."""
-        self._session.set_textures(textures, own_colors=True)
-        self._session.name_step(f"{', '.join(textures)} {look}")
+    def give_looks(self, looks: Mapping[str, NewLook], name: str) -> None:
+        """Give parts new looks, and back the palettes that these were made for."""
+        self._session.set_looks(looks)
+        self._session.name_step(f"{', '.join(looks)} {name}")
         self._latest = None
 
     def give_model(self, name: str, model: Surfels, tf: TransferFunction, before: Path | None) -> Path | None:

@@ -22,7 +22,7 @@ from texgs.core.progress import watched
 from texgs.edit.function_model import models_of, overlap_of, tried
 from texgs.edit.task import parts_with_surfels
 from texgs.fields.surfels.model import Surfels
-from texgs.scene.parts import entry_of, require_new, split
+from texgs.scene.parts import NewLook, entry_of, look_of, require_new, split
 from texgs.viewer.downloads import Downloads, require_kind
 from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks, Styles
@@ -202,17 +202,17 @@ class Work:
             output = self._edits.new_folder(edit.name)
 
         def show(part: str, file: Path) -> None:
-            loop.call_soon_threadsafe(page.try_on, {part: file})
+            loop.call_soon_threadsafe(page.try_on, {part: NewLook(file)})
 
         start = monotonic()
         try:
             edited = await self._jobs.run(partial(self._looks.make, scene, edit, output, show), watch)
-            textures = {part: entry_of(edited.scene, part).texture for part in parts}
+            looks = {part: look_of(edited.scene, part, scene) for part in parts}
             if asked.preview:
-                page.try_on(textures)
+                page.try_on(looks)
                 return
             async with self._changing:
-                await asyncio.to_thread(self._edits.give_textures, textures, name)
+                await asyncio.to_thread(self._edits.give_looks, looks, name)
         except Exception:
             rmtree(output, ignore_errors=True)
             raise

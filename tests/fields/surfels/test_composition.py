@@ -1,3 +1,5 @@
+from functools import partial
+
 import pytest
 import torch
 from torch.testing import assert_close
@@ -7,10 +9,11 @@ from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.composition import Composition, Part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fields.surfels.texels import offsets_of
+from texgs.raster.reference import shading as reference
 from texgs.raster.shading import MATERIAL
 
 CAMERA = orbit(30, 20, 3, 40, 64, 48)
@@ -90,6 +93,28 @@ def test_an_edit_is_the_model_with_other_numbers_and_at_most_opaque(opacity):
     assert_close(Composition([model]).render(CAMERA, SIDE, [edit]).color, expected.color, atol=2e-5, rtol=0)
 
 
+def test_highlights_have_the_tint_of_their_part():
+    """The closed form in double precision; segments have tints of their own."""
+    model, first = ball(4, shared=False), torch.arange(150) < 60
+    gold, blue = (1.0, 0.7, 0.3), (0.0, 0.0, 1.0)
+    edits = [PartEdit(specular=3.0, shininess=0.5, tint=gold), PartEdit(specular=2.0, tint=blue)]
+    part = Part(model, [first])
+    base, gain = part.look(part.edited(edits), CAMERA, SIDE, "shaded")
+    p = {name: x.double() for name, x in model.parameters.items()}
+    k_s, beta = torch.where(first, 0.4, 0.6), torch.where(first, 20.0, 10.0)
+    zero, place = torch.zeros(150).double(), CAMERA.position.double()
+    light = SIDE.direction(CAMERA).double()
+    rest = (p["means"], p["quats"], place, light)
+    colors = p["colors"] + p["palette"]
+    shade = partial(reference.blinn_phong_texture, facing=True)
+    matt, gains = shade(colors, zero + 0.4, zero + 0.5, zero, zero, *rest)
+    shine, _ = shade(0 * colors, zero, zero, k_s, beta, *rest)
+    tint = torch.where(first[:, None], torch.tensor(blue), torch.tensor(gold))
+    assert float(shine.max()) > 0.2
+    assert_close(base.double(), (matt + tint * shine).clamp(0, 1), atol=1e-5, rtol=0)
+    assert_close(gain.double(), gains, atol=1e-5, rtol=0)
+
+
 def test_edits_do_not_copy_texels():
     scene = Composition([ball(1), ball(2)])
     before = scene.texels.data_ptr()
@@ -151,6 +176,8 @@ def test_what_cannot_be_composed(models, edits, message):
         ({"opacity": -1}, "opacity: expected a factor from 0 to 1000, got -1"),
         ({"diffuse": float("nan")}, "diffuse: expected a factor"),
         ({"specular": True}, "specular: expected a factor"),
+        ({"tint": (1, 2, 0)}, "tint: expected three numbers from 0 to 1 or #rrggbb"),
+        ({"tint": None}, "tint: expected three numbers from 0 to 1 or #rrggbb, got None"),
         ({"visible": 1}, "visible: expected true or false, got 1"),
     ],
 )

@@ -15,6 +15,7 @@ WORDINGS = {
     "cartoon": ("in the style of a cartoon",),
     "marble": ("make it a marble sculpture",),
     "wood": ("make it out of wood",),
+    "glass": ("make it out of glass",),
     "gold": ("turn it into gold", "golden"),
     "silver": ("make it silver",),
     "colour blue": ("make it blue",),

@@ -37,6 +37,10 @@ class TextKeys(InstructionKeys):
         choices=("axes", "nearest", "all"),
     )
     textured: bool = key(True, "each texel follows, or each surfel's one colour: the paper's ablation")
+    material: bool | None = key(
+        None,
+        "an instruction that names a material, such as gold, sets its highlights too; default the recipe's",
+    )
     size: int = key(512, "longer side of the six views", "pixels", least=64)
 
     def recipe_of(self) -> TextRecipe:
@@ -44,7 +48,8 @@ class TextKeys(InstructionKeys):
         from texgs.edit.text import RECIPES
 
         recipe = replace(RECIPES[self.recipe], is_textured=self.textured)
-        return replace(recipe, views=self.views) if self.views else recipe  # type: ignore[arg-type]
+        chosen: dict[str, Any] = {"views": self.views, "material": self.material}
+        return replace(recipe, **{name: value for name, value in chosen.items() if value is not None})
 
     def numbers(self) -> dict[str, Any]:
         """Return those of the recipe."""
@@ -53,6 +58,7 @@ class TextKeys(InstructionKeys):
 
 def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
+    from texgs.edit.material import highlights_of
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
     from texgs.volume.images import smaller
@@ -77,7 +83,11 @@ def run(task: Task[TextKeys]) -> EditedScene:
         rows[f"{name} edited"] = [image.cpu().numpy() for image in result.images[:SHOWN]]
         return result.model
 
-    scene = task.each_part(one)
+    def highlights(name: str, model: Surfels, surfels: Tensor | None) -> dict[str, Any]:
+        followed = task.settings_for(name).instruction
+        return highlights_of(followed, model, surfels) if settings.recipe_of().material else {}
+
+    scene = task.each_part(one, highlights)
     return EditedScene(
         scene,
         f"{guidance.name}, {settings.recipe}" + ("" if settings.textured else ", without texture"),

@@ -34,6 +34,7 @@ class Edited:
     colors: Tensor  # [N, 3] c_ind without texels
     material: tuple[Tensor, Tensor, Tensor, Tensor]  # k_a, k_d, k_s and beta, [N] or [1]
     opacities: Tensor  # [N]
+    tint: Tensor | None  # [N, 3] or [3] colour of highlights; None: white
 
 
 class Part:
@@ -77,7 +78,11 @@ class Part:
             self.material[name] * self.per_surfel([getattr(edit, name) for edit in edits])
             for name in MATERIAL
         )
-        return Edited(self.colored(edits), (a, d, s, b), self.opacity(edits))
+        tints = [edit.tint for edit in edits]
+        tint = None
+        if set(tints) != {PartEdit.tint}:
+            tint = self.colors.new_tensor(tints)[0 if self.labels is None else self.labels]
+        return Edited(self.colored(edits), (a, d, s, b), self.opacity(edits), tint)
 
     def look(self, edited: Edited, camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
         """Return base [N, 3] and gain [N]: the colour of a fragment is base + gain * texel."""
@@ -94,6 +99,9 @@ class Part:
         base, gain = blinn_phong_texture(
             colors, a, d, s, b, p["means"], p["quats"], seen_from, direction, facing=shading.facing
         )
+        if edited.tint is not None:
+            matt = gain[:, None] * colors
+            base = matt + edited.tint * (base - matt)
         return base.clamp_(0, 1), torch.zeros_like(gain) if look == "discs" else gain
 
     def opacity(self, edits: Sequence[PartEdit]) -> Tensor:

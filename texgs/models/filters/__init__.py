@@ -24,6 +24,7 @@ FILTERS: dict[str, Filter] = {  # by the names of the vocabulary
     "cartoon": painting.cartoon,
     "marble": painting.marble,
     "wood": painting.wood,
+    "glass": painting.glass,
     "mosaic": painting.mosaic,
     "gold": partial(painting.metal, tones=painting.GOLD),
     "silver": partial(painting.metal, tones=painting.SILVER),

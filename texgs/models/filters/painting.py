@@ -172,6 +172,20 @@ def wood(surface: Surface) -> Tensor:
     return (plank * (0.82 + 0.32 * fibre)[:, None]).clamp(0, 1)
 
 
+def glass(surface: Surface) -> Tensor:
+    """Return blown glass [P, 3] of the surface's colours: clear with deep swirls, and a few bubbles."""
+    swirl = fractal_noise(surface.points * 0.2, 0, octaves=2)
+    fold = 1 - torch.sin(2 * math.pi * (surface.points[:, 1] * 0.08 + 1.5 * swirl)).abs()
+    deep = _saturated(surface.color, 1.6).clamp(0, 1)
+    clear = torch.lerp(deep, _color(surface, (0.86, 0.96, 0.94)), 0.55)
+    blown = torch.lerp(clear, 0.85 * deep, (0.8 * fold.square() + 0.3 * (1 - surface.shade))[:, None])
+    bubble = torch.zeros_like(surface.tone)
+    for vector, cells in neighbours(surface.points * 0.8, 5):
+        rim = (vector.norm(dim=1) - 0.08 - 0.12 * cell_hash(cells, 7)) / 0.8
+        bubble = torch.maximum(bubble, (cell_hash(cells, 9) < 0.25) * surface.ramp(rim))
+    return torch.lerp(blown, torch.ones_like(blown), 0.6 * bubble[:, None]).clamp(0, 1)
+
+
 def metal(surface: Surface, tones: Sequence[tuple[float, float, float]]) -> Tensor:
     """Return hammered metal [P, 3]: a steep ramp of tones over the light and small dents."""
     dents = fractal_noise(surface.points * 0.7, 0, octaves=2)

@@ -59,8 +59,9 @@ function opacityAt({ opacity }, value) {
   return value < opacity[0][0] || value > opacity.at(-1)[0] ? 0 : at(opacity, value)[0];
 }
 
-/** Factors of light for the whole volume: those of the first visible model. */
+/** Factors of light and the tint of highlights for the whole volume: those of the first visible model. */
 export function materialOf({ models }, appearance) {
   const { edit } = models.find((model) => model.edit.visible && model.edit.opacity > 0) ?? { edit: {} };
-  return ["ambient", "diffuse", "specular", "shininess"].map((key) => appearance[key] * (edit[key] ?? 1));
+  const factors = ["ambient", "diffuse", "specular", "shininess"].map((key) => appearance[key] * (edit[key] ?? 1));
+  return { factors, tint: edit.tint ?? [1, 1, 1] };
 }

@@ -16,7 +16,7 @@ const arePoints = (x, columns, least) => Array.isArray(x) && x.length >= least &
 const isFunction = (x) => arePoints(x?.opacity, 2, 2) && arePoints(x?.color, 4, 1);
 const OF_PART = {
   visible: (x) => typeof x === "boolean", palette: isColor, opacity: isFactor,
-  ambient: isFactor, diffuse: isFactor, specular: isFactor, shininess: isFactor,
+  ambient: isFactor, diffuse: isFactor, specular: isFactor, shininess: isFactor, tint: isColor,
 };
 const OF_SCENE = {
   light: (x) => isNumber(x?.azimuth) && isNumber(x?.polar),

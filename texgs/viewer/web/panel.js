@@ -3,7 +3,7 @@
 import { isUnedited } from "./state.js";
 import { capital, colorInput, element, slider, tick } from "./inputs.js";
 
-const FACTORS = { ambient: 3, diffuse: 3, specular: 4, shininess: 4 }; // and where their sliders end
+const FACTORS = { ambient: 3, diffuse: 3, specular: 4, shininess: 16 }; // and where their sliders end
 const OPAQUE = 2;
 
 const button = (text, what, onclick) =>
@@ -110,6 +110,7 @@ export class Panel {
       const material = element("details", {}, element("summary", {}, "Material"));
       material.dataset.part = part;
       for (const [key, max] of factors) add(material, key, factor(key, max));
+      add(material, "tint", colorInput("Highlights", `tint of ${part}`, edit("tint")));
       box.append(material);
     }
     this.#parts.set(part, (each, model) => {

@@ -1,6 +1,6 @@
 // The table of parts: what edits change, one row for each model and for each of its segments behind it.
 
-export const COLUMNS = 3; // texels of 4 floats in a row
+export const COLUMNS = 4; // texels of 4 floats in a row
 
 /** First row of each model. */
 export function firstRows(models) {
@@ -14,7 +14,7 @@ export function firstRows(models) {
 
 /**
  * The rows of all parts [R, COLUMNS, 4]: palette and opacity factor (0 for what is hidden); factors of the
- * material; whether the viewer is near, and whether only the face towards the viewer is lit.
+ * material; whether the viewer is near, and whether only the face towards the viewer is lit; tint of highlights.
  *
  * @param {object[]} models of a scene description.
  * @param {object[]} optics of each model.
@@ -25,7 +25,7 @@ export function partTable(models, optics) {
     const palette = edit.palette ?? model.fitted_palette ?? [0, 0, 0];
     const factors = [edit.ambient, edit.diffuse, edit.specular, edit.shininess];
     const { local_viewer: isNear, facing } = optics[number];
-    return [...palette, edit.visible ? edit.opacity : 0, ...factors, Number(isNear), Number(facing), 0, 0];
+    return [...palette, edit.visible ? edit.opacity : 0, ...factors, Number(isNear), Number(facing), 0, 0, ...edit.tint, 0];
   }));
   return Float32Array.from(rows.flat());
 }

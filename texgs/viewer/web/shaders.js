@@ -61,7 +61,7 @@ vec3 unit(vec3 a) {
 }
 
 // Blinn-Phong: gain in w, and gain * colour + highlight. See texgs/raster/shading.py.
-vec4 shade(vec3 color, vec4 material, vec3 mean, vec3 n, bool near_viewer, bool facing) {
+vec4 shade(vec3 color, vec4 material, vec3 tint, vec3 mean, vec3 n, bool near_viewer, bool facing) {
   vec3 eye = near_viewer ? -translation * rotation : -FAR * vec3(rotation[0].z, rotation[1].z, rotation[2].z);
   vec3 v = unit(eye - mean), l = headlight ? v : unit(light), h = headlight ? v : unit(v + l);
   float n_l = dot(n, l), n_h = dot(n, h);
@@ -69,7 +69,7 @@ vec4 shade(vec3 color, vec4 material, vec3 mean, vec3 n, bool near_viewer, bool 
   bool shadow = facing && (dot(n, v) < 0.0 ? -n_l : n_l) <= 0.0;
   if (shadow) n_l = 0.0, lobe = 0.0;
   float g = material.x + material.y * abs(n_l);
-  return vec4(clamp(g * color + material.z * lobe, 0.0, 1.0), g);
+  return vec4(clamp(g * color + material.z * lobe * tint, 0.0, 1.0), g);
 }
 
 // sigma^2 (a.x b.x + a.y b.y) - a.z b.z: an entry of the conic that the surfel's edge becomes.
@@ -116,7 +116,7 @@ vec4 box_of(Rows m, bool edge_on, float opacity) {
 }
 
 // The colour of each mode of texgs/scene/frame.py, and the factor on texels.
-vec4 colour_of(vec3 color, vec4 material, vec3 mean, vec3 n, vec4 flags) {
+vec4 colour_of(vec3 color, vec4 material, vec3 tint, vec3 mean, vec3 n, vec4 flags) {
   vec3 to_eye = -translation * rotation - mean;
   if (look == LOOK_UNSHADED) return vec4(color, 1.0);
   if (look == LOOK_NORMAL) return vec4(0.5 + 0.5 * (dot(n, to_eye) < 0.0 ? -n : n), 0.0);
@@ -124,7 +124,7 @@ vec4 colour_of(vec3 color, vec4 material, vec3 mean, vec3 n, vec4 flags) {
   if (look == LOOK_SHININESS) return vec4(vec3(material.w / 100.0), 0.0);
   if (look >= LOOK_AMBIENT && look < LOOK_SHININESS) return vec4(vec3(material[look - LOOK_AMBIENT]), 0.0);
   if (look == LOOK_TEXTURE) return vec4(vec3(0.5), 1.0);
-  vec4 shaded = shade(color, material, mean, n, flags.x > 0.5, flags.y > 0.5);
+  vec4 shaded = shade(color, material, tint, mean, n, flags.x > 0.5, flags.y > 0.5);
   return look == LOOK_DISCS ? vec4(shaded.rgb, 0.0) : shaded;
 }
 
@@ -159,7 +159,9 @@ void main() {
 
   vec4 material = texelFetch(surfels, ivec3(at, MATERIAL), 0) * texelFetch(parts, ivec2(1, lookup.w), 0);
   vec3 color = texelFetch(surfels, ivec3(at, COLORS), 0).xyz + part.xyz;
-  vec4 shaded = colour_of(color, material, place.xyz, world.n, texelFetch(parts, ivec2(2, lookup.w), 0));
+  vec4 flags = texelFetch(parts, ivec2(2, lookup.w), 0);
+  vec3 tint = texelFetch(parts, ivec2(3, lookup.w), 0).rgb;
+  vec4 shaded = colour_of(color, material, tint, place.xyz, world.n, flags);
   base = vec4(shaded.xyz, log2(opacity));
   gain = shaded.w * texel_step;
   texture_place = lookup.xyz;

@@ -6,6 +6,7 @@ import { toHex } from "./inputs.js";
 
 const UNEDITED = {
   visible: true, palette: null, opacity: 1, ambient: 1, diffuse: 1, specular: 1, shininess: 1,
+  tint: [1, 1, 1],
 };
 const MOST_STEPS = 200; // of the history: of more, the oldest cannot be undone
 const OF_SCENE = {
@@ -68,7 +69,7 @@ function titleOfValue(value) {
 
 /** Whether a value of an edit changes nothing. */
 export function isUnedited(key, value) {
-  return value === UNEDITED[key];
+  return String(value) === String(UNEDITED[key]);
 }
 
 /** Dispatches "change" whenever something of it is another, and "edit" before somebody changes the scene here. */

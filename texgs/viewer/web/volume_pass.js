@@ -57,7 +57,9 @@ export class VolumePass {
     gl.uniform1i(uniforms.is_depth, isDepth ? 1 : 0);
     gl.uniform3fv(uniforms.viewer, viewer);
     gl.uniform3fv(uniforms.light, light ?? viewer);
-    gl.uniform4fv(uniforms.material, materialOf(scene, this.#facts.appearance));
+    const { factors, tint } = materialOf(scene, this.#facts.appearance);
+    gl.uniform4fv(uniforms.material, factors);
+    gl.uniform3fv(uniforms.tint, tint);
     gl.uniform1i(uniforms.are_faces_lit, scene.cuts.faces === "shaded" ? 1 : 0);
     gl.uniform1i(uniforms.n_planes, planes.length);
     if (planes.length) gl.uniform4fv(uniforms["planes[0]"], planes.flatMap(unitPlane));

@@ -26,6 +26,7 @@ uniform float interval, unit;    // distance of samples, and the length that opa
 uniform float reach;             // behind faces, world units; 0: no end
 uniform vec3 viewer, light;      // directions to them
 uniform vec4 material;
+uniform vec3 tint;               // of highlights
 uniform bool are_faces_lit, is_depth;
 uniform int n_planes;
 uniform vec4 planes[${MOST_PLANES}]; // normals and offsets in the world
@@ -40,7 +41,7 @@ vec3 lit(vec3 color, vec3 normal) {
   vec3 n = dot(normal, viewer) < 0.0 ? -normal : normal, between = viewer + light;
   float n_l = max(dot(n, light), 0.0), n_h = dot(between, between) > 0.0 ? max(dot(n, normalize(between)), 0.0) : 0.0;
   float highlight = n_l > 0.0 ? material.z * pow(max(n_h, 1e-30), material.w) : 0.0;
-  return clamp(color * (material.x + material.y * n_l) + highlight, 0.0, 1.0);
+  return clamp(color * (material.x + material.y * n_l) + highlight * tint, 0.0, 1.0);
 }
 
 // The normal at a place of the texture, 0 where nothing changes.
