@@ -11,6 +11,7 @@ from texgs.config.compose import compose
 from texgs.core.checksum import Checksums
 from texgs.core.errors import MissingDataError
 from texgs.models import weights
+from texgs.models.catalogue import CATALOGUE
 from texgs.workflow.job import settings_digest
 from texgs.workflow.missing import missing_weights, require_same, weights_of
 from texgs.workflow.provenance import record
@@ -115,7 +116,7 @@ def test_another_revision_in_the_cache_of_the_hub_is_named_in_lists_and_in_resul
 def test_the_verb_lists_all_and_refuses_unknown_names(there, capsys):
     assert main(["weights"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == len(weights.CATALOGUE)
+    assert len(lines) == len(CATALOGUE)
     assert all("not here; http" in line for line in lines)
     assert main(["weights", "resnet"]) == 2
     assert "weights: expected one of vgg16," in capsys.readouterr().err

@@ -1,4 +1,5 @@
 import hashlib
+import json
 import sys
 from importlib.util import find_spec
 
@@ -9,7 +10,7 @@ from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError, MissingDataError
 from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
 from texgs.models.networks import read_tensors
-from texgs.models.weights import checksum, find, locate, titled, unusable
+from texgs.models.weights import checksum, find, locate, pipeline_files, titled, unusable
 
 CONTENT = b"weights of a model"
 CHECKSUM = hashlib.sha256(CONTENT).hexdigest()
@@ -117,6 +118,66 @@ def test_a_folder_that_is_missing_names_its_repository_and_an_unknown_name_those
         locate("hub")
     with pytest.raises(ArgumentError, match=r"expected one of vgg16, .*, got 'vgg19'"):
         locate("vgg19")
+
+
+PINNED = f"someone/editor@{'c' * 40}"
+
+
+@pytest.fixture(params=[PINNED, f"hub/models--someone--editor/snapshots/{'c' * 40}"])
+def pipeline(request, folder):
+    """The folder that a pipeline of the hub may be in, of weights or of the hub's cache."""
+    return folder / (f"weights/{PINNED}" if request.param == PINNED else request.param)
+
+
+def test_a_pipeline_is_found_once_it_has_all_that_its_index_names(pipeline):
+    index = {"_class_name": "A", "flag": True, "vae": ["diffusers", "B"], "unet": ["diffusers", "C"]}
+    index |= {"scheduler": ["diffusers", "D"], "tokenizer": ["transformers", "E"], "safety": [None, None]}
+    shards = {"weight_map": {"a": "part-1.safetensors", "b": "part-2.safetensors", "c": "part-1.safetensors"}}
+    files = {
+        "model_index.json": json.dumps(index),
+        "vae/config.json": "{}",
+        "vae/diffusion_pytorch_model.safetensors": "1",
+        "unet/config.json": "{}",
+        "unet/diffusion_pytorch_model.safetensors.index.json": json.dumps(shards),
+        "unet/part-1.safetensors": "1",
+        "unet/part-2.safetensors": "2",
+        "scheduler/scheduler_config.json": "{}",
+        "tokenizer/tokenizer_config.json": "{}",
+    }
+    for name, text in files.items():
+        assert find(PINNED) is None, name
+        put(pipeline / name, text.encode())
+    assert (locate(PINNED), titled(PINNED)) == (pipeline, PINNED)
+    present = {each for names in pipeline_files(pipeline) for each in names if (pipeline / each).is_file()}
+    assert present == set(files)
+    if not unusable(PINNED):
+        before = checksum(PINNED, Checksums())
+        put(pipeline / "unet/part-2.safetensors", b"3")
+        assert checksum(PINNED, Checksums()) != before
+    for name, text in (("model_index.json", b"{"), ("model_index.json", b"[]")):
+        put(pipeline / name, text)
+        assert find(PINNED) is None, "an index that cannot be read"
+
+
+def test_no_other_revision_stands_in_for_that_of_a_pipeline(folder, capsys):
+    for name, text in (("model_index.json", b'{"vae": ["a", "b"]}'), ("vae/scheduler_config.json", b"")):
+        put(folder / f"hub/models--someone--editor/snapshots/{'c' * 40}" / name, text)
+    assert find(PINNED)
+    other = PINNED.replace("c" * 40, "d" * 40)
+    assert find(other) is None
+    with pytest.raises(
+        MissingDataError, match=rf"{other}: its weights \(of unknown size\) are not on this m"
+    ):
+        locate(other)
+    assert "downloading its weights (of unknown size) from https://huggingface.co/someone/editor" in (
+        capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize("name", ["someone/editor", "someone/editor@main", f"editor@{'c' * 40}"])
+def test_a_pipeline_of_the_hub_needs_the_whole_revision(folder, name):
+    with pytest.raises(ArgumentError, match=r"expected one of vgg16, .* or OWNER/NAME@REVISI"):
+        find(name)
 
 
 def test_the_catalogue_says_what_each_file_is():

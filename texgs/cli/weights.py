@@ -12,18 +12,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "names",
         nargs="*",
         metavar="NAME",
-        help="weights to download, where they are not here (none: only list them)",
+        help="weights to download, where they are not here, or OWNER/NAME@REVISION (none: only list them)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Download what is named; then list all with their sizes and places."""
-    from texgs.models.catalogue import CATALOGUE
+    from texgs.models.catalogue import CATALOGUE, entry_of
     from texgs.models.weights import find, locate, titled
 
     for name in arguments.names:
         locate(name)
-    for name, entry in CATALOGUE.items():
+    for name in dict.fromkeys((*CATALOGUE, *arguments.names)):
+        entry = entry_of(name)
         place = find(name) or f"not here; {entry.source}"
         print(f"{titled(name):24} {entry.megabytes:6.0f} MB  {place}")
     return 0

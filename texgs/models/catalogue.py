@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from texgs.core.errors import ArgumentError
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,17 @@ class Snapshot:
     def source(self) -> str:
         """Return the page where a person gets it."""
         return f"https://huggingface.co/{self.repository}"
+
+
+@dataclass(frozen=True)
+class Pipeline(Snapshot):
+    """A pipeline of diffusers that edits images."""
+
+    megabytes: float = 0  # 0: not known
+    needs: tuple[tuple[str, ...], ...] = ()  # its index says them, see `pipeline_files`
+    patterns: tuple[str, ...] = ("*.json", "*.txt", "*.jinja", "*/*.safetensors")
+    packages: tuple[str, ...] = ("transformers", "diffusers")
+    numbers: Mapping[str, Any] = field(default_factory=dict)  # of its model card: scales and others
 
 
 # Backbones of CLIP to choose from, for scores and for losses; the first one is the default.
@@ -121,4 +137,28 @@ CATALOGUE: dict[str, Single | Snapshot] = {
         (*TEXT_FILES, *DIFFUSION_FILES),
         ("transformers", "diffusers"),
     ),
+    "sdxl-instruct-pix2pix": Pipeline(
+        *("diffusers/sdxl-instructpix2pix-768", "06653d47f8d22f2c2205a5884d6a24c5e76d2ca7", 12600),
+        numbers={"size": 768, "steps": 30, "text_scale": 3.0, "image_scale": 1.5},
+    ),
+    "flux2-klein": Pipeline(
+        *("black-forest-labs/FLUX.2-klein-4B", "e7b7dc27f91deacad38e78976d1f2b499d76a294", 15970),
+        numbers={"size": 1024, "steps": 4, "text_scale": 1.0},
+    ),
+    "qwen-image-edit": Pipeline(
+        *("Qwen/Qwen-Image-Edit", "ac7f9318f633fc4b5778c59367c8128225f1e3de", 57700),
+        numbers={"size": 1024, "steps": 50, "text_scale": 4.0},
+    ),
 }
+PIPELINES = {name: entry for name, entry in CATALOGUE.items() if isinstance(entry, Pipeline)}
+HUB = "OWNER/NAME@REVISION (40 digits)"
+PINNED = re.compile(r"([\w.-]+/[\w.-]+)@([0-9a-f]{40})")
+
+
+def entry_of(name: str) -> Single | Snapshot:
+    """Return a model by its name, or a pipeline of the Hugging Face hub by OWNER/NAME@REVISION."""
+    if pinned := PINNED.fullmatch(name):
+        return Pipeline(pinned[1], pinned[2])
+    if name not in CATALOGUE:
+        raise ArgumentError(f"weights: expected one of {', '.join(CATALOGUE)} or {HUB}, got {name!r}")
+    return CATALOGUE[name]

@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
 from texgs.core.cache import cache_folder, weights_folder
 from texgs.core.checksum import Checksums, combined
 from texgs.core.errors import ArgumentError, MissingDataError, first_line
-from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
+from texgs.core.io import read_json
+from texgs.models.catalogue import File, Single, Snapshot, entry_of
 
 VERIFIED = Checksums()  # of files that this process has read
 
@@ -22,14 +24,12 @@ def locate(name: str) -> Path:
     Looked for in the weights folder (TEXGS_WEIGHTS), in the caches of the hubs, and then downloaded with
     a line that says so and a progress bar, at a pinned revision or with a known checksum, into the cache.
     """
-    return find(name) or _download(name, CATALOGUE[name])
+    return find(name) or _download(name, entry_of(name))
 
 
 def find(name: str) -> Path | None:
     """Return the path of the weights on this machine; None where `locate` would have to download them."""
-    if name not in CATALOGUE:
-        raise ArgumentError(f"weights: expected one of {', '.join(CATALOGUE)}, got {name!r}")
-    entry = CATALOGUE[name]
+    entry = entry_of(name)
     if isinstance(entry, Snapshot):
         folders = (weights_folder() / name, *_hub_folders(entry))
         return next((folder for folder in folders if _is_complete(folder, entry)), None)
@@ -46,7 +46,7 @@ def unusable(name: str) -> str:
     if find(name) is None:
         how = f"`texgs weights {name}` downloads them or says how to get them"
         return f"the weights of {name} are not on this machine; {how}"
-    entry = CATALOGUE[name]
+    entry = entry_of(name)
     packages = entry.packages if isinstance(entry, Snapshot) else ()
     if lacking := [package for package in packages if find_spec(package) is None]:
         return f"{lacking[0]}, which reads {name}, is not installed; pip install '.[models]' adds it"
@@ -55,10 +55,10 @@ def unusable(name: str) -> str:
 
 def titled(name: str) -> str:
     """Return the name of weights, with the revision of a snapshot that is not the one of the catalogue."""
-    entry = CATALOGUE[name]
+    entry = entry_of(name)
     if not isinstance(entry, Snapshot) or (path := find(name)) is None:
         return name
-    if path.name in (name, entry.revision):
+    if path.name in (name.rpartition("/")[2], entry.revision):
         return name
     return f"{name} (revision {path.name[:12]}, not {entry.revision[:12]})"
 
@@ -68,10 +68,11 @@ def checksum(name: str, checksums: Checksums) -> str | None:
     path = find(name)
     if path is None or unusable(name):
         return None
-    entry = CATALOGUE[name]
+    entry = entry_of(name)
     if isinstance(entry, Single):
         return checksums.of(path)
-    names = [next(each for each in names if (path / each).is_file()) for names in entry.needs]
+    needs = entry.needs or pipeline_files(path)
+    names = [next(each for each in names if (path / each).is_file()) for names in needs]
     return combined((each, checksums.of(path / each)) for each in names)
 
 
@@ -88,12 +89,31 @@ def _hub_folders(entry: Snapshot) -> list[Path]:
     home = Path(os.environ.get("HF_HOME") or Path.home() / ".cache" / "huggingface").expanduser()
     cache = Path(os.environ.get("HF_HUB_CACHE") or home / "hub").expanduser()
     snapshots = cache / f"models--{entry.repository.replace('/', '--')}" / "snapshots"
-    return [snapshots / entry.revision, *sorted(snapshots.glob("*"))]
+    # No other revision stands in for that of a pipeline.
+    return [snapshots / entry.revision, *(sorted(snapshots.glob("*")) if entry.needs else ())]
+
+
+def pipeline_files(folder: Path) -> list[tuple[str, ...]]:
+    """Return the files of a pipeline of diffusers, each with the names it may have; none without an index."""
+    files: list[tuple[str, ...]] = [("model_index.json",)]
+    with suppress(ArgumentError, LookupError, TypeError, AttributeError):
+        index = read_json(folder / "model_index.json")
+        for part in [name for name, kind in index.items() if isinstance(kind, list) and kind[0]]:
+            settings = sorted(path.name for path in (folder / part).glob("*.json")) or ["config.json"]
+            files += [(f"{part}/{name}",) for name in settings]
+            if tables := [name for name in settings if name.endswith(".safetensors.index.json")]:
+                table = read_json(folder / part / tables[0])["weight_map"]
+                files += [(f"{part}/{name}",) for name in sorted(set(table.values()))]
+            elif "config.json" in settings:  # a network
+                files.append(tuple(f"{part}/{x}.safetensors" for x in ("diffusion_pytorch_model", "model")))
+        return files
+    return []
 
 
 def _is_complete(folder: Path, entry: Snapshot) -> bool:
     """Return whether a folder has all files of a snapshot that are needed."""
-    return all(any((folder / name).is_file() for name in names) for names in entry.needs)
+    needs = entry.needs or pipeline_files(folder)
+    return bool(needs) and all(any((folder / name).is_file() for name in names) for names in needs)
 
 
 def _verify(name: str, file: File, path: Path) -> None:
@@ -108,7 +128,8 @@ def _verify(name: str, file: File, path: Path) -> None:
 
 def _download(name: str, entry: Single | Snapshot) -> Path:
     """Download weights after a line that says what the progress bar is about."""
-    print(f"{name}: downloading its weights ({entry.megabytes:g} MB) from {entry.source}", file=sys.stderr)
+    size = f"{entry.megabytes:g} MB" if entry.megabytes else "of unknown size"
+    print(f"{name}: downloading its weights ({size}) from {entry.source}", file=sys.stderr)
     try:
         if isinstance(entry, Single):
             import pooch
@@ -125,7 +146,7 @@ def _download(name: str, entry: Single | Snapshot) -> Path:
         files = [file.name for file in entry.files] if isinstance(entry, Single) else []
         target = f"file {' or '.join(files)}" if files else f"folder {name}"
         raise MissingDataError(
-            f"{name}: its weights ({entry.megabytes:g} MB) are not on this machine, and a download failed "
+            f"{name}: its weights ({size}) are not on this machine, and a download failed "
             f"({first_line(error)}); get them from {entry.source} and put the {target} into "
             f"{weights_folder()}, or set TEXGS_WEIGHTS"
         ) from error

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.method import MethodKeys
+from texgs.models.catalogue import HUB, PINNED, PIPELINES
+from texgs.models.weights import locate, pipeline_files
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,6 +20,8 @@ if TYPE_CHECKING:
     from texgs.models.guidance import Guidance
 
 SHOWN = 6  # edited views in the picture of them
+EDITORS = f"instruct_pix2pix, {', '.join(PIPELINES)}, {HUB}, a folder of diffusers, an address or filters"
+WEB = ("http://", "https://")
 
 
 @dataclass(frozen=True)
@@ -24,51 +29,59 @@ class InstructionKeys(MethodKeys):
     """What to do, and what edits the views. The scales are those of TexGS-VolVis."""
 
     instruction: str = key("", "what to do, such as 'make it gold'")
-    guidance: str = key(
-        "instruct_pix2pix",
-        "what edits the views: a diffusion model, or procedural filters with a vocabulary of their own",
-        choices=("instruct_pix2pix", "filters"),
-    )
-    text_scale: float = key(12.5, "guidance by the instruction, of the diffusion model", least=0)
-    image_scale: float = key(1.25, "guidance by the views, of the diffusion model", least=0)
+    guidance: str = key("instruct_pix2pix", f"what edits the views: {EDITORS}, which need no weights")
+    steps: int | None = key(None, "of denoising; default, here and below, the diffusion model's own", least=1)
+    text_scale: float | None = key(None, "guidance by the instruction", least=0)
+    image_scale: float | None = key(None, "guidance by the views", least=0)
     negative: str | None = key(None, "what views should not show; default words for light and shadow")
-    epipolar: bool = key(False, "views are edited together, along epipolar lines")
+    epipolar: bool = key(False, "InstructPix2Pix edits views together, along epipolar lines")
     disagreement: float = key(
         0.0, "by which edited views differ at random, as a share of their colours and in world units", least=0
     )
 
     def opened(self, device: torch.device) -> Guidance:
         """Return what edits the views."""
+        from texgs.models.editors import Endpoint, ImagePipeline
         from texgs.models.filters import ProceduralFilters
         from texgs.models.guidance import Disagreeing
-        from texgs.models.instruct_pix2pix import NO_LIGHT, InstructPix2Pix
-        from texgs.models.weights import locate
+        from texgs.models.instruct_pix2pix import InstructPix2Pix
 
         editor: Guidance
-        if self.guidance == "filters":
+        name, options = self.guidance, ("steps", "text_scale", "image_scale", "negative")
+        given = {each: x for each in options if (x := getattr(self, each)) is not None}
+        folder = locate(*self.weights()) if self.weights() else Path(name)
+        if name == "filters":
             editor = ProceduralFilters()
+        elif name == "instruct_pix2pix":
+            editor = InstructPix2Pix.open(folder, device, epipolar=self.epipolar, **given)
+        elif name.startswith(WEB):
+            editor = Endpoint(name, given)
         else:
-            editor = InstructPix2Pix.open(
-                locate("instruct-pix2pix"),
-                device,
-                text_scale=self.text_scale,
-                image_scale=self.image_scale,
-                negative=NO_LIGHT if self.negative is None else self.negative,
-                epipolar=self.epipolar,
-            )
+            given = {**(PIPELINES[name].numbers if name in PIPELINES else {}), **given}
+            editor = ImagePipeline.open(folder, name, device, **given)
         return Disagreeing(editor, self.disagreement) if self.disagreement else editor
 
     def check(self) -> None:
-        """Require an instruction that the guidance understands."""
+        """Require an instruction that the guidance understands, and a guidance that there is."""
         from texgs.models.instruction import require_instruction, understand
 
-        instruction = require_instruction(self.instruction)
-        if self.guidance == "filters":
+        instruction, name = require_instruction(self.instruction), self.guidance
+        if name == "filters":
             understand(instruction)
+        elif not (name.startswith(WEB) or self.weights() or self.files()):
+            raise ArgumentError(f"{self.node}.guidance: expected {EDITORS}, got {name!r}")
 
     def weights(self) -> dict[str, str]:
-        """Return the diffusion model, where it edits the views."""
-        return {"instruct-pix2pix": "guidance=filters"} if self.guidance == "instruct_pix2pix" else {}
+        """Return the diffusion model, where one that texgs finds edits the views."""
+        name = "instruct-pix2pix" if self.guidance == "instruct_pix2pix" else self.guidance
+        is_known = self.guidance in ("instruct_pix2pix", *PIPELINES) or PINNED.fullmatch(name)
+        return {name: "guidance=filters"} if is_known else {}
+
+    def files(self) -> dict[str, Path]:
+        """Return the files of a pipeline in a folder, where that edits the views."""
+        folder = Path(self.guidance)
+        paths = [folder / each for names in pipeline_files(folder) for each in names]
+        return {f"guidance.{index}": path for index, path in enumerate(filter(Path.is_file, paths))}
 
     def followed(self) -> str:
         """Return the instruction."""

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 class TextKeys(InstructionKeys):
     """What to do, what edits the views, and how texels follow."""
 
+    node = "edit.text"
+
     recipe: str = key(
         "default",
         "how texels follow: solved for the colours of edited views; or as in the paper, by iterations to the "
