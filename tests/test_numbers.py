@@ -39,6 +39,9 @@ ELSEWHERE = {  # page: numbers that are of no measurement, and what they are of
         "605 MB",
         "1.7 GB",
         "4.3 GB",
+        "12.6 GB",
+        "16.0 GB",
+        "57.7 GB",
         "29 MB",
     },  # texgs/models/catalogue.py
     "report.md": {"95 %"},  # an interval

@@ -235,9 +235,9 @@ def test_python_examples_run(project, monkeypatch):
 
 
 def test_what_a_user_writes_is_shown_as_it_is_tested():
-    """tests/metrics and tests/workflow run the toys as texgs's own."""
+    """tests/metrics, tests/models and tests/workflow run the toys as texgs's own."""
     toys = ROOT / "tests" / "toys"
-    names = ("fade", "brightness", "projection")
+    names = ("fade", "brightness", "projection", "editor")
     shown = [(toys / f"{name}.py").read_text(encoding="utf-8") for name in names]
     assert blocks("docs/extend.md", "python") == shown
 

@@ -1,4 +1,4 @@
-"""A toy of an editor: a server that inverts colours. A real one asks a diffusion model there."""
+"""A toy of an editor: a server that inverts colours, where a real one asks a model."""
 
 import base64
 import io
