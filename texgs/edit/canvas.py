@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import torch
@@ -98,14 +98,19 @@ def visible_range(seen: Tensor) -> slice:
 
 
 @torch.no_grad()
-def mean_alpha(model: Surfels, cameras: Sequence[Camera]) -> float:
-    """Return the mean alpha of pixels of a few views, each weighted by its alpha; 1 where nothing shows.
+def mean_alpha(model: Surfels, cameras: Sequence[Camera], opacity: float = 1.0) -> float:
+    """Return the mean alpha of a few views of a model with a factor on its opacities, see `weighted_mean`."""
+    parts = (around(model, camera.to(model.device)) for camera in cameras[:: -(-len(cameras) // VIEWS)])
+    nothing = model.parameters["means"][:, :1]
+    return weighted_mean(rasterized(model, part, opacity, features=nothing).alpha for part in parts)
+
+
+def weighted_mean(alphas: Iterable[Tensor]) -> float:
+    """Return the mean alpha of pixels [h, w] of views, each weighted by its alpha; 1 where nothing shows.
 
     Weighted so, pixels at the rim of an opaque object hardly count, and the background does not at all.
     """
     total = square = 0.0
-    for camera in cameras[:: -(-len(cameras) // VIEWS)]:
-        part = around(model, camera.to(model.device))
-        alpha = rasterized(model, part, features=model.parameters["means"][:, :1]).alpha
+    for alpha in alphas:
         total, square = total + float(alpha.sum()), square + float(alpha.square().sum())
     return square / total if total > 0 else 1.0

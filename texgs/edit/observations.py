@@ -54,8 +54,13 @@ def edit_views(
 
 
 @torch.no_grad()
-def render_views(model: Surfels, cameras: Sequence[Camera], light: Light | None) -> EditViews:
-    """Render a textured model for a guidance by cameras of one size; without a light, its bare colours."""
+def render_views(
+    model: Surfels, cameras: Sequence[Camera], light: Light | None, opacity: float = 1.0
+) -> EditViews:
+    """Render a textured model for a guidance by cameras of one size; without a light, its bare colours.
+
+    Opacities are those of the model times a factor.
+    """
     sizes = {(camera.width, camera.height) for camera in cameras}
     if len(sizes) != 1:
         raise ArgumentError(f"cameras: expected at least one, all of one size, got sizes {sorted(sizes)}")
@@ -63,7 +68,7 @@ def render_views(model: Surfels, cameras: Sequence[Camera], light: Light | None)
     white = torch.ones_like(colors[0])
     renders = (
         rasterized(
-            *(model, camera),
+            *(model, camera, opacity),
             texture=Texture(*light_on(model, camera, light), colors, p["sizes"], p["offsets"]),
             background=white,
             outputs=("depth", "normal"),

@@ -93,7 +93,7 @@ class SurfelPainting:
     ) -> None:
         self.whole = model
         if recipe.adapts:
-            recipe = recipe.adapted(mean_alpha(model, cameras))
+            recipe = recipe.adapted(mean_alpha(model, cameras, recipe.opacity))
         if not recipe.is_textured:
             model = untextured(model, surfels)
         p = model.parameters

@@ -19,7 +19,7 @@ from texgs.fields.field import Field
 from texgs.fields.kinds import kinds
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import labels_of, write_texture
-from texgs.scene.parts import NewLook, part_names, replaced, split, with_looks
+from texgs.scene.parts import NewLook, entry_of, part_names, replaced, split, with_looks
 from texgs.scene.scene import Scene
 from texgs.volume.view_set import View, read_views
 
@@ -91,6 +91,10 @@ class Task(Generic[Settings]):
         look = self.followed.get(split(self.scene, part)[0])
         changes: dict[str, Any] = {} if look is None else {method_of(self.edit).follows: look}
         return replace(self.settings, **changes)  # type: ignore[type-var]
+
+    def opacity_of(self, part: str) -> float:
+        """Return the factor on the opacity of a part that the scene has."""
+        return entry_of(self.scene, part).edit.opacity
 
     def title_of(self, part: str) -> str:
         """Return the title of a progress bar."""

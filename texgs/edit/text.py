@@ -82,6 +82,7 @@ def edit_by_text(
     recipe: TextRecipe = RECIPES["default"],
     *,
     light: Light = HEADLIGHT,
+    opacity: float = 1.0,
     surfels: Tensor | None = None,
     size: int = SIZE,
     seed: int = 0,
@@ -101,6 +102,7 @@ def edit_by_text(
         instruction: such as "as a stipple drawing".
         recipe: which views are edited, and how texels follow.
         light: that shines on the scene while it is edited.
+        opacity: factor on the model's opacities, with which it is shown before and after the edit.
         surfels: [N] bool, which may change; all by default. Others keep their colours bit for bit.
         size: pixels along the longer side of the six views; all training views are edited as they are.
         seed: of all random numbers; with the same one, machine and versions, results are the same.
@@ -112,10 +114,10 @@ def edit_by_text(
     changing, shine = changing.to(model.device), light if guidance.lit else None
     generator = torch.Generator().manual_seed(seed)
     cameras = edited_cameras(recipe, cameras, model.parameters["means"], size)
-    pixels, opacities = cameras[0].width * cameras[0].height, recipe.opacities
+    pixels, opacities = cameras[0].width * cameras[0].height, [opacity * x for x in recipe.opacities]
     needed = len(cameras) * (PIXEL * pixels + len(opacities) * (FOLLOWED * pixels + SURFEL * len(model)))
     require_memory(needed, f"{len(cameras)} views that are edited", "edit fewer views, or smaller ones")
-    views = render_views(model, cameras, shine)
+    views = render_views(model, cameras, shine, opacity)
     edited = require_edited(guidance(views, instruction, generator), views, guidance.name)
     own = model if recipe.is_textured else untextured(model, changing)
     rows = observe(own, views, edited, shine, opacities, changing, target=recipe.target)

@@ -118,7 +118,8 @@ def pairs_of(records: Sequence[Record[Any]]) -> list[tuple[Edit, Record[EditMeas
 def row_of(edit: Edit, measured: Record[EditMeasures] | None) -> dict[str, Any]:
     """Return the row of one edit of one scene, for all tables."""
     made, seen, field = edit.result, measured.result if measured else None, kinds().get(edit.field)
-    names = cells(edit, edit=made.edit, method=f"{made.method}: {made.how}", kind=made.follows)
+    how = ", ".join(filter(None, [made.how, made.lifted]))
+    names = cells(edit, edit=made.edit, method=f"{made.method}: {how}", kind=made.follows)
     return names | {
         "is_compared": made.is_compared,
         "counts": bool(seen and seen.width and not edit.stand_in),

@@ -244,6 +244,13 @@ class EditResult(Result, section="parts"):
     iterations: int = 0  # of the method, for each part
     losses: dict[str, list[float]] = field(default_factory=dict)  # over them, by part and term
     is_compared: bool = False  # see `edit.compared`
+    opacity: dict[str, float] = field(default_factory=dict)  # factors that came with the look, by part
+
+    @property
+    def lifted(self) -> str:
+        """Return which parts became more or less opaque, in words; "" where none did."""
+        words = ", ".join(f"{part} × {factor:g}" for part, factor in self.opacity.items())
+        return f"opacity of {words}" if words else ""
 
 
 @dataclass(frozen=True)

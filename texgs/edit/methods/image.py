@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
 from texgs.edit.methods.style import Look, StyleKeys
+from texgs.edit.readable import OpacityKeys, raised
 from texgs.models.catalogue import CLIP_BACKBONES
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class ImageKeys(StyleKeys):
+class ImageKeys(OpacityKeys, StyleKeys):
     """How texels take on a style."""
 
     node = "edit.image"
@@ -84,6 +85,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     from texgs.models.vgg import Vgg
     from texgs.volume.images import smaller
 
+    task = raised(task)
     keys, recipe = task.settings, task.settings.recipe_of(task.edit.seed)
     dtype = torch.float32 if recipe.single_precision else None
     look = Look(task, Vgg.load(device=task.device, dtype=dtype) if recipe.needs_vgg else None)
@@ -98,7 +100,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
             [smaller(view.camera, task.reduce) for view in views],
             [task.scene.light] * len(views),
             picture,
-            recipe,
+            replace(recipe, opacity=task.opacity_of(name)),
             vgg=look.vgg,
             clip=ClipLoss(network, picture.image.permute(1, 2, 0).to(task.device)) if network else None,
             surfels=surfels,
@@ -110,10 +112,9 @@ def run(task: Task[ImageKeys]) -> EditedScene:
         return result.model
 
     scene = task.each_part(one)
-    lambda_s = recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None
-    notes = {"seconds": seconds}
+    share = recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None
     words = how(adapted, network.name if network else keys.clip)
-    return EditedScene(scene, words, look.write_pictures(), lambda_s, notes, look.losses)
+    return EditedScene(scene, words, look.write_pictures(), share, {"seconds": seconds}, look.losses)
 
 
 def how(recipes: Sequence[Recipe], clip: str) -> str:

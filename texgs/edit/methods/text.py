@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.keys import key
 from texgs.edit.method import Method
 from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
+from texgs.edit.readable import OpacityKeys, raised
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class TextKeys(InstructionKeys):
+class TextKeys(OpacityKeys, InstructionKeys):
     """What to do, what edits the views, and how texels follow."""
 
     node = "edit.text"
@@ -65,6 +66,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
     from texgs.edit.text import edit_by_text
     from texgs.volume.images import smaller
 
+    task = raised(task)
     settings, guidance = task.settings, task.settings.opened(task.device)
     rows: dict[str, list[np.ndarray]] = {}
     seen: dict[str, float] = {}
@@ -75,6 +77,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
             [smaller(view.camera, task.reduce).to(task.device) for view in views],
             *(guidance, task.settings_for(name).instruction, settings.recipe_of()),
             light=task.scene.light,
+            opacity=task.opacity_of(name),
             surfels=surfels,
             size=settings.size,
             seed=task.edit.seed,

@@ -18,6 +18,7 @@ from texgs.workflow.stages.settings import FitLabel, OfDataset
 
 if TYPE_CHECKING:
     from texgs.edit.task import Task
+    from texgs.scene.scene import Scene
 
 POINTS = 100  # of a curve of losses at most
 SHOWN = "Before and after the edit; what can be relit, under another light too."
@@ -72,19 +73,29 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     edited = method.run(task)
     seconds = time.monotonic() - start  # of all methods alike: with what they read and write
     write_scene(output / "scene.yaml", edited.scene)
+    result = EditResult(
+        *(task.edit.name, method.name, edited.how, seconds, edited.lambda_s, dict(edited.notes)),
+        *(method.follows, followed(task), *fallen(edited.losses), task.edit.compared),
+        opacity_factors(before, edited.scene),
+    )
     pictures = dict(edited.pictures)
     if method.is_look:
         kind = kinds()[settings.fit.field]
         write_before_and_after(before, edited.scene, kind, lens, output, device, title)
-        pictures["edit.png"] = SHOWN
+        pictures["edit.png"] = f"{SHOWN} The edit: {result.lifted}." if result.lifted else SHOWN
     if edited.losses:
         write_convergence(output / "convergence.png", edited.losses)
         pictures["convergence.png"] = "How the loss of the edit fell, term by term."
-    result = EditResult(
-        *(task.edit.name, method.name, edited.how, seconds, edited.lambda_s, dict(edited.notes)),
-        *(method.follows, followed(task), *fallen(edited.losses), task.edit.compared),
-    )
     return Outcome(result, pictures)
+
+
+def opacity_factors(before: Scene, after: Scene) -> dict[str, float]:
+    """Return the factors on opacities that an edit brought, by part, where there are any."""
+    from texgs.scene.parts import entry_of, part_names
+
+    pairs = {part: (entry_of(before, part).edit, entry_of(after, part).edit) for part in part_names(before)}
+    factors = {part: new.opacity / old.opacity for part, (old, new) in pairs.items() if old.opacity}
+    return {part: round(factor, 4) for part, factor in factors.items() if factor != 1}
 
 
 def fallen(losses: Mapping[str, Mapping[str, Sequence[float]]]) -> tuple[int, dict[str, list[float]]]:

@@ -1,0 +1,150 @@
+"""How opaque parts become with a new look: as readable as asked for, and what is inside stays visible."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.edit.scenes import ball, on_sphere, sphere_points, task
+from texgs.core.errors import ArgumentError
+from texgs.edit.keys import EditKeys
+from texgs.edit.methods.image import ImageKeys, run
+from texgs.edit.methods.text import TextKeys
+from texgs.edit.readable import KEPT, LARGEST, READABLE, SHOWS, SIZE, VIEWS, raised, readable_factors
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.splats import geometry
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.model_file import write_model
+from texgs.raster import rasterize
+from texgs.scene.scene import Scene, SceneModel
+from texgs.volume.cameras import icosphere_of
+
+FAINT = -2.2  # raw opacity: 0.1
+
+
+def scene_of(folder, edits=None, **models):
+    """A scene of models in files."""
+    edits = edits or {}
+    return Scene(
+        {
+            name: SceneModel(write_model(folder / name, model), edits.get(name, PartEdit()))
+            for name, model in models.items()
+        }
+    )
+
+
+def sized(radius, opacity):
+    """A ball like `ball` of another radius."""
+    model = ball(opacity=opacity)
+    points = sphere_points(len(model))
+    other = on_sphere(points, radius, 1.6 * radius / len(model) ** 0.5, opacity)
+    return Surfels({**model.parameters, **other}, model.shading)
+
+
+def shares(scene, factors):
+    """What views show of each model [V, P, H, W], by the rasterizer alone: its share of each pixel."""
+    models = {name: entry.open()[0] for name, entry in scene.models.items()}
+    parts = [geometry(model.parameters) for model in models.values()]
+    means, quats, scales, opacities = (torch.cat(x) for x in zip(*parts, strict=True))
+    counts = [len(model) for model in models.values()]
+    factor = torch.cat(
+        [torch.full((n,), factors.get(name, 1.0)) for name, n in zip(models, counts, strict=True)]
+    )
+    features = torch.nn.functional.one_hot(torch.arange(len(models)).repeat_interleave(torch.tensor(counts)))
+    frames = []
+    for camera in icosphere_of(2 * VIEWS, scene.framed().lens().square(SIZE))[::2]:
+        frames.append(
+            rasterize(
+                *(means, quats, scales, (opacities * factor).clamp_max(1)),
+                *(camera.viewmat, camera.K, camera.width, camera.height),
+                features=features.float(),
+                options=next(iter(models.values())).shading.options,
+            ).color.permute(2, 0, 1)
+        )
+    return torch.stack(frames)
+
+
+def alpha_of(scene, factors):
+    alpha = shares(scene, factors).sum(1)
+    return float(alpha.square().sum() / alpha.sum())
+
+
+def test_a_faint_part_becomes_as_opaque_as_is_readable_and_not_more(tmp_path):
+    scene = scene_of(tmp_path, shell=ball(opacity=FAINT))
+    (factor,) = readable_factors(scene, ["shell"], "cpu").values()
+    assert 1.5 < factor < LARGEST
+    assert alpha_of(scene, {"shell": factor / 1.15}) < READABLE < alpha_of(scene, {"shell": 1.05 * factor})
+
+
+def test_an_opaque_part_stays_as_it_is_and_one_that_never_is_readable_gets_the_largest_factor(tmp_path):
+    scene = scene_of(tmp_path, solid=ball(), veil=ball(opacity=-5.0))
+    assert readable_factors(scene, ["solid"], "cpu") == {"solid": 1.0}
+    assert readable_factors(scene_of(tmp_path, veil=ball(opacity=-5.0)), ["veil"], "cpu") == {"veil": LARGEST}
+
+
+def test_what_is_inside_keeps_half_of_its_pixels(tmp_path):
+    """Three faint shells, each readable alone, would hide the core together."""
+    shells = {name: sized(radius, FAINT) for name, radius in (("a", 0.5), ("b", 0.55), ("c", 0.6))}
+    scene = scene_of(tmp_path, core=sized(0.2, 4.0), **shells)
+    alone = {
+        name: readable_factors(scene_of(tmp_path, x=each), ["x"], "cpu")["x"] for name, each in shells.items()
+    }
+    factors = readable_factors(scene, list(scene.models), "cpu")
+    before = (shares(scene, {})[:, 0] > SHOWS).sum()
+
+    def kept(factors):
+        return float((shares(scene, factors)[:, 0] > SHOWS).sum() / before)
+
+    assert kept(alone) < KEPT
+    assert factors["core"] == 1.0
+    assert all(1 < factors[name] < alone[name] for name in shells)
+    assert kept(factors) >= KEPT > kept({name: 1.25 * factors[name] for name in shells})
+
+
+def test_the_factor_is_on_top_of_what_was_edited_and_only_of_parts_that_are_styled(tmp_path):
+    edits = {"shell": PartEdit(opacity=0.5, diffuse=2.0), "other": PartEdit(opacity=0.25)}
+    scene = scene_of(tmp_path, edits, shell=ball(opacity=FAINT), other=ball(opacity=FAINT))
+    for opacity, expected in (("4", 2.0), ("keep", 0.5)):
+        given = replace(task(scene, tmp_path, ["shell"]), settings=ImageKeys(opacity=opacity))
+        edited = raised(given).scene
+        assert edited.models["shell"].edit == PartEdit(opacity=expected, diffuse=2.0)
+        assert edited.models["other"] == scene.models["other"]
+
+
+@pytest.mark.parametrize("recipe", ["preview", "paper"])
+def test_a_style_is_learned_and_shown_at_the_opacity_it_is_given(tmp_path, recipe, monkeypatch):
+    """Recipe `paper` keeps opacities; others raise those of faint parts."""
+    scene, seen = scene_of(tmp_path, shell=ball(opacity=FAINT)), []
+
+    def stylize(model, cameras, lights, picture, given, **options):
+        from texgs.edit.stylize import Stylized
+
+        seen.append(given.opacity)
+        return Stylized(model, given, {}, {})
+
+    monkeypatch.setattr("texgs.edit.stylize.stylize", stylize)
+    monkeypatch.setattr("texgs.models.vgg.Vgg.load", lambda **options: None)
+    monkeypatch.setattr("texgs.models.clip.Clip.load", lambda *options: type("Clip", (), {"name": "none"}))
+    monkeypatch.setattr("texgs.edit.objective.ClipLoss", lambda *options: None)
+    settings = ImageKeys(recipe=recipe)
+    made = run(replace(task(scene, tmp_path), settings=settings, edit=EditKeys("look")))
+    wanted = readable_factors(scene, ["shell"], "cpu")["shell"] if recipe == "preview" else 1.0
+    assert seen == [made.scene.models["shell"].edit.opacity] == [wanted]
+
+
+def test_opacity_is_a_word_or_a_factor():
+    assert [ImageKeys(opacity=said).factor for said in (None, "auto", "keep", "2.5")] == [
+        None,
+        None,
+        1.0,
+        2.5,
+    ]
+    assert ImageKeys(recipe="paper").factor == TextKeys(recipe="paper").factor == 1.0
+    assert ImageKeys(recipe="paper", opacity="auto").factor is None
+    for said in ("much", "0", "-1", "1001", "nan"):
+        with pytest.raises(
+            ArgumentError, match=r"edit.image.opacity: expected keep, auto or a factor above 0"
+        ):
+            ImageKeys(opacity=said).check()
+    with pytest.raises(ArgumentError, match=r"edit.text.opacity: expected keep, auto or a factor .* got 'x'"):
+        TextKeys(opacity="x", instruction="gold", guidance="filters").check()

@@ -1,0 +1,190 @@
+"""How opaque parts are while and after they get a new look, so that a person can read it.
+
+Where a part is translucent, a pixel shows several of its layers, whose colours average to grey. More opacity
+brings the front layer out. It also hides what is inside, of which enough has to stay visible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import floor, log10
+from typing import TYPE_CHECKING, Any
+
+from texgs.core.errors import ArgumentError
+from texgs.core.keys import key
+from texgs.edit.method import MethodKeys
+from texgs.fields.part_edit import MOST, PartEdit
+
+if TYPE_CHECKING:
+    import torch
+    from torch import Tensor
+
+    from texgs.core.camera import Camera
+    from texgs.edit.task import Task
+    from texgs.fields.field import Composed
+    from texgs.raster import Render
+    from texgs.scene.scene import Scene
+
+READABLE = 0.9  # mean alpha of a part from which its pattern is plain
+LARGEST = 16.0  # of a factor: beyond, next to nothing changes
+KEPT = 0.5  # share of its pixels that every part keeps
+SHOWS = 0.1  # share of a pixel's colour from which the pixel shows a part
+VIEWS, SIZE = 6, 100  # that tell, and pixels of their sides
+STEPS = 5  # of a bisection
+BLACK, *PRIMARIES = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class OpacityKeys(MethodKeys):
+    """How opaque parts become with their new look."""
+
+    opacity: str | None = key(
+        None,
+        "factor on the opacity of the parts, an edit of the scene that can be taken back: keep; a number; or "
+        "auto, as much as makes a pattern readable and leaves visible what is inside; default auto, keep in "
+        "recipe paper",
+    )
+
+    def check(self) -> None:
+        """Require words or a factor."""
+        _ = self.factor
+        super().check()
+
+    @property
+    def factor(self) -> float | None:
+        """Return the factor; None for one that follows the scene."""
+        said = self.opacity or ("keep" if getattr(self, "recipe", "") == "paper" else "auto")
+        if said in ("keep", "auto"):
+            return 1.0 if said == "keep" else None
+        try:
+            factor = float(said)
+        except ValueError:
+            factor = -1.0
+        if not 0 < factor <= MOST:
+            raise ArgumentError(
+                f"{self.node}.opacity: expected keep, auto or a factor above 0, up to {MOST:g}; "
+                f"got {said!r:.60}"
+            )
+        return factor
+
+
+def raised(task: Task[Any]) -> Task[Any]:
+    """Return the task with the opacities in its scene that the look of its parts asks for."""
+    from texgs.edit.task import parts_of
+    from texgs.scene.parts import entry_of, replaced
+
+    scene, factor = task.scene, task.settings.factor
+    parts = parts_of(scene, task.edit.parts)
+    given = dict.fromkeys(parts, factor) if factor else readable_factors(scene, parts, task.device)
+    for part, each in given.items():
+        entry = entry_of(scene, part)
+        edit = replace(entry.edit, opacity=min(each * entry.edit.opacity, MOST))
+        scene = replaced(scene, part, replace(entry, edit=edit))
+    return replace(task, scene=scene)
+
+
+def readable_factors(scene: Scene, parts: Sequence[str], device: torch.device | str) -> dict[str, float]:
+    """Return the factor on the opacity of each of some parts that makes patterns on them readable.
+
+    It brings the mean alpha of the part alone to `READABLE` and is at least 1. Where this would take half of
+    its pixels from a part that shows now, all factors come down together, on a logarithmic scale.
+    """
+    sight = Sight.of(scene, device)
+    wanted = {part: sight.readable(part) for part in parts}
+    before = sight.pixels({})
+
+    def is_visible(share: float) -> bool:
+        shown = sight.pixels({part: factor**share for part, factor in wanted.items()})
+        return bool((shown >= KEPT * before).all())
+
+    share = largest(is_visible) if max(wanted.values()) > 1 else 0.0
+    return {part: two_digits(factor**share) for part, factor in wanted.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What a few views around a scene show of each part."""
+
+    composed: Composed
+    edits: Mapping[str, PartEdit]  # by part, in the order of the composition
+    cameras: Sequence[Camera]
+
+    @classmethod
+    def of(cls, scene: Scene, device: torch.device | str) -> Sight:
+        """Return that of a scene, framed as its pictures are."""
+        from texgs.scene.parts import entry_of
+        from texgs.volume.cameras import icosphere_of
+
+        names = [
+            part
+            for name, entry in scene.models.items()
+            for part in (name, *(f"{name}/{segment}" for segment in entry.segments))
+        ]
+        composed = scene.open(device)
+        cameras = icosphere_of(2 * VIEWS, scene.framed(composed).lens().square(SIZE))[::2]
+        edits = {name: entry_of(scene, name).edit for name in names}
+        return cls(composed, edits, [camera.to(composed.device) for camera in cameras])
+
+    def readable(self, part: str) -> float:
+        """Return the factor from 1 to `LARGEST` that makes a part alone as opaque as is readable."""
+        alone = {name: replace(edit, visible=name == part) for name, edit in self.edits.items()}
+
+        def is_readable(share: float) -> bool:
+            opacity = LARGEST ** (1 - share) * alone[part].opacity
+            return self.alpha({**alone, part: replace(alone[part], opacity=opacity)}) >= READABLE
+
+        return float(LARGEST ** (1 - largest(is_readable)))
+
+    def alpha(self, edits: Mapping[str, PartEdit]) -> float:
+        """Return the mean alpha of what edits leave, see `weighted_mean`."""
+        from texgs.edit.canvas import weighted_mean
+
+        return weighted_mean(self.render(camera, edits).alpha for camera in self.cameras)
+
+    def pixels(self, factors: Mapping[str, float]) -> Tensor:
+        """Return how many pixels show each part [P] with factors on some opacities.
+
+        Colours without light are linear in the palettes: a channel of one that is 1 in place of 0 adds the
+        share that its part has of the pixel.
+        """
+        import torch
+
+        black = {
+            name: replace(edit, palette=BLACK, opacity=factors.get(name, 1.0) * edit.opacity)
+            for name, edit in self.edits.items()
+        }
+        counts = torch.zeros(len(black))
+        names = list(black)
+        for camera in self.cameras:
+            dark = self.render(camera, black).color
+            for start in range(0, len(names), 3):
+                three = names[start : start + 3]
+                marked = {
+                    name: replace(black[name], palette=color)
+                    for name, color in zip(three, PRIMARIES, strict=False)
+                }
+                share = self.render(camera, {**black, **marked}).color - dark
+                counts[start : start + 3] += (share > SHOWS).sum(dim=(0, 1))[: len(three)].cpu()
+        return counts
+
+    def render(self, camera: Camera, edits: Mapping[str, PartEdit]) -> Render:
+        """Render a view of bare colours."""
+        return self.composed.render(camera, edits=[*edits.values()], look="unshaded")
+
+
+def largest(holds: Callable[[float], bool]) -> float:
+    """Return the largest share in [0, 1] for which something holds that holds up to some share."""
+    if holds(1.0):
+        return 1.0
+    low, step = 0.0, 0.5
+    for _ in range(STEPS):
+        low += step * holds(low + step)
+        step /= 2
+    return low
+
+
+def two_digits(factor: float) -> float:
+    """Return a factor of at least 1 rounded down to two digits, as a person would write it."""
+    unit = 10.0 ** (floor(log10(factor)) - 1)
+    return round(floor(factor / unit + 1e-9) * unit, 1)
