@@ -176,8 +176,24 @@ def test_the_paper_looks_at_the_whole_view_over_white(vgg, style):
     assert all(torch.equal(image[0, 0], torch.ones(3)) for image in seen)
 
 
+@pytest.mark.parametrize("opacity", [4.0, -2.0])  # opaque, and so translucent that recipes adapt to it
+@pytest.mark.parametrize("start", ["projected", "sphere"])
+def test_an_edit_starts_from_its_preview_bit_for_bit(vgg, style, start, opacity):
+    model, shown = ball(opacity=opacity), []
+
+    def show(result):
+        shown.append(result())
+
+    preview = styled(style, preset("preview", start=start), model)
+    for name in ("default", "patches"):
+        no_step = preset(name, start=start, rate=0.0, iterations=1)
+        styled(style, no_step, model, vgg=vgg, show=show)
+        assert all(torch.equal(x, shown[-1].parameters[key]) for key, x in preview.model.parameters.items())
+    assert len(shown) == 2
+
+
 def test_starts(style):
-    names = ("projected", "mean", "random", "transfer")
+    names = ("projected", "sphere", "mean", "random", "transfer")
     colors = {name: base_color(styled(style, preset("preview", start=name)).model) for name in names}
     style = style.scaled(64)  # as it is laid onto views of that size
     pixels = style.pixels
@@ -185,7 +201,7 @@ def test_starts(style):
     assert all((pixels - color).abs().sum(1).min() < 1e-5 for color in colors["random"][:5])
     assert (colors["random"].mean(0) - pixels.mean(0)).abs().max() < 0.02
     assert (colors["transfer"].mean(0) - style.mean).abs().max() < 0.1
-    assert colors["projected"].std(dim=0).min() > 0.05
+    assert min(colors[name].std(dim=0).min() for name in ("projected", "sphere")) > 0.05
 
 
 def test_colours_of_a_segment_are_moved_to_those_of_the_style(style):

@@ -55,7 +55,6 @@ async def test_a_preview_shows_on_its_page_alone_and_changes_nothing(browser, cl
         before = await picture(browser)
         await browser.send(**look(style="glass", preview=True))
         assert (await browser.next("trial"))["parts"] == ["TF01", "TF02"]
-        await ended(browser)
         assert np.abs(await picture(browser) - before).mean() > 3
         assert (await picture(browser, before=True) == before).all()
         assert (await picture(other) == before).all()
@@ -74,7 +73,7 @@ async def test_a_look_is_one_step_and_written_beside_the_scene(browser, scene_fi
     before = await picture(browser)
     gold = look(parts=["TF01"], instruction="turn it into gold")
     await browser.send(**{**gold, "preview": True})
-    await ended(browser)
+    await browser.next("trial")
     tried = await picture(browser)
     await browser.send(**gold)
     news = await browser.next("notice")
@@ -232,26 +231,69 @@ async def test_words_of_a_page_are_no_references_to_anything(browser, monkeypatc
     assert "secret of" not in said
 
 
-@on_page
-async def test_a_preview_that_is_cancelled_as_it_ends_is_not_shown(browser, monkeypatch):
-    reached, go_on, run = threading.Event(), threading.Event(), Looks.make
+@pytest.fixture
+def held(monkeypatch):
+    """Previews wait at their end for the second event, and set the first when they are there."""
+    reached, go_on, preview = threading.Event(), threading.Event(), Looks.preview
 
     def slow(*words):
-        result = run(*words)
+        result = preview(*words)
         reached.set()
         go_on.wait(30)
         return result
 
-    monkeypatch.setattr(Looks, "make", slow)
+    monkeypatch.setattr(Looks, "preview", slow)
+    return reached, go_on
+
+
+@on_page
+async def test_a_preview_that_is_cancelled_as_it_ends_is_not_shown(browser, held):
+    reached, go_on = held
     before = await picture(browser)
     await browser.send(**look(style="glass", preview=True))
     await asyncio.to_thread(reached.wait, 30)
     await browser.send(type="cancel")
     assert (await browser.next("trial"))["parts"] == []
     go_on.set()
-    assert "It was cancelled" in (await browser.next("notice"))["text"]
-    await ended(browser)
+    await browser.send(**look(parts=["TF01"], style="dots", preview=True))
+    assert (await browser.next("trial"))["parts"] == ["TF01"], "nothing of the first"
+    await browser.send(type="cancel")
+    assert (await browser.next("trial"))["parts"] == []
     assert (await picture(browser) == before).all()
+
+
+@on_page
+async def test_of_previews_that_wait_the_newest_is_shown(browser, client, held):
+    reached, go_on = held
+    await browser.send(**look(style="glass", preview=True))
+    await asyncio.to_thread(reached.wait, 30)
+    for style in ("marble", "weave", "dots"):
+        await browser.send(**look(style=style, preview=True))
+    await picture(browser)  # frames go on meanwhile
+    go_on.set()
+    await browser.next("trial")
+    newest = await picture(browser)
+    (own,) = client.server_side._pages
+    assert {each.texture.parent.name for each in own._trial.values()} == {"2"}, "those between were not made"
+    await browser.send(**look(style="dots", preview=True))
+    await browser.next("trial")
+    assert (await picture(browser) == newest).all()
+
+
+@on_page
+async def test_a_picture_of_a_sphere_goes_by_normals(browser):
+    shown = []
+    for sphere in (False, True):
+        await browser.send(**look(style="glass", sphere=sphere, preview=True))
+        await browser.next("trial")
+        shown.append(await picture(browser))
+    assert np.abs(shown[0] - shown[1]).mean() > 1
+
+
+@on_page
+async def test_a_preview_that_cannot_be_is_a_sentence(browser):
+    await browser.send(**look(style="nothing", preview=True))
+    assert "style: expected one of strokes" in (await browser.next("notice"))["text"]
 
 
 @on_page
@@ -259,7 +301,7 @@ async def test_many_previews_of_one_part_leave_that_of_another(browser, client, 
     monkeypatch.setattr("texgs.viewer.looks.KEPT", 1)
     for part in ("TF01", "TF02", "TF02"):
         await browser.send(**look(parts=[part], style="glass", preview=True))
-        await ended(browser)
+        await browser.next("trial")
     (own,) = client.server_side._pages
     assert all(look.texture.is_file() for look in own._trial.values())
     assert sorted(own._trial) == ["TF01", "TF02"]

@@ -11,7 +11,7 @@ import os, signal
 from pathlib import Path
 from texgs.viewer.looks import Looks, Styles
 looks = Looks(Styles())
-looks.preview_folder(1, ["TF01"]).mkdir(parents=True)
+looks._scratch.new("preview").mkdir(parents=True)
 os.kill(os.getpid(), signal.SIGKILL)
 """
 

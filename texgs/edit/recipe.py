@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-Start = Literal["projected", "mean", "random", "transfer"]
+Start = Literal["projected", "sphere", "mean", "random", "transfer"]
 OPAQUE = 0.8  # mean alpha from which on a scene is taken for opaque
 FULL_RESOLUTION = 500  # pixels of the longer side up to which features see every pixel
 
@@ -19,8 +19,8 @@ class Recipe:
     """
 
     iterations: int = 100  # one view each
-    start: Start = "projected"  # colours at the start: the picture laid onto the surface, its mean, random
-    # pixels of it, or the model's own colours moved to those of the style
+    start: Start = "projected"  # colours at the start: the picture laid onto the surface, or by its normals
+    # where it shows a sphere, its mean, random pixels, or the model's own colours moved to its colours
     rate: float = 0.05  # of Adam at the start
     last_rate: float = 0.1  # at the end, relative to that
     features: float = 1.0  # weight of NNFM and CLIP together; at 0 no weights of VGG are needed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import torch
 from torch import Tensor
@@ -116,8 +116,12 @@ class SurfelPainting:
         # The colours of surfels are taken out where they change: texels [T, 3] have all of the colour.
         self.model = Surfels({**p, "colors": colors.contiguous()}, model.shading, model.metadata)
         self.texels = texels.requires_grad_()
-        self.adam = torch.optim.Adam([self.texels], eps=1e-15, fused=True)
         self.generator = torch.Generator().manual_seed(recipe.seed)
+
+    @cached_property
+    def adam(self) -> torch.optim.Adam:
+        """Return the optimiser. It takes a second to import, for which a preview need not wait."""
+        return torch.optim.Adam([self.texels], eps=1e-15, fused=True)
 
     def render(self, view: int) -> list[Painting]:
         """Show a view over the style or white."""

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from shutil import rmtree
 from threading import Lock
@@ -20,6 +20,7 @@ import torch
 from PIL import Image
 
 from texgs.config.recipes import Edit
+from texgs.core.camera import Camera
 from texgs.core.checksum import digest
 from texgs.core.errors import ArgumentError
 from texgs.core.image import FORMATS
@@ -28,11 +29,12 @@ from texgs.core.names import file_name, part_file
 from texgs.edit.method import method_of
 from texgs.edit.pictures import PICTURES, picture
 from texgs.edit.style_picture import read_style
-from texgs.edit.task import EditedScene, Task
+from texgs.edit.task import EditedScene, Task, parts_with_surfels
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import write_texture
 from texgs.models.instruction import understand, vocabulary
 from texgs.models.weights import unusable
+from texgs.scene.parts import NewLook, look_of
 from texgs.scene.scene import Scene
 from texgs.viewer.messages import Look
 from texgs.viewer.scratch import scratch_folder
@@ -56,7 +58,12 @@ class OrbitTask(Task[Any]):
 
     def training_views(self, model: str) -> Sequence[View]:
         """Return the cameras on a sphere; there are no images."""
-        return [View(camera, Path(), self.scene.light) for camera in icosphere_of(VIEWS, self.lens)]
+        return [View(camera, Path(), self.scene.light) for camera in self._cameras]
+
+    @cached_property
+    def _cameras(self) -> list[Camera]:
+        """Return the same ones for all parts."""
+        return icosphere_of(VIEWS, self.lens)
 
 
 class Styles:
@@ -119,8 +126,8 @@ class Looks:
             raise ArgumentError("look: expected a picture or an instruction, got both or none")
         if asked.style:
             style = self._styles.source(asked.style)
-            recipes = ("preview",) if asked.preview else FULL
-            choices = [{"image": {"style": style, "recipe": recipe}} for recipe in recipes]
+            recipes, start = ("preview",) if asked.preview else FULL, "sphere" if asked.sphere else None
+            choices = [{"image": {"style": style, "recipe": recipe, "start": start}} for recipe in recipes]
         else:
             said = asked.instruction
             choices = [{"text": {"instruction": said, "guidance": guidance}} for guidance in GUIDANCE]
@@ -156,9 +163,11 @@ class Looks:
                     output.parent.rmdir()
             raise
 
-    def preview_folder(self, page: int, parts: Sequence[str]) -> Path:
-        """Return a folder for a preview; removed when a page has many of the same parts, or in the end."""
-        return self._scratch.new(f"preview-{page}-{digest(repr(parts))}")
+    def preview(self, scene: Scene, asked: Look, page: int) -> dict[str, NewLook]:
+        """Return looks as a page asks for, in files that stay until it has had many of these parts."""
+        edit = with_parts(self.edit_of(asked), scene)
+        output = self._scratch.new(f"preview-{page}-{digest(repr(edit.parts))}")
+        return looks_of(self.make(scene, edit, output, lambda *_: None).scene, edit.parts, scene)
 
     def close(self) -> None:
         """Remove what was not kept."""
@@ -191,6 +200,16 @@ class ThrottledPreview:
         name = part_file("look", part)
         self._show(part, write_texture(self._folders.new(Path(name).stem) / name, model()))
         self._latest = monotonic()
+
+
+def with_parts(edit: Any, scene: Scene) -> Any:
+    """Return the edit with the names of its parts, where these are all that have surfels."""
+    return replace(edit, parts=edit.parts or parts_with_surfels(scene))
+
+
+def looks_of(scene: Scene, parts: Sequence[str], before: Scene) -> dict[str, NewLook]:
+    """Return the looks of parts, as far as they had others before."""
+    return {part: look_of(scene, part, before) for part in parts}
 
 
 def edit_with(parts: Sequence[str], choice: dict[str, Any]) -> Any:

@@ -152,7 +152,8 @@ class Look:
     parts: Annotated[tuple[str, ...], Field(max_length=MOST_PARTS)] = ()  # none: all models
     style: str = ""  # name of a picture; "" with an instruction
     instruction: str = ""  # "" with a picture
-    preview: bool = False  # show what it would be like, and change nothing
+    sphere: bool = False  # the picture is of a lit sphere, and goes onto surfaces by their normals
+    preview: bool = False  # lay the picture on, show that on this page, and change nothing
     type: Literal["look"] = tag("look")
 
 

@@ -15,7 +15,7 @@ from texgs.core.errors import TexgsError, first_line
 from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames, Pace
-from texgs.viewer.messages import Mask, Pick, View
+from texgs.viewer.messages import Look, Mask, Pick, View
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.work import Stopped, Work
 
@@ -35,8 +35,9 @@ class Page:
         self._notices: deque[dict[str, Any]] = deque(maxlen=MOST_NOTICES)
         self._news: dict[str, dict[str, Any]] = {}  # by type, of each the newest
         self._view: View | None = None
-        self._mask: Mask | None = None
-        self._masking: asyncio.Task[None] | None = None
+        self._asked: dict[str, Mask | Look] = {}  # by type, of each the newest that waits
+        self._finding: dict[str, asyncio.Task[None]] = {}
+        self._tried: Look | None = None  # the newest preview, until it is taken off
         self._trial: dict[str, NewLook] = {}
         self._pace = Pace()
         self.answered = 0  # messages that change the scene
@@ -52,9 +53,11 @@ class Page:
         point = await self._frames.point_at(asked.view, self.shown(asked.view), asked.pixel)
         self._tell_newest({"type": "point", "point": point})
 
-    def show_mask(self, mask: Mask) -> None:
-        """Send what these clicks select, in place of what others do."""
-        self._mask = mask
+    def find(self, asked: Mask | Look) -> None:
+        """Send what clicks select, or show a preview of a look, in place of what was asked for before."""
+        self._asked[asked.type] = asked
+        if isinstance(asked, Look):
+            self._tried = asked
         self._wake.set()
 
     def tell_job(self, title: str, done: float | None, failed: bool = False) -> None:
@@ -68,6 +71,8 @@ class Page:
 
     def try_on(self, looks: Mapping[str, NewLook] | None) -> None:
         """Show parts with new looks on this page alone, beside those before; None: as all pages do."""
+        if looks is None:
+            self._tried = None
         self._trial = {} if looks is None else {**self._trial, **looks}
         self._tell_newest({"type": "trial", "parts": list(self._trial)})
 
@@ -91,8 +96,8 @@ class Page:
                 self._wake.clear()
                 await self._send_what_waits()
         finally:
-            if self._masking is not None:
-                self._masking.cancel()
+            for task in self._finding.values():
+                task.cancel()
 
     async def beat(self) -> None:
         """Send a word again and again until the page is gone: its script cannot see pings."""
@@ -101,15 +106,15 @@ class Page:
             await self._socket.send_str('{"type": "beat"}')
 
     async def _send_what_waits(self) -> None:
-        """Send notices, news and the frame; masks are found meanwhile."""
+        """Send notices, news and the frame; masks and previews are found meanwhile."""
         while self._notices:
             await self._socket.send_str(json.dumps(self._notices.popleft()))
         news, self._news = self._news, {}
         for message in news.values():
             await self._socket.send_str(json.dumps(message))
-        if self._mask is not None and (self._masking is None or self._masking.done()):
-            mask, self._mask = self._mask, None
-            self._masking = asyncio.create_task(self._find_mask(mask))
+        for kind in [*self._asked]:
+            if kind not in self._finding or self._finding[kind].done():
+                self._finding[kind] = asyncio.create_task(self._find(self._asked.pop(kind)))
         if self._view is not None:
             view, self._view = self._view, None
             await self._send_frame(view)
@@ -133,10 +138,16 @@ class Page:
             return
         await self._socket.send_bytes(frame)
 
-    async def _find_mask(self, mask: Mask) -> None:
-        """Find what clicks select: it may have to wait for a job of another page, while frames go on."""
+    async def _find(self, asked: Mask | Look) -> None:
+        """Find what was asked for: it may have to wait for another page, while frames go on."""
         try:
-            self._tell_newest(await self._work.mask(mask))
+            if isinstance(asked, Mask):
+                self._tell_newest(await self._work.mask(asked))
+                return
+            looks = await self._work.preview(asked, self.number)
+            if asked is self._tried:
+                self.try_on(looks)
         except Exception as error:  # whatever it is, the server goes on
-            self.tell_error(error, mask=mask.id)
-        self._wake.set()  # another may wait
+            self.tell_error(error, **({"mask": asked.id} if isinstance(asked, Mask) else {}))
+        finally:
+            self._wake.set()  # another may wait

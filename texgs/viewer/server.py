@@ -170,8 +170,8 @@ class Server:
             page.show(message)
         elif isinstance(message, Pick):
             await page.pick(message)
-        elif isinstance(message, Mask):
-            page.show_mask(message)
+        elif isinstance(message, Mask) or (isinstance(message, Look) and message.preview):
+            page.find(message)
         elif isinstance(message, Segment):
             self.work.begin_segment(message, page)
         elif isinstance(message, Look):

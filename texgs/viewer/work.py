@@ -6,7 +6,7 @@ import asyncio
 import threading
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from shutil import rmtree
@@ -20,12 +20,11 @@ from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.names import part_file, require_name
 from texgs.core.progress import watched
 from texgs.edit.function_model import models_of, overlap_of, tried
-from texgs.edit.task import parts_with_surfels
 from texgs.fields.surfels.model import Surfels
-from texgs.scene.parts import NewLook, entry_of, look_of, require_new, split
+from texgs.scene.parts import NewLook, entry_of, require_new, split
 from texgs.viewer.downloads import Downloads, require_kind
 from texgs.viewer.frames import Frames
-from texgs.viewer.looks import Looks, Styles
+from texgs.viewer.looks import Looks, Styles, looks_of, with_parts
 from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
@@ -96,7 +95,7 @@ class Work:
     ) -> None:
         self._edits, self._changing, self._changed = edits, changing, changed
         self._device = device
-        self._jobs, self.styles = Jobs(), Styles()
+        self._jobs, self._previews, self.styles = Jobs(), Jobs(), Styles()
         self._segmenter, self._looks = Segmenter(device), Looks(self.styles, device)
         self.downloads = Downloads(frames, edits)
         self._task: asyncio.Task[None] | None = None
@@ -107,6 +106,11 @@ class Work:
         """Return what clicks select in a view, as a message; a job of another page may come before."""
         return await self._jobs.run(partial(self._segmenter.mask, self._edits.scene, asked), Watch())
 
+    async def preview(self, asked: Look, page: int) -> dict[str, NewLook]:
+        """Return looks of parts with a picture laid on, while a job may be at work."""
+        work = partial(self._looks.preview, self._edits.scene, asked, page)
+        return await self._previews.run(work, Watch(), is_urgent=True)
+
     def begin_segment(self, asked: Segment, page: Page) -> None:
         """Begin to make a segment."""
         require_new(self._edits.scene, asked.part)
@@ -116,7 +120,7 @@ class Work:
         self._begin(page, partial(self._segment, asked, page))
 
     async def begin_look(self, asked: Look, page: Page) -> None:
-        """Begin to make a new look, or a preview of one; its picture and the weights are looked at first."""
+        """Begin to make a new look; its picture and the weights are looked at first."""
         for part in asked.parts:
             entry_of(self._edits.scene, part)
         edit = await asyncio.to_thread(self._looks.edit_of, asked)
@@ -156,6 +160,7 @@ class Work:
         """Stop, and end the thread."""
         self.stop()
         self._jobs.close()
+        self._previews.close()
         self._looks.close()
         self.downloads.close()
         self.styles.close()
@@ -190,16 +195,10 @@ class Work:
         page.tell(f"{asked.part}: {lifted.basis}", level="info")
 
     async def _look(self, asked: Look, edit: Any, page: Page, watch: Watch) -> None:
-        """Show textures on their way on the page that asked; those of a preview stay until others come."""
+        """Show textures on their way on the page that asked, then give them to the scene."""
         scene, loop = self._edits.scene, asyncio.get_running_loop()
-        name, parts = asked.style or asked.instruction, asked.parts
-        if not parts:
-            parts = tuple(await asyncio.to_thread(parts_with_surfels, scene))
-            edit = replace(edit, parts=list(parts))
-        if asked.preview:
-            output = self._looks.preview_folder(page.number, parts)
-        else:
-            output = self._edits.new_folder(edit.name)
+        name, output = asked.style or asked.instruction, self._edits.new_folder(edit.name)
+        edit = await asyncio.to_thread(with_parts, edit, scene)
 
         def show(part: str, file: Path) -> None:
             loop.call_soon_threadsafe(page.try_on, {part: NewLook(file)})
@@ -207,18 +206,14 @@ class Work:
         start = monotonic()
         try:
             edited = await self._jobs.run(partial(self._looks.make, scene, edit, output, show), watch)
-            looks = {part: look_of(edited.scene, part, scene) for part in parts}
-            if asked.preview:
-                page.try_on(looks)
-                return
+            looks = looks_of(edited.scene, edit.parts, scene)
             async with self._changing:
                 await asyncio.to_thread(self._edits.give_looks, looks, name)
         except Exception:
             rmtree(output, ignore_errors=True)
             raise
         finally:
-            if not asked.preview:
-                page.try_on(None)
+            page.try_on(None)
         how = f"{name}: {edited.how}, {monotonic() - start:.0f} s."
         page.tell(f"{how} Textures are in {output}; the scene is not saved yet.", level="info")
 

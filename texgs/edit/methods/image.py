@@ -46,9 +46,9 @@ class ImageKeys(OpacityKeys, StyleKeys):
     pattern: float = key(1.0, "size of the style's pattern, as a multiple of the views' size", above=0)
     start: str | None = key(
         None,
-        "colours at the start: the picture laid onto the surface, its mean, random pixels of it, or the "
-        "model's own moved to its colours; default the recipe's",
-        choices=("projected", "mean", "random", "transfer"),
+        "colours at the start: the picture laid onto the surface, or by normals where it shows a lit sphere, "
+        "its mean, random pixels of it, or the model's own moved to its colours; default the recipe's",
+        choices=("projected", "sphere", "mean", "random", "transfer"),
     )
     textured: bool = key(True, "each texel learns, or each surfel one colour: the paper's ablation")
 

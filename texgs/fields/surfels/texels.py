@@ -111,10 +111,12 @@ def recolored(model: Surfels, colors: Tensor, surfels: Tensor | None = None) -> 
     """
     p = model.parameters
     place, surfel = owners(p)
-    changing = torch.ones_like(p["opacities"], dtype=torch.bool) if surfels is None else surfels
     mean = mean_texels({**p, "texels": colors}).to(colors)  # [N, 3]
-    offsets = torch.where(changing[:, None], mean - p["palette"], p["colors"])
-    texels = p["texels"].clone()
-    moved = changing[surfel]
-    texels[place[moved]] = colors[place[moved]] - mean[surfel[moved]]
+    offsets = mean - p["palette"]
+    if surfels is not None:
+        offsets = torch.where(surfels[:, None], offsets, p["colors"])
+        moved = surfels[surfel]
+        place, surfel = place[moved], surfel[moved]
+    changed = colors.index_select(0, place) - mean.index_select(0, surfel)
+    texels = p["texels"].index_copy(0, place, changed)
     return replace(model, parameters={**p, "colors": offsets, "texels": texels})

@@ -1,4 +1,4 @@
-// A new look: a picture or words for a part of the scene or all of it, shown as a preview and while it is made.
+// A new look: a picture or words for a part of the scene or all of it. A picture shows at once, as a preview.
 
 import { element } from "./inputs.js";
 
@@ -21,9 +21,9 @@ export class LookTool {
     get("look-file").addEventListener("change", ({ target }) => this.#send(target.files));
     get("look").addEventListener("submit", (event) => {
       event.preventDefault();
-      this.#make(false);
+      this.#page.job.begin(this.#asked(false));
     });
-    get("look-preview").onclick = () => this.#make(true);
+    for (const id of ["look-part", "look-sphere"]) get(id).addEventListener("change", () => this.#preview());
     get("look-close").onclick = () => this.leave();
     get("look").addEventListener("keydown", ({ key }) => { if (key === "Escape") this.leave(); });
     this.#takeDrops();
@@ -49,8 +49,7 @@ export class LookTool {
   /** Take the preview off, and close. */
   leave() {
     if (get("look").hidden) return;
-    const { job } = this.#page;
-    if (this.#isTried || (job.isAtWork && job.kind === "look")) job.leave("look");
+    this.#page.job.leave("look");
     if (get("look").contains(document.activeElement)) this.#page.canvas.focus();
     get("look").hidden = true;
   }
@@ -71,7 +70,7 @@ export class LookTool {
   #choose(style) {
     for (const each of get("look-styles").querySelectorAll("input")) each.checked = each === style;
     if (style) get("look-words").value = "";
-    this.#show();
+    this.#preview();
   }
 
   /** Give the server a picture file. */
@@ -98,10 +97,18 @@ export class LookTool {
     });
   }
 
-  #make(preview) {
+  /** Lay the picture that is chosen onto the part, or none. */
+  #preview() {
+    const { connection } = this.#page;
+    if (this.#style) connection.send(this.#asked(true));
+    else if (this.#isTried) connection.send({ type: "cancel", preview: true });
+    this.#show();
+  }
+
+  #asked(preview) {
     const part = get("look-part").value, instruction = get("look-words").value.trim();
-    const parts = part === ALL ? [] : [part];
-    this.#page.job.begin({ type: "look", parts, style: this.#style, instruction, preview });
+    const parts = part === ALL ? [] : [part], sphere = get("look-sphere").checked;
+    return { type: "look", parts, style: this.#style, instruction, sphere, preview };
   }
 
   #try(parts) {
@@ -124,7 +131,6 @@ export class LookTool {
     const { isAtWork } = this.#page.job, hasWords = get("look-words").value.trim() !== "";
     const isReady = (hasWords || this.#style) && !isAtWork;
     get("look-make").disabled = !isReady;
-    get("look-preview").disabled = !isReady || hasWords;
     for (const each of get("look").querySelectorAll("input, select")) each.disabled = isAtWork;
     get("look-note").textContent = this.#isTried && !isAtWork ? "A preview: nothing has changed yet." : "";
   }
