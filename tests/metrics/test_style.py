@@ -1,13 +1,28 @@
-import math
+from statistics import fmean
 
 import pytest
 import torch
+from torch.nn.functional import cosine_similarity
 
 from tests.edit.scenes import ball, views
 from tests.models.networks import vgg  # noqa: F401  a fixture
 from texgs.fields.surfels.composition import Composition
-from texgs.fields.surfels.model import Surfels
-from texgs.metrics.style import gram, style_similarity
+from texgs.metrics.style import StyleTarget, gram, on_object
+
+
+def rows(vgg, image, share=None):  # noqa: F811
+    """The features [n, C] of an image [3, h, w], or of what has a share [h, w] of it."""
+    layers = [layer[0] for layer in vgg.layers(image[None])]
+    return on_object(layers, torch.ones(image.shape[1:]) if share is None else share.float())
+
+
+def distances(model, cameras, lights, style, vgg, region=None):  # noqa: F811
+    """NNFM and Gram distance of views of a model to a style [3, h, w], means over views."""
+    target, scene, found = StyleTarget.of(rows(vgg, style, region)), Composition([model]), []
+    for camera, light in zip(cameras, lights, strict=True):
+        shown = scene.render(camera, light)
+        found.append(target.distances(rows(vgg, shown.color.clamp(0, 1).permute(2, 0, 1), shown.alpha)))
+    return map(fmean, zip(*found, strict=True))
 
 
 def test_gram_matrices_are_mean_products():
@@ -21,39 +36,42 @@ def test_gram_matrices_are_mean_products():
 def test_a_view_is_like_itself_and_less_like_noise(vgg):  # noqa: F811
     cameras, lights = views(1)
     shown = Composition([ball()]).render(cameras[0], lights[0]).color.permute(2, 0, 1)
-    itself = style_similarity(ball(), cameras, lights, shown, vgg)
-    assert itself.nnfm < 1e-5
+    nnfm, alike = distances(ball(), cameras, lights, shown, vgg)
+    assert nnfm < 1e-5
     noise = torch.rand(3, 64, 64, generator=torch.Generator().manual_seed(1))
-    other = style_similarity(ball(), cameras, lights, noise, vgg)
-    assert other.nnfm > itself.nnfm + 0.01
-    assert other.gram > itself.gram
+    of_noise, unlike = distances(ball(), cameras, lights, noise, vgg)
+    assert of_noise > nnfm + 0.01
+    assert unlike > alike
 
 
-def test_a_region_that_is_the_object_has_its_gram_matrix_and_colour(vgg):  # noqa: F811
+def test_a_region_that_is_the_object_has_its_gram_matrix(vgg):  # noqa: F811
     cameras, lights = views(1)
     shown = Composition([ball()]).render(cameras[0], lights[0])
-    inside = style_similarity(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha > 0.9)
-    around = style_similarity(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha < 0.1)
-    assert inside.gram < 0.3 < around.gram
-    assert max(abs(x) for x in inside.color) < 1e-5
+    given = ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg
+    (_, inside), (_, around) = (distances(*given, where) for where in (shown.alpha > 0.9, shown.alpha < 0.1))
+    assert inside < 0.3 < around
 
 
-def test_colours_are_those_of_opaque_pixels(vgg):  # noqa: F811
-    cameras, lights = views(2)
-    color = torch.tensor([0.1, 0.5, 0.9])
-    p = ball().parameters
-    plain = Surfels({**p, "palette": color, "colors": torch.zeros_like(p["colors"])})
-    scores = style_similarity(plain, cameras, lights, torch.full((3, 64, 64), 0.5), vgg)
-    pixels = []
-    for camera, light in zip(cameras, lights, strict=True):
-        shown = Composition([plain]).render(camera, light)
-        pixels.append(shown.color.clamp(0, 1)[shown.alpha > 0.9])
-    expected = (torch.cat(pixels).mean(0) - 0.5).tolist()
-    assert list(scores.color) == pytest.approx(expected, abs=1e-5)
+def test_distances_are_those_of_all_features_on_the_object_by_exact_search():
+    generator = torch.Generator().manual_seed(2)
+    maps, picture = (torch.rand(6, *size, generator=generator) for size in ((5, 4), (3, 7)))
+    alpha = torch.zeros(20, 16)
+    alpha[4:12, 4:16] = 1  # two rows of three positions, of four pixels each way
+    seen, style = maps[:, 1:3, 1:4].flatten(1).T.double(), picture.flatten(1).T.double()
+    nearest = (1 - cosine_similarity(seen[:, None], style[None], dim=2)).min(1).values
+    grams = [rows.T @ rows / len(rows) for rows in (seen, style)]
+    picked = on_object([maps[:4], maps[4:]], alpha)
+    torch.testing.assert_close(picked.double(), seen)
+    target = StyleTarget.of(picture.flatten(1).T)
+    nnfm, relative = target.distances(picked)
+    assert nnfm == pytest.approx(float(nearest.mean()), abs=1e-6)
+    assert relative == pytest.approx(float((grams[0] - grams[1]).norm() / grams[1].norm()), rel=1e-5)
+    drawn, same = target.distances(picked, most=2, seed=5)
+    assert any(drawn == pytest.approx(float(nearest[list(two)].mean()), abs=1e-6) for two in pairs(6))
+    assert same == relative
+    assert on_object([maps], 0 * alpha).shape == (0, 6)
 
 
-def test_nothing_to_see_is_no_number(vgg):  # noqa: F811
-    cameras, lights = views(1)
-    faint = ball(opacity=-9.0)
-    scores = style_similarity(faint, cameras, lights, torch.rand(3, 64, 64), vgg)
-    assert all(math.isnan(x) for x in (scores.nnfm, scores.gram, *scores.color))
+def pairs(count):
+    """All pairs of different numbers below a count."""
+    return [(a, b) for a in range(count) for b in range(a)]

@@ -5,7 +5,7 @@ from torch.nn.functional import avg_pool2d, conv2d, pad
 from tests.models.networks import outputs, random_weights
 from tests.real_data import real_data
 from texgs.core.errors import ShapeError
-from texgs.models.lpips import Lpips
+from texgs.models.lpips import LAYERS, Lpips
 
 
 @pytest.fixture(scope="module")
@@ -38,11 +38,28 @@ def test_the_distance_is_the_published_one(files):
     lpips = Lpips.load(folder / "vgg.pth", folder / "heads.pth")
     assert float(lpips.distance(image, other)) == pytest.approx(defined(image, other, heads), rel=1e-4)
     assert float(lpips.distance(image, image)) == 0
-    assert lpips.to(image)(other) == float(lpips.distance(image, other))
     with pytest.raises(ShapeError, match=r"other: expected \[1, 32, 40, 3\]"):
         lpips.distance(image, other[:20])
     with pytest.raises(ShapeError, match=r"image: expected \[N, H, W, 3\], got \[32, 40\]"):
         lpips.distance(image[..., 0], other[..., 0])
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns"), [((20, 26), (30, 41)), ((0, 3), (100, 101)), ((89, 90), (0, 1)), ((0, 90), (0, 101))]
+)
+def test_an_image_that_differs_in_a_part_has_the_same_distance(files, rows, columns):
+    """The oracle runs VGG on the whole image; sizes are odd, and parts reach the borders."""
+    folder, _ = files
+    lpips = Lpips.load(folder / "vgg.pth", folder / "heads.pth")
+    generator = torch.Generator().manual_seed(2)
+    image, noise = torch.rand(2, 90, 101, 3, generator=generator)
+    where = torch.zeros(90, 101, dtype=torch.bool)
+    where[slice(*rows), slice(*columns)] = True
+    other = torch.where(where[..., None], noise, image)
+    layers = dict(zip(LAYERS, lpips.vgg.layers(image.permute(2, 0, 1)[None]), strict=True))
+    expected = float(lpips.distance(image, other))
+    assert lpips.changed(layers, other, where) == pytest.approx(expected, rel=1e-4)
+    assert lpips.changed(layers, image, where) == pytest.approx(0, abs=1e-4 * expected)
 
 
 def test_heads_of_another_backbone_are_refused(files, tmp_path):

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import sqrt
 from statistics import fmean
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError
-from texgs.core.light import Light
-from texgs.fields.field import Composed, Look
-from texgs.fields.part_edit import PartEdit
 
 SHORT, LONG = 1, 7  # views between those compared, as is usual for stylised scenes
 OPAQUE = 0.5  # least alpha of a pixel that has a depth
 TOLERANCE = 0.01  # of the depth, by which two views of the same point may differ
 
-# For an image [H, W, 3], a function that says how far others are from it, such as by LPIPS.
-Perceptual = Callable[[Tensor], Callable[[Tensor], float]]
+# How far an image [H, W, 3], which differs in some pixels [H, W] at most, is from a view, such as by LPIPS.
+Perceptual = Callable[[Tensor, Tensor], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,75 +57,27 @@ class ViewConsistency:
         return cls(sqrt(fmean(squares)), mean_distance, fmean(shares), len(pairs))
 
 
-def consistency(
-    frames: Sequence[SeenFrame],
-    apart: Sequence[int] = (SHORT,),
-    perceptual: Perceptual | None = None,
-    tolerance: float = TOLERANCE,
-) -> dict[int, ViewConsistency]:
-    """Compare views along a path with those some views later, warped into them.
+def difference(
+    first: SeenFrame, second: SeenFrame, distance: Perceptual | None = None, tolerance: float = TOLERANCE
+) -> Difference | None:
+    """Compare a view with another one, warped into it; None where they see nothing that is the same.
 
     What depends on the place of the viewer counts as inconsistent, highlights and headlights too: render
     without light to measure textures alone.
 
     Args:
-        frames: along a path of cameras.
-        apart: how many views; as many pairs are compared for each, so that the largest decides.
-        perceptual: distance of images; it sees the first view with the compared pixels exchanged.
+        first: the view.
+        second: the other one.
+        distance: from the first; it sees that view with the compared pixels exchanged.
         tolerance: of depths, relative.
-
-    Returns:
-        For each of `apart`, but those at which no pair sees the same.
     """
-    if min(apart) < 1 or len(frames) <= max(apart):
-        most = max(apart)
-        raise ArgumentError(f"frames: expected more than {most} for pairs so far apart, got {len(frames)}")
-    pairs: dict[int, list[Difference]] = {each: [] for each in apart}
-    for place, first in enumerate(frames[: len(frames) - max(apart)]):
-        distance = perceptual(first.image) if perceptual else None
-        for each, differences in pairs.items():
-            differences += difference(first, frames[place + each], distance, tolerance)
-    return {each: ViewConsistency.of(differences) for each, differences in pairs.items() if differences}
-
-
-def difference(
-    first: SeenFrame, second: SeenFrame, distance: Callable[[Tensor], float] | None, tolerance: float
-) -> list[Difference]:
-    """Compare one pair; empty where the two see nothing that is the same."""
     warped, same = warp(second, first, tolerance)
     if not bool(same.any()):
-        return []
+        return None
     square = float((warped - first.image)[same].double().square().mean())
     share = float(same.sum() / (first.alpha >= OPAQUE).sum())
     exchanged = torch.where(same[..., None], warped, first.image)
-    return [Difference(square, share, None if distance is None else distance(exchanged))]
-
-
-def frames_of(
-    scene: Composed,
-    cameras: Iterable[Camera],
-    light: Light,
-    edits: Sequence[PartEdit] | None = None,
-    geometry: Composed | None = None,
-    depth: Literal["median", "depth"] = "median",
-    look: Look = "shaded",
-) -> Iterator[SeenFrame]:
-    """Yield views of a scene along a path of cameras with what `consistency` needs.
-
-    Args:
-        scene: to show.
-        cameras: on the scene's device.
-        light: shines on it.
-        edits: as for `Composition.render`.
-        geometry: scene whose depth and alpha say where surfaces are; by default this one. Different edits of
-            one volume are compared on one geometry.
-        depth: which of its outputs says where a pixel's surface is.
-        look: "unshaded" measures textures alone.
-    """
-    for camera in cameras:
-        shown = scene.render(camera, light, edits, look=look)
-        surface = (geometry or scene).render(camera, outputs=(depth,))
-        yield SeenFrame(shown.color.clamp(0, 1), getattr(surface, depth), surface.alpha, camera)
+    return Difference(square, share, None if distance is None else distance(exchanged, same))
 
 
 @torch.no_grad()

@@ -1,15 +1,17 @@
 """What a metric of edits is, and the metrics that there are: the modules of texgs/metrics/edits.
 
-A metric is one file there. The stage edit_metrics runs all of them; the tables of edits and of sweeps take
-their columns from the specifications.
+A metric is one file there. It measures the scene, or watches its views: then VGG-16 runs once a view for all
+metrics. The stage edit_metrics runs all of them; the tables of edits and of sweeps take their columns from
+the specifications.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 from texgs.core.specifications import specifications
 
@@ -18,7 +20,11 @@ if TYPE_CHECKING:
 
     from texgs.core.camera import Camera
     from texgs.fields.field import Composed
+    from texgs.models.vgg import Vgg
+    from texgs.raster import Render
     from texgs.scene.scene import Scene
+
+LAST_FRAMES = 32  # that are kept: all that a usual number of views needs
 
 
 @dataclass(frozen=True)
@@ -39,18 +45,38 @@ class Metric:
 
     name: str
     measures: tuple[Measure, ...]
-    run: Callable[[MeasuredScene], Mapping[str, Any]]  # values of measures and notes, those that there are
+    run: Callable[[MeasuredScene], Mapping[str, Any] | Watcher]  # values of measures and notes
     notes: Mapping[str, str] | None = None  # words beside numbers, and the sentences that hold them
     order: int = 100  # where its columns stand; the lowest come first
     is_in_paper: bool = True  # whether tables that are as in the paper have its columns, too
 
 
 @dataclass(frozen=True, eq=False)
-class StyledModel:
-    """A model of a scene and the style that it was given."""
+class SeenView:
+    """A view of the edited scene, and what VGG-16 makes of it."""
 
-    model: str
-    part: str  # its name in titles
+    place: int  # along the path
+    image: Tensor  # [H, W, 3] in [0, 1]
+    alpha: Tensor  # [H, W]
+    layers: Mapping[str, Tensor]  # [1, C, h, w], those of LPIPS and of styles by name; none without weights
+
+
+@runtime_checkable
+class Watcher(Protocol):
+    """What measures views that are shown to it in turn, so that VGG-16 runs once a view for all metrics."""
+
+    def see(self, view: SeenView) -> None:
+        """Measure a view."""
+
+    def values(self) -> Mapping[str, Any]:
+        """Return the values of measures and notes, after the last view."""
+
+
+@dataclass(frozen=True, eq=False)
+class Style:
+    """A picture, and the models of a scene that follow it."""
+
+    models: Sequence[str]
     image: Tensor  # [3, h, w] in [0, 1], its longer side that of the views
     region: Tensor  # [h, w] bool
 
@@ -64,12 +90,11 @@ class MeasuredScene:
     compositions: tuple[Composed, Composed]  # the same, opened
     geometry_file: Path  # scene whose depth says where surfaces are
     cameras: Sequence[Camera]  # along the test path
-    some: Sequence[Camera]  # spread over it
+    compared: int  # how many of them measure
     captions: tuple[str, str]  # before and after
     clip: str  # backbone of CLIP
     weights: Mapping[str, str | None]  # digests by name; None for those that nothing can work with here
-    styles: Sequence[StyledModel]  # of models that follow a picture; none where parts of models do
-    has_normals: bool  # whether fields of this kind render normals
+    styles: Sequence[Style]  # that models follow; none where parts of models do
 
     @property
     def after(self) -> Scene:
@@ -81,6 +106,48 @@ class MeasuredScene:
         """Return the edited scene, opened."""
         return self.compositions[1]
 
+    @property
+    def places(self) -> list[int]:
+        """Return which cameras measure: in the middles of equal parts of the path; all, if it has no more."""
+        length, count = len(self.cameras), min(self.compared, len(self.cameras))
+        return [(2 * index + 1) * length // (2 * count) for index in range(count)]
+
+    @property
+    def some(self) -> list[Camera]:
+        """Return the cameras that measure."""
+        return [self.cameras[place] for place in self.places]
+
+    @cached_property
+    def frame(self) -> Callable[[int], Render]:
+        """Return what renders the edited scene at a place of the path, and keeps the last frames."""
+        scene = self.after
+        return lru_cache(LAST_FRAMES)(
+            lambda place: self.shown.render(self.cameras[place], scene.light, scene.edits)
+        )
+
+    @cached_property
+    def vgg(self) -> Vgg | None:
+        """Return VGG-16 in single precision for all metrics; None without its weights."""
+        import torch
+
+        from texgs.models.lpips import LAYERS
+        from texgs.models.vgg import STYLE_LAYERS, Vgg
+
+        layers = sorted({*LAYERS, *STYLE_LAYERS})
+        is_here = self.weights["vgg16"] is not None
+        return Vgg.load(None, self.shown.device, layers, torch.float32) if is_here else None
+
+    def views(self) -> Iterator[SeenView]:
+        """Yield what measures, one view at a time: the features of a view are larger than its pixels."""
+        from texgs.core.progress import progress
+
+        for place in progress(self.places, title=self.title, unit="view"):
+            shown = self.frame(place)
+            image, layers = shown.color.clamp(0, 1), {}
+            if vgg := self.vgg:
+                layers = dict(zip(vgg.wanted, vgg.layers(image.permute(2, 0, 1)[None]), strict=True))
+            yield SeenView(place, image, shown.alpha, layers)
+
 
 def metrics() -> dict[str, Metric]:
     """Return all metrics of edits by name, in the order of their columns."""
@@ -88,6 +155,15 @@ def metrics() -> dict[str, Metric]:
     return dict(sorted(defined.items(), key=lambda item: (item[1].order, item[0])))
 
 
-def values_of(scene: MeasuredScene) -> dict[str, Any]:
-    """Measure all that can be measured of an edited scene."""
-    return {name: value for metric in metrics().values() for name, value in metric.run(scene).items()}
+def values_of(scene: MeasuredScene, chosen: Iterable[Metric] | None = None) -> dict[str, Any]:
+    """Measure all that can be measured of an edited scene, or what some metrics can."""
+    import torch
+
+    with torch.no_grad():
+        found = [metric.run(scene) for metric in (metrics().values() if chosen is None else chosen)]
+        watchers = [each for each in found if isinstance(each, Watcher)]
+        for view in scene.views() if watchers else ():
+            for watcher in watchers:
+                watcher.see(view)
+        told = [each.values() if isinstance(each, Watcher) else each for each in found]
+    return {name: value for each in told for name, value in each.items()}

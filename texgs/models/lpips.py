@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,17 +28,17 @@ class Lpips:
     @classmethod
     def load(
         cls,
-        vgg: str | Path | None = None,
+        vgg: Vgg | str | Path | None = None,
         heads: str | Path | None = None,
         device: torch.device | str = "cpu",
         dtype: torch.dtype = torch.float32,
     ) -> Lpips:
-        """Read both files of weights; by default where they are found."""
+        """Read both files of weights, by default where they are found; a VGG with `LAYERS` may be given."""
         heads = locate("lpips_vgg") if heads is None else heads
         names = [f"lin{index}.model.1.weight" for index in range(len(LAYERS))]
         stored = read_tensors(heads, names)
         weights = tuple(stored[name].flatten().to(device, torch.float32) for name in names)
-        backbone = Vgg.load(vgg, device, LAYERS, dtype)
+        backbone = vgg if isinstance(vgg, Vgg) else Vgg.load(vgg, device, LAYERS, dtype)
         for name, weight, layer in zip(names, weights, LAYERS, strict=True):
             check.shape(f"{heads}: {name}", weight, f"{channels(layer)}")
         return cls(backbone, weights)
@@ -51,7 +51,7 @@ class Lpips:
         if images.ndim == 3:
             images = images[None]
         check.shape("image", images, "N H W 3")
-        return [unit(layer) for layer in self.vgg.layers(images.permute(0, 3, 1, 2))]
+        return [unit(layer) for layer in self.vgg.layers(images.permute(0, 3, 1, 2), LAYERS)]
 
     def between(self, ours: Sequence[Tensor], others: Sequence[Tensor]) -> Tensor:
         """Return how different images look [] by their features, 0 for equal ones; differentiable in both."""
@@ -69,10 +69,19 @@ class Lpips:
         check.shape("other", other, "N H W 3", **size)
         return self.between(self.features(image), self.features(other))
 
-    def to(self, image: Tensor) -> Callable[[Tensor], float]:
-        """Return the distance of images [H, W, 3] to this one, whose features are computed once."""
-        features = self.features(image)
-        return lambda other: float(self.between(features, self.features(other)))
+    def changed(self, layers: Mapping[str, Tensor], image: Tensor, where: Tensor) -> float:
+        """Return the distance of an image [H, W, 3] from one that differs in some pixels [H, W] at most.
+
+        Of that one the outputs [1, C, h, w] of `LAYERS` are given; VGG runs around these pixels only.
+        """
+        total = 0.0
+        parts = self.vgg.changed(layers, image.permute(2, 0, 1)[None], where)
+        for (name, part, seen), head in zip(parts, self.heads, strict=True):
+            before, now = (x[0].permute(1, 2, 0).float() for x in (layers[name][part], seen))  # [h, w, C]
+            lengths = [torch.linalg.vector_norm(x, dim=2, keepdim=True) + EPSILON for x in (before, now)]
+            difference = (before / lengths[0]).addcdiv_(now, lengths[1], value=-1)
+            total += float((difference.square_() @ head).sum()) / layers[name][0, 0].numel()
+        return total
 
 
 def unit(features: Tensor) -> Tensor:

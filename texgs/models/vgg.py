@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import EllipsisType
 
 import torch
 from torch import Tensor
@@ -18,6 +19,7 @@ from texgs.raster.convolution import RectifiedConvolution
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of ImageNet, per channel
 BLOCKS = (2, 2, 3, 3, 3)  # convolutions between poolings
 CHANNELS = (64, 128, 256, 512, 512)  # of the blocks
+Box = tuple[EllipsisType | slice, ...]  # rows and columns of an image
 STYLE_LAYERS = ("relu3_1", "relu3_2", "relu3_3")  # 3 x 256 channels, a quarter of the resolution
 
 
@@ -65,19 +67,53 @@ class Vgg:
         Images [N, 3, H, W] are red, green and blue in [0, 1]. Layers are named up to the last one that was
         loaded, in order; by default those loaded for.
         """
-        from kornia.enhance import normalize
-
-        check.shape("images", images, "N 3 H W")
-        x = normalize(images, torch.tensor(MEAN), torch.tensor(DEVIATION))
-        x = x.to(self.dtype, memory_format=torch.channels_last)
-        wanted, features = self.wanted if wanted is None else wanted, []
-        for name, convolve in zip(self.names, self.convolutions, strict=True):
+        x, features = self.prepared(images), []
+        wanted = self.wanted if wanted is None else wanted
+        last = self.names.index(wanted[-1]) + 1
+        for name, convolve in zip(self.names[:last], self.convolutions, strict=False):
             if name.endswith("_1") and name != "relu1_1":
                 x = F.max_pool2d(x, 2)
             x = convolve(x)
             if name in wanted:
                 features.append(x)
         return features
+
+    def prepared(self, images: Tensor) -> Tensor:
+        """Return images [N, 3, H, W] in [0, 1] as the first convolution takes them."""
+        from kornia.enhance import normalize
+
+        check.shape("images", images, "N 3 H W")
+        x = normalize(images, torch.tensor(MEAN), torch.tensor(DEVIATION))
+        return x.to(self.dtype, memory_format=torch.channels_last)
+
+    def changed(
+        self, layers: Mapping[str, Tensor], image: Tensor, where: Tensor
+    ) -> Iterator[tuple[str, Box, Tensor]]:
+        """Yield where the last layer of each block differs from a known one, and what it is there.
+
+        It is that of an image [1, 3, H, W], which differs from the known one in some pixels [H, W] at most.
+        What is given and yielded are outputs [1, C, h, w] by name. Not differentiable.
+        """
+        rows, columns = (where.any(dim).nonzero()[:, 0] for dim in (1, 0))
+        ends = [(int(each[0]), int(each[-1]) + 1) for each in (rows, columns)]
+        sizes, first = list(where.shape), 0
+        outer = grown(ends, 2 * BLOCKS[0], sizes)
+        x = self.prepared(image[box(outer)])
+        for count, following in zip(BLOCKS, (*BLOCKS[1:], 0), strict=True):
+            for convolve in self.convolutions[first : first + count]:
+                x = convolve(x)
+            first += count
+            # Of what the convolutions saw, what differs and as much around it as they have made wrong.
+            inner = grown(ends, count, sizes)
+            name, seen = self.names[first - 1], x[box(within(inner, outer))]
+            yield name, box(inner), seen
+            if following:
+                ends, halves = [(a // 2, (b + 1) // 2) for a, b in inner], [size // 2 for size in sizes]
+                outer = grown(ends, 2 * following, halves)
+                full = [(2 * a, min(2 * b + 1, size)) for (a, b), size in zip(outer, sizes, strict=True)]
+                layer = layers[name][box(full)].clone()
+                layer[box(within(inner, full))] = seen
+                x, sizes = F.max_pool2d(layer, 2), halves
 
     def blocks(self, image: Tensor, wanted: Sequence[str] | None = None) -> dict[int, Tensor]:
         """Return some layers of an image [3, H, W], those of a block as one [C, H/s, W/s], by s."""
@@ -91,6 +127,21 @@ class Vgg:
         """Return the wanted layers of an image [3, H, W], all of one block, as one [C, H/s, W/s]."""
         (features,) = self.blocks(image).values()
         return features
+
+
+def grown(ends: Sequence[tuple[int, int]], margin: int, sizes: Sequence[int]) -> list[tuple[int, int]]:
+    """Return the first and last of rows and of columns with a margin, within an image of these sizes."""
+    return [(max(0, a - margin), min(size, b + margin)) for (a, b), size in zip(ends, sizes, strict=True)]
+
+
+def within(ends: Sequence[tuple[int, int]], outer: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return rows and columns as counted from the first of others."""
+    return [(a - first, b - first) for (a, b), (first, _) in zip(ends, outer, strict=True)]
+
+
+def box(ends: Sequence[tuple[int, int]]) -> Box:
+    """Return the index of rows and columns."""
+    return (..., *(slice(a, b) for a, b in ends))
 
 
 def rectified(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:

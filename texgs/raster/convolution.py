@@ -80,8 +80,9 @@ def transformed(weight: Tensor) -> Tensor:
     outputs, inputs = weight.shape[:2]
     g = torch.tensor(TRANSFORM, dtype=torch.float64)
     padded = F.pad(weight.double(), (0, 0, 0, 0, 0, -inputs % BLOCK, 0, -outputs % BLOCK))
-    points = torch.einsum("yi,oijk,xk->yxoj", g, padded.transpose(1, 2), g)
-    return points.reshape(36, -1, BLOCK, padded.shape[1]).transpose(2, 3).float().contiguous()
+    blocks = padded.reshape(-1, BLOCK, padded.shape[1], 9).permute(3, 0, 2, 1).contiguous()
+    points = torch.kron(g, g) @ blocks.reshape(9, -1)  # [36, 9] and [9, out / 16, in, 16]
+    return points.reshape(36, *blocks.shape[1:]).float()
 
 
 class _Convolve(torch.autograd.Function):

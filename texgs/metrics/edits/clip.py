@@ -12,9 +12,7 @@ if TYPE_CHECKING:
 
 
 def run(measured: MeasuredScene) -> dict[str, Any]:
-    """Score all views with CLIP, or say why not."""
-    import torch
-
+    """Score views with CLIP, or say why not."""
     from texgs.core.progress import progress
     from texgs.metrics.clip import clip_scores
     from texgs.models.clip import Clip
@@ -28,11 +26,10 @@ def run(measured: MeasuredScene) -> dict[str, Any]:
 
     def views_of(index: int) -> Iterator[Tensor]:
         scene, composition = measured.scenes[index], measured.compositions[index]
-        for camera in progress(measured.cameras, title=f"{measured.title}, CLIP", unit="view"):
+        for camera in progress(measured.some, title=f"{measured.title}, CLIP", unit="view"):
             yield composition.render(camera, scene.light, scene.edits).color.clamp(0, 1)
 
-    with torch.no_grad():
-        scores = clip_scores(clip, views_of(1), views_of(0), *measured.captions)
+    scores = clip_scores(clip, views_of(1), views_of(0), *measured.captions)
     return {"clip": scores.backbone, "similarity": scores.similarity, "direction": scores.direction}
 
 

@@ -3,44 +3,68 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
-from texgs.metrics.metric import Measure, MeasuredScene, Metric
+from texgs.metrics.metric import LAST_FRAMES, Measure, MeasuredScene, Metric, SeenView
 
 if TYPE_CHECKING:
+    from texgs.metrics.consistency import Difference, SeenFrame
     from texgs.scene.scene import Scene
 
 
-def run(measured: MeasuredScene) -> dict[str, Any]:
-    """Compare views in the middle of the path, as they look with the scene's light.
+def run(measured: MeasuredScene) -> Pairs:
+    """Compare views with those nearby and farther along the path, as they look with the scene's light.
 
-    Fields that have light in their colours can be compared with others so. Nothing is returned where no two
+    Fields that have light in their colours can be compared with others so. Nothing is measured where no two
     views see the same, as of a scene that is nowhere opaque.
     """
-    import torch
+    return Pairs(measured)
 
-    from texgs.fields.kinds import kinds
-    from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of
-    from texgs.models.lpips import Lpips
-    from texgs.scene.scene_file import read_scene
 
-    scene, composition, count = measured.after, measured.shown, len(measured.some)
-    start = max(0, (len(measured.cameras) - count - LONG) // 2)
-    cameras = measured.cameras[start : start + count + LONG]
-    surfaces = without_hidden(read_scene(measured.geometry_file), scene)
-    depth = kinds()[next(iter(surfaces.models.values())).open()[0].kind].depth or "median"
-    with torch.no_grad():
-        opened = surfaces.open(composition.device)
-        frames = list(frames_of(composition, cameras, scene.light, scene.edits, opened, depth))
-        perceptual = None
-        if measured.weights["vgg16"] and measured.weights["lpips_vgg"]:
-            perceptual = Lpips.load(device=composition.device).to
-        apart = [each for each in (SHORT, LONG) if each < len(frames)]
-        values: dict[str, Any] = {}
-        for each, compared in consistency(frames, apart, perceptual).items():
-            name = "short" if each == SHORT else "long"
-            values |= {f"{name}_rmse": compared.rmse, f"{name}_lpips": compared.perceptual}
-    return values
+class Pairs:
+    """Views of a scene and those later on the path, warped into them by the depth of its geometry."""
+
+    def __init__(self, measured: MeasuredScene) -> None:
+        from texgs.fields.kinds import kinds
+        from texgs.models.lpips import Lpips
+        from texgs.scene.scene_file import read_scene
+
+        self.measured = measured
+        surfaces = without_hidden(read_scene(measured.geometry_file), measured.after)
+        self.depth = kinds()[next(iter(surfaces.models.values())).open()[0].kind].depth or "median"
+        self.surfaces = surfaces.open(measured.shown.device)
+        is_here = measured.vgg and measured.weights["lpips_vgg"]
+        self.lpips = Lpips.load(measured.vgg, device=measured.shown.device) if is_here else None
+        self.frame = lru_cache(LAST_FRAMES)(self.frame_at)
+        self.pairs: dict[str, list[Difference]] = {"short": [], "long": []}
+
+    def frame_at(self, place: int) -> SeenFrame:
+        """Return a frame of the path with the depth of the geometry."""
+        from texgs.metrics.consistency import SeenFrame
+
+        camera, shown = self.measured.cameras[place], self.measured.frame(place)
+        surface = self.surfaces.render(camera, outputs=(self.depth,))
+        return SeenFrame(shown.color.clamp(0, 1), getattr(surface, self.depth), surface.alpha, camera)
+
+    def see(self, view: SeenView) -> None:
+        """Compare a view with those on the path that are `SHORT` and `LONG` views later."""
+        from texgs.metrics.consistency import LONG, SHORT, difference
+
+        distance = partial(self.lpips.changed, view.layers) if self.lpips else None
+        for name, apart in (("short", SHORT), ("long", LONG)):
+            if view.place + apart < len(self.measured.cameras):
+                first, second = self.frame(view.place), self.frame(view.place + apart)
+                compared = difference(first, second, distance)
+                self.pairs[name] += [compared] if compared else []
+
+    def values(self) -> dict[str, Any]:
+        """Return the means over pairs."""
+        from texgs.metrics.consistency import ViewConsistency
+
+        means = {name: ViewConsistency.of(pairs) for name, pairs in self.pairs.items() if pairs}
+        rmse = {f"{name}_rmse": mean.rmse for name, mean in means.items()}
+        return rmse | {f"{name}_lpips": mean.perceptual for name, mean in means.items()}
 
 
 def without_hidden(geometry: Scene, scene: Scene) -> Scene:

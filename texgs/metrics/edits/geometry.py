@@ -7,22 +7,24 @@ from typing import TYPE_CHECKING
 from texgs.metrics.metric import Measure, MeasuredScene, Metric
 
 if TYPE_CHECKING:
-    from texgs.core.camera import Camera
+    from torch import Tensor
+
+    from texgs.scene.scene import Scene
 
 
 def run(measured: MeasuredScene) -> dict[str, bool]:
-    """Compare depth, alpha and, where there are any, normals of all views bit for bit."""
-    import torch
+    """Compare what decides where models are, bit for bit: then all views have the same depth and alpha."""
+    from torch import equal
 
-    outputs = ("depth", "normal") if measured.has_normals else ("depth",)
+    before, after = map(geometry, measured.scenes)
+    is_same = before.keys() == after.keys() and all(equal(before[key], after[key]) for key in before)
+    return {"geometry_kept": is_same}
 
-    def is_same(camera: Camera) -> bool:
-        frames = [scene.render(camera, outputs=outputs) for scene in measured.compositions]
-        planes = [[getattr(frame, name) for name in ("alpha", *outputs)] for frame in frames]
-        return all(map(torch.equal, *planes))
 
-    with torch.no_grad():
-        return {"geometry_kept": all(map(is_same, measured.some))}
+def geometry(scene: Scene) -> dict[tuple[str, str], Tensor]:
+    """Return the tensors of the geometry of all models, by the names of the model and of the tensor."""
+    opened = {name: model.open()[0] for name, model in scene.models.items()}
+    return {(name, key): x for name, field in opened.items() for key, x in field.tensors("geometry").items()}
 
 
 METRIC = Metric(

@@ -2,41 +2,86 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from dataclasses import replace
 from statistics import fmean
+from typing import TYPE_CHECKING
 
-from texgs.metrics.metric import Measure, MeasuredScene, Metric
+from texgs.fields.part_edit import PartEdit
+from texgs.metrics.metric import Measure, MeasuredScene, Metric, SeenView, Style
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from texgs.metrics.style import StyleTarget
+    from texgs.scene.scene import SceneModel
+
+HIDDEN = PartEdit(visible=False)
+QUERIES = 250  # features of a view that are searched for: more say the same
 
 
-def run(measured: MeasuredScene) -> dict[str, float]:
-    """Measure NNFM and Gram distances of the models with a style, means over them.
+def run(measured: MeasuredScene) -> Distances | dict[str, float]:
+    """Measure NNFM and Gram distances of the models that follow a picture, means over pictures.
 
-    Nothing is returned of looks that follow words or several pictures, or where a model is nowhere opaque.
+    Nothing is measured of looks that follow words or several pictures, or where a model is nowhere opaque.
     """
-    import torch
+    return Distances(measured) if measured.styles and measured.vgg else {}
 
-    from texgs.metrics.style import style_similarity
-    from texgs.models.vgg import Vgg
 
-    if not measured.styles or not measured.weights["vgg16"]:
-        return {}
-    scene, device = measured.after, measured.shown.device
-    vgg = Vgg.load(device=device, dtype=torch.float32)
-    compared = [
-        style_similarity(
-            scene.models[style.model].open()[0].to(device),
-            measured.some,
-            [scene.light] * len(measured.some),
-            style.image,
-            vgg,
-            style.region,
-            f"{measured.title}, {style.part}",
-        )
-        for style in measured.styles
-    ]
-    names = {"style_nnfm": "nnfm", "style_gram": "gram"}
-    means = {name: fmean(getattr(each, key) for each in compared) for name, key in names.items()}
-    return {name: value for name, value in means.items() if isfinite(value)}
+class Distances:
+    """Distances of views to each picture, of the scene without the models that do not follow it."""
+
+    def __init__(self, measured: MeasuredScene) -> None:
+        self.measured = measured
+        self.targets = [self.target(style) for style in measured.styles]
+        self.found: list[list[tuple[float, float]]] = [[] for _ in self.targets]
+
+    def target(self, style: Style) -> StyleTarget:
+        """Return what views are compared with."""
+        from texgs.metrics.style import StyleTarget
+
+        return StyleTarget.of(self.features(style.image.to(self.measured.shown.device), style.region.float()))
+
+    def features(self, image: Tensor, share: Tensor) -> Tensor:
+        """Return the features [n, C] that styles are compared by, of what has a share [H, W] of an image."""
+        from texgs.metrics.style import on_object
+        from texgs.models.vgg import STYLE_LAYERS
+
+        assert self.measured.vgg is not None
+        layers = self.measured.vgg.layers(image[None], STYLE_LAYERS)
+        return on_object([layer[0] for layer in layers], share.to(image.device))
+
+    def see(self, view: SeenView) -> None:
+        """Compare a view; VGG-16 runs again for each picture that not all models follow."""
+        for style, target, found in zip(self.measured.styles, self.targets, self.found, strict=True):
+            rows = self.seen(view, style)
+            found += [target.distances(rows, QUERIES, view.place)] if len(rows) else []
+
+    def seen(self, view: SeenView, style: Style) -> Tensor:
+        """Return the features [n, C] of the models that follow a picture."""
+        from texgs.metrics.style import on_object
+        from texgs.models.vgg import STYLE_LAYERS
+
+        scene, camera = self.measured.after, self.measured.cameras[view.place]
+        if set(style.models) == set(scene.models):
+            return on_object([view.layers[name][0] for name in STYLE_LAYERS], view.alpha)
+        models = {
+            name: model if name in style.models else hidden(model) for name, model in scene.models.items()
+        }
+        shown = self.measured.shown.render(camera, scene.light, replace(scene, models=models).edits)
+        return self.features(shown.color.clamp(0, 1).permute(2, 0, 1), shown.alpha)
+
+    def values(self) -> dict[str, float]:
+        """Return the means over views and pictures; nothing where one is seen in no view."""
+        if not all(self.found):
+            return {}
+        means = [map(fmean, zip(*found, strict=True)) for found in self.found]
+        return dict(zip(("style_nnfm", "style_gram"), map(fmean, zip(*means, strict=True)), strict=True))
+
+
+def hidden(model: SceneModel) -> SceneModel:
+    """Return a model that does not show."""
+    unseen = {name: replace(each, edit=HIDDEN) for name, each in model.segments.items()}
+    return replace(model, edit=HIDDEN, segments=unseen)
 
 
 METRIC = Metric(

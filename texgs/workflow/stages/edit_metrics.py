@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from texgs.config.views import ViewKeys
 from texgs.edit.method import method_of, methods
-from texgs.fields.kinds import kinds
 from texgs.report.results import EditMeasures
 from texgs.workflow.edits import edited_scene
 from texgs.workflow.inputs import view_settings, with_recipe
@@ -16,7 +15,7 @@ from texgs.workflow.stage import EVERY, Config, Outcome, Rule, Stage, made, read
 from texgs.workflow.stages.edit import Settings as EditSettings
 
 if TYPE_CHECKING:
-    from texgs.metrics.metric import StyledModel
+    from texgs.metrics.metric import Style
     from texgs.scene.scene import Scene
 
 
@@ -37,7 +36,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.core.check import torch_device
     from texgs.metrics.metric import MeasuredScene, values_of
     from texgs.scene.scene_file import read_scene
-    from texgs.volume.cameras import spiral, spread
+    from texgs.volume.cameras import spiral
 
     edit, views, device = settings.edit, settings.views, torch_device(settings.fit.device)
     before, after = read_scene(inputs["before"]), read_scene(inputs["scene"])
@@ -49,32 +48,32 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         compositions=(before.open(device), after.open(device, is_lean=True)),
         geometry_file=inputs["geometry"],
         cameras=cameras,
-        some=spread(cameras, settings.compared),
+        compared=settings.compared,
         captions=(edit.source_caption, edit.target_caption),
         clip=settings.clip,
         weights=settings.weights,
         styles=styles_of(settings, after, max(cameras[0].width, cameras[0].height)),
-        has_normals="normals" in kinds()[settings.fit.field].can,
     )
     return Outcome(EditMeasures(edit.name, edit.method, views.width, views.height, values_of(measured)))
 
 
-def styles_of(settings: Settings, scene: Scene, longest: int) -> list[StyledModel]:
-    """Return the styles of models, `longest` pixels large; none of segments, words or several pictures."""
+def styles_of(settings: Settings, scene: Scene, longest: int) -> list[Style]:
+    """Return the pictures that models follow, `longest` pixels large; none of segments or words."""
     from texgs.edit.task import parts_of
-    from texgs.metrics.metric import StyledModel
+    from texgs.metrics.metric import Style
 
     edit = settings.edit
     parts, method = parts_of(scene, edit.parts), method_of(edit)
     if any(part not in scene.models for part in parts):
         return []
     styles = []
-    for part in parts:
-        picture = method.of(edit, settings.followed.get(part)).picture()
+    for look in dict.fromkeys(map(settings.followed.get, parts)):
+        picture = method.of(edit, look).picture()
         if picture is None:
             return []
         style = picture.scaled(longest)
-        styles.append(StyledModel(part, part, style.image, style.region))
+        models = [part for part in parts if settings.followed.get(part) == look]
+        styles.append(Style(models, style.image, style.region))
     return styles
 
 

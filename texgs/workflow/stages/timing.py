@@ -12,6 +12,7 @@ from texgs.workflow.inputs import has_scene, scene_and_volume
 from texgs.workflow.stage import EVERY, Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfScene
 
+FRAMES = 61  # spread over the path: more say the same
 VOLUME_FRAMES = 12  # spread over the path: they take long
 
 
@@ -23,7 +24,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     import torch
 
     from texgs.core.check import torch_device
-    from texgs.metrics.edits.frame_times import FRAMES, milliseconds
+    from texgs.metrics.edits.frame_times import milliseconds
     from texgs.scene.scene_file import read_scene
     from texgs.scene.twin import Twin
     from texgs.volume.cameras import spiral, spread
