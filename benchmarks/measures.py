@@ -35,7 +35,7 @@ def measured(edit: str, count: str, *words: str) -> dict[str, object]:
     config = compose(given)
     numbers = read_json(STAGES["edit_metrics"].output(config) / "metrics.json")["numbers"]
     size = f"{config.views.width}x{config.views.height}"
-    found = {name: numbers.get(name) for name in MEASURED}
+    found = {name: numbers.get(name, float("nan")) for name in MEASURED}
     return {"data": config.dataset.name, "pixels": size, "edit": edit, "views": numbers["views"], **found}
 
 
