@@ -74,9 +74,9 @@ class Watcher(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Style:
-    """A picture, and the models of a scene that follow it."""
+    """A picture that a scene follows, or one of its models."""
 
-    models: Sequence[str]
+    model: str | None  # by itself; None: all that is shown
     image: Tensor  # [3, h, w] in [0, 1], its longer side that of the views
     region: Tensor  # [h, w] bool
 
@@ -94,7 +94,7 @@ class MeasuredScene:
     captions: tuple[str, str]  # before and after
     clip: str  # backbone of CLIP
     weights: Mapping[str, str | None]  # digests by name; None for those that nothing can work with here
-    styles: Sequence[Style]  # that models follow; none where parts of models do
+    styles: Sequence[Style]  # none where parts of models follow them
 
     @property
     def after(self) -> Scene:

@@ -105,14 +105,14 @@ class Vgg:
             first += count
             # Of what the convolutions saw, what differs and as much around it as they have made wrong.
             inner = grown(ends, count, sizes)
-            name, seen = self.names[first - 1], x[box(within(inner, outer))]
+            name, seen = self.names[first - 1], x[box(inner, outer)]
             yield name, box(inner), seen
             if following:
                 ends, halves = [(a // 2, (b + 1) // 2) for a, b in inner], [size // 2 for size in sizes]
                 outer = grown(ends, 2 * following, halves)
                 full = [(2 * a, min(2 * b + 1, size)) for (a, b), size in zip(outer, sizes, strict=True)]
                 layer = layers[name][box(full)].clone()
-                layer[box(within(inner, full))] = seen
+                layer[box(inner, full)] = seen
                 x, sizes = F.max_pool2d(layer, 2), halves
 
     def blocks(self, image: Tensor, wanted: Sequence[str] | None = None) -> dict[int, Tensor]:
@@ -134,14 +134,9 @@ def grown(ends: Sequence[tuple[int, int]], margin: int, sizes: Sequence[int]) ->
     return [(max(0, a - margin), min(size, b + margin)) for (a, b), size in zip(ends, sizes, strict=True)]
 
 
-def within(ends: Sequence[tuple[int, int]], outer: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Return rows and columns as counted from the first of others."""
-    return [(a - first, b - first) for (a, b), (first, _) in zip(ends, outer, strict=True)]
-
-
-def box(ends: Sequence[tuple[int, int]]) -> Box:
-    """Return the index of rows and columns."""
-    return (..., *(slice(a, b) for a, b in ends))
+def box(ends: Sequence[tuple[int, int]], outer: Sequence[tuple[int, int]] = ((0, 0), (0, 0))) -> Box:
+    """Return the index of rows and columns, counted from the first of others."""
+    return (..., *(slice(a - first, b - first) for (a, b), (first, _) in zip(ends, outer, strict=True)))
 
 
 def rectified(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:

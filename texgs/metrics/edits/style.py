@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from statistics import fmean
 from typing import TYPE_CHECKING
 
-from texgs.fields.part_edit import PartEdit
 from texgs.metrics.metric import Measure, MeasuredScene, Metric, SeenView, Style
 
 if TYPE_CHECKING:
     from torch import Tensor
 
     from texgs.metrics.style import StyleTarget
-    from texgs.scene.scene import SceneModel
 
-HIDDEN = PartEdit(visible=False)
 QUERIES = 250  # features of a view that are searched for: more say the same
 
 
 def run(measured: MeasuredScene) -> Distances | dict[str, float]:
-    """Measure NNFM and Gram distances of the models that follow a picture, means over pictures.
+    """Measure NNFM and Gram distances of all, or of the models with a picture each, means over them.
 
     Nothing is measured of looks that follow words or several pictures, or where a model is nowhere opaque.
     """
@@ -28,7 +24,7 @@ def run(measured: MeasuredScene) -> Distances | dict[str, float]:
 
 
 class Distances:
-    """Distances of views to each picture, of the scene without the models that do not follow it."""
+    """Distances of views to pictures."""
 
     def __init__(self, measured: MeasuredScene) -> None:
         self.measured = measured
@@ -51,23 +47,21 @@ class Distances:
         return on_object([layer[0] for layer in layers], share.to(image.device))
 
     def see(self, view: SeenView) -> None:
-        """Compare a view; VGG-16 runs again for each picture that not all models follow."""
+        """Compare a view; VGG-16 runs again for each model that follows a picture of its own."""
         for style, target, found in zip(self.measured.styles, self.targets, self.found, strict=True):
             rows = self.seen(view, style)
             found += [target.distances(rows, QUERIES, view.place)] if len(rows) else []
 
     def seen(self, view: SeenView, style: Style) -> Tensor:
-        """Return the features [n, C] of the models that follow a picture."""
+        """Return the features [n, C] of what follows a picture."""
         from texgs.metrics.style import on_object
         from texgs.models.vgg import STYLE_LAYERS
 
-        scene, camera = self.measured.after, self.measured.cameras[view.place]
-        if set(style.models) == set(scene.models):
+        if style.model is None:
             return on_object([view.layers[name][0] for name in STYLE_LAYERS], view.alpha)
-        models = {
-            name: model if name in style.models else hidden(model) for name, model in scene.models.items()
-        }
-        shown = self.measured.shown.render(camera, scene.light, replace(scene, models=models).edits)
+        scene, camera = self.measured.after, self.measured.cameras[view.place]
+        field = scene.models[style.model].open()[0].to(self.measured.shown.device)
+        shown = field.render(camera, scene.light)
         return self.features(shown.color.clamp(0, 1).permute(2, 0, 1), shown.alpha)
 
     def values(self) -> dict[str, float]:
@@ -76,12 +70,6 @@ class Distances:
             return {}
         means = [map(fmean, zip(*found, strict=True)) for found in self.found]
         return dict(zip(("style_nnfm", "style_gram"), map(fmean, zip(*means, strict=True)), strict=True))
-
-
-def hidden(model: SceneModel) -> SceneModel:
-    """Return a model that does not show."""
-    unseen = {name: replace(each, edit=HIDDEN) for name, each in model.segments.items()}
-    return replace(model, edit=HIDDEN, segments=unseen)
 
 
 METRIC = Metric(

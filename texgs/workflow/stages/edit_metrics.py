@@ -58,7 +58,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 
 def styles_of(settings: Settings, scene: Scene, longest: int) -> list[Style]:
-    """Return the pictures that models follow, `longest` pixels large; none of segments or words."""
+    """Return the picture that all follow, or one a model, `longest` pixels large; none of segments."""
     from texgs.edit.task import parts_of
     from texgs.metrics.metric import Style
 
@@ -66,14 +66,15 @@ def styles_of(settings: Settings, scene: Scene, longest: int) -> list[Style]:
     parts, method = parts_of(scene, edit.parts), method_of(edit)
     if any(part not in scene.models for part in parts):
         return []
+    looks = {part: settings.followed.get(part) for part in parts}
+    is_one = len(set(looks.values())) == 1 and set(parts) == set(scene.models)
     styles = []
-    for look in dict.fromkeys(map(settings.followed.get, parts)):
-        picture = method.of(edit, look).picture()
+    for part in parts[:1] if is_one else parts:
+        picture = method.of(edit, looks[part]).picture()
         if picture is None:
             return []
         style = picture.scaled(longest)
-        models = [part for part in parts if settings.followed.get(part) == look]
-        styles.append(Style(models, style.image, style.region))
+        styles.append(Style(None if is_one else part, style.image, style.region))
     return styles
 
 
