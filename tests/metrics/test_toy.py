@@ -40,6 +40,9 @@ def test_a_metric_of_one_file_is_measured_and_has_its_columns(tmp_path, scenes):
         edit = EditResult("gold", "text", "how", 6.0, follows="instruction", is_compared=True)
         write_metrics(folder, "edit_text", edit, **facts)
         write_metrics(folder, "edit_metrics", EditMeasures("gold", "text", values=values), **facts)
+    told = "Views of the test path that measure: 2, 5, 8, 11 of 12."
+    for table in (looks(records(folder)), text_driven(records(folder))):
+        assert told in table.markdown()
     for table in (looks(records(folder)), text_driven(records(folder)), sweep(records(folder), "mine")):
         assert rows(table)[0]["mean brightness"] == values["brightness"]
         assert f"{values['brightness']:.3f}" in table.markdown()

@@ -110,8 +110,7 @@ def test_a_picture_that_one_model_follows_is_compared_with_it_alone(scenes, give
     alone = read_scene(scenes["clear"])
     both = {**alone.models, "other": SceneModel(tmp_path / "other.safetensors")}
     write_scene(tmp_path / "both.yaml", replace(alone, models=both))
-    files = [tmp_path / "both.yaml"] * 3
-    whole = subject(*files, compared=12, weights=WEIGHTS, styles=given.styles)
+    whole = subject(*[tmp_path / "both.yaml"] * 3, compared=12, weights=WEIGHTS, styles=given.styles)
     one = replace(whole, styles=[Style("ball", PICTURE, REGION)])
     expected, of_one, of_all = (values_of(each, [style.METRIC]) for each in (given, one, whole))
     assert of_one == pytest.approx(expected, rel=1e-5)

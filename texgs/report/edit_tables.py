@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from texgs.fields.kinds import kinds
@@ -84,7 +84,8 @@ def looks(records: Iterable[Record[Any]]) -> Table:
     rows = sorted(rows_of(records), key=lambda row: FOLLOWED.index(row["kind"]))
     labels = [*LABELS[:4], Column("follows"), Column("lambda_s", 2, "-")]
     columns = [Column(measure.title, measure.digits) for measure in measures()]
-    return Table(" ".join([caption, *notes(rows)]), [*labels, *columns], rows)
+    told = notes(rows, [measure.title for measure in measures()])
+    return Table(" ".join([caption, *told]), [*labels, *columns], rows)
 
 
 def table(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
@@ -94,9 +95,7 @@ def table(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
     means = mean_rows(rows, (LABEL, "edit", "pixels"), ["method", *titles])
     means = [{**row, "method": row["method"] or ADAPTS} for row in means]
     theirs = published(follows, listed) if rows and follows else []
-    sentences = [CAPTION, NOT_ALIKE] if theirs else [CAPTION]
-    if set(titles) >= {measure.title for measure in metrics()["clip"].measures}:
-        sentences += notes(rows)
+    sentences = [CAPTION, NOT_ALIKE, *notes(rows, titles)] if theirs else [CAPTION, *notes(rows, titles)]
     return Table(" ".join(sentences), [*LABELS, *columns], [*rows, *means, *theirs])
 
 
@@ -161,11 +160,12 @@ def published(follows: str, listed: Sequence[Measure]) -> list[dict[str, Any]]:
     return [{**blank, **labels, **line} for line in lines.to_dict("records")]
 
 
-def notes(rows: Rows) -> list[str]:
-    """Return what metrics say beside their numbers, such as which CLIP it was, and why it was not."""
+def notes(rows: Rows, titles: Collection[str]) -> list[str]:
+    """Return what metrics with all their columns there say beside numbers, such as which CLIP it was."""
     return [
         sentence.format(value)
         for metric in metrics().values()
+        if {measure.title for measure in metric.measures} <= set(titles)
         for key, sentence in (metric.notes or {}).items()
         for value in sorted({row["values"][key] for row in rows if row["values"].get(key)})
     ]

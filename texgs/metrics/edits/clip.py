@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from texgs.metrics.metric import Measure, MeasuredScene, Metric
-
-if TYPE_CHECKING:
-    from torch import Tensor
 
 
 def run(measured: MeasuredScene) -> dict[str, Any]:
@@ -23,13 +19,12 @@ def run(measured: MeasuredScene) -> dict[str, Any]:
     if not all(measured.captions):
         return {"clip_missing": "the edit has no captions"}
     clip = Clip.load(measured.clip, measured.shown.device)
-
-    def views_of(index: int) -> Iterator[Tensor]:
-        scene, composition = measured.scenes[index], measured.compositions[index]
-        for camera in progress(measured.some, title=f"{measured.title}, CLIP", unit="view"):
-            yield composition.render(camera, scene.light, scene.edits).color.clamp(0, 1)
-
-    scores = clip_scores(clip, views_of(1), views_of(0), *measured.captions)
+    scene, composition = measured.scenes[0], measured.compositions[0]
+    places = progress(measured.places, title=f"{measured.title}, CLIP", unit="view")
+    after = (measured.frame(place).color.clamp(0, 1) for place in places)
+    frames = (composition.render(camera, scene.light, scene.edits) for camera in measured.some)
+    before = (frame.color.clamp(0, 1) for frame in frames)
+    scores = clip_scores(clip, after, before, *measured.captions)
     return {"clip": scores.backbone, "similarity": scores.similarity, "direction": scores.direction}
 
 
