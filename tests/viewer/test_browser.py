@@ -382,6 +382,12 @@ def test_a_picture_is_dropped_and_words_are_followed(chromium, scene_file, tmp_p
         expect(page.get_by_role("radio", name="black.png")).to_be_checked(timeout=WAIT)
         page.get_by_label("or words").fill("turn it into gold")
         expect(page.get_by_role("radio", name="black.png")).not_to_be_checked()
+        note = page.get_by_text("A preview: nothing has changed yet.")
+        before = shown(page)
+        expect(note).not_to_be_visible()
+        page.get_by_label("or words").press("Tab")
+        expect(note).to_be_visible(timeout=WAIT)
+        assert np.abs(shown(page) - before).mean() > 1
         page.get_by_role("button", name="Make look").click()
         expect(page.get_by_role("listitem")).to_have_text(["TF01, TF02 turn it into gold"], timeout=WAIT)
         page.get_by_label("Another picture").set_input_files(scene_file)

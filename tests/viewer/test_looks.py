@@ -98,6 +98,33 @@ async def test_a_look_is_one_step_and_written_beside_the_scene(browser, scene_fi
 
 
 @on_page
+async def test_words_are_tried_from_one_side_and_change_nothing(browser, client):
+    before = await picture(browser)
+    gold = look(instruction="turn it into gold")
+    await browser.send(**{**gold, "preview": True, "camera": SHOT["camera"]})
+    await browser.next("trial")
+    tried = await picture(browser)
+    assert client.server_side.edits.state()["past"] == []
+    await browser.send(**gold)
+    await ended(browser)
+    made = await picture(browser)
+    assert np.abs(tried - made).mean() < 0.5 * np.abs(made - before).mean(), "from this side it is alike"
+
+
+def test_previews_of_words_are_made_by_filters_all_else_by_a_network_that_is_there(monkeypatch):
+    monkeypatch.setattr("texgs.viewer.looks.unusable", lambda name: None)
+    looks = Looks(Styles())
+    full, tried, side = (
+        looks.edit_of(Look(instruction="gold", preview=preview, camera=camera)).text
+        for preview, camera in ((False, FRONT), (True, None), (True, FRONT))
+    )
+    assert (full.guidance, full.recipe, full.size) == ("instruct_pix2pix", "default", 512)
+    assert (tried.guidance, tried.recipe, tried.recipe_of().views) == ("filters", "quick", "axes")
+    assert (side.guidance, side.recipe_of().views) == ("filters", "all")
+    looks.close()
+
+
+@on_page
 async def test_textures_on_their_way_are_shown(browser, client, monkeypatch):
     monkeypatch.setattr("texgs.viewer.looks.BETWEEN", 0.0)
     await browser.send(**look(parts=["TF02"], style="dots"))
@@ -172,10 +199,9 @@ async def test_a_picture_of_the_user_is_taken_in(browser, client, tmp_path):
         ({"style": "dots", "instruction": "gold"}, "look: expected a picture or an instruction"),
         ({"style": "nothing"}, "style: expected one of strokes"),
         ({"style": "/etc/passwd"}, "style: expected one of strokes"),
-        (
-            {"instruction": "make it a cathedral"},
-            "'make it a cathedral': expected what filters know (stipple",
-        ),
+        ({"instruction": "a cathedral"}, "'a cathedral': expected what filters know (stipple"),
+        ({"instruction": "a cathedral", "preview": True}, "'a cathedral': expected what filters know (sti"),
+        ({"instruction": "gold", "camera": {"azimuth": 3}}, "camera.target: expected a value, got none"),
         ({"style": "dots", "parts": ["TF09"]}, "expected a model of the scene (TF01, TF02), got TF09"),
         ({"style": "dots", "parts": "TF01"}, "parts: expected a valid array"),
     ],

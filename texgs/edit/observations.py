@@ -8,7 +8,7 @@ from typing import Literal
 
 import torch
 from torch import Tensor
-from torch.nn.functional import avg_pool2d
+from torch.nn.functional import pad
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
@@ -211,8 +211,9 @@ def straight_colors(image: Tensor, alpha: Tensor) -> Tensor:
 
 def _mean(own: Tensor, alpha: Tensor, window: int, beyond: Tensor) -> Tensor:
     """Return the mean colour [H, W, 3] of a window; where it is nearly empty, `beyond`."""
-    planes = torch.cat([own, alpha[..., None]], dim=-1).permute(2, 0, 1)[None]
-    for size in ((window, 1), (1, window)):  # separable, and zeros beyond the border count as transparent
-        planes = avg_pool2d(planes, size, stride=1, padding=(size[0] // 2, size[1] // 2))
-    *color, cover = planes[0]
+    planes = torch.cat([own, alpha[..., None]], dim=-1).permute(2, 0, 1)
+    for _ in range(2):  # separable, and zeros beyond the border count as transparent
+        sums = pad(planes, (window // 2 + 1, window // 2)).cumsum(dim=-1, dtype=torch.float64)
+        planes = ((sums[..., window:] - sums[..., :-window]) / window).to(planes).mT
+    *color, cover = planes
     return (torch.stack(color, dim=-1) + FEW * beyond) / (cover[..., None] + FEW)

@@ -85,6 +85,7 @@ class Task(Generic[Settings]):
     title: str  # of progress bars
     followed: Mapping[str, str] = field(default_factory=dict)  # by model, where not as settings say
     show: Callable[[str, Callable[[], Surfels]], None] = lambda part, model: None  # parts on their way
+    draws: bool = True  # whether pictures of an instruction's views are wanted, which take seconds
 
     def settings_for(self, part: str) -> Settings:
         """Return the settings with the picture or the instruction that the model of a part follows."""

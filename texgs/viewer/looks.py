@@ -6,7 +6,7 @@ import io
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from shutil import rmtree
@@ -20,7 +20,7 @@ import torch
 from PIL import Image
 
 from texgs.config.recipes import Edit
-from texgs.core.camera import Camera
+from texgs.core.camera import Camera, orbit
 from texgs.core.checksum import digest
 from texgs.core.errors import ArgumentError
 from texgs.core.image import FORMATS
@@ -28,6 +28,7 @@ from texgs.core.keys import typed
 from texgs.core.names import file_name, part_file
 from texgs.edit.method import method_of
 from texgs.edit.pictures import PICTURES, picture
+from texgs.edit.readable import raised
 from texgs.edit.style_picture import read_style
 from texgs.edit.task import EditedScene, Task, parts_with_surfels
 from texgs.fields.surfels.model import Surfels
@@ -36,12 +37,13 @@ from texgs.models.instruction import understand, vocabulary
 from texgs.models.weights import unusable
 from texgs.scene.parts import NewLook, look_of
 from texgs.scene.scene import Scene
-from texgs.viewer.messages import Look
+from texgs.viewer.messages import Look, Orbit
 from texgs.viewer.scratch import scratch_folder
 from texgs.volume.cameras import icosphere_of
 from texgs.volume.view_set import View
 
 VIEWS, SIZE = 92, 400  # that parts learn from, and pixels of their sides
+QUICK = 352  # of those along the axes, which the scene fills
 BETWEEN = 2.0  # seconds between textures on their way that are shown
 KEPT = 20  # of those of each part, and of previews: frames may be on their way
 LARGEST = 32 * 2**20  # bytes of a picture that a page sends
@@ -50,11 +52,14 @@ MOST_PIXELS = 50_000_000  # of one: more takes many seconds to read, at each pre
 THUMBNAIL = 96  # pixels of a side
 # The first is taken whose weights are on this machine.
 FULL = ("default", "patches")  # recipes for pictures
-GUIDANCE = ("instruct_pix2pix", "filters")  # what edits views by an instruction
+Show = Callable[[str, Path], None]  # of a part, and the file of its texture
 
 
+@dataclass(frozen=True, eq=False)
 class OrbitTask(Task[Any]):
     """An edit that learns from new views around the scene, under its light: training views are not needed."""
+
+    side: Orbit | None = None  # from which the only view is made; None: from all
 
     def training_views(self, model: str) -> Sequence[View]:
         """Return the cameras on a sphere; there are no images."""
@@ -63,6 +68,8 @@ class OrbitTask(Task[Any]):
     @cached_property
     def _cameras(self) -> list[Camera]:
         """Return the same ones for all parts."""
+        if self.side:
+            return [orbit(self.side.azimuth, self.side.polar, *self.lens)]
         return icosphere_of(VIEWS, self.lens)
 
 
@@ -119,18 +126,24 @@ class Looks:
         self._styles, self._device = styles, torch.device(device)
         self._folder = scratch_folder()
         self._scratch = ScratchFolders(Path(self._folder.name))
+        self._latest: tuple[Any, Scene] | None = None  # scene, parts and opacity asked for, and its result
 
     def edit_of(self, asked: Look) -> Any:
         """Return the edit, as conf/edit has it, with a recipe whose weights are on this machine."""
         if bool(asked.style) == bool(asked.instruction):
             raise ArgumentError("look: expected a picture or an instruction, got both or none")
+        choices: list[dict[str, Any]]
         if asked.style:
             style = self._styles.source(asked.style)
             recipes, start = ("preview",) if asked.preview else FULL, "sphere" if asked.sphere else None
             choices = [{"image": {"style": style, "recipe": recipe, "start": start}} for recipe in recipes]
         else:
-            said = asked.instruction
-            choices = [{"text": {"instruction": said, "guidance": guidance}} for guidance in GUIDANCE]
+            words = {"instruction": asked.instruction}
+            quick = {**words, "guidance": "filters", "recipe": "quick", "size": QUICK}
+            if asked.preview:
+                choices = [{"text": {**quick, "views": "all" if asked.camera else None}}]
+            else:
+                choices = [{"text": words}, {"text": quick}]
         *others, last = (edit_with(asked.parts, choice) for choice in choices)
         edit = next((each for each in others if has_weights(each)), last)
         if edit is last and asked.instruction:
@@ -138,15 +151,19 @@ class Looks:
         method_of(edit).of(edit).check()
         return edit
 
-    def make(self, scene: Scene, edit: Any, output: Path, show: Callable[[str, Path], None]) -> EditedScene:
+    def make(
+        self, scene: Scene, edit: Any, output: Path, show: Show, side: Orbit | None = None
+    ) -> EditedScene:
         """Return the scene with new textures, written to a folder, which must not be there.
 
-        `show` is called with a part and the file of its texture on its way, which is gone in the end.
+        `show` is called with a part and the file of its texture on its way, which is gone in the end. With a
+        side, views are one from there.
         """
         method = method_of(edit)
         settings, preview = method.of(edit), ThrottledPreview(show, self._scratch)
         lens = scene.framed().lens().square(SIZE)
-        task = OrbitTask(settings, edit, scene, {}, output, self._device, 1, lens, "look", show=preview)
+        task = OrbitTask(settings, edit, scene, {}, output, self._device, 1, lens, "look", side=side)
+        task = self._raised(replace(task, show=preview, draws=False))
         is_alone = not output.parent.exists()
         try:
             output.mkdir(parents=True)
@@ -163,11 +180,19 @@ class Looks:
                     output.parent.rmdir()
             raise
 
+    def _raised(self, task: OrbitTask) -> OrbitTask:
+        """Return the task with opacities for its look; those of the latest scene are not measured again."""
+        asked, latest = (task.scene, task.edit.parts, task.settings.factor), self._latest
+        if latest is None or latest[0] != asked:  # another thread may put another one there
+            self._latest = latest = (asked, raised(task).scene)
+        return replace(task, scene=latest[1], settings=replace(task.settings, opacity="keep"))
+
     def preview(self, scene: Scene, asked: Look, page: int) -> dict[str, NewLook]:
         """Return looks as a page asks for, in files that stay until it has had many of these parts."""
         edit = with_parts(self.edit_of(asked), scene)
         output = self._scratch.new(f"preview-{page}-{digest(repr(edit.parts))}")
-        return looks_of(self.make(scene, edit, output, lambda *_: None).scene, edit.parts, scene)
+        edited = self.make(scene, edit, output, lambda *_: None, asked.camera)
+        return looks_of(edited.scene, edit.parts, scene)
 
     def close(self) -> None:
         """Remove what was not kept."""
@@ -190,7 +215,7 @@ class ScratchFolders:
 class ThrottledPreview:
     """Parts on their way, of which some are written and shown."""
 
-    def __init__(self, show: Callable[[str, Path], None], folders: ScratchFolders) -> None:
+    def __init__(self, show: Show, folders: ScratchFolders) -> None:
         self._show, self._folders, self._latest = show, folders, monotonic()
 
     def __call__(self, part: str, model: Callable[[], Surfels]) -> None:
@@ -239,8 +264,8 @@ def require_known(instruction: str) -> None:
         understand(instruction)
     except ArgumentError as error:
         raise ArgumentError(
-            f"{instruction!r}: expected what filters know ({', '.join(vocabulary())}), as the weights of "
-            "InstructPix2Pix are not on this machine"
+            f"{instruction!r}: expected what filters know ({', '.join(vocabulary())}), as previews and "
+            "machines without the weights of InstructPix2Pix follow them"
         ) from error
 
 

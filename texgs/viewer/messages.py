@@ -153,7 +153,8 @@ class Look:
     style: str = ""  # name of a picture; "" with an instruction
     instruction: str = ""  # "" with a picture
     sphere: bool = False  # the picture is of a lit sphere, and goes onto surfaces by their normals
-    preview: bool = False  # lay the picture on, show that on this page, and change nothing
+    preview: bool = False  # show on this page what it would be like, and change nothing
+    camera: Orbit | None = None  # from whose side words are previewed; none: from all
     type: Literal["look"] = tag("look")
 
 

@@ -13,8 +13,10 @@ from texgs.core.camera import orbit
 from texgs.models.filters import FILTERS, ProceduralFilters
 from texgs.models.filters.painting import GOLD, tint
 from texgs.models.filters.surface import (
+    PRIMES,
     Surface,
     cell_hash,
+    cell_keys,
     fractal_noise,
     neighbours,
     surface_of,
@@ -134,22 +136,38 @@ def test_pattern_size_is_that_of_the_scene_for_any_camera():
 
 
 def test_hash_is_uniform_and_knows_its_seed():
-    cells = torch.cartesian_prod(*[torch.arange(-15, 16)] * 3)
-    values = cell_hash(cells, 3)
+    cells = torch.cartesian_prod(*[torch.arange(-15, 16, dtype=torch.int32)] * 3)
+    keys = cell_keys(cells)
+    values = cell_hash(keys, 3)
     assert_close(values.mean(), torch.tensor(0.5), atol=0.01, rtol=0)
     counts = torch.histc(values, 10, 0, 1) / len(values)
     assert_close(counts, torch.full((10,), 0.1), atol=0.008, rtol=0)
-    other = cell_hash(cells, 4)
+    other = cell_hash(keys, 4)
     assert torch.corrcoef(torch.stack([values, other]))[0, 1].abs() < 0.02
-    shifted = cell_hash(cells + torch.tensor([1, 0, 0]), 3)
+    shifted = cell_hash(cell_keys(cells + torch.tensor([1, 0, 0], dtype=torch.int32)), 3)
     assert torch.corrcoef(torch.stack([values, shifted]))[0, 1].abs() < 0.02
 
 
+@pytest.mark.parametrize("seed", [0, 7, 308])
+def test_hash_is_that_of_unsigned_numbers_of_32_bits(seed):
+    cells = [(0, 0, 0), (1, -2, 3), (-40, 25, 1000), (12345, -6789, -1)]
+    expected = []
+    for cell in cells:
+        h = seed * 2654435761
+        for place, prime in zip(cell, PRIMES, strict=True):
+            h ^= place * prime
+        h %= 2**32
+        h = (h ^ h >> 16) * 0x7FEB352D % 2**32
+        h = (h ^ h >> 15) * 0x846CA68B % 2**32
+        expected.append(((h ^ h >> 16) >> 8) / 2**24)
+    assert cell_hash(cell_keys(torch.tensor(cells, dtype=torch.int32)), seed).tolist() == expected
+
+
 def test_value_noise_is_the_hash_at_cells_and_trilinear_between():
-    cells = torch.tensor([[0, 0, 0], [5, -3, 2], [-7, 4, 1]])
-    assert_close(value_noise(cells.float(), 9), cell_hash(cells, 9))
+    cells = torch.tensor([[0, 0, 0], [5, -3, 2], [-7, 4, 1]], dtype=torch.int32)
+    assert_close(value_noise(cells.float(), 9), cell_hash(cell_keys(cells), 9))
     middle = value_noise(torch.tensor([[2.5, 1.0, -3.0]]), 9)
-    ends = cell_hash(torch.tensor([[2, 1, -3], [3, 1, -3]]), 9)
+    ends = cell_hash(cell_keys(torch.tensor([[2, 1, -3], [3, 1, -3]], dtype=torch.int32)), 9)
     assert_close(middle[0], ends.mean())
     points = torch.linspace(-4, 4, 4001)[:, None] * torch.tensor([0.7, 0.5, -0.4])
     assert value_noise(points, 1).diff().abs().max() < 0.01  # continuous across cells
@@ -159,8 +177,8 @@ def test_value_noise_is_the_hash_at_cells_and_trilinear_between():
 def test_neighbours_hold_the_nearest_centre():
     points = torch.rand(200, 3, generator=torch.Generator().manual_seed(0)) * 3 - 1
     distances = torch.stack([vector.norm(dim=1) for vector, _ in neighbours(points, 5)])
-    cells = torch.cartesian_prod(*[torch.arange(-4, 6)] * 3)
-    shift = torch.stack([cell_hash(cells, 5 + 101 * axis) for axis in (1, 2, 3)], dim=1)
+    cells = torch.cartesian_prod(*[torch.arange(-4, 6, dtype=torch.int32)] * 3)
+    shift = torch.stack([cell_hash(cell_keys(cells), 5 + 101 * axis) for axis in (1, 2, 3)], dim=1)
     centres = cells + 0.5 + 0.9 * (shift - 0.5)
     assert_close(distances.amin(dim=0), torch.cdist(points, centres).amin(dim=1), atol=1e-5, rtol=0)
 

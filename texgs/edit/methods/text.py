@@ -29,9 +29,9 @@ class TextKeys(OpacityKeys, InstructionKeys):
 
     recipe: str = key(
         "default",
-        "how texels follow: solved for the colours of edited views; or as in the paper, by iterations to the "
-        "edited images themselves",
-        choices=("default", "paper"),
+        "how texels follow: solved for the colours of edited views, quickly at one opacity; or as in the "
+        "paper, by iterations to the edited images themselves",
+        choices=("default", "quick", "paper"),
     )
     views: str | None = key(
         None,
@@ -96,7 +96,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
     return EditedScene(
         scene,
         f"{guidance.name}, {settings.recipe}" + ("" if settings.textured else ", without texture"),
-        write_views(task.output, rows),
+        write_views(task.output, rows) if task.draws else {},
         notes={"instruction": task.followed or settings.instruction, "seen": seen},
     )
 

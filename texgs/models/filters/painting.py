@@ -33,9 +33,9 @@ def stipple(surface: Surface) -> Tensor:
     points = surface.points * 1.5
     darkness = 1 - surface.tone
     ink = torch.zeros_like(darkness)
-    for vector, cells in neighbours(points, 0, jitter=0.75):
+    for vector, keys in neighbours(points, 0, jitter=0.75):
         distance = tangential(vector, surface.normals, 0.6).norm(dim=1)
-        is_there = cell_hash(cells, 7) < 0.25 + 1.1 * darkness
+        is_there = cell_hash(keys, 7) < 0.25 + 1.1 * darkness
         radius = 0.17 + 0.30 * darkness
         ink = torch.maximum(ink, is_there * surface.ramp((distance - radius) / 1.5))
     return _mix(PAPER, INK, ink)
@@ -81,9 +81,9 @@ def oil(surface: Surface) -> Tensor:
     points = surface.points * 0.8
     top = torch.full_like(surface.tone, -1.0)
     value, warm, relief = (torch.zeros_like(surface.tone) for _ in range(3))
-    for vector, cells in neighbours(points, 0):
+    for vector, keys in neighbours(points, 0):
         flat = tangential(vector, surface.normals, 0.5)
-        turn = torch.stack([cell_hash(cells, k) - 0.5 for k in (31, 37, 41)], dim=1)
+        turn = torch.stack([cell_hash(keys, k) - 0.5 for k in (31, 37, 41)], dim=1)
         along = tangential(turn, surface.normals, 0.0)
         along = along / along.norm(dim=1, keepdim=True).clamp_min(1e-6)
         u = (flat * along).sum(dim=1)
@@ -91,11 +91,11 @@ def oil(surface: Surface) -> Tensor:
         side = (torch.linalg.cross(surface.normals, along) * flat).sum(dim=1)
         ragged = 0.12 * torch.sin(23 * side + 40 * turn[:, 0])
         is_inside = (u.abs() < 0.85 + ragged) & (v < 0.36)
-        order = cell_hash(cells, 43)
+        order = cell_hash(keys, 43)
         is_top = is_inside & (order > top)
         top = torch.where(is_top, order, top)
-        value = torch.where(is_top, 2 * cell_hash(cells, 47) - 1, value)
-        warm = torch.where(is_top, 2 * cell_hash(cells, 53) - 1, warm)
+        value = torch.where(is_top, 2 * cell_hash(keys, 47) - 1, value)
+        warm = torch.where(is_top, 2 * cell_hash(keys, 53) - 1, warm)
         bristles = 0.45 * torch.sin(38 * side + 9 * turn[:, 1]) + 1.6 * side  # light from one side of a dab
         relief = torch.where(is_top, bristles, relief)
     steps = (surface.shade * 4).floor() / 4 + 0.2
@@ -180,9 +180,9 @@ def glass(surface: Surface) -> Tensor:
     clear = torch.lerp(deep, _color(surface, (0.86, 0.96, 0.94)), 0.55)
     blown = torch.lerp(clear, 0.85 * deep, (0.8 * fold.square() + 0.3 * (1 - surface.shade))[:, None])
     bubble = torch.zeros_like(surface.tone)
-    for vector, cells in neighbours(surface.points * 0.8, 5):
-        rim = (vector.norm(dim=1) - 0.08 - 0.12 * cell_hash(cells, 7)) / 0.8
-        bubble = torch.maximum(bubble, (cell_hash(cells, 9) < 0.25) * surface.ramp(rim))
+    for vector, keys in neighbours(surface.points * 0.8, 5):
+        rim = (vector.norm(dim=1) - 0.08 - 0.12 * cell_hash(keys, 7)) / 0.8
+        bubble = torch.maximum(bubble, (cell_hash(keys, 9) < 0.25) * surface.ramp(rim))
     return torch.lerp(blown, torch.ones_like(blown), 0.6 * bubble[:, None]).clamp(0, 1)
 
 
@@ -199,12 +199,12 @@ def mosaic(surface: Surface) -> Tensor:
     """Lay tiles [P, 3] with dark joints, each of one shade."""
     first = torch.full_like(surface.tone, torch.inf)
     second, shade = first.clone(), torch.zeros_like(first)
-    for vector, cells in neighbours(surface.points * 0.9, 0, jitter=0.8):
+    for vector, keys in neighbours(surface.points * 0.9, 0, jitter=0.8):
         distance = tangential(vector, surface.normals, 0.7).norm(dim=1)
         is_first = distance < first
         second = torch.where(is_first, first, torch.minimum(second, distance))
         first = torch.where(is_first, distance, first)
-        shade = torch.where(is_first, cell_hash(cells, 3), shade)
+        shade = torch.where(is_first, cell_hash(keys, 3), shade)
     tile = surface.color * (0.60 + 0.55 * shade)[:, None] + 0.10 * (shade[:, None] - 0.5)
     joint = surface.ramp((second - first - 0.14) / 0.9)[:, None]
     return torch.lerp(tile.clamp(0, 1), _color(surface, (0.13, 0.12, 0.12)), joint)

@@ -20,7 +20,6 @@ KEY_LIGHT = (-0.45, 0.75, 0.48)  # direction of the light that a drawing's tone 
 SOLID = 0.02  # alpha from which a pixel shows enough of the scene to be painted
 LOUD = 0.95  # quantile of luminance that counts as white
 PRIMES = (73856093, 19349663, 83492791)  # of the usual hash of cells (Teschner et al. 2003)
-MASK = 0xFFFFFFFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +76,23 @@ def _pixel(views: EditViews, points: Tensor) -> float:
     return sum(float((c.position - middle).norm() / c.K[0, 0]) for c in views.cameras) / len(views)
 
 
-def cell_hash(cells: Tensor, seed: int) -> Tensor:
-    """Return uniform numbers [...] in [0, 1) of integer cells [..., 3], as if random."""
+def cell_keys(cells: Tensor) -> Tensor:
+    """Return numbers [...] int32 that tell integer cells [..., 3] int32 apart, for `cell_hash`."""
     x, y, z = (cells[..., axis] * prime for axis, prime in enumerate(PRIMES))
-    h = (x ^ y ^ z ^ (seed * 2654435761 & MASK)) & MASK
-    for shift, factor in ((16, 0x7FEB352D), (15, 0x846CA68B)):  # a finaliser that mixes all 32 bits
-        h = ((h ^ (h >> shift)) * factor) & MASK
-    h = h ^ (h >> 16)
-    return (h >> 8).to(torch.float32) / 2**24
+    return x ^ y ^ z
+
+
+def cell_hash(keys: Tensor, seed: int) -> Tensor:
+    """Return uniform numbers [...] in [0, 1) of the keys [...] of cells, as if random."""
+    h = keys ^ ((seed * 2654435761 + 2**31) % 2**32 - 2**31)
+    for shift, factor in ((16, 0x7FEB352D), (15, 0x846CA68B - 2**32)):  # a finaliser that mixes all 32 bits
+        h = (h ^ _shifted(h, shift)) * factor
+    return _shifted(h ^ _shifted(h, 16), 8).to(torch.float32) / 2**24
+
+
+def _shifted(bits: Tensor, count: int) -> Tensor:
+    """Return 32 bits moved to the right, with zeros in front."""
+    return (bits >> count) & (2 ** (32 - count) - 1)
 
 
 def value_noise(points: Tensor, seed: int) -> Tensor:
@@ -92,12 +100,12 @@ def value_noise(points: Tensor, seed: int) -> Tensor:
     low = points.floor()
     t = points - low
     t = t * t * (3 - 2 * t)
-    cells = low.long()
+    cells = low.int()
     total = torch.zeros_like(points[:, 0])
     for corner in product((0, 1), repeat=3):
-        at = torch.tensor(corner, device=points.device)
+        at = torch.tensor(corner, device=points.device, dtype=torch.int32)
         weight = torch.where(at.bool(), t, 1 - t).prod(dim=1)
-        total += weight * cell_hash(cells + at, seed)
+        total += weight * cell_hash(cell_keys(cells + at), seed)
     return total
 
 
@@ -111,13 +119,14 @@ def fractal_noise(points: Tensor, seed: int, octaves: int = 4) -> Tensor:
 
 
 def neighbours(points: Tensor, seed: int, jitter: float = 0.9) -> Iterator[tuple[Tensor, Tensor]]:
-    """Yield vectors from a random centre to points [P, 3], and its integer cells, for the 27 cells around."""
+    """Yield vectors from a random centre to points [P, 3], and keys of its cells, for the 27 cells around."""
     low = points.floor()
     for corner in product((-1, 0, 1), repeat=3):
-        cells = low.long() + torch.tensor(corner, device=points.device)
-        shift = torch.stack([cell_hash(cells, seed + 101 * axis) for axis in (1, 2, 3)], dim=1)
+        cells = low.int() + torch.tensor(corner, device=points.device, dtype=torch.int32)
+        keys = cell_keys(cells)
+        shift = torch.stack([cell_hash(keys, seed + 101 * axis) for axis in (1, 2, 3)], dim=1)
         centre = cells + 0.5 + jitter * (shift - 0.5)
-        yield points - centre, cells
+        yield points - centre, keys
 
 
 def tangential(vectors: Tensor, normals: Tensor, flat: float) -> Tensor:

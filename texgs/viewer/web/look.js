@@ -10,7 +10,7 @@ export class LookTool {
   #isTried = false; // whether the page shows a preview, or a look on its way
 
   /**
-   * @param {object} page - with canvas, connection, job, notices, shown, state, beginLook() and show()
+   * @param {object} page - with camera, canvas, connection, job, notices, renderer, shown, state, beginLook() and show()
    * @param {{styles: string[], words: string[]}} choices - pictures and words that the server knows
    */
   constructor(page, { styles, words }) {
@@ -23,7 +23,7 @@ export class LookTool {
       event.preventDefault();
       this.#page.job.begin(this.#asked(false));
     });
-    for (const id of ["look-part", "look-sphere"]) get(id).addEventListener("change", () => this.#preview());
+    for (const id of ["look-part", "look-sphere", "look-words"]) get(id).addEventListener("change", () => this.#preview());
     get("look-close").onclick = () => this.leave();
     get("look").addEventListener("keydown", ({ key }) => { if (key === "Escape") this.leave(); });
     this.#takeDrops();
@@ -70,7 +70,7 @@ export class LookTool {
   #choose(style) {
     for (const each of get("look-styles").querySelectorAll("input")) each.checked = each === style;
     if (style) get("look-words").value = "";
-    this.#preview();
+    this.#preview(style);
   }
 
   /** Give the server a picture file. */
@@ -97,18 +97,19 @@ export class LookTool {
     });
   }
 
-  /** Lay the picture that is chosen onto the part, or none. */
-  #preview() {
+  /** Show on the part what is chosen, a picture or words; or nothing. */
+  #preview(chosen = this.#style || get("look-words").value.trim()) {
     const { connection } = this.#page;
-    if (this.#style) connection.send(this.#asked(true));
-    else if (this.#isTried) connection.send({ type: "cancel", preview: true });
+    if (chosen) connection.send(this.#asked(true));
+    else connection.send({ type: "cancel", preview: true }); // one may be on its way
     this.#show();
   }
 
   #asked(preview) {
     const part = get("look-part").value, instruction = get("look-words").value.trim();
-    const parts = part === ALL ? [] : [part], sphere = get("look-sphere").checked;
-    return { type: "look", parts, style: this.#style, instruction, sphere, preview };
+    const parts = part === ALL ? [] : [part], sphere = get("look-sphere").checked, { camera, renderer } = this.#page;
+    const side = preview && instruction ? camera.wire(...renderer.size()) : null;
+    return { type: "look", parts, style: this.#style, instruction, sphere, preview, camera: side };
   }
 
   #try(parts) {
