@@ -110,7 +110,7 @@ export class Panel {
       const material = element("details", {}, element("summary", {}, "Material"));
       material.dataset.part = part;
       for (const [key, max] of factors) add(material, key, factor(key, max));
-      add(material, "tint", colorInput("Highlights", `tint of ${part}`, edit("tint")));
+      add(material, "tint", colorInput("Tint", `tint of highlights of ${part}`, edit("tint")));
       box.append(material);
     }
     this.#parts.set(part, (each, model) => {
