@@ -24,10 +24,11 @@ JPEG = 1.5  # levels of 255: what quality 95 costs on average
 
 
 @contextmanager
-def served(scene_file, port=0, **environment):
+def served(scene_file, port=0, styles=None, **environment):
     """A server in a process of its own, and its address."""
     words = [sys.executable, "-m", "texgs.cli.main", "view", str(scene_file)]
     words += ["--no-browser", "--port", str(port)]
+    words += ["--styles", str(styles)] if styles else []
     env = {**os.environ, "TEXGS_CACHE": str(scene_file.parent / "cache"), **environment}
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env)
     try:

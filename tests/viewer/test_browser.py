@@ -394,6 +394,55 @@ def test_a_picture_is_dropped_and_words_are_followed(chromium, scene_file, tmp_p
         expect(page.get_by_text("scene.yaml cannot be used")).to_be_visible(timeout=WAIT)
 
 
+def drop(page, name, content):
+    """Drop a file onto the picture of the page."""
+    make = """([name, bytes]) => {
+      const data = new DataTransfer();
+      data.items.add(new File([new Uint8Array(bytes)], name));
+      return data;
+    }"""
+    data = page.evaluate_handle(make, [name, list(content)])
+    page.dispatch_event("#picture", "drop", {"dataTransfer": data})
+
+
+def thumbnail(page, name):
+    """Mean colour of a picture on the scene, once it is there."""
+    image = page.locator("label.style", has=page.get_by_role("radio", name=name)).locator("img")
+    expect(image).to_have_attribute("src", re.compile("^blob:"), timeout=WAIT)
+    return pixels(image.screenshot()).mean((0, 1))
+
+
+def test_pictures_of_a_folder_are_on_the_scene_and_tried_at_once(chromium, scene_file, tmp_path):
+    for name, color in (("red.png", "red"), ("blue.webp", "blue")):
+        Image.new("RGB", (64, 64), color).save(tmp_path / name)
+    (tmp_path / "broken.jpg").write_bytes(b"no picture")
+    with served(scene_file, styles=tmp_path) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("button", name="New look of the scene").click()
+        expect(page.get_by_text("broken.jpg: expected a picture")).to_be_visible(timeout=WAIT)
+        red, blue = thumbnail(page, "red.png"), thumbnail(page, "blue.webp")
+        assert red[0] > blue[0] + 20
+        assert blue[2] > red[2] + 20
+        first, before = still(page), shown(page)
+        page.get_by_role("radio", name="red.png").check(force=True)
+        expect(page.get_by_text("A preview: nothing has changed yet.")).to_be_visible(timeout=WAIT)
+        assert (shown(page) - before)[..., 1].mean() < -1, "less green"
+        page.keyboard.press("ArrowRight")  # inputs stay while a preview is made
+        page.locator("#look-part").select_option("TF01")
+        page.get_by_role("checkbox", name="Picture of a lit sphere").check()
+        file = scene_file.parent / "green.png"
+        Image.new("RGB", (64, 64), "lime").save(file)
+        drop(page, "green.png", file.read_bytes())
+        expect(page.get_by_role("radio", name="green.png")).to_be_checked(timeout=WAIT)
+        green = thumbnail(page, "green.png")
+        assert green[1] > max(green[0], green[2])
+        drop(page, "notes.txt", b"no picture")
+        expect(page.get_by_text("notes.txt cannot be used")).to_be_visible(timeout=WAIT)
+        page.get_by_role("form", name="New look").get_by_role("button", name="Close").click()
+        expect(page.get_by_role("listitem")).to_have_count(0)
+        page.wait_for_timeout(500)
+        assert still(page) == first
+
+
 def test_edits_stand_in_the_link(chromium, scene_file):
     with served(scene_file) as (_, address), opened(chromium, address) as page:
         page.get_by_role("checkbox", name="TF02").uncheck()

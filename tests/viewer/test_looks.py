@@ -1,6 +1,7 @@
 """New looks on a page: previews, textures that are kept, what is refused, and how one is cancelled."""
 
 import asyncio
+import io
 import json
 import threading
 from dataclasses import asdict
@@ -14,11 +15,13 @@ from tests.fields.surfels.test_composition import ball
 from tests.viewer.pages import TOKEN, on_page, origin, page
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
+from texgs.core.errors import ArgumentError
 from texgs.edit.material import MATERIALS
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.scene_file import read_scene
-from texgs.viewer.looks import Looks, ScratchFolders, Styles, ThrottledPreview
+from texgs.viewer.looks import Looks, ScratchFolders, ThrottledPreview
 from texgs.viewer.messages import Look
+from texgs.viewer.styles import Styles
 from texgs.viewer.work import Jobs, Stopped, Watch
 
 SHOT = {**VIEW, "mode": "shaded", "camera": asdict(FRONT) | {"target": [0, 0, 0]}}
@@ -188,8 +191,6 @@ async def test_a_picture_of_the_user_is_taken_in(browser, client, tmp_path):
         assert answer.status == 403
     async with client.post(path, data=bytes(33 * 2**20), headers=headers) as answer:
         assert answer.status == 413
-    async with client.get(f"{path}/dots.jpg") as answer, client.get(f"{path}/other.jpg") as other:
-        assert (answer.content_type, other.status) == ("image/jpeg", 404)
 
 
 @pytest.mark.parametrize(
@@ -340,3 +341,76 @@ async def test_a_folder_that_cannot_be_written_is_a_sentence(browser, client, sc
     while (notice := await browser.next("notice"))["level"] == "info":
         pass
     assert "cannot be written (Not a directory); start texgs view with another --folder" in notice["text"]
+
+
+async def thumbnail(client, style="glass", **values):
+    asked = json.dumps({**look(style=style, preview=True), "camera": SHOT["camera"], **values})
+    async with client.get(f"/{TOKEN}/thumbnail.jpg", params={"look": asked}) as answer:
+        return answer.status, await answer.read()
+
+
+@on_page
+async def test_a_thumbnail_is_the_scene_with_a_picture_on_it(browser, client):
+    """It is the preview, as the page shows it, in small; nothing is kept of it."""
+    await browser.send(**look(style="glass", preview=True))
+    await browser.next("trial")
+    shown = Image.fromarray((await picture(browser)).astype(np.uint8))
+    status, content = await thumbnail(client)
+    small = Image.open(io.BytesIO(content))
+    assert (status, small.format, small.height) == (200, "JPEG", 112)
+    off = np.abs(np.asarray(small).astype(int) - np.asarray(shown.resize(small.size)).astype(int)).mean()
+    _, other = await thumbnail(client, "dots")
+    others = np.abs(
+        np.asarray(Image.open(io.BytesIO(other))).astype(int) - np.asarray(small).astype(int)
+    ).mean()
+    assert off < 0.5 * others
+    scratch = client.server_side.work._looks._scratch._parent
+    assert not list((scratch / "thumbnail").iterdir())
+
+
+@on_page
+async def test_a_thumbnail_that_cannot_be_is_a_sentence(client, browser):
+    for values, message in (
+        ({"style": "nothing"}, b"style: expected one of strokes"),
+        ({"camera": {}}, b"camera.target: expected a value, got none"),
+        ({"camera": None}, b"camera: expected one to show a thumbnail from, got none"),
+        ({"colour": 1}, b"message: no such key 'colour'"),
+    ):
+        assert await thumbnail(client, **values) == (400, StartsWith(message))
+    async with client.get(f"/{TOKEN}/thumbnail.jpg") as answer:
+        assert answer.status == 400
+
+
+class StartsWith(bytes):
+    def __eq__(self, other):
+        return other.startswith(bytes(self))
+
+    __hash__ = bytes.__hash__
+
+
+def test_pictures_of_a_folder(tmp_path):
+    Image.new("RGB", (64, 48), "red").save(tmp_path / "red.png")
+    (tmp_path / "broken.JPG").write_bytes(b"no picture")
+    (tmp_path / "notes.txt").write_text("not offered")
+    Image.new("1", (13_000, 13_000)).save(tmp_path / "large.png")
+    styles = Styles(tmp_path)
+    assert styles.names[-3:] == ["broken.JPG", "large.png", "red.png"]
+    assert styles.source("red.png") == str(tmp_path / "red.png")
+    with pytest.raises(ArgumentError, match=r"large\.png: expected a picture of at most 50 million pixels"):
+        styles.source("large.png")
+    looks = Looks(styles)
+    with pytest.raises(ArgumentError, match=r"broken\.JPG: expected a picture"):
+        looks.edit_of(Look(style="broken.JPG", preview=True))
+    assert looks.edit_of(Look(style="red.png", preview=True)).image.style == str(tmp_path / "red.png")
+    looks.close(), styles.close()
+
+
+def test_a_folder_of_pictures_has_to_have_some(tmp_path):
+    with pytest.raises(ArgumentError, match=r"--styles: expected a folder, got .*none \(No such file"):
+        Styles(tmp_path / "none")
+    with pytest.raises(ArgumentError, match=r"--styles: expected 1 to 50 pictures .* got 0"):
+        Styles(tmp_path)
+    for number in range(51):
+        (tmp_path / f"{number}.png").touch()
+    with pytest.raises(ArgumentError, match="got 51"):
+        Styles(tmp_path)

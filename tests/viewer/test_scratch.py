@@ -9,7 +9,8 @@ from texgs.viewer.scratch import scratch_folder
 KILLED = """
 import os, signal
 from pathlib import Path
-from texgs.viewer.looks import Looks, Styles
+from texgs.viewer.looks import Looks
+from texgs.viewer.styles import Styles
 looks = Looks(Styles())
 looks._scratch.new("preview").mkdir(parents=True)
 os.kill(os.getpid(), signal.SIGKILL)

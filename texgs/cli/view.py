@@ -28,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="where scenes are saved; default beside the scene, or here for a scene of the workflow",
     )
+    parser.add_argument("--styles", type=Path, metavar="FOLDER", help="of pictures of yours, for new looks")
     parser.add_argument("--port", type=int, help=f"default {PORT}, or another one where it is taken")
     parser.add_argument(
         "--host",
@@ -49,7 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.viewer.server import Server
     from texgs.viewer.shared_edits import open_scene
 
-    server = Server(open_scene(arguments.scene, arguments.folder), torch_device(arguments.device))
+    opened = open_scene(arguments.scene, arguments.folder)
+    server = Server(opened, torch_device(arguments.device), arguments.styles)
     listening = listen(arguments.host, arguments.port)
     if not is_loopback(arguments.host):
         sys.stderr.write(

@@ -1,4 +1,4 @@
-"""New looks for parts of a scene, from a picture or an instruction, and the pictures to choose from."""
+"""New looks for parts of a scene, from a picture or an instruction; and what they would be like."""
 
 from __future__ import annotations
 
@@ -7,15 +7,12 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from shutil import rmtree
-from threading import Lock
 from time import monotonic
 from typing import Any
-from warnings import catch_warnings
 
-import numpy as np
 import torch
 from PIL import Image
 
@@ -23,22 +20,21 @@ from texgs.config.recipes import Edit
 from texgs.core.camera import Camera, orbit
 from texgs.core.checksum import digest
 from texgs.core.errors import ArgumentError
-from texgs.core.image import FORMATS
 from texgs.core.keys import typed
-from texgs.core.names import file_name, part_file
+from texgs.core.names import part_file
 from texgs.edit.method import method_of
-from texgs.edit.pictures import PICTURES, picture
 from texgs.edit.readable import raised
-from texgs.edit.style_picture import read_style
 from texgs.edit.task import EditedScene, Task, parts_with_surfels
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import write_texture
 from texgs.models.instruction import understand, vocabulary
 from texgs.models.weights import unusable
+from texgs.scene.frame import frame
 from texgs.scene.parts import NewLook, look_of
 from texgs.scene.scene import Scene
 from texgs.viewer.messages import Look, Orbit
 from texgs.viewer.scratch import scratch_folder
+from texgs.viewer.styles import Styles
 from texgs.volume.cameras import icosphere_of
 from texgs.volume.view_set import View
 
@@ -46,10 +42,7 @@ VIEWS, SIZE = 92, 400  # that parts learn from, and pixels of their sides
 QUICK = 352  # of those along the axes, which the scene fills
 BETWEEN = 2.0  # seconds between textures on their way that are shown
 KEPT = 20  # of those of each part, and of previews: frames may be on their way
-LARGEST = 32 * 2**20  # bytes of a picture that a page sends
-MOST = 50  # such pictures
-MOST_PIXELS = 50_000_000  # of one: more takes many seconds to read, at each preview again
-THUMBNAIL = 96  # pixels of a side
+THUMBNAIL = 112  # rows of pixels
 # The first is taken whose weights are on this machine.
 FULL = ("default", "patches")  # recipes for pictures
 Show = Callable[[str, Path], None]  # of a part, and the file of its texture
@@ -71,52 +64,6 @@ class OrbitTask(Task[Any]):
         if self.side:
             return [orbit(self.side.azimuth, self.side.polar, *self.lens)]
         return icosphere_of(VIEWS, self.lens)
-
-
-class Styles:
-    """Pictures by name: those that texgs has, and files that pages send, kept as long as this is."""
-
-    def __init__(self) -> None:
-        self._folder = scratch_folder()
-        self._files: dict[str, Path] = {}
-        self._adding = Lock()  # pages may send several at once
-
-    def add(self, name: str, content: bytes) -> str:
-        """Take in a file, with the name that its author gave it; return the name that it has from then on."""
-        with self._adding:
-            if len(self._files) >= MOST:
-                raise ArgumentError(f"style: expected at most {MOST} pictures, got another one; start again")
-            known = f"{len(self._files) + 1} {file_name('style', name)}"
-            path = Path(self._folder.name, known)
-            path.write_bytes(content)
-            try:
-                require_readable(path)
-                read_style(path)
-            except ArgumentError as error:
-                path.unlink()
-                raise ArgumentError(str(error).replace(str(path), name)) from error
-            self._files[known] = path
-            return known
-
-    def source(self, name: str) -> str:
-        """Return what `edit.image.style` is for a picture."""
-        if name not in PICTURES and name not in self._files:
-            raise ArgumentError(f"style: expected one of {', '.join(PICTURES)}, or a file; got {name!r:.100}")
-        return str(self._files.get(name, name))
-
-    def close(self) -> None:
-        """Remove the files."""
-        self._folder.cleanup()
-
-
-@lru_cache
-def thumbnail(name: str) -> bytes:
-    """Return a small view of a picture that texgs has, as JPEG."""
-    pixels = picture(name, 4 * THUMBNAIL).permute(1, 2, 0).numpy()
-    file = io.BytesIO()
-    shown = Image.fromarray((255 * pixels).round().astype(np.uint8)).resize((THUMBNAIL, THUMBNAIL))
-    shown.save(file, "JPEG", quality=85)
-    return file.getvalue()
 
 
 class Looks:
@@ -194,6 +141,20 @@ class Looks:
         edited = self.make(scene, edit, output, lambda *_: None, asked.camera)
         return looks_of(edited.scene, edit.parts, scene)
 
+    def thumbnail(self, scene: Scene, asked: Look) -> bytes:
+        """Return a small view of the scene with a look, from the camera that is asked for, as JPEG."""
+        if asked.camera is None:
+            raise ArgumentError("camera: expected one to show a thumbnail from, got none")
+        edit = with_parts(self.edit_of(asked), scene)
+        output, file = self._scratch.new("thumbnail"), io.BytesIO()
+        try:
+            shown = self.make(scene, edit, output, lambda *_: None).scene
+            camera = asked.camera.camera(THUMBNAIL / asked.camera.height)
+            Image.fromarray(frame(shown.open(self._device), camera, shown)).save(file, "JPEG", quality=90)
+        finally:
+            rmtree(output, ignore_errors=True)
+        return file.getvalue()
+
     def close(self) -> None:
         """Remove what was not kept."""
         self._folder.cleanup()
@@ -244,18 +205,6 @@ def edit_with(parts: Sequence[str], choice: dict[str, Any]) -> Any:
     # What a page has written is taken as it is: a configuration would look for references in it.
     chosen = replace(getattr(edit, method), **values)
     return replace(edit, parts=list(parts), **{method: chosen})
-
-
-def require_readable(path: Path) -> None:
-    """Require of a picture, if it is one, that it takes a moment to read."""
-    quiet, refused = catch_warnings(action="ignore"), (OSError, Image.DecompressionBombError)
-    with suppress(*refused), quiet, Image.open(path, formats=FORMATS) as picture:
-        width, height = picture.size
-        if width * height > MOST_PIXELS:
-            raise ArgumentError(
-                f"{path}: expected a picture of at most {MOST_PIXELS // 10**6} million pixels, got {width} x "
-                f"{height}; scale it down"
-            )
 
 
 def require_known(instruction: str) -> None:

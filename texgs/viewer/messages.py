@@ -154,7 +154,7 @@ class Look:
     instruction: str = ""  # "" with a picture
     sphere: bool = False  # the picture is of a lit sphere, and goes onto surfaces by their normals
     preview: bool = False  # show on this page what it would be like, and change nothing
-    camera: Orbit | None = None  # from whose side words are previewed; none: from all
+    camera: Orbit | None = None  # of a thumbnail, and from whose side words are previewed; none: from all
     type: Literal["look"] = tag("look")
 
 
@@ -214,7 +214,7 @@ class Cancel:
 Making = Mask | Segment | Look | Fit | Keep | Export
 Message = View | Pick | Edit | Undo | Redo | Save | Making | Rename | Remove | Cancel
 MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
-VIEWS = TypeAdapter(View)
+VIEWS, LOOKS = TypeAdapter(View), TypeAdapter(Look)
 
 
 def parse(text: str | bytes, adapter: TypeAdapter[Any] = MESSAGES) -> Any:

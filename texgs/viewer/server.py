@@ -12,7 +12,6 @@ import torch
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.edit.pictures import PICTURES
 from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
@@ -22,11 +21,11 @@ from texgs.viewer.description import bounds, describe, presets
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import add_headers, guard
-from texgs.viewer.looks import LARGEST, thumbnail
 from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Pick, Save, Segment, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
+from texgs.viewer.styles import LARGEST
 from texgs.viewer.work import Work
 
 WEB = Path(__file__).parent / "web"
@@ -41,23 +40,25 @@ GOODBYE = b"texgs view has ended. Start it again, and open the address that it p
 class Server:
     """What the handlers of requests share. The models of the scene are read at once."""
 
-    def __init__(self, opened: Opened, device: torch.device | str = "cpu") -> None:
+    def __init__(
+        self, opened: Opened, device: torch.device | str = "cpu", styles: Path | None = None
+    ) -> None:
         session = Session(opened.scene, device)
         self._title, composed = title_of(opened.source), session.composition
         self._bounds, self._device = bounds(opened.scene, composed), device
         self._opened = self._latest = (files_of_models(opened.scene), composed)  # models as they were fitted
-        self._choices = {
-            "styles": list(PICTURES),
-            "words": list(WORDS),
-            "exports": exports_of(opened.scene),
-            "presets": presets(),
-        }
         self.edits = SharedEdits(session, opened)
         self._origins = Origins(opened.scene)
         self._beside = Beside(session, self._origins)
         self.frames = Frames(session, self._beside)
         self._changing = asyncio.Lock()  # a change that reads files takes its time in another thread
-        self.work = Work(self.frames, self.edits, self._changing, self._tell_all, device)
+        self.work = Work(self.frames, self.edits, self._changing, self._tell_all, device, styles)
+        self._choices = {
+            "styles": self.work.styles.names,
+            "words": list(WORDS),
+            "exports": exports_of(opened.scene),
+            "presets": presets(),
+        }
         self._pages: dict[Page, web.WebSocketResponse] = {}
         self._count = 0  # of pages so far
         self._run = secrets.token_hex(8)  # tells pages that they have met another server
@@ -69,7 +70,7 @@ class Server:
             "": self.index,
             "socket": self.socket,
             "still.png": self.still,
-            "styles/{name}.jpg": self.style,
+            "thumbnail.jpg": self.thumbnail,
             "files/{name}": self.file,
             "{name}": self.module,
         }
@@ -129,12 +130,13 @@ class Server:
         saved = {"Content-Disposition": "attachment"}  # the page gives it a name
         return web.Response(body=png, content_type="image/png", headers=saved)
 
-    async def style(self, request: web.Request) -> web.StreamResponse:
-        """Return a small view of a picture that texgs has."""
+    async def thumbnail(self, request: web.Request) -> web.StreamResponse:
+        """Return a small view of the scene with a picture laid on."""
         try:
-            picture = await asyncio.to_thread(thumbnail, request.match_info["name"])
+            asked = parse(request.query.get("look", ""), messages.LOOKS)
+            picture = await self.work.thumbnail(asked)
         except TexgsError as error:
-            raise web.HTTPNotFound(text=str(error)) from error
+            raise web.HTTPBadRequest(text=str(error)) from error
         return web.Response(body=picture, content_type="image/jpeg")
 
     async def new_style(self, request: web.Request) -> web.StreamResponse:

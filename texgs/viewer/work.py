@@ -24,10 +24,11 @@ from texgs.fields.surfels.model import Surfels
 from texgs.scene.parts import NewLook, entry_of, require_new, split
 from texgs.viewer.downloads import Downloads, require_kind
 from texgs.viewer.frames import Frames
-from texgs.viewer.looks import Looks, Styles, looks_of, with_parts
+from texgs.viewer.looks import Looks, looks_of, with_parts
 from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
+from texgs.viewer.styles import Styles
 
 if TYPE_CHECKING:
     from texgs.viewer.page import Page
@@ -92,10 +93,12 @@ class Work:
         changing: asyncio.Lock,
         changed: Callable[[], None],
         device: torch.device | str,
+        styles: Path | None = None,
     ) -> None:
         self._edits, self._changing, self._changed = edits, changing, changed
         self._device = device
-        self._jobs, self._previews, self.styles = Jobs(), Jobs(), Styles()
+        self._jobs, self._previews, self._thumbnails = Jobs(), Jobs(), Jobs()
+        self.styles = Styles(styles)
         self._segmenter, self._looks = Segmenter(device), Looks(self.styles, device)
         self.downloads = Downloads(frames, edits)
         self._task: asyncio.Task[None] | None = None
@@ -110,6 +113,10 @@ class Work:
         """Return looks of parts with a picture laid on, while a job may be at work."""
         work = partial(self._looks.preview, self._edits.scene, asked, page)
         return await self._previews.run(work, Watch(), is_urgent=True)
+
+    async def thumbnail(self, asked: Look) -> bytes:
+        """Return a small picture of the scene with a look, after those that were asked for before."""
+        return await self._thumbnails.run(partial(self._looks.thumbnail, self._edits.scene, asked), Watch())
 
     def begin_segment(self, asked: Segment, page: Page) -> None:
         """Begin to make a segment."""
@@ -159,8 +166,8 @@ class Work:
     def close(self) -> None:
         """Stop, and end the thread."""
         self.stop()
-        self._jobs.close()
-        self._previews.close()
+        for jobs in (self._jobs, self._previews, self._thumbnails):
+            jobs.close()
         self._looks.close()
         self.downloads.close()
         self.styles.close()

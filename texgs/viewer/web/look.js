@@ -4,9 +4,12 @@ import { element } from "./inputs.js";
 
 const get = (id) => document.getElementById(id);
 const ALL = ""; // parts
+const REST = 400; // milliseconds without a change, after which thumbnails are made
 
 export class LookTool {
   #page;
+  #painting = 0; // timer of the thumbnails that count
+  #painted = new Map(); // what the pictures of thumbnails show
   #isTried = false; // whether the page shows a preview, or a look on its way
 
   /**
@@ -16,7 +19,7 @@ export class LookTool {
   constructor(page, { styles, words }) {
     this.#page = page;
     get("look-known").append(...words.map((word) => new Option(word)));
-    for (const name of styles) this.#addStyle(name, `styles/${name}.jpg`);
+    for (const name of styles) this.#addStyle(name);
     get("look-words").addEventListener("input", () => this.#choose(null));
     get("look-file").addEventListener("change", ({ target }) => this.#send(target.files));
     get("look").addEventListener("submit", (event) => {
@@ -33,6 +36,7 @@ export class LookTool {
     });
     connection.addEventListener("lost", () => this.#try([]));
     for (const event of ["begin", "end"]) job.addEventListener(event, () => this.#show());
+    job.addEventListener("end", () => this.paint());
     state.addEventListener("change", () => this.#showParts());
     this.#showParts();
   }
@@ -44,6 +48,13 @@ export class LookTool {
     if (get("look-part").selectedIndex < 0) get("look-part").selectedIndex = 0;
     get("look-styles").querySelector("input").focus();
     this.#show();
+    this.paint();
+  }
+
+  /** Soon show the pictures on the scene as the camera has it, one after the other; those that are so stay. */
+  paint() {
+    clearTimeout(this.#painting);
+    if (!get("look").hidden) this.#painting = setTimeout(() => this.#paint(), REST);
   }
 
   /** Take the preview off, and close. */
@@ -58,10 +69,32 @@ export class LookTool {
     return get("look").querySelector("input[name=style]:checked")?.value ?? "";
   }
 
-  #addStyle(name, address, title = name) {
+  async #paint() {
+    const turn = this.#painting, { camera, job, notices, renderer, state } = this.#page;
+    const isOver = () => turn !== this.#painting || get("look").hidden || job.isAtWork;
+    for (const label of get("look-styles").children) {
+      if (isOver()) return;
+      const style = label.querySelector("input").value, side = camera.wire(...renderer.size());
+      const look = JSON.stringify({ ...this.#asked(true), style, instruction: "", camera: side });
+      const key = look + JSON.stringify(state.scene), picture = label.querySelector("img");
+      if (this.#painted.get(picture) === key) continue;
+      const answer = await fetch(`thumbnail.jpg?${new URLSearchParams({ look })}`).catch(() => null);
+      if (!answer) return;
+      this.#painted.set(picture, key);
+      if (answer.ok) {
+        URL.revokeObjectURL(picture.src);
+        picture.src = URL.createObjectURL(await answer.blob());
+      } else {
+        label.classList.add("wrong");
+        notices.tell(await answer.text(), "error");
+      }
+    }
+  }
+
+  #addStyle(name, title = name) {
     const input = element("input", { type: "radio", name: "style", value: name });
     input.addEventListener("change", () => this.#choose(input));
-    const picture = element("img", { src: address, alt: "", width: 56, height: 56 });
+    const picture = element("img", { alt: "", width: 72, height: 72 });
     get("look-styles").append(element("label", { className: "style", title }, input, picture, title));
     return input;
   }
@@ -73,17 +106,19 @@ export class LookTool {
     this.#preview(style);
   }
 
-  /** Give the server a picture file. */
-  async #send([file]) {
-    if (!file) return;
-    try {
-      const address = `styles?${new URLSearchParams({ name: file.name })}`;
-      const answer = await fetch(address, { method: "POST", body: file });
-      if (!answer.ok) throw new Error(await answer.text());
-      this.#choose(this.#addStyle(await answer.text(), URL.createObjectURL(file), file.name));
-    } catch (error) {
-      this.#page.notices.tell(`${file.name} cannot be used: ${error.message}`, "error");
+  /** Give the server picture files. */
+  async #send(files) {
+    for (const file of files) {
+      try {
+        const address = `styles?${new URLSearchParams({ name: file.name })}`;
+        const answer = await fetch(address, { method: "POST", body: file });
+        if (!answer.ok) throw new Error(await answer.text());
+        this.#choose(this.#addStyle(await answer.text(), file.name));
+      } catch (error) {
+        this.#page.notices.tell(`${file.name} cannot be used: ${error.message}`, "error");
+      }
     }
+    this.paint();
     get("look-file").value = "";
   }
 
@@ -103,6 +138,7 @@ export class LookTool {
     if (chosen) connection.send(this.#asked(true));
     else connection.send({ type: "cancel", preview: true }); // one may be on its way
     this.#show();
+    this.paint();
   }
 
   #asked(preview) {

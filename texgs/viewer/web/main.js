@@ -54,6 +54,7 @@ class Page extends ScenePage {
   draw(moving) {
     super.draw(moving);
     this.compare?.show();
+    this.looks?.paint();
   }
 
   #segment(model) {
