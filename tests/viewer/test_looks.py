@@ -6,6 +6,7 @@ import json
 import threading
 from dataclasses import asdict
 from functools import partial
+from shutil import rmtree
 
 import numpy as np
 import pytest
@@ -351,7 +352,7 @@ async def thumbnail(client, style="glass", **values):
 
 @on_page
 async def test_a_thumbnail_is_the_scene_with_a_picture_on_it(browser, client):
-    """It is the preview, as the page shows it, in small; nothing is kept of it."""
+    """It is the preview, as the page shows it, in small."""
     await browser.send(**look(style="glass", preview=True))
     await browser.next("trial")
     shown = Image.fromarray((await picture(browser)).astype(np.uint8))
@@ -364,8 +365,32 @@ async def test_a_thumbnail_is_the_scene_with_a_picture_on_it(browser, client):
         np.asarray(Image.open(io.BytesIO(other))).astype(int) - np.asarray(small).astype(int)
     ).mean()
     assert off < 0.5 * others
-    scratch = client.server_side.work._looks._scratch._parent
-    assert not list((scratch / "thumbnail").iterdir())
+
+
+@on_page
+async def test_a_preview_takes_what_its_thumbnail_was_made_with(browser, client, monkeypatch):
+    """Also when the files of the thumbnail are gone, and not for another scene."""
+    await browser.send(**look(style="glass", preview=True))
+    await browser.next("trial")
+    expected = await picture(browser)
+    await thumbnail(client)
+    looks, made = client.server_side.work._looks, []
+    make = Looks.make
+    monkeypatch.setattr(Looks, "make", lambda *words: made.append(words) or make(*words))
+    await browser.send(**look(style="glass", preview=True))
+    await browser.next("trial")
+    rmtree(looks._scratch._parent / "thumbnail")
+    assert (await picture(browser) == expected).all()
+    assert made == []
+    await browser.send(**look(style="glass", preview=True))
+    await browser.next("trial")
+    assert len(made) == 1, "its files are gone"
+    await thumbnail(client)
+    await browser.send(type="edit", part="TF01", key="opacity", value=0.5)
+    await browser.past("TF01 opacity 0.5")
+    await browser.send(**look(style="glass", preview=True))
+    await browser.next("trial")
+    assert len(made) == 3, "the scene is another"
 
 
 @on_page

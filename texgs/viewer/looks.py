@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -73,6 +73,7 @@ class Looks:
         self._styles, self._device = styles, torch.device(device)
         self._folder = scratch_folder()
         self._scratch = ScratchFolders(Path(self._folder.name))
+        self._shown: dict[str, tuple[Scene | None, dict[str, NewLook]]] = {}  # by edit, of thumbnails
         self._latest: tuple[Any, Scene] | None = None  # scene, parts and opacity asked for, and its result
 
     def edit_of(self, asked: Look) -> Any:
@@ -138,21 +139,24 @@ class Looks:
         """Return looks as a page asks for, in files that stay until it has had many of these parts."""
         edit = with_parts(self.edit_of(asked), scene)
         output = self._scratch.new(f"preview-{page}-{digest(repr(edit.parts))}")
+        known, looks = self._shown.get(repr(edit), (None, {}))
+        if known == scene and (linked := linked_to(output, looks)):
+            return linked
         edited = self.make(scene, edit, output, lambda *_: None, asked.camera)
         return looks_of(edited.scene, edit.parts, scene)
 
     def thumbnail(self, scene: Scene, asked: Look) -> bytes:
-        """Return a small view of the scene with a look, from the camera that is asked for, as JPEG."""
+        """Return a small view of the scene with a look, from the camera that is asked for, as JPEG.
+
+        A preview of the look takes no time from then on, unless many others were made since.
+        """
         if asked.camera is None:
             raise ArgumentError("camera: expected one to show a thumbnail from, got none")
         edit = with_parts(self.edit_of(asked), scene)
-        output, file = self._scratch.new("thumbnail"), io.BytesIO()
-        try:
-            shown = self.make(scene, edit, output, lambda *_: None).scene
-            camera = asked.camera.camera(THUMBNAIL / asked.camera.height)
-            Image.fromarray(frame(shown.open(self._device), camera, shown)).save(file, "JPEG", quality=90)
-        finally:
-            rmtree(output, ignore_errors=True)
+        shown = self.make(scene, edit, self._scratch.new("thumbnail"), lambda *_: None).scene
+        self._shown[repr(edit)] = (scene, looks_of(shown, edit.parts, scene))
+        camera, file = asked.camera.camera(THUMBNAIL / asked.camera.height), io.BytesIO()
+        Image.fromarray(frame(shown.open(self._device), camera, shown)).save(file, "JPEG", quality=90)
         return file.getvalue()
 
     def close(self) -> None:
@@ -196,6 +200,21 @@ def with_parts(edit: Any, scene: Scene) -> Any:
 def looks_of(scene: Scene, parts: Sequence[str], before: Scene) -> dict[str, NewLook]:
     """Return the looks of parts, as far as they had others before."""
     return {part: look_of(scene, part, before) for part in parts}
+
+
+def linked_to(folder: Path, looks: Mapping[str, NewLook]) -> dict[str, NewLook]:
+    """Return looks with links in a new folder to their files, whatever becomes of these; or none."""
+    linked = {}
+    try:
+        folder.mkdir(parents=True)
+        for part, look in looks.items():
+            if look.texture:
+                linked[part] = replace(look, texture=folder / look.texture.name)
+                (folder / look.texture.name).hardlink_to(look.texture)
+    except OSError:  # a file is gone, or the system has no links
+        rmtree(folder)
+        return {}
+    return linked
 
 
 def edit_with(parts: Sequence[str], choice: dict[str, Any]) -> Any:
