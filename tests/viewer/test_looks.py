@@ -401,16 +401,11 @@ async def test_a_thumbnail_that_cannot_be_is_a_sentence(client, browser):
         ({"camera": None}, b"camera: expected one to show a thumbnail from, got none"),
         ({"colour": 1}, b"message: no such key 'colour'"),
     ):
-        assert await thumbnail(client, **values) == (400, StartsWith(message))
+        status, text = await thumbnail(client, **values)
+        assert status == 400
+        assert text.startswith(message)
     async with client.get(f"/{TOKEN}/thumbnail.jpg") as answer:
         assert answer.status == 400
-
-
-class StartsWith(bytes):
-    def __eq__(self, other):
-        return other.startswith(bytes(self))
-
-    __hash__ = bytes.__hash__
 
 
 def test_pictures_of_a_folder(tmp_path):

@@ -9,10 +9,13 @@ from hypothesis import strategies as st
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.viewer.messages import (
+    LOOKS,
+    MESSAGES,
     Cancel,
     Edit,
     Fit,
     Keep,
+    Look,
     Mask,
     Pick,
     Redo,
@@ -49,6 +52,8 @@ def test_messages_are_read():
     assert parse('{"type": "fit", "function": "TF03"}') == Fit("TF03")
     assert parse('{"type": "keep", "function": "TF03"}') == Keep("TF03")
     assert parse('{"type": "remove", "part": "TF01/a"}') == Remove("TF01/a")
+    look = {"type": "look", "parts": ["TF01"], "style": "glass", "sphere": True, "camera": CAMERA}
+    assert parse(json.dumps(look)) == Look(("TF01",), "glass", sphere=True, camera=view.camera)
     clicks = {"camera": CAMERA, "points": [[1, 2.5, True], [3, 4, False]]}
     clicked = (view.camera, ((1, 2.5, True), (3, 4, False)))
     mask, segment = {"type": "mask", "id": 4, "model": "TF01"}, {"type": "segment", "part": "TF01/a"}
@@ -157,12 +162,13 @@ VALUES = st.recursive(
 
 KEYS = ("id", "camera", "mode", "moving", "before", "only", "part", "key", "value", "step", "name", "replace",
         "model", "points", "outline", "function", "view", "pixel", "kind", "stops", "seconds",
-        "fps")  # fmt: skip
+        "fps", "parts", "style", "instruction", "sphere", "preview")  # fmt: skip
 
 
+@pytest.mark.parametrize("adapter", [MESSAGES, LOOKS])
 @given(st.sampled_from(TYPES), st.dictionaries(st.sampled_from(KEYS), VALUES))
-def test_nothing_else_is_raised(kind, values):
+def test_nothing_else_is_raised(adapter, kind, values):
     try:
-        parse(json.dumps({"type": kind, **values}))
+        parse(json.dumps({"type": kind, **values}), adapter)
     except ArgumentError as error:
         assert len(str(error)) < 2100  # noqa: PT017  one sentence, of bounded length
