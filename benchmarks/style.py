@@ -10,12 +10,12 @@ from benchmarks.settings import Settings
 from texgs.core.camera import Camera, orbit
 from texgs.core.light import Light
 from texgs.core.process import keep_freed_memory
-from texgs.edit.pictures import picture
 from texgs.edit.recipe import Recipe, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.stylize import Stylized, stylize
 from texgs.fields.surfels.model import Surfels
 from texgs.models.networks import fast_dtype
+from texgs.models.pictures import picture
 from texgs.models.vgg import Vgg
 
 ITERATIONS, FEW = 10, 2  # of a run; the latter for --quick

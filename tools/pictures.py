@@ -96,7 +96,7 @@ def styles(run: Path) -> Image.Image:
     """Draw each picture, and two scenes with it laid onto their surfaces and after the edit."""
     rows = {}
     for style in STYLES:
-        picture = np.asarray(Image.open(ROOT / f"texgs/edit/pictures/{style}.png").convert("RGB"))
+        picture = np.asarray(Image.open(ROOT / f"texgs/models/pictures/{style}.webp").convert("RGB"))
         edits = [f"{name}/scene/quick/edits/style-{style}" for name in ("vortex", "engine")]
         files = [run / f"{edit}-{recipe}/scene.yaml" for edit in edits for recipe in ("preview", "default")]
         rows[style] = [picture, *(shown(file, 512) for file in files)]

@@ -4,11 +4,11 @@ import torch
 from texgs.core import memory
 from texgs.core.errors import OutOfMemoryError
 from texgs.edit.objective import Objective, pooled
-from texgs.edit.pictures import picture
 from texgs.edit.recipe import PRESETS, Recipe, preset
 from texgs.edit.sliced_wasserstein import FeatureDistribution, PatchStatistics
 from texgs.edit.style_picture import StylePicture
 from texgs.models.nnfm import StyleFeatures, nnfm
+from texgs.models.pictures import picture
 
 STYLE = StylePicture.of(picture("weave", 64))
 EXACT = {"positions": None, "dimensions": None, "queries": None}

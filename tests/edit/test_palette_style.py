@@ -13,12 +13,12 @@ from texgs.edit import palette_style
 from texgs.edit.methods.stylerf import StyleRfKeys
 from texgs.edit.objective import Objective
 from texgs.edit.palette_style import PalettePainting, stylize_palette
-from texgs.edit.pictures import picture
 from texgs.edit.style_loop import learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.palette.networks import free_color, palette_color
 from texgs.fields.palette.rendering import points_on, shown
 from texgs.fit.palette import PaletteFit
+from texgs.models.pictures import picture
 from texgs.raster.voxels import camera_rays
 
 WEIGHTS = StyleRfKeys(nnfm=0.0, patches=50.0, variation=0.1, distillation=60)

@@ -7,7 +7,6 @@ from tests.edit.scenes import ball, plain_style, task, views
 from tests.models.networks import random_weights
 from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.methods.image import ImageKeys, run
-from texgs.edit.pictures import picture
 from texgs.edit.recipe import PRESETS, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_start import pixel_side, start_colors
@@ -18,6 +17,7 @@ from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.texels import lean, owners
+from texgs.models.pictures import picture
 from texgs.models.vgg import Vgg
 from texgs.raster.shading import MATERIAL
 from texgs.scene.scene import Scene, SceneModel

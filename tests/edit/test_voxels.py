@@ -10,10 +10,10 @@ from tests.fields.voxels.test_voxels import ball
 from tests.fit.scenes import cameras
 from texgs.edit.methods.arf import ArfKeys
 from texgs.edit.objective import Objective
-from texgs.edit.pictures import picture
 from texgs.edit.style_loop import learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.voxels import VoxelPainting, moved, object_colors, recolored_images, stylize_voxels
+from texgs.models.pictures import picture
 from texgs.raster.voxel_grid import drop_sh, unpack_rows
 from texgs.raster.voxels import render_view
 

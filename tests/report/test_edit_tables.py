@@ -176,8 +176,31 @@ def test_what_was_not_measured_says_so_and_why(tmp_path):
     text = table.markdown()
     assert "CLIP not measured: the weights of x are not on this machine." in text
     line = next(line for line in text.splitlines() if "| gold |" in line)
-    assert line.count("not measured") == 8, "CLIP, style and consistency"
+    assert line.count("not measured") == 10, "CLIP, style, consistency and places"
     assert rows(table)[-1]["geometry kept"] is None, "the segment was not measured"
+
+
+def test_looks_of_one_scene_tell_the_place_of_their_picture_among_all(tmp_path):
+    """Less the mean over both looks each is nearest to its own; a scene with one look has no place."""
+    for dataset, name, far in (
+        ("a", "glass", (1.0, 4.0, 0.5)),
+        ("a", "dots", (3.0, 3.0, 0.5)),
+        ("b", "glass", (1.0, 1.0, 1.0)),
+    ):
+        followed = {"TF01": name}
+        metrics(
+            tmp_path,
+            "edit_image",
+            EditResult(name, "image", "x", 6.0, follows="style", followed=followed),
+            dataset=dataset,
+        )
+        both = {
+            f"far_by_{kind}": dict(zip(("glass", "dots", "hub"), far, strict=True))
+            for kind in ("colors", "pattern")
+        }
+        metrics(tmp_path, "edit_metrics", EditMeasures(name, "image", 9, 9, VALUES | both), dataset=dataset)
+    places = {(row["data set"], row["edit"]): row["place, colours"] for row in rows(looks(records(tmp_path)))}
+    assert places == {("a", "glass"): 1, ("a", "dots"): 1, ("b", "glass"): None}
 
 
 def test_without_edits_there_are_no_rows(tmp_path):

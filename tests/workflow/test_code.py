@@ -103,7 +103,7 @@ def test_what_settings_name_counts(monkeypatch, changed, stages):
     code.code_digest.cache_clear()
 
 
-@pytest.mark.parametrize("ending", ["js", "png"])
+@pytest.mark.parametrize("ending", ["js", "webp"])
 def test_files_beside_a_module_that_reads_some_count(tree, tmp_path, ending):
     page = tmp_path / f"texgs/core/web/page.{ending}"
     page.parent.mkdir()

@@ -5,8 +5,8 @@ import pytest
 from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
-from texgs.edit.pictures import PICTURES
 from texgs.models.instruction import understand
+from texgs.models.pictures import PICTURES
 from texgs.workflow.edits import captions, edited_scene, looks_of
 from texgs.workflow.stage_table import STAGES
 

@@ -49,6 +49,9 @@ class Metric:
     notes: Mapping[str, str] | None = None  # words beside numbers, and the sentences that hold them
     order: int = 100  # where its columns stand; the lowest come first
     is_in_paper: bool = True  # whether tables that are as in the paper have its columns, too
+    tables: tuple[str, ...] = ()  # values that are numbers by name, which no table shows
+    # From what each look of a scene follows, and its values, to measures that it has among these looks.
+    among: Callable[[Sequence[tuple[str, Mapping[str, Any]]]], Sequence[Mapping[str, Any]]] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from texgs.fields.kinds import kinds
@@ -79,7 +80,8 @@ def looks(records: Iterable[Record[Any]]) -> Table:
     """Return the table of all measures of all edits: by pictures, by words, and others."""
     caption = (
         "Minutes of the edit alone; frames spread over the test path; NNFM and Gram distance to the style in "
-        f"views that it was not learned from. {CONSISTENCY}"
+        "views that it was not learned from; the place of its picture among the 24 of texgs, by how near "
+        f"views are to each, less the mean over all looks of the scene: 1 is the nearest. {CONSISTENCY}"
     )
     rows = sorted(rows_of(records), key=lambda row: FOLLOWED.index(row["kind"]))
     labels = [*LABELS[:4], Column("follows"), Column("lambda_s", 2, "-")]
@@ -105,13 +107,33 @@ def rows_of(records: Iterable[Record[Any]]) -> Rows:
 
 
 def pairs_of(records: Sequence[Record[Any]]) -> list[tuple[Edit, Record[EditMeasures] | None]]:
-    """Return each edit with what was measured of it."""
+    """Return each edit with what was measured of it, and its place among the looks of its data set."""
 
     def key(record: Record[Any]) -> tuple[str, str, str]:
         return record.dataset, record.label, record.result.edit
 
     measured = {key(each): each for each in of(EditMeasures, records)}
-    return [(edit, measured.get(key(edit))) for edit in of(EditResult, records)]
+    edits = of(EditResult, records)
+    by_dataset: dict[str, list[Edit]] = {}
+    for edit in edits:
+        if key(edit) in measured:
+            by_dataset.setdefault(edit.dataset, []).append(edit)
+    for looks in by_dataset.values():
+        seen = [measured[key(edit)] for edit in looks]
+        listed = [
+            (words_of(edit.result.followed), each.result.values)
+            for edit, each in zip(looks, seen, strict=True)
+        ]
+        for metric in metrics().values():
+            more = metric.among(listed) if metric.among else []
+            seen = [with_values(*pair) for pair in zip(seen, more, strict=True)] if more else seen
+        measured |= {key(edit): each for edit, each in zip(looks, seen, strict=True)}
+    return [(edit, measured.get(key(edit))) for edit in edits]
+
+
+def with_values(record: Record[EditMeasures], more: Mapping[str, Any]) -> Record[EditMeasures]:
+    """Return a record with more values."""
+    return replace(record, result=replace(record.result, values={**record.result.values, **more}))
 
 
 def row_of(edit: Edit, measured: Record[EditMeasures] | None) -> dict[str, Any]:

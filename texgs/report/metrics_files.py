@@ -166,14 +166,17 @@ def _check(path: Path, facts: Mapping[str, Any]) -> None:
 
 
 def _check_values(path: Path, values: Mapping[str, Any]) -> None:
-    """Require values of the metrics that there are, numbers for measures and words for notes."""
-    words = {name for metric in metrics().values() for name in metric.notes or {}}
-    measures = {measure.name for metric in metrics().values() for measure in metric.measures}
+    """Require values of the metrics that there are: numbers for measures, words for notes, tables."""
+    kinds: dict[str, tuple[Any, str]] = {}
+    for metric in metrics().values():
+        kinds |= dict.fromkeys((measure.name for measure in metric.measures), (int | float, "a number"))
+        kinds |= dict.fromkeys(metric.notes or {}, (str, "words"))
+        kinds |= dict.fromkeys(metric.tables, (dict, "numbers by name"))
     for key, value in values.items():
-        if key not in words | measures:
-            raise KeyError(key)
-        if not isinstance(value, str if key in words else int | float):
-            got = f"expected {'words' if key in words else 'a number'}, got {value!r:.60}"
+        kind, words = kinds[key]
+        numbers = value.values() if isinstance(value, dict) else ()
+        if not isinstance(value, kind) or not all(isinstance(x, int | float) for x in numbers):
+            got = f"expected {words}, got {value!r:.60}"
             raise ArgumentError(f"{path}: numbers.{key}: {got}; run the job again")
 
 

@@ -12,8 +12,8 @@ from PIL import Image
 from texgs.core.errors import ArgumentError
 from texgs.core.image import FORMATS
 from texgs.core.names import file_name
-from texgs.edit.pictures import PICTURES
 from texgs.edit.style_picture import read_style
+from texgs.models.pictures import PICTURES
 from texgs.viewer.scratch import scratch_folder
 
 LARGEST = 32 * 2**20  # bytes of a picture that a page sends

@@ -24,7 +24,7 @@ STAGES = "texgs.workflow.stages."
 ENGINE = "texgs.workflow."  # what else is there decides settings and inputs, which jobs are known by anyway
 NATIVE = "texgs.raster.native"  # the module that calls the native library
 READS_DATA = b"importlib.resources"  # in modules that do
-DATA = (".css", ".csv", ".html", ".j2", ".js", ".png", ".yaml")
+DATA = (".css", ".csv", ".html", ".j2", ".js", ".safetensors", ".webp", ".yaml")
 CACHE = "sources.json"  # in the cache folder
 MOST = 3000  # sources in it
 

@@ -170,8 +170,8 @@ def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
 
     Of it counts what `find` returns, see `read_style`; by default all.
     """
-    from texgs.edit.pictures import PICTURES, picture
     from texgs.edit.style_picture import StylePicture, read_style
+    from texgs.models.pictures import PICTURES, picture
 
     if name in PICTURES:
         image = picture(name)
@@ -185,7 +185,7 @@ def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
 
 def require_picture(name: str, key: str) -> None:
     """Require one of the pictures of texgs, or a file that can be read as one."""
-    from texgs.edit.pictures import PICTURES
+    from texgs.models.pictures import PICTURES
 
     if name not in PICTURES:
         picture_of(name, key)

@@ -1,6 +1,7 @@
 """Style pictures of texgs, files beside this one: own work, in which nobody else has a right.
 
-For demonstrations and tests: brush strokes, stained glass, polished marble, cloth, dots and printed fans.
+Most are computed by `python -m tools.style_pictures`, which also describes all of them for the metric
+`retrieval`.
 """
 
 from __future__ import annotations
@@ -16,7 +17,23 @@ from texgs.core.errors import ArgumentError
 if TYPE_CHECKING:
     from torch import Tensor
 
-PICTURES = ("strokes", "glass", "marble", "weave", "dots", "waves")
+PICTURES = (
+    *(
+        "strokes",
+        "glass",
+        "marble",
+        "weave",
+        "dots",
+        "waves",
+        "hatching",
+        "mosaic",
+        "bricks",
+        "scales",
+        "zebra",
+    ),
+    *("leopard", "planks", "contours", "crackle", "honeycomb", "swirls", "splatter", "knit", "halftone"),
+    *("labyrinth", "tartan", "feathers", "facets"),
+)
 SIZE = 512  # pixels of each side of a file
 
 
@@ -26,7 +43,7 @@ def picture(name: str, size: int = SIZE) -> Tensor:
 
     if name not in PICTURES:
         raise ArgumentError(f"picture: expected one of {', '.join(PICTURES)}, got {name!r}")
-    with files(__package__).joinpath(f"{name}.png").open("rb") as file, Image.open(file) as image:
+    with files(__package__).joinpath(f"{name}.webp").open("rb") as file, Image.open(file) as image:
         shown = image if size == SIZE else image.resize((size, size), Image.Resampling.LANCZOS)
-        pixels = np.asarray(shown) / 255
+        pixels = np.asarray(shown.convert("RGB")) / 255
     return torch.from_numpy(pixels.astype(np.float32)).permute(2, 0, 1).contiguous()

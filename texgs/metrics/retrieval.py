@@ -1,0 +1,137 @@
+"""How far views are from pictures as a whole, by features that no loss uses: what they would be taken for.
+
+Only the object counts. Views are compared with colours, and by the pattern alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+import torch
+from safetensors.torch import load, save_file
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.models import pictures
+from texgs.models.pictures import PICTURES, picture
+from texgs.models.vgg import Vgg
+
+LAYERS = ("relu4_3", "relu5_3")
+SIZE = 256  # pixels of the longer side of views and pictures
+SCALES = (1.0, 0.5)  # of pictures against views: a pattern may be laid on at any size
+COVERED = 0.7  # share of what a feature sees that is on the object, for it to count
+FEW = 8  # features: where fewer count, those that are a little on the object count too
+BINS = 6  # of the histogram, of each channel
+HISTOGRAM = 0.5  # weight of the histograms against a layer
+AROUND = 1 / 16  # standard deviation of what is around a pixel, in image sides: its contrast becomes 1
+LEAST = 0.02  # contrast that is not made larger
+LUMINANCE = (0.299, 0.587, 0.114)
+KNOWN = files(pictures) / "likeness.safetensors"
+
+
+@dataclass(frozen=True, eq=False)
+class Likeness:
+    """What views or pictures [...] are compared by."""
+
+    colors: Tensor  # [..., C] means and deviations of features
+    pattern: Tensor  # [..., C] the same without colours and with one contrast
+    histogram: Tensor  # [..., B] shares of colours
+
+    @classmethod
+    def stacked(cls, several: Iterable[Likeness]) -> Likeness:
+        """Return many as one, along a new first dimension."""
+        listed = list(several)
+        return cls(*(torch.stack([vars(each)[name] for each in listed]) for name in vars(listed[0])))
+
+    @property
+    def mean(self) -> Likeness:
+        """Return the mean along the first dimension."""
+        return Likeness(*(each.mean(0) for each in vars(self).values()))
+
+    def distances(self, pictures: Likeness) -> dict[str, Tensor]:
+        """Return how far pictures [P, S] are, at the scale of each at which it is nearest: by kind [P].
+
+        A layer counts by the cosine, and with colours the Hellinger distance of histograms counts too.
+        """
+        shares = (self.histogram.sqrt() - pictures.histogram.sqrt()).norm(dim=-1)
+        far = {
+            name: by_layers(getattr(self, name), getattr(pictures, name)) for name in ("colors", "pattern")
+        }
+        far["colors"] = far["colors"] + HISTOGRAM * shares
+        return {name: each.amin(dim=-1) for name, each in far.items()}
+
+
+def by_layers(ours: Tensor, others: Tensor) -> Tensor:
+    """Return the sum over layers of the cosine distances [...] of descriptions [..., C]."""
+    pairs = zip(ours.chunk(len(LAYERS), -1), others.chunk(len(LAYERS), -1), strict=True)
+    return torch.stack([1 - torch.cosine_similarity(a, b, dim=-1) for a, b in pairs]).sum(0)
+
+
+@torch.no_grad()
+def likeness(image: Tensor, where: Tensor, vgg: Vgg) -> Likeness:
+    """Describe an image [3, h, w] in [0, 1] where it shows an object [h, w] bool, in one pixel at least."""
+    own = image[:, where]
+    whole = torch.where(where, image, own.mean(1)[:, None, None])
+    edges = [torch.linspace(0, 1, BINS + 1)] * 3
+    counts = torch.histogramdd(own.T.cpu().double(), [edge.double() for edge in edges]).hist.flatten().float()
+    colors, pattern = (described(each, where, vgg) for each in (whole, contrast(whole, where)))
+    return Likeness(colors, pattern, (counts / counts.sum()).to(image.device))
+
+
+def described(image: Tensor, where: Tensor, vgg: Vgg) -> Tensor:
+    """Return mean and deviation [C] of the features of each layer on the object."""
+    parts = []
+    for layer in vgg.layers(image[None], LAYERS):
+        height, width = layer.shape[2:]
+        share = F.adaptive_avg_pool2d(where[None].float(), (height, width))[0]
+        counts = share > (COVERED if int((share > COVERED).sum()) >= FEW else 0)
+        rows = layer[0][:, counts].float()
+        parts.append(torch.cat([rows.mean(1), rows.std(1, correction=0)]))
+    return torch.cat(parts)
+
+
+def contrast(image: Tensor, where: Tensor) -> Tensor:
+    """Return an image [3, h, w] in grey, around each pixel of the object with one mean and contrast."""
+    from kornia.filters import gaussian_blur2d
+
+    sigma = AROUND * max(image.shape[1:])
+    size = 2 * round(3 * sigma) // 2 * 2 + 1
+
+    def around(x: Tensor) -> Tensor:
+        return gaussian_blur2d(x[None, None], (size, size), (sigma, sigma), "constant")[0, 0]
+
+    mask = where.to(image)
+    grey = torch.einsum("chw,c->hw", image, image.new_tensor(LUMINANCE)) * mask
+    share = around(mask).clamp_min(1e-3)
+    mean = around(grey) / share
+    deviation = (around(grey.square()) / share - mean.square()).clamp_min(0).sqrt()
+    return (0.5 + 0.2 * mask * (grey - mean) / (deviation + LEAST)).clamp(0, 1).expand(3, -1, -1)
+
+
+def picture_likeness(image: Tensor, vgg: Vgg) -> Likeness:
+    """Describe a picture [3, h, w] in [0, 1] at each of `SCALES`, [S] of them."""
+    height, width = image.shape[1:]
+    scaled = []
+    for scale in SCALES:
+        factor = scale * SIZE / max(height, width)
+        size = [max(16, round(factor * side)) for side in (height, width)]
+        small = F.interpolate(image[None], size, mode="bicubic", antialias=True)[0].clamp(0, 1)
+        scaled.append(likeness(small, torch.ones(size, dtype=torch.bool, device=image.device), vgg))
+    return Likeness.stacked(scaled)
+
+
+def write_known(vgg: Vgg) -> Path:
+    """Describe all pictures of texgs in the file beside them, which `known` reads; return the file."""
+    described = Likeness.stacked(picture_likeness(picture(name), vgg) for name in PICTURES)
+    file = Path(str(KNOWN))
+    save_file({name: x.half().contiguous() for name, x in vars(described).items()}, file)
+    return file
+
+
+def known(device: torch.device | str = "cpu") -> Likeness:
+    """Return the descriptions [P, S] of all pictures of texgs."""
+    tensors = load(KNOWN.read_bytes())
+    return Likeness(**{name: x.float().to(device) for name, x in tensors.items()})
