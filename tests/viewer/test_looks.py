@@ -19,9 +19,11 @@ from tests.viewer.test_segments import FRONT, ended
 from texgs.core.errors import ArgumentError
 from texgs.edit.material import MATERIALS
 from texgs.fields.part_edit import PartEdit
+from texgs.scene.parts import NewLook
 from texgs.scene.scene_file import read_scene
-from texgs.viewer.looks import Looks, ScratchFolders, ThrottledPreview
+from texgs.viewer.looks import THUMBNAILS, Looks, ScratchFolders, ThrottledPreview
 from texgs.viewer.messages import Look
+from texgs.viewer.page import Page
 from texgs.viewer.styles import Styles
 from texgs.viewer.work import Jobs, Stopped, Watch
 
@@ -129,22 +131,33 @@ def test_previews_of_words_are_made_by_filters_all_else_by_a_network_that_is_the
 
 
 @on_page
-async def test_textures_on_their_way_are_shown(browser, client, monkeypatch):
+async def test_textures_on_their_way_are_shown_as_opaque_as_they_become(browser, client, monkeypatch):
+    """Also those of a faint part, which the look makes more opaque."""
     monkeypatch.setattr("texgs.viewer.looks.BETWEEN", 0.0)
+    edits, tried, try_on = client.server_side.edits, [], Page.try_on
+    monkeypatch.setattr(Page, "try_on", lambda own, looks: tried.append(looks) or try_on(own, looks))
+    await browser.send(type="edit", part="TF02", key="opacity", value=0.1)
+    await browser.past("TF02 opacity 0.1")
     await browser.send(**look(parts=["TF02"], style="dots"))
     assert (await browser.next("trial"))["parts"] == ["TF02"]
     await ended(browser)
-    assert client.server_side.edits.state()["past"] == ["TF02 dots"]
+    assert edits.state()["past"] == ["TF02 opacity 0.1", "TF02 dots"]
+    *on_their_way, last = tried
+    assert last is None
+    opacity = edits.scene.models["TF02"].edit.opacity
+    assert opacity > 0.1
+    assert {each["TF02"].edit["opacity"] for each in on_their_way} == {opacity}
 
 
 def test_the_newest_texture_of_each_part_stays(tmp_path, monkeypatch):
     monkeypatch.setattr("texgs.viewer.looks.BETWEEN", 0.0)
     monkeypatch.setattr("texgs.viewer.looks.KEPT", 2)
     shown = {}
-    preview = ThrottledPreview(shown.__setitem__, ScratchFolders(tmp_path))
+    looks = {part: NewLook(None, {"opacity": 0.5}) for part in ("TF01", "TF02/core")}
+    preview = ThrottledPreview(shown.__setitem__, looks, ScratchFolders(tmp_path))
     for part in ("TF01", *5 * ["TF02/core"]):
         preview(part, lambda: ball(1))
-    assert [file.is_file() for file in shown.values()] == [True, True]
+    assert [look.texture.is_file() for look in shown.values()] == [True, True]
     assert len(list(tmp_path.rglob("*.safetensors"))) == 3, "older ones are gone"
 
 
@@ -325,14 +338,12 @@ async def test_a_preview_that_cannot_be_is_a_sentence(browser):
 
 
 @on_page
-async def test_many_previews_of_one_part_leave_that_of_another(browser, client, monkeypatch):
-    monkeypatch.setattr("texgs.viewer.looks.KEPT", 1)
-    for part in ("TF01", "TF02", "TF02"):
-        await browser.send(**look(parts=[part], style="glass", preview=True))
-        await browser.next("trial")
+async def test_a_preview_is_on_the_parts_that_are_chosen_and_on_no_others(browser, client):
     (own,) = client.server_side._pages
-    assert all(look.texture.is_file() for look in own._trial.values())
-    assert sorted(own._trial) == ["TF01", "TF02"]
+    for parts in ([], ["TF02"], ["TF01"]):
+        await browser.send(**look(parts=parts, style="glass", preview=True))
+        assert (await browser.next("trial"))["parts"] == (parts or ["TF01", "TF02"])
+        assert all(look.texture.is_file() for look in own._trial.values())
 
 
 @on_page
@@ -394,6 +405,25 @@ async def test_a_preview_takes_what_its_thumbnail_was_made_with(browser, client,
 
 
 @on_page
+async def test_a_thumbnail_is_laid_out_once_for_all_cameras(browser, client, monkeypatch):
+    """Also where as many others as there may be were made since, but not once its files are gone."""
+    made, make = [], Looks.make
+    monkeypatch.setattr(Looks, "make", lambda *words: made.append(words) or make(*words))
+    scratch = client.server_side.work._looks._scratch
+    _, first = await thumbnail(client)
+    for _ in range(THUMBNAILS - 1):
+        scratch.new("thumbnail", THUMBNAILS)
+    _, again = await thumbnail(client, preview=False)
+    camera = SHOT["camera"] | {"azimuth": SHOT["camera"]["azimuth"] + 90}
+    _, turned = await thumbnail(client, camera=camera)
+    assert first == again != turned
+    assert len(made) == 1
+    scratch.new("thumbnail", THUMBNAILS)
+    assert (await thumbnail(client))[1] == first
+    assert len(made) == 2, "its files are gone"
+
+
+@on_page
 async def test_a_thumbnail_that_cannot_be_is_a_sentence(client, browser):
     for values, message in (
         ({"style": "nothing"}, b"style: expected one of strokes"),
@@ -428,9 +458,9 @@ def test_pictures_of_a_folder(tmp_path):
 def test_a_folder_of_pictures_has_to_have_some(tmp_path):
     with pytest.raises(ArgumentError, match=r"--styles: expected a folder, got .*none \(No such file"):
         Styles(tmp_path / "none")
-    with pytest.raises(ArgumentError, match=r"--styles: expected 1 to 50 pictures .* got 0"):
+    with pytest.raises(ArgumentError, match=r"--styles: expected 1 to 50 pictures .* got 0; .* some"):
         Styles(tmp_path)
     for number in range(51):
         (tmp_path / f"{number}.png").touch()
-    with pytest.raises(ArgumentError, match="got 51"):
+    with pytest.raises(ArgumentError, match="got 51; name a folder with fewer"):
         Styles(tmp_path)

@@ -28,7 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="where scenes are saved; default beside the scene, or here for a scene of the workflow",
     )
-    parser.add_argument("--styles", type=Path, metavar="FOLDER", help="of pictures of yours, for new looks")
+    parser.add_argument(
+        "--styles", type=Path, metavar="FOLDER", help="folder of your own pictures, to choose new looks from"
+    )
     parser.add_argument("--port", type=int, help=f"default {PORT}, or another one where it is taken")
     parser.add_argument(
         "--host",

@@ -18,7 +18,6 @@ from PIL import Image
 
 from texgs.config.recipes import Edit
 from texgs.core.camera import Camera, orbit
-from texgs.core.checksum import digest
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed
 from texgs.core.names import part_file
@@ -28,13 +27,14 @@ from texgs.edit.task import EditedScene, Task, parts_with_surfels
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import write_texture
 from texgs.models.instruction import understand, vocabulary
+from texgs.models.pictures import PICTURES
 from texgs.models.weights import unusable
 from texgs.scene.frame import frame
-from texgs.scene.parts import NewLook, look_of
+from texgs.scene.parts import NewLook, look_of, with_looks
 from texgs.scene.scene import Scene
 from texgs.viewer.messages import Look, Orbit
 from texgs.viewer.scratch import scratch_folder
-from texgs.viewer.styles import Styles
+from texgs.viewer.styles import MOST, Styles
 from texgs.volume.cameras import icosphere_of
 from texgs.volume.view_set import View
 
@@ -42,10 +42,11 @@ VIEWS, SIZE = 92, 400  # that parts learn from, and pixels of their sides
 QUICK = 352  # of those along the axes, which the scene fills
 BETWEEN = 2.0  # seconds between textures on their way that are shown
 KEPT = 20  # of those of each part, and of previews: frames may be on their way
+THUMBNAILS = len(PICTURES) + 2 * MOST  # that are kept: of all pictures that there may be
 THUMBNAIL = 112  # rows of pixels
 # The first is taken whose weights are on this machine.
 FULL = ("default", "patches")  # recipes for pictures
-Show = Callable[[str, Path], None]  # of a part, and the file of its texture
+Show = Callable[[str, NewLook], None]  # of a part, and its look
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,14 +105,14 @@ class Looks:
     ) -> EditedScene:
         """Return the scene with new textures, written to a folder, which must not be there.
 
-        `show` is called with a part and the file of its texture on its way, which is gone in the end. With a
-        side, views are one from there.
+        `show` is called with a part and its look on its way, whose file is gone in the end. With a side,
+        views are one from there.
         """
         method = method_of(edit)
-        settings, preview = method.of(edit), ThrottledPreview(show, self._scratch)
         lens = scene.framed().lens().square(SIZE)
-        task = OrbitTask(settings, edit, scene, {}, output, self._device, 1, lens, "look", side=side)
-        task = self._raised(replace(task, show=preview, draws=False))
+        task = OrbitTask(method.of(edit), edit, scene, {}, output, self._device, 1, lens, "look", side=side)
+        task = self._raised(replace(task, draws=False))
+        preview = ThrottledPreview(show, looks_of(task.scene, edit.parts, scene), self._scratch)
         is_alone = not output.parent.exists()
         try:
             output.mkdir(parents=True)
@@ -120,7 +121,7 @@ class Looks:
                 f"{output}: cannot be written ({error.strerror}); start texgs view with another --folder"
             ) from error
         try:
-            return method.run(task)
+            return method.run(replace(task, show=preview))
         except BaseException:
             rmtree(output)
             if is_alone:
@@ -136,9 +137,9 @@ class Looks:
         return replace(task, scene=latest[1], settings=replace(task.settings, opacity="keep"))
 
     def preview(self, scene: Scene, asked: Look, page: int) -> dict[str, NewLook]:
-        """Return looks as a page asks for, in files that stay until it has had many of these parts."""
+        """Return looks as a page asks for, in files that stay until it has had many."""
         edit = with_parts(self.edit_of(asked), scene)
-        output = self._scratch.new(f"preview-{page}-{digest(repr(edit.parts))}")
+        output = self._scratch.new(f"preview-{page}", KEPT)
         known, looks = self._shown.get(repr(edit), (None, {}))
         if known == scene and (linked := linked_to(output, looks)):
             return linked
@@ -148,13 +149,17 @@ class Looks:
     def thumbnail(self, scene: Scene, asked: Look) -> bytes:
         """Return a small view of the scene with a look, from the camera that is asked for, as JPEG.
 
-        A preview of the look takes no time from then on, unless many others were made since.
+        A preview, and another camera, take next to no time from then on, unless many were made since.
         """
         if asked.camera is None:
             raise ArgumentError("camera: expected one to show a thumbnail from, got none")
         edit = with_parts(self.edit_of(asked), scene)
-        shown = self.make(scene, edit, self._scratch.new("thumbnail"), lambda *_: None).scene
-        self._shown[repr(edit)] = (scene, looks_of(shown, edit.parts, scene))
+        known, looks = self._shown.get(repr(edit), (None, {}))
+        if known != scene or not all(each.texture and each.texture.is_file() for each in looks.values()):
+            output = self._scratch.new("thumbnail", THUMBNAILS)
+            looks = looks_of(self.make(scene, edit, output, lambda *_: None).scene, edit.parts, scene)
+            self._shown[repr(edit)] = (scene, looks)
+        shown = with_looks(scene, looks)
         camera, file = asked.camera.camera(THUMBNAIL / asked.camera.height), io.BytesIO()
         Image.fromarray(frame(shown.open(self._device), camera, shown)).save(file, "JPEG", quality=90)
         return file.getvalue()
@@ -170,25 +175,26 @@ class ScratchFolders:
     def __init__(self, parent: Path) -> None:
         self._parent, self._counts = parent, Counter[str]()
 
-    def new(self, kind: str) -> Path:
-        """Return a place for a folder."""
+    def new(self, kind: str, kept: int) -> Path:
+        """Return a place for a folder, of which so many are kept."""
         self._counts[kind] += 1
-        rmtree(self._parent / kind / f"{self._counts[kind] - KEPT}", ignore_errors=True)
+        rmtree(self._parent / kind / f"{self._counts[kind] - kept}", ignore_errors=True)
         return self._parent / kind / f"{self._counts[kind]}"
 
 
 class ThrottledPreview:
-    """Parts on their way, of which some are written and shown."""
+    """Parts on their way, of which some are written and shown with all else of their looks."""
 
-    def __init__(self, show: Show, folders: ScratchFolders) -> None:
-        self._show, self._folders, self._latest = show, folders, monotonic()
+    def __init__(self, show: Show, looks: Mapping[str, NewLook], folders: ScratchFolders) -> None:
+        self._show, self._looks, self._folders, self._latest = show, looks, folders, monotonic()
 
     def __call__(self, part: str, model: Callable[[], Surfels]) -> None:
         """Show a part, unless one was shown a moment ago."""
         if monotonic() - self._latest < BETWEEN:
             return
         name = part_file("look", part)
-        self._show(part, write_texture(self._folders.new(Path(name).stem) / name, model()))
+        file = write_texture(self._folders.new(Path(name).stem, KEPT) / name, model())
+        self._show(part, replace(self._looks[part], texture=file))
         self._latest = monotonic()
 
 
@@ -212,7 +218,7 @@ def linked_to(folder: Path, looks: Mapping[str, NewLook]) -> dict[str, NewLook]:
                 linked[part] = replace(look, texture=folder / look.texture.name)
                 (folder / look.texture.name).hardlink_to(look.texture)
     except OSError:  # a file is gone, or the system has no links
-        rmtree(folder)
+        rmtree(folder, ignore_errors=True)
         return {}
     return linked
 

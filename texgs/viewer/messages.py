@@ -154,7 +154,7 @@ class Look:
     instruction: str = ""  # "" with a picture
     sphere: bool = False  # the picture is of a lit sphere, and goes onto surfaces by their normals
     preview: bool = False  # show on this page what it would be like, and change nothing
-    camera: Orbit | None = None  # of a thumbnail, and from whose side words are previewed; none: from all
+    camera: Orbit | None = None  # of a thumbnail; or the side from which words are previewed, all by default
     type: Literal["look"] = tag("look")
 
 

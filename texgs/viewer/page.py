@@ -146,6 +146,7 @@ class Page:
                 return
             looks = await self._work.preview(asked, self.number)
             if asked is self._tried:
+                self._trial = {}  # of parts that are no longer chosen
                 self.try_on(looks)
         except Exception as error:  # whatever it is, the server goes on
             self.tell_error(error, **({"mask": asked.id} if isinstance(asked, Mask) else {}))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +135,7 @@ class Server:
         """Return a small view of the scene with a picture laid on."""
         try:
             asked = parse(request.query.get("look", ""), messages.LOOKS)
-            picture = await self.work.thumbnail(asked)
+            picture = await self.work.thumbnail(replace(asked, preview=True))  # never by a full recipe
         except TexgsError as error:
             raise web.HTTPBadRequest(text=str(error)) from error
         return web.Response(body=picture, content_type="image/jpeg")

@@ -79,8 +79,8 @@ def pictures_in(folder: Path) -> dict[str, Path]:
     endings = {end for end, kind in Image.registered_extensions().items() if kind in FORMATS}
     pictures = {path.name: path for path in files if path.suffix.lower() in endings}
     if not 0 < len(pictures) <= MOST:
-        few = f"expected 1 to {MOST} pictures (.png, .jpg, .webp, ...) in {folder}"
-        raise ArgumentError(f"--styles: {few}, got {len(pictures)}")
+        few = f"expected 1 to {MOST} pictures (.png, .jpg, .webp, ...) in {folder}, got {len(pictures)}"
+        raise ArgumentError(f"--styles: {few}; name a folder with {'fewer' if pictures else 'some'}")
     return pictures
 
 

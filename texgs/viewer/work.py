@@ -1,4 +1,4 @@
-"""What pages ask for that takes a while, one thing at a time: segments, new looks, files."""
+"""What pages ask for that takes a while: one job at a time, with previews and thumbnails beside it."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Work:
     ) -> None:
         self._edits, self._changing, self._changed = edits, changing, changed
         self._device = device
-        self._jobs, self._previews, self._thumbnails = Jobs(), Jobs(), Jobs()
+        self._jobs, self._previews, self._thumbnails = Jobs(), Jobs(), Jobs()  # side by side
         self.styles = Styles(styles)
         self._segmenter, self._looks = Segmenter(device), Looks(self.styles, device)
         self.downloads = Downloads(frames, edits)
@@ -110,7 +110,7 @@ class Work:
         return await self._jobs.run(partial(self._segmenter.mask, self._edits.scene, asked), Watch())
 
     async def preview(self, asked: Look, page: int) -> dict[str, NewLook]:
-        """Return looks of parts with a picture laid on, while a job may be at work."""
+        """Return looks for a preview, of a picture or words, while a job may be at work."""
         work = partial(self._looks.preview, self._edits.scene, asked, page)
         return await self._previews.run(work, Watch(), is_urgent=True)
 
@@ -207,8 +207,8 @@ class Work:
         name, output = asked.style or asked.instruction, self._edits.new_folder(edit.name)
         edit = await asyncio.to_thread(with_parts, edit, scene)
 
-        def show(part: str, file: Path) -> None:
-            loop.call_soon_threadsafe(page.try_on, {part: NewLook(file)})
+        def show(part: str, look: NewLook) -> None:
+            loop.call_soon_threadsafe(page.try_on, {part: look})
 
         start = monotonic()
         try:

@@ -81,11 +81,11 @@ export class LookTool {
       const answer = await fetch(`thumbnail.jpg?${new URLSearchParams({ look })}`).catch(() => null);
       if (!answer) return;
       this.#painted.set(picture, key);
+      label.classList.toggle("wrong", !answer.ok);
       if (answer.ok) {
         URL.revokeObjectURL(picture.src);
         picture.src = URL.createObjectURL(await answer.blob());
       } else {
-        label.classList.add("wrong");
         notices.tell(await answer.text(), "error");
       }
     }
