@@ -16,17 +16,18 @@ from time import monotonic
 
 import torch
 
+from texgs.core.errors import ArgumentError
 from texgs.edit.keys import EditKeys
 from texgs.edit.methods.image import ImageKeys, run
 from texgs.edit.methods.style import picture_of
-from texgs.metrics.edits.retrieval import VIEWS, named
-from texgs.metrics.retrieval import LAYERS, SIZE, Likeness, known, likeness, picture_likeness
+from texgs.metrics.edits.retrieval import named
+from texgs.metrics.retrieval import LAYERS, Likeness, known, scene_likeness
 from texgs.models.pictures import PICTURES
 from texgs.models.vgg import Vgg
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.viewer.looks import OrbitTask
-from texgs.volume.cameras import spiral
+from tools.style_pictures import picture_likeness
 
 CPU = torch.device("cpu")
 
@@ -45,16 +46,6 @@ def edited(scene: Scene, style: str, recipe: str, opacity: str, folder: Path) ->
     return made, monotonic() - start
 
 
-def described(scene: Scene, vgg: Vgg) -> Likeness:
-    """Return what framed views of a scene are compared by."""
-    shown, views = scene.open(), []
-    for camera in spiral(VIEWS, *scene.framed().lens().square(SIZE)):
-        view = shown.render(camera, scene.light, scene.edits)
-        where = view.alpha > min(0.5, 0.5 * float(view.alpha.max()))
-        views.append(likeness(view.color.clamp(0, 1).permute(2, 0, 1), where, vgg))
-    return Likeness.stacked(views).mean
-
-
 def gallery(files: list[str], vgg: Vgg) -> tuple[list[str], Likeness]:
     """Return the names and descriptions of the pictures of texgs and of files."""
     own, more = known(), [picture_likeness(picture_of(file, "--styles").image, vgg) for file in files]
@@ -70,13 +61,20 @@ def rows_of(arguments: argparse.Namespace, vgg: Vgg) -> list[dict[str, object]]:
     rows = []
     for file in arguments.scenes:
         scene = read_scene(file)
-        title = f"{file.parts[-5]} {'+'.join(scene.models)}"
+        title = f"{file.resolve().parts[-5:][0]} {'+'.join(scene.models)}"
         for recipe in arguments.recipes.split(","):
             looks, told = [], []
             for style in styles:
-                folder = arguments.folder / title.replace(" ", "-") / f"{Path(style).stem}-{recipe}"
+                folder = (
+                    arguments.folder
+                    / title.replace(" ", "-")
+                    / f"{Path(style).stem}-{recipe}-{arguments.opacity}"
+                )
                 made, seconds = edited(scene, style, recipe, arguments.opacity, folder)
-                far = described(made, vgg).distances(pictures)
+                seen = scene_likeness(made, made.open(), vgg)
+                if seen is None:
+                    raise ArgumentError(f"{folder}: expected a scene that shows something, got nothing")
+                far = seen.distances(pictures)
                 values = {
                     f"far_by_{kind}": dict(zip(names, x.tolist(), strict=True)) for kind, x in far.items()
                 }
@@ -105,7 +103,7 @@ def main() -> None:
     rows = rows_of(arguments, Vgg.load(layers=LAYERS))
     for key in sorted({(str(row["scene"]), str(row["recipe"])) for row in rows}):
         own = [row for row in rows if (row["scene"], row["recipe"]) == key]
-        shares = [fmean(row[f"place_by_{kind}"] == 1 for row in own) for kind in ("colors", "pattern")]
+        shares = [fmean(row.get(f"place_by_{kind}") == 1 for row in own) for kind in ("colors", "pattern")]
         print(*key, f"{len(own)} looks: first by colours {shares[0]:.0%}, by the pattern {shares[1]:.0%}")
     if arguments.output:
         pd.DataFrame(rows).to_csv(arguments.output, index=False)

@@ -10,11 +10,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import torch
 from PIL import Image
+from safetensors.torch import save_file
 from scipy.ndimage import gaussian_filter, zoom
 from scipy.spatial import cKDTree
+from torch import Tensor
+from torch.nn import functional as F
 
-from texgs.metrics.retrieval import LAYERS, write_known
+from texgs.metrics.retrieval import KNOWN, LAYERS, SCALES, Likeness, likeness
+from texgs.metrics.retrieval import SIZE as SIDE
+from texgs.models.pictures import PICTURES, picture
 from texgs.models.vgg import Vgg
 
 FOLDER = Path(__file__).parents[1] / "texgs" / "models" / "pictures"
@@ -310,6 +316,27 @@ def facets(random: Random) -> np.ndarray:
     shade = 7 * (tilt * (np.stack([Y, X], axis=-1) - middle)).sum(axis=-1)
     tone = 0.5 + 0.22 * random.normal(size=len(points))[index] + shade
     return ramp(tone, "2b1055", "6a2fa0", "b86adf", "f0c6f5", "ffffff")
+
+
+@torch.no_grad()
+def picture_likeness(image: Tensor, vgg: Vgg) -> Likeness:
+    """Describe a picture [3, h, w] in [0, 1] at each of `SCALES`, [S] of them."""
+    height, width = image.shape[1:]
+    scaled = []
+    for scale in SCALES:
+        factor = scale * SIDE / max(height, width)
+        size = [max(16, round(factor * side)) for side in (height, width)]
+        small = F.interpolate(image[None], size, mode="bicubic", antialias=True)[0].clamp(0, 1)
+        scaled.append(likeness(small, torch.ones(size, dtype=torch.bool, device=image.device), vgg))
+    return Likeness.stacked(scaled)
+
+
+def write_known(vgg: Vgg) -> Path:
+    """Describe all pictures of texgs in the file that the metric `retrieval` reads; return the file."""
+    described = Likeness.stacked(picture_likeness(picture(name), vgg) for name in PICTURES)
+    file = Path(str(KNOWN))
+    save_file({name: x.half().contiguous() for name, x in vars(described).items()}, file)
+    return file
 
 
 def main() -> None:

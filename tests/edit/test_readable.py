@@ -6,17 +6,20 @@ import pytest
 import torch
 
 from tests.edit.scenes import ball, on_sphere, sphere_points, task
+from tests.fields.test_sizes import gaussians
 from texgs.core.errors import ArgumentError
 from texgs.edit.keys import EditKeys
 from texgs.edit.methods.image import ImageKeys, run
 from texgs.edit.methods.text import TextKeys
 from texgs.edit.readable import KEPT, LARGEST, READABLE, SHOWS, SIZE, VIEWS, raised, readable_factors
+from texgs.fields.gaussians.files import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.raster import rasterize
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel, SceneSegment
+from texgs.scene.segment_file import write_segment
 from texgs.volume.cameras import icosphere_of
 
 FAINT = -2.2  # raw opacity: 0.1
@@ -99,6 +102,34 @@ def test_what_is_inside_keeps_half_of_its_pixels(tmp_path):
     assert factors["core"] == 1.0
     assert all(1 < factors[name] < alone[name] for name in shells)
     assert kept(factors) >= KEPT > kept({name: 1.25 * factors[name] for name in shells})
+
+
+def test_models_without_texture_stay_visible_too_and_other_fields_are_refused(tmp_path):
+    names = {"texels", "sizes", "offsets", "palette"}
+    core = sized(0.2, 4.0)
+    plain = {name: x for name, x in core.parameters.items() if name not in names}
+    shells = {name: sized(radius, FAINT) for name, radius in (("a", 0.5), ("b", 0.55), ("c", 0.6))}
+    textured, mixed = (
+        readable_factors(scene_of(tmp_path, core=each, **shells), list(shells), "cpu")
+        for each in (core, Surfels(plain, core.shading))
+    )
+    assert textured == mixed
+    other = SceneModel(write_gaussians(tmp_path / "gaussians", gaussians(20)))
+    with pytest.raises(ArgumentError, match="expected surfels, got gaussians; fit surfels for this"):
+        readable_factors(Scene({"x": other}), ["x"], "cpu")
+
+
+def test_segments_of_a_model_have_factors_of_their_own(tmp_path, monkeypatch):
+    """Its half in front is faint; the other has a mean alpha of 0.87, for its surfels have soft rims."""
+    monkeypatch.setattr("texgs.edit.readable.READABLE", 0.8)
+    model = ball()
+    front = model.parameters["means"][:, 2] > 0
+    opacities = torch.where(front, FAINT, 4.0)
+    scene = scene_of(tmp_path, x=Surfels({**model.parameters, "opacities": opacities}, model.shading))
+    file = write_segment(tmp_path / "front.safetensors", scene.models["x"].open()[0], front)
+    parts = replace(scene.models["x"], segments={"front": SceneSegment(file)})
+    factors = readable_factors(replace(scene, models={"x": parts}), ["x", "x/front"], "cpu")
+    assert factors["x"] == 1.0 < factors["x/front"]
 
 
 def test_the_factor_is_on_top_of_what_was_edited_and_only_of_parts_that_are_styled(tmp_path):

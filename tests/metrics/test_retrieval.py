@@ -9,9 +9,10 @@ from tests.metrics.test_edit_metrics import MISSING, scenes, subject  # noqa: F4
 from tests.models.networks import random_weights
 from tests.real_data import real_data
 from texgs.metrics.edits import retrieval
-from texgs.metrics.retrieval import LAYERS, LUMINANCE, Likeness, contrast, known, likeness, picture_likeness
+from texgs.metrics.retrieval import LAYERS, LUMINANCE, Likeness, contrast, known, likeness
 from texgs.models.pictures import PICTURES, picture
 from texgs.models.vgg import Vgg
+from tools.style_pictures import picture_likeness
 
 
 @pytest.fixture(scope="module")
@@ -107,15 +108,17 @@ def test_a_picture_that_is_near_to_all_looks_is_no_answer():
     places = retrieval.named([*looks, third, without])
     assert places[2:] == [{}, {}]
     assert places[0].keys() == places[1].keys() == {"place_by_colors", "place_by_pattern"}
+    assert retrieval.named([*looks, look("glass", other=1.0)])[2] == {}, "compared with other pictures"
     assert retrieval.named(looks[:1]) == [{}]
     assert retrieval.named([]) == []
 
 
 def test_an_edited_scene_tells_its_distances_to_all_pictures(scenes, deep, monkeypatch):  # noqa: F811
-    monkeypatch.setattr("texgs.models.vgg.Vgg.load", lambda *given, **options: deep)
+    monkeypatch.setattr("texgs.metrics.metric.MeasuredScene.vgg", deep)
     given = [scenes["clear"]] * 3
     measured = retrieval.run(subject(*given, weights={**MISSING, "vgg16": "here"}))
     assert measured.keys() == {"far_by_colors", "far_by_pattern"}
     assert list(measured["far_by_colors"]) == list(PICTURES)
     assert all(0 < x < 5 for far in measured.values() for x in far.values())
+    monkeypatch.undo()
     assert retrieval.run(subject(*given, weights=MISSING)) == {}

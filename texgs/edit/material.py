@@ -14,7 +14,7 @@ from texgs.models.instruction import understand
 
 
 class Highlights(NamedTuple):
-    """Of a material."""
+    """Highlights that a material has."""
 
     specular: float  # k_s
     shininess: float  # beta
@@ -54,5 +54,6 @@ def highlights_of(instruction: str, model: Surfels, surfels: Tensor | None = Non
     for key in ("specular", "shininess"):
         values = own[key] if surfels is None or len(own[key]) == 1 else own[key][surfels]
         wanted, fitted = getattr(named, key), float(values.median())
-        edit[key] = min(wanted / fitted, MOST) if fitted else MOST
+        if fitted:  # else no factor reaches it
+            edit[key] = min(wanted / fitted, MOST)
     return edit

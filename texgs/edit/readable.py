@@ -6,7 +6,7 @@ brings the front layer out. It also hides what is inside, of which enough has to
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
 from typing import TYPE_CHECKING, Any
@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
     from texgs.core.camera import Camera
     from texgs.edit.task import Task
-    from texgs.fields.field import Composed
-    from texgs.raster import Render
+    from texgs.fields.surfels.composition import Composition
     from texgs.scene.scene import Scene
 
 READABLE = 0.9  # mean alpha of a part from which its pattern is plain
@@ -32,7 +31,7 @@ KEPT = 0.5  # share of its pixels that every part keeps
 SHOWS = 0.1  # share of a pixel's colour from which the pixel shows a part
 VIEWS, SIZE = 6, 100  # that tell, and pixels of their sides
 STEPS = 5  # of a bisection
-BLACK, *PRIMARIES = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+CHANNELS = 32  # that are rasterized at once
 
 
 @dataclass(frozen=True)
@@ -106,75 +105,81 @@ def readable_factors(scene: Scene, parts: Sequence[str], device: torch.device | 
 class Sight:
     """What a few views around a scene show of each part."""
 
-    composed: Composed
+    composed: Composition
     edits: Mapping[str, PartEdit]  # by part, in the order of the composition
+    marks: Tensor  # [N, P] 1 for the part of each surfel
     cameras: Sequence[Camera]
 
     @classmethod
     def of(cls, scene: Scene, device: torch.device | str) -> Sight:
-        """Return that of a scene, framed as its pictures are."""
-        from texgs.scene.parts import entry_of
+        """Return that of a scene of surfels, framed as its pictures are."""
+        import torch
+
+        from texgs.fields.surfels.composition import Composition
         from texgs.volume.cameras import icosphere_of
 
-        names = [
-            part
-            for name, entry in scene.models.items()
-            for part in (name, *(f"{name}/{segment}" for segment in entry.segments))
-        ]
-        composed = scene.open(device)
+        opened = [entry.surfels() for entry in scene.models.values()]
+        models, masks = [model.to(device) for model, _ in opened], [own for _, own in opened]
+        composed = Composition(models, [[mask.to(device) for mask in own] for own in masks])
+        names: list[str] = []
+        numbers = []
+        for part, (name, entry) in zip(composed.parts, scene.models.items(), strict=True):
+            own = torch.zeros(len(part.model)).long().to(device) if part.labels is None else part.labels
+            numbers.append(len(names) + own)
+            names += [name, *(f"{name}/{segment}" for segment in entry.segments)]
+        marks = torch.nn.functional.one_hot(torch.cat(numbers), len(names)).float()
         cameras = icosphere_of(2 * VIEWS, scene.framed(composed).lens().square(SIZE))[::2]
-        edits = {name: entry_of(scene, name).edit for name in names}
-        return cls(composed, edits, [camera.to(composed.device) for camera in cameras])
+        edits = dict(zip(names, scene.edits, strict=True))
+        return cls(composed, edits, marks, [camera.to(device) for camera in cameras])
 
     def readable(self, part: str) -> float:
         """Return the factor from 1 to `LARGEST` that makes a part alone as opaque as is readable."""
+        from texgs.edit.canvas import weighted_mean
+
         alone = {name: replace(edit, visible=name == part) for name, edit in self.edits.items()}
 
         def is_readable(share: float) -> bool:
             opacity = LARGEST ** (1 - share) * alone[part].opacity
-            return self.alpha({**alone, part: replace(alone[part], opacity=opacity)}) >= READABLE
+            shares = self.shares({**alone, part: replace(alone[part], opacity=opacity)})
+            return weighted_mean(each.sum(-1) for each in shares) >= READABLE
 
         return float(LARGEST ** (1 - largest(is_readable)))
 
-    def alpha(self, edits: Mapping[str, PartEdit]) -> float:
-        """Return the mean alpha of what edits leave, see `weighted_mean`."""
-        from texgs.edit.canvas import weighted_mean
-
-        return weighted_mean(self.render(camera, edits).alpha for camera in self.cameras)
-
     def pixels(self, factors: Mapping[str, float]) -> Tensor:
-        """Return how many pixels show each part [P] with factors on some opacities.
-
-        Colours without light are linear in the palettes: a channel of one that is 1 in place of 0 adds the
-        share that its part has of the pixel.
-        """
+        """Return how many pixels show each part [P] with factors on some opacities."""
         import torch
 
-        black = {
-            name: replace(edit, palette=BLACK, opacity=factors.get(name, 1.0) * edit.opacity)
+        edits = {
+            name: replace(edit, opacity=factors.get(name, 1.0) * edit.opacity)
             for name, edit in self.edits.items()
         }
-        counts = torch.zeros(len(black))
-        names = list(black)
-        for camera in self.cameras:
-            dark = self.render(camera, black).color
-            for start in range(0, len(names), 3):
-                three = names[start : start + 3]
-                marked = {
-                    name: replace(black[name], palette=color)
-                    for name, color in zip(three, PRIMARIES, strict=False)
-                }
-                share = self.render(camera, {**black, **marked}).color - dark
-                counts[start : start + 3] += (share > SHOWS).sum(dim=(0, 1))[: len(three)].cpu()
-        return counts
+        return torch.stack([(each > SHOWS).sum(dim=(0, 1)) for each in self.shares(edits)]).sum(0)
 
-    def render(self, camera: Camera, edits: Mapping[str, PartEdit]) -> Render:
-        """Render a view of bare colours."""
-        return self.composed.render(camera, edits=[*edits.values()], look="unshaded")
+    def shares(self, edits: Mapping[str, PartEdit]) -> Iterator[Tensor]:
+        """Yield of each view what share of its pixels each part makes up [H, W, P]."""
+        import torch
+
+        from texgs.fields.surfels.composition import by_part
+        from texgs.raster import rasterize
+
+        composed = self.composed
+        edited = zip(composed.parts, by_part(composed.parts, [*edits.values()]), strict=True)
+        splats = composed.means, composed.quats, composed.scales
+        opacities = torch.cat([part.opacity(own) for part, own in edited])
+        for camera in self.cameras:
+            planes = [
+                rasterize(
+                    *(*splats, opacities, camera.viewmat, camera.K, camera.width, camera.height),
+                    features=marks.contiguous(),
+                    options=composed.options,
+                ).color
+                for marks in self.marks.split(CHANNELS, dim=1)
+            ]
+            yield torch.cat(planes, dim=-1)
 
 
 def largest(holds: Callable[[float], bool]) -> float:
-    """Return the largest share in [0, 1] for which something holds that holds up to some share."""
+    """Return the largest share in [0, 1] at which `holds` is true; it is up to some share, and not beyond."""
     if holds(1.0):
         return 1.0
     low, step = 0.0, 0.5

@@ -94,8 +94,8 @@ class Task(Generic[Settings]):
         return replace(self.settings, **changes)  # type: ignore[type-var]
 
     def opacity_of(self, part: str) -> float:
-        """Return the factor on the opacity of a part that the scene has."""
-        return entry_of(self.scene, part).edit.opacity
+        """Return the factor on the opacity of a part that the scene has; 1 for a part that it fades away."""
+        return entry_of(self.scene, part).edit.opacity or 1.0
 
     def title_of(self, part: str) -> str:
         """Return the title of a progress bar."""

@@ -8,19 +8,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.resources import files
-from pathlib import Path
 
 import torch
-from safetensors.torch import load, save_file
+from safetensors.torch import load
 from torch import Tensor
 from torch.nn import functional as F
 
-from texgs.models import pictures
-from texgs.models.pictures import PICTURES, picture
+from texgs.fields.field import Composed
 from texgs.models.vgg import Vgg
+from texgs.scene.scene import Scene
+from texgs.volume.cameras import spiral
 
 LAYERS = ("relu4_3", "relu5_3")
-SIZE = 256  # pixels of the longer side of views and pictures
+VIEWS, SIZE = 8, 256  # of a scene, and pixels of the longer side of views and pictures
 SCALES = (1.0, 0.5)  # of pictures against views: a pattern may be laid on at any size
 COVERED = 0.7  # share of what a feature sees that is on the object, for it to count
 FEW = 8  # features: where fewer count, those that are a little on the object count too
@@ -29,7 +29,7 @@ HISTOGRAM = 0.5  # weight of the histograms against a layer
 AROUND = 1 / 16  # standard deviation of what is around a pixel, in image sides: its contrast becomes 1
 LEAST = 0.02  # contrast that is not made larger
 LUMINANCE = (0.299, 0.587, 0.114)
-KNOWN = files(pictures) / "likeness.safetensors"
+KNOWN = files(__package__) / "likeness.safetensors"  # by `python -m tools.style_pictures`
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +75,7 @@ def likeness(image: Tensor, where: Tensor, vgg: Vgg) -> Likeness:
     """Describe an image [3, h, w] in [0, 1] where it shows an object [h, w] bool, in one pixel at least."""
     own = image[:, where]
     whole = torch.where(where, image, own.mean(1)[:, None, None])
-    edges = [torch.linspace(0, 1, BINS + 1)] * 3
-    counts = torch.histogramdd(own.T.cpu().double(), [edge.double() for edge in edges]).hist.flatten().float()
+    counts = torch.histogramdd(own.T.cpu(), [BINS] * 3, range=[0.0, 1.0] * 3).hist.flatten()
     colors, pattern = (described(each, where, vgg) for each in (whole, contrast(whole, where)))
     return Likeness(colors, pattern, (counts / counts.sum()).to(image.device))
 
@@ -111,27 +110,19 @@ def contrast(image: Tensor, where: Tensor) -> Tensor:
     return (0.5 + 0.2 * mask * (grey - mean) / (deviation + LEAST)).clamp(0, 1).expand(3, -1, -1)
 
 
-def picture_likeness(image: Tensor, vgg: Vgg) -> Likeness:
-    """Describe a picture [3, h, w] in [0, 1] at each of `SCALES`, [S] of them."""
-    height, width = image.shape[1:]
-    scaled = []
-    for scale in SCALES:
-        factor = scale * SIZE / max(height, width)
-        size = [max(16, round(factor * side)) for side in (height, width)]
-        small = F.interpolate(image[None], size, mode="bicubic", antialias=True)[0].clamp(0, 1)
-        scaled.append(likeness(small, torch.ones(size, dtype=torch.bool, device=image.device), vgg))
-    return Likeness.stacked(scaled)
-
-
-def write_known(vgg: Vgg) -> Path:
-    """Describe all pictures of texgs in the file beside them, which `known` reads; return the file."""
-    described = Likeness.stacked(picture_likeness(picture(name), vgg) for name in PICTURES)
-    file = Path(str(KNOWN))
-    save_file({name: x.half().contiguous() for name, x in vars(described).items()}, file)
-    return file
-
-
 def known(device: torch.device | str = "cpu") -> Likeness:
     """Return the descriptions [P, S] of all pictures of texgs."""
     tensors = load(KNOWN.read_bytes())
     return Likeness(**{name: x.float().to(device) for name, x in tensors.items()})
+
+
+@torch.no_grad()
+def scene_likeness(scene: Scene, shown: Composed, vgg: Vgg) -> Likeness | None:
+    """Describe framed views of a scene, which is opened, on a path of their own; None where nothing shows."""
+    views = []
+    for camera in spiral(VIEWS, *scene.framed(shown).lens().square(SIZE)):
+        view = shown.render(camera.to(shown.device), scene.light, scene.edits)
+        where = view.alpha > min(0.5, 0.5 * float(view.alpha.max()))
+        if bool(where.any()):
+            views.append(likeness(view.color.clamp(0, 1).permute(2, 0, 1), where, vgg))
+    return Likeness.stacked(views).mean if views else None

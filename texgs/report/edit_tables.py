@@ -8,6 +8,7 @@ from typing import Any
 
 from texgs.fields.kinds import kinds
 from texgs.metrics.metric import Measure, metrics
+from texgs.models.pictures import PICTURES
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import DATA, LABEL, THEIRS, cells, in_order, mean_rows, paper, paper_file
 from texgs.report.results import EditMeasures, EditResult
@@ -79,9 +80,10 @@ def compared(records: Iterable[Record[Any]], follows: str) -> Rows:
 def looks(records: Iterable[Record[Any]]) -> Table:
     """Return the table of all measures of all edits: by pictures, by words, and others."""
     caption = (
-        "Minutes of the edit alone; frames spread over the test path; NNFM and Gram distance to the style in "
-        "views that it was not learned from; the place of its picture among the 24 of texgs, by how near "
-        f"views are to each, less the mean over all looks of the scene: 1 is the nearest. {CONSISTENCY}"
+        "Minutes of the edit alone; eight frames spread over the test path; NNFM and Gram distance to the "
+        "style in views that it was not learned from; the place of its picture among the "
+        f"{len(PICTURES)} of texgs, by how near views are to each, less the mean over the scene's looks, two "
+        f"at least: 1 is the nearest. {CONSISTENCY}"
     )
     rows = sorted(rows_of(records), key=lambda row: FOLLOWED.index(row["kind"]))
     labels = [*LABELS[:4], Column("follows"), Column("lambda_s", 2, "-")]
@@ -107,27 +109,25 @@ def rows_of(records: Iterable[Record[Any]]) -> Rows:
 
 
 def pairs_of(records: Sequence[Record[Any]]) -> list[tuple[Edit, Record[EditMeasures] | None]]:
-    """Return each edit with what was measured of it, and its place among the looks of its data set."""
+    """Return each edit with what was measured of it, also among the looks of its scene."""
 
     def key(record: Record[Any]) -> tuple[str, str, str]:
         return record.dataset, record.label, record.result.edit
 
     measured = {key(each): each for each in of(EditMeasures, records)}
     edits = of(EditResult, records)
-    by_dataset: dict[str, list[Edit]] = {}
+    by_scene: dict[tuple[str, str], list[Edit]] = {}
     for edit in edits:
         if key(edit) in measured:
-            by_dataset.setdefault(edit.dataset, []).append(edit)
-    for looks in by_dataset.values():
-        seen = [measured[key(edit)] for edit in looks]
-        listed = [
-            (words_of(edit.result.followed), each.result.values)
-            for edit, each in zip(looks, seen, strict=True)
-        ]
+            by_scene.setdefault((edit.dataset, edit.label), []).append(edit)
+    for own in by_scene.values():
+        seen = [measured[key(edit)] for edit in own]
+        pictures = [words_of(edit.result.followed) if edit.result.follows == "style" else "" for edit in own]
+        listed = [(name, each.result.values) for name, each in zip(pictures, seen, strict=True)]
         for metric in metrics().values():
             more = metric.among(listed) if metric.among else []
             seen = [with_values(*pair) for pair in zip(seen, more, strict=True)] if more else seen
-        measured |= {key(edit): each for edit, each in zip(looks, seen, strict=True)}
+        measured |= {key(edit): each for edit, each in zip(own, seen, strict=True)}
     return [(edit, measured.get(key(edit))) for edit in edits]
 
 

@@ -62,7 +62,7 @@ def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
 
 @dataclass(frozen=True)
 class NewLook:
-    """What is another about a part that was given a look."""
+    """What a new look changes about a part."""
 
     texture: Path | None  # file; None: what the part was fitted with
     edit: Mapping[str, Any] = field(default_factory=dict)  # values of a `PartEdit`

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def run(measured: MeasuredScene) -> dict[str, bool]:
-    """Compare what decides where models are, bit for bit: then all views have the same depth and alpha."""
+    """Compare the stored geometry of all models; factors on opacities and hidden parts do not count."""
     from torch import equal
 
     before, after = map(geometry, measured.scenes)

@@ -5,36 +5,22 @@ From these distances tables tell the place of the picture that a look follows, s
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from texgs.metrics.metric import Measure, MeasuredScene, Metric
 
-VIEWS = 8  # framed, along a path of their own
-
 
 def run(measured: MeasuredScene) -> dict[str, Any]:
     """Measure distances of the scene as it is shown; nothing without weights, or where it shows nothing."""
-    import torch
-
-    from texgs.metrics.retrieval import LAYERS, SIZE, Likeness, known, likeness
+    from texgs.metrics.retrieval import known, scene_likeness
     from texgs.models.pictures import PICTURES
-    from texgs.models.vgg import Vgg
-    from texgs.volume.cameras import spiral
 
-    if measured.weights["vgg16"] is None:
+    seen = measured.vgg and scene_likeness(measured.after, measured.shown, measured.vgg)
+    if not seen:
         return {}
-    scene, shown = measured.after, measured.shown
-    vgg = Vgg.load(None, shown.device, LAYERS, torch.float32)
-    described = []
-    for camera in spiral(VIEWS, *scene.framed(shown).lens().square(SIZE)):
-        view = shown.render(camera.to(shown.device), scene.light, scene.edits)
-        where = view.alpha > min(0.5, 0.5 * float(view.alpha.max()))
-        if bool(where.any()):
-            described.append(likeness(view.color.clamp(0, 1).permute(2, 0, 1), where, vgg))
-    if not described:
-        return {}
-    far = Likeness.stacked(described).mean.distances(known(shown.device))
+    far = seen.distances(known(measured.shown.device))
     return {f"far_by_{kind}": dict(zip(PICTURES, each.tolist(), strict=True)) for kind, each in far.items()}
 
 
@@ -42,23 +28,24 @@ def named(looks: Sequence[tuple[str, Mapping[str, Any]]]) -> list[dict[str, int]
     """Return the place of the picture that each look of a scene follows, 1 for the nearest, by measures.
 
     A picture that is near to all looks says little about one, so the mean over the looks is taken from the
-    distances to it. It takes two looks at least.
+    distances to it. It takes two looks at least, that were compared with the same pictures.
 
     Args:
         looks: the picture of each, and what was measured of it. One without distances, or of another picture
-            than those of texgs, has no place.
+            than those compared, has no place.
     """
     import numpy as np
 
     places: list[dict[str, int]] = [{} for _ in looks]
     for kind in ("colors", "pattern"):
         name = f"far_by_{kind}"
-        compared = [at for at, (_, values) in enumerate(looks) if name in values]
+        far = {at: values[name] for at, (_, values) in enumerate(looks) if name in values}
+        pictures = Counter(map(tuple, far.values())).most_common(1)[0][0] if far else ()
+        compared = [at for at in far if tuple(far[at]) == pictures]
         if len(compared) < 2:
             continue
-        pictures = list(looks[compared[0]][1][name])
-        far = np.array([[looks[at][1][name][picture] for picture in pictures] for at in compared])
-        for at, row in zip(compared, far - far.mean(0), strict=True):
+        table = np.array([[*far[at].values()] for at in compared])
+        for at, row in zip(compared, table - table.mean(0), strict=True):
             if (followed := looks[at][0]) in pictures:
                 places[at][f"place_by_{kind}"] = int((row < row[pictures.index(followed)]).sum()) + 1
     return places

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cache
 from statistics import fmean
 from typing import TYPE_CHECKING
 
@@ -10,7 +12,9 @@ from texgs.metrics.metric import Measure, MeasuredScene, Metric, SeenView, Style
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from texgs.fields.field import Composed
     from texgs.metrics.style import StyleTarget
+    from texgs.scene.scene import Scene
 
 QUERIES = 250  # features of a view that are searched for: more say the same
 
@@ -59,10 +63,16 @@ class Distances:
 
         if style.model is None:
             return on_object([view.layers[name][0] for name in STYLE_LAYERS], view.alpha)
-        scene, camera = self.measured.after, self.measured.cameras[view.place]
-        field = scene.models[style.model].open()[0].to(self.measured.shown.device)
-        shown = field.render(camera, scene.light)
+        alone, opened = self.alone(style.model)
+        shown = opened.render(self.measured.cameras[view.place], alone.light, alone.edits)
         return self.features(shown.color.clamp(0, 1).permute(2, 0, 1), shown.alpha)
+
+    @cache  # noqa: B019, for the few models of a scene, as long as it is measured
+    def alone(self, name: str) -> tuple[Scene, Composed]:
+        """Return the scene of one model, and the same opened."""
+        scene = self.measured.after
+        scene = replace(scene, models={name: scene.models[name]})
+        return scene, scene.open(self.measured.shown.device)
 
     def values(self) -> dict[str, float]:
         """Return the means over views and pictures; nothing where one is seen in no view."""
