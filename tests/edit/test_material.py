@@ -53,10 +53,10 @@ def test_metals_alone_tint_their_highlights():
         assert red > green > blue
 
 
-def test_a_part_without_highlights_gets_no_more_than_a_factor_can():
+def test_a_part_without_highlights_keeps_none_as_no_factor_makes_them():
     model = ball(1)
     dull = Surfels({**model.parameters, "specular": torch.tensor([-torch.inf])}, model.shading)
-    assert highlights_of("gold", dull)["specular"] == 1000
+    assert highlights_of("gold", dull).keys() == {"tint", "shininess"}
 
 
 @pytest.mark.parametrize(
