@@ -58,6 +58,8 @@ def test_a_film_goes_through_the_bookmarks_of_the_viewer(chromium, scene_file):
 def test_bookmarks_stay_in_the_link_of_the_standalone_page(chromium, scene_file):
     with standalone(chromium, scene_file) as page:
         kept = keep_two(page)
+        # The link follows when the view rests; before, it may say the same of the camera.
+        expect(page).to_have_url(re.compile("#azimuth=40&.*&bookmarks=40%2C10%2C.*60%2C10%2C"), timeout=WAIT)
         page.reload()
         expect(kept).to_have_count(2)
         page.get_by_role("button", name="Remove bookmark 1").click()
