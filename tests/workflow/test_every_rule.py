@@ -128,7 +128,7 @@ def test_a_method_and_a_field_of_one_file_each_are_in_tables_and_report(project)
     }
     for name, lines in rows.items():
         assert any(",ball," in line for line in lines), f"{name} has a row of the fit `ball`"
-    faded = [line for line in rows["looks"] if ",fade,fade: a toy," in line]
+    faded = [line for line in rows["looks"] if ',fade,"fade: a toy, opacity of ' in line]
     assert {line.split(",")[1] for line in faded} == {"demo", "ball"}, "both fields can fade"
     assert sum(",glass," in line for line in rows["looks"]) == 1, "a ball has no texture"
     report = (results / "report.html").read_text()
