@@ -163,10 +163,10 @@ def values_of(scene: MeasuredScene, chosen: Iterable[Metric] | None = None) -> d
     import torch
 
     with torch.no_grad():
-        found = [metric.run(scene) for metric in (metrics().values() if chosen is None else chosen)]
-        watchers = [each for each in found if isinstance(each, Watcher)]
+        results = [metric.run(scene) for metric in (metrics().values() if chosen is None else chosen)]
+        watchers = [each for each in results if isinstance(each, Watcher)]
         for view in scene.views() if watchers else ():
             for watcher in watchers:
                 watcher.see(view)
-        told = [each.values() if isinstance(each, Watcher) else each for each in found]
+        told = [each.values() if isinstance(each, Watcher) else each for each in results]
     return {name: value for each in told for name, value in each.items()}

@@ -33,7 +33,7 @@ class Distances:
     def __init__(self, measured: MeasuredScene) -> None:
         self.measured = measured
         self.targets = [self.target(style) for style in measured.styles]
-        self.found: list[list[tuple[float, float]]] = [[] for _ in self.targets]
+        self.distances: list[list[tuple[float, float]]] = [[] for _ in self.targets]
 
     def target(self, style: Style) -> StyleTarget:
         """Return what views are compared with."""
@@ -52,9 +52,9 @@ class Distances:
 
     def see(self, view: SeenView) -> None:
         """Compare a view; VGG-16 runs again for each model that follows a picture of its own."""
-        for style, target, found in zip(self.measured.styles, self.targets, self.found, strict=True):
+        for style, target, pairs in zip(self.measured.styles, self.targets, self.distances, strict=True):
             rows = self.seen(view, style)
-            found += [target.distances(rows, QUERIES, view.place)] if len(rows) else []
+            pairs += [target.distances(rows, QUERIES, view.place)] if len(rows) else []
 
     def seen(self, view: SeenView, style: Style) -> Tensor:
         """Return the features [n, C] of what follows a picture."""
@@ -76,9 +76,9 @@ class Distances:
 
     def values(self) -> dict[str, float]:
         """Return the means over views and pictures; nothing where one is seen in no view."""
-        if not all(self.found):
+        if not all(self.distances):
             return {}
-        means = [map(fmean, zip(*found, strict=True)) for found in self.found]
+        means = [map(fmean, zip(*pairs, strict=True)) for pairs in self.distances]
         return dict(zip(("style_nnfm", "style_gram"), map(fmean, zip(*means, strict=True)), strict=True))
 
 
