@@ -176,7 +176,7 @@ def test_a_film_moves_the_last_plane(results, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     path, size = results / "compose" / "scene.yaml", ["--width", "48", "--path", "cut", "--frames", "3"]
     assert main(["render", str(path), *size]) == 2
-    assert "--path cut: expected a scene that a plane cuts, got none" in capsys.readouterr().err
+    assert "path cut: expected a scene that a plane cuts, got none" in capsys.readouterr().err
     assert main(["edit", str(path), "cut=x,0", "--output", "cut.yaml"]) == 0
     assert main(["render", "cut.yaml", *size, "--output", "frames"]) == 0
     first, middle, last = (np.asarray(Image.open(each)) for each in sorted(Path("frames").iterdir()))

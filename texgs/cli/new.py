@@ -46,11 +46,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read the volume, choose TFs, write the file and the plot, and say what comes next."""
-    from texgs.cli.stage import ensure
     from texgs.config.dataset import BasicTF
     from texgs.config.project import check_name, members, own_folder, shown
     from texgs.volume.tf_files import read_tf
     from texgs.workflow.checks import check_basic_tfs
+    from texgs.workflow.ensure import ensure
     from texgs.workflow.stage_table import STAGES
 
     name = arguments.name or re.sub(r"[^A-Za-z0-9_]+", "_", arguments.file.name.split(".")[0])

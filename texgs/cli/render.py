@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from texgs.cli.options import add_device, add_lens, lens_of, option
 from texgs.core.errors import ArgumentError, located
+from texgs.scene.paths import PATHS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 MOST_FRAMES = 100_000  # an hour of film
 MOST_GAIN = 16.0
-MARGIN = 0.1  # of the extent of what is visible: from its end to where a plane that moves starts or ends
-PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61, "cut": 61}  # frames by default
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,6 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.progress import progress
     from texgs.report.check import checked
     from texgs.scene.frame import Mode, frame
+    from texgs.scene.paths import shots_of
     from texgs.scene.scene_file import read_scene
     from texgs.scene.twin import twin_of
 
@@ -76,7 +75,9 @@ def run(arguments: argparse.Namespace) -> int:
     output = output_of(arguments, count)
     with located(arguments.scene):
         composition = scene.open(torch_device(arguments.device))
-    shots = shots_of(arguments, scene, count, composition)
+    lens = lens_of(arguments, scene.framed(composition))
+    place = (arguments.azimuth, arguments.polar)
+    shots = shots_of(scene, composition, arguments.path, count, lens, *place)
     shots = progress(shots, count, title=str(output), unit="frame")
     if arguments.compare:
         frames = compared(arguments, scene, composition, shots)
@@ -160,47 +161,3 @@ def frames_of(arguments: argparse.Namespace) -> int:
         bound = "at least 1" if count < 1 else f"at most {MOST_FRAMES}"
         raise ArgumentError(f"--frames: expected {bound}, got {count}")
     return round(count)
-
-
-def shots_of(
-    arguments: argparse.Namespace, scene: Scene, count: int, composition: Composed
-) -> Iterator[tuple[Camera, Scene]]:
-    """Return camera and scene of each frame, of so many."""
-    from texgs.core.camera import orbit
-    from texgs.core.light import Light
-    from texgs.volume.cameras import orbit_path, spiral
-
-    lens = lens_of(arguments, scene.framed(composition))
-    if arguments.path == "test":
-        return ((camera, scene) for camera in spiral(count, *lens))
-    if arguments.path == "orbit":
-        turn = orbit_path(count, arguments.polar, *lens, start=arguments.azimuth)
-        return ((camera, scene) for camera in turn)
-    camera = orbit(arguments.azimuth, arguments.polar, *lens)
-    if arguments.path == "view":
-        return ((camera, scene) for _ in range(count))
-    shares = (i / max(count - 1, 1) for i in range(count))
-    if arguments.path == "cut":
-        low, high = swept(scene, composition)
-        return ((camera, moved(scene, high + share * (low - high))) for share in shares)
-    # as the paper shows relighting: from below the object to above it, on the camera's side
-    lights = (Light("directional", arguments.azimuth, -90 + 180 * share) for share in shares)
-    return ((camera, replace(scene, light=light)) for light in lights)
-
-
-def swept(scene: Scene, composition: Composed) -> tuple[float, float]:
-    """Return between which offsets the last plane moves: both ends show something."""
-    from texgs.scene.bounds import STRAYS, models_of, span_of
-
-    if not scene.cuts.planes:
-        raise ArgumentError("--path cut: expected a scene that a plane cuts, got none; texgs edit cut=x,0")
-    models = zip(models_of(composition), scene.models.values(), strict=False)  # none of them without means
-    shown = [model for model, entry in models if entry.edit.visible or entry.segments]
-    low, high = span_of(shown, scene.framed(composition), scene.cuts.planes[-1].normal, STRAYS)
-    return low + MARGIN * (high - low), high - MARGIN * (high - low)
-
-
-def moved(scene: Scene, offset: float) -> Scene:
-    """Return a scene whose last plane has another offset."""
-    *others, last = scene.cuts.planes
-    return replace(scene, cuts=replace(scene.cuts, planes=[*others, replace(last, offset=offset)]))
