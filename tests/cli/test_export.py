@@ -1,5 +1,7 @@
 """Exports from the command line: of surfels, of Gaussians, and of what other programs have fitted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -9,7 +11,11 @@ from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.ply_files import vertices
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
+from tests.fields.voxels.test_voxels import ball as voxels
+from tests.scene.cloud_files import READERS
+from texgs.cli.export import ENDINGS
 from texgs.cli.main import main
+from texgs.core.cuts import Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.fields.files import open_field
 from texgs.fields.gaussians.files import write_gaussians
@@ -21,6 +27,7 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texels import bare_colors
 from texgs.fields.surfels.variants import write_texture
+from texgs.fields.voxels.file import write_voxels
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 
@@ -126,10 +133,61 @@ def test_a_mesh(scene, model, tmp_path, kind):
         assert vertices["red"].max() > 25
 
 
+@pytest.mark.parametrize("ending", READERS)
+def test_clouds_of_a_scene_and_of_its_models(scene, model, tmp_path, ending, capsys):
+    cut = read_scene(scene)
+    write_scene(scene, replace(cut, cuts=Cuts(planes=[Plane([1.0, 0.0, 0.0])])))
+    target = tmp_path / f"x{ending}"
+    assert export(scene, target) == 0
+    printed = capsys.readouterr()
+    assert printed.out.strip() == str(target)
+    assert "Surfels have one colour each, the mean of their texture, with the light" in printed.err
+    assert "its cuts are left out" in printed.err
+    clouds = READERS[ending](target)
+    assert sum(len(cloud.means) for cloud in clouds) == 230
+    whole = np.concatenate([cloud.opacities for cloud in clouds])
+    own = ball(2, n=80).parameters["opacities"].sigmoid()
+    assert np.abs(whole[150:] - 0.5 * own.numpy()).max() < 0.01
+    assert export(scene, target, "--model", "B") == 0
+    (alone,) = READERS[ending](target)
+    assert np.array_equal(alone.opacities, whole[150:]), "with its edits"
+    assert export(model, target) == 0
+    (of_file,) = READERS[ending](target)
+    assert "its cuts" not in capsys.readouterr().err.splitlines()[-1]
+    assert np.array_equal(of_file.opacities, whole[:150])
+    assert alone.name == of_file.name == "spz" or (alone.name, of_file.name) == ("B", "a")
+
+
+@pytest.mark.parametrize("ending", READERS)
+def test_clouds_of_what_others_have_fitted(tmp_path, ending):
+    source = write_gaussians(tmp_path / "model.safetensors", gaussians(30))
+    assert export(source, tmp_path / f"x{ending}") == 0
+    (cloud,) = READERS[ending](tmp_path / f"x{ending}")
+    assert np.abs(cloud.opacities - gaussians(30).parameters["opacities"].sigmoid().numpy()).max() < 0.01
+    source = write_ply(tmp_path / "model.ply", sample("surfels"), "2dgs")
+    assert export(source, tmp_path / f"x{ending}") == 0
+    (cloud,) = READERS[ending](tmp_path / f"x{ending}")
+    assert len(cloud.means) == 7
+
+
+def test_a_grid_makes_no_cloud(scene, tmp_path, capsys):
+    models = {
+        **read_scene(scene).models,
+        "C": SceneModel(write_voxels(tmp_path / "grid.safetensors", voxels())),
+    }
+    mixed = write_scene(tmp_path / "mixed.yaml", Scene(models))
+    assert export(mixed, tmp_path / "x.glb") == 2
+    assert "--kind gltf: expected gaussians or surfels, got voxels, which" in capsys.readouterr().err
+    assert not (tmp_path / "x.glb").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--to", "x.obj"], "--to: expected a file that ends in .ply, .texgs or .html, got x.obj"),
+        (["--to", "x.obj"], f"--to: expected a file that ends in {' or '.join(ENDINGS)}, got x.obj"),
+        (["--to", "x.usd"], ".html or .usdc or .usda or .glb or .spz, got x.usd"),
+        (["--to", "x.ply", "--kind", "usd"], "--to: expected a file that ends in .usdc or .usda, got x.ply"),
+        (["--to", "x.glb", "--model", "C"], "--model: expected one of A, B, got C"),
         (["--to", "x.ply", "--kind", "compact"], "--to: expected a file that ends in .texgs, got x.ply"),
         (["--to", "x.texgs", "--kind", "mesh"], "--to: expected a file that ends in .ply, got x.texgs"),
         (["--to", "x.texgs"], "--kind compact: expected a model file, got"),
@@ -198,5 +256,8 @@ def test_what_gaussians_cannot_become_is_one_sentence(tmp_path, capsys, kind):
     target = tmp_path / ("x.html" if kind == "html" else "x.ply")
     assert export(source, target, "--kind", kind) == 2
     said = capsys.readouterr().err
-    assert f"--kind {kind}: expected surfels, got gaussians, which can be exported as 3dgs or mesh" in said
+    assert (
+        f"--kind {kind}: expected surfels, got gaussians, which can be exported as 3dgs or mesh or usd"
+        in said
+    )
     assert not target.exists()

@@ -59,6 +59,9 @@ async def test_the_scene_is_written_as_it_is_shown(browser, client):
     _, part = await saved(browser, client, "3dgs")
     counts = [len(PlyData.read(io.BytesIO(each))["vertex"]) for each in (whole, part)]
     assert counts[1] == counts[0] // 2
+    name, binary = await saved(browser, client, "gltf")
+    assert name == "scene.glb"
+    assert binary.startswith(b"glTF")
     name, page = await saved(browser, client, "html")
     assert name == "scene.html"
     assert page.startswith(b"<!doctype html>")
@@ -69,6 +72,6 @@ async def test_the_scene_is_written_as_it_is_shown(browser, client):
 async def test_what_a_scene_cannot_be_is_told(browser, client, kind):
     await browser.send(type="export", kind=kind, view=VIEW)
     said = (await browser.next("notice"))["text"]
-    assert f"expected one of mp4, gif, 3dgs, 2dgs, points, mesh, html, got '{kind}'" in said
+    assert f"expected one of mp4, gif, 3dgs, 2dgs, points, mesh, html, usd, gltf, spz, got '{kind}'" in said
     async with client.get(f"/{TOKEN}/files/scene.html") as answer:
         assert answer.status == 404

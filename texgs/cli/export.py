@@ -1,4 +1,4 @@
-"""Export a scene or a model: Gaussians, points or a mesh, a compact model file, or a page for a browser."""
+"""Export a scene or a model: splats, points or a mesh, a compact model file, or a page for a browser."""
 
 from __future__ import annotations
 
@@ -10,33 +10,34 @@ from typing import TYPE_CHECKING
 
 from texgs.cli.options import add_device, option
 from texgs.core.errors import ArgumentError
-from texgs.core.names import SCENES
+from texgs.core.names import EXPORTS, SCENES
 from texgs.viewer import PAGE_VOLUME
 
 if TYPE_CHECKING:
     from texgs.scene.scene import Scene, SceneModel
 
-KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact", "html")
-ENDINGS = {"compact": ".texgs", "html": ".html"}  # of kinds that are not .ply
-DEFAULTS = {".ply": "3dgs", **{ending: kind for kind, ending in ENDINGS.items()}}
+ENDINGS = list(dict.fromkeys(ending for endings in EXPORTS.values() for ending in endings))
+DEFAULTS = {ending: next(kind for kind in EXPORTS if ending in EXPORTS[kind]) for ending in ENDINGS}
+BAKED = "Surfels have one colour each, the mean of their texture, with the light of the scene as harmonics"
 NUMBERS = ("opacity", "voxel", "views", "size", "drop_unseen", "device")  # arguments that `Export` has, too
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to export, and where to."""
     parser.add_argument("source", type=Path, help="scene.yaml or a model file")
-    parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=".ply, .texgs or .html")
+    parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=" ".join(ENDINGS))
     parser.add_argument(
         "--kind",
-        choices=KINDS,
+        choices=EXPORTS,
         help="3dgs or 2dgs for viewers of Gaussians, release as the paper's code has them, points with "
-        "colours, mesh, compact, or html, a page that shows and edits the scene; default 3dgs for .ply, "
-        "compact for .texgs, html for .html",
+        "colours, mesh, compact, html, a page that shows and edits the scene, or with light in the colours "
+        "usd (OpenUSD), gltf (KHR_gaussian_splatting) or spz; default by the ending, 3dgs for .ply",
     )
     parser.add_argument(
         "--model",
         metavar="NAME",
-        help="one model of a scene, with the textures that it has there; other edits of it only in html",
+        help="one model of a scene, with the textures that it has there; other edits of it only in html, "
+        "usd, gltf and spz",
     )
     parser.add_argument(
         "--volume",
@@ -60,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
     from texgs.fields.files import open_field
-    from texgs.scene.export import Export, export_model, export_scene
+    from texgs.scene.export import OF_CLOUDS, Export, export_model, export_scene
     from texgs.scene.scene_file import read_scene
 
     kind = kind_of(arguments)
@@ -71,6 +72,11 @@ def run(arguments: argparse.Namespace) -> int:
         print(of_page(arguments, scene))
         return 0
     export = Export(kind, **{name: getattr(arguments, name) for name in NUMBERS})
+    if kind in OF_CLOUDS:
+        shown = as_scene(arguments, scene)
+        print(export_scene(arguments.to, shown, export))
+        print(BAKED + ("; its cuts are left out" if shown.cuts else ""), file=sys.stderr)
+        return 0
     if scene is not None and arguments.model is None:
         print(export_scene(arguments.to, scene, export))
         return 0
@@ -92,9 +98,9 @@ def kind_of(arguments: argparse.Namespace) -> str:
 
     ending = arguments.to.suffix
     kind: str | None = arguments.kind or DEFAULTS.get(ending)
-    expected = ".ply, .texgs or .html" if kind is None else ENDINGS.get(kind, ".ply")
-    if kind is None or ending != expected:
-        raise ArgumentError(f"--to: expected a file that ends in {expected}, got {arguments.to}")
+    expected = ENDINGS if kind is None else EXPORTS[kind]
+    if kind is None or ending not in expected:
+        raise ArgumentError(f"--to: expected a file that ends in {' or '.join(expected)}, got {arguments.to}")
     is_scene = arguments.source.suffix in SCENES
     if arguments.model is not None and not is_scene:
         raise ArgumentError(
@@ -108,24 +114,30 @@ def kind_of(arguments: argparse.Namespace) -> str:
     return kind
 
 
+def as_scene(arguments: argparse.Namespace, scene: Scene | None) -> Scene:
+    """Return the scene, with the chosen model alone; or one of a model file."""
+    from texgs.scene.scene import Scene, SceneModel
+
+    if scene is None:
+        return Scene({arguments.source.stem: SceneModel(arguments.source)})
+    if arguments.model is None:
+        return scene
+    return replace(scene, models={arguments.model: chosen(scene, arguments.model)})
+
+
 def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
     """Export a scene, one model of it or a model file as a web page."""
     from texgs.fields import files
     from texgs.report.check import checked
     from texgs.scene.export import require_export
-    from texgs.scene.scene import Scene, SceneModel
     from texgs.viewer.page_volume import page_volume
     from texgs.viewer.standalone import write_page
 
-    source: Path = arguments.source
-    if scene is None:
-        scene = Scene({source.stem: SceneModel(source)})
-    elif arguments.model is not None:
-        scene = replace(scene, models={arguments.model: chosen(scene, arguments.model)})
+    scene = as_scene(arguments, scene)
     for entry in scene.models.values():
         require_export(files.kind_of(entry.file), "html")
     volume = None
     if arguments.volume is not None:
         volume = page_volume(scene, arguments.volume)
         print(f"Volume in the page: {volume}", file=sys.stderr)
-    return write_page(arguments.to, scene, arguments.to.stem, checked(source, scene), volume).path
+    return write_page(arguments.to, scene, arguments.to.stem, checked(arguments.source, scene), volume).path

@@ -12,6 +12,11 @@ from unicodedata import category
 from texgs.core.errors import ArgumentError
 
 SCENES = (".yaml", ".yml")  # suffixes of scene files
+EXPORTS = {  # endings of what `texgs export` writes, by its kind
+    **dict.fromkeys(("3dgs", "2dgs", "release", "points", "mesh"), (".ply",)),
+    **{"compact": (".texgs",), "html": (".html",)},
+    **{"usd": (".usdc", ".usda"), "gltf": (".glb",), "spz": (".spz",)},
+}
 POINTS = "points3d.ply"  # where fits start, in a folder of views
 SLICES = (".tif", ".tiff")  # suffixes of the files in a folder of slices
 LARGEST = 10**300  # there are whole numbers that no float can hold

@@ -1,4 +1,4 @@
-"""Files of a scene or a model for other programs: Gaussians, points or a mesh; or a compact model file."""
+"""Files of a scene or a model for other programs: splats, points or a mesh; or a compact model file."""
 
 from __future__ import annotations
 
@@ -31,18 +31,23 @@ from texgs.fields.surfels.texels import mean_texels
 from texgs.raster import Render
 from texgs.raster.shading import Y00
 from texgs.scene.bounds import bounds_of
+from texgs.scene.clouds import clouds_of
+from texgs.scene.gltf import write_gltf
 from texgs.scene.mesh import VERTEX, fill, fuse, write_mesh
 from texgs.scene.scene import Scene
+from texgs.scene.spz import write_spz
+from texgs.scene.usd import write_usd
 from texgs.volume.cameras import icosphere_of
 
 OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
+OF_CLOUDS = {"usd": write_usd, "gltf": write_gltf, "spz": write_spz}  # of scenes, with their light
 
 
 @dataclass(frozen=True)
 class Export:
     """What to write."""
 
-    kind: str  # 3dgs, 2dgs, release, points, mesh or compact
+    kind: str  # 3dgs, 2dgs, release, points, mesh, compact, usd, gltf or spz
     opacity: float = 0.5  # least of points
     voxel: float = 1 / 256  # of a mesh, world units
     views: int = 92  # that a mesh is made from, and that unseen surfels are looked for in
@@ -73,8 +78,11 @@ def export_scene(path: Path, scene: Scene, export: Export) -> Path:
         ArgumentError, ShapeError: if its models cannot be exported so, nothing is visible, or the file cannot
             be written.
     """
-    field = files.kind_of(next(iter(scene.models.values())).file)
-    require_export(field, export.kind)
+    for entry in scene.models.values():
+        field = files.kind_of(entry.file)
+        require_export(field, export.kind)
+    if export.kind in OF_CLOUDS:
+        return OF_CLOUDS[export.kind](path, clouds_of(scene))
     composed, edits = scene.open(export.device), scene.edits
     if export.kind == "mesh":
         look: Look = "unshaded" if "unlit" in field.can else "shaded"

@@ -51,6 +51,11 @@ class SceneModel:
     segments: Mapping[str, SceneSegment] = field(default_factory=dict)
 
     @property
+    def edits(self) -> list[PartEdit]:
+        """Return that of what no segment holds, and behind it those of its segments."""
+        return [self.edit, *(segment.edit for segment in self.segments.values())]
+
+    @property
     def files(self) -> list[Path | None]:
         """Return all that `open` reads."""
         paths = [self.file, self.texture]
@@ -107,10 +112,7 @@ class Scene:
     @property
     def edits(self) -> list[PartEdit]:
         """Return those of all models; behind the edit of a model those of its segments."""
-        edits = []
-        for model in self.models.values():
-            edits += [model.edit, *(segment.edit for segment in model.segments.values())]
-        return edits
+        return [edit for model in self.models.values() for edit in model.edits]
 
     def framed(self, composed: Composed | None = None) -> Frame:
         """Return what pictures show: the frame of the data, else the bounds of the models.

@@ -11,6 +11,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.movie import write_frames
+from texgs.core.names import EXPORTS
 from texgs.core.progress import progress
 from texgs.fields.files import kind_of
 from texgs.scene import export
@@ -36,13 +37,13 @@ class Downloads:
     def write(self, scene: Scene, asked: Export, name: str) -> Path:
         """Return the file of a scene as it is shown; the name is without its ending."""
         require_kind(scene, asked.kind)
-        ending = asked.kind if asked.kind in FILMS else "html" if asked.kind in PAGES else "ply"
-        stem = f"{name}-{asked.kind}" if ending == "ply" else name  # there are several kinds of these
-        path = Path(self._folder.name, f"{stem}.{ending}")
+        ending = ".html" if asked.kind in PAGES else EXPORTS.get(asked.kind, [f".{asked.kind}"])[0]
+        stem = f"{name}-{asked.kind}" if ending == ".ply" else name  # there are several kinds of these
+        path = Path(self._folder.name, f"{stem}{ending}")
         if asked.kind in FILMS:
             words = self._edits.checked(scene)
             return write_frames(path, self._film(scene, asked), asked.fps, comment=words)
-        if ending == "html":
+        if asked.kind in PAGES:
             volume = page_volume(scene) if asked.kind == "volume" else None
             return write_page(path, scene, name, self._edits.checked(scene), volume).path
         return export.export_scene(path, scene, export.Export(asked.kind))

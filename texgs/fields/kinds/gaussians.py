@@ -19,6 +19,6 @@ FIELD = Kind(
     ("texgs-gaussians", "ply scale_2"),
     frozenset({"opacity"}),
     functions,
-    exports=("3dgs", "mesh"),
+    exports=("3dgs", "mesh", "usd", "gltf", "spz"),
     depth="depth",  # the mean, as the authors of 2DGS take it of 3D Gaussians
 )

@@ -1,0 +1,106 @@
+"""A scene as clouds of splats for other programs: one colour a surfel, with the light in its harmonics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from texgs.core.errors import ArgumentError, located
+from texgs.core.lens import Lens
+from texgs.core.light import Light
+from texgs.fields.field import Field
+from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.part_edit import PartEdit, opacity_factors
+from texgs.fields.splats import geometry
+from texgs.fields.surfels.composition import Part
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import FAR
+from texgs.fields.surfels.texels import untextured
+from texgs.raster.reference.shading import harmonics
+from texgs.scene.scene import Scene
+from texgs.volume.cameras import icosphere_of
+
+THIN = 1e-6  # standard deviation of a surfel along its normal, world units
+DIRECTIONS = 92  # from which the light on a surfel is looked at
+COEFFICIENTS = {"headlight": 9, "directional": 16}  # a headlight looks the same from behind: even degrees
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Splats of one model as they are drawn, all float32."""
+
+    name: str
+    is_flat: bool  # surfels: the third axis is their normal
+    antialiased: bool  # small ones stay faint, see texgs.raster.Options; surfels do
+    means: np.ndarray  # [N, 3] world units
+    quats: np.ndarray  # [N, 4] wxyz, unit length
+    scales: np.ndarray  # [N, 3] standard deviations, world units
+    opacities: np.ndarray  # [N] in [0, 1]
+    sh: np.ndarray  # [N, K, 3] in the order and with the signs of 3DGS
+
+
+def clouds_of(scene: Scene) -> list[Cloud]:
+    """Return the visible splats of each model of surfels or 3D Gaussians, as edited and lit, but not cut.
+
+    Raises:
+        ArgumentError: if a model cannot be opened, or nothing is visible.
+    """
+    clouds = []
+    for name, entry in scene.models.items():
+        with located(f"models.{name}"):
+            clouds.append(cloud_of(name, entry.open(), entry.edits, scene.light))
+    visible = [cloud for cloud in clouds if len(cloud.means)]
+    if not visible:
+        raise ArgumentError("models: expected at least one visible splat, got none; show a model")
+    return visible
+
+
+@torch.no_grad()
+def cloud_of(
+    name: str, opened: tuple[Field, Sequence[Tensor]], edits: Sequence[PartEdit], light: Light
+) -> Cloud:
+    """Return what is visible of a model as `SceneModel.open` returns it; edits are those of a `Part`."""
+    model, masks = cast("Surfels | Gaussians", opened[0]), opened[1]
+    means, quats, scales, opacities = geometry(model.parameters)
+    is_flat = isinstance(model, Surfels)
+    if isinstance(model, Surfels) and model.stage != "surfels":
+        opacities, sh = lit(model, masks, edits, light)
+    else:
+        (factor,) = opacity_factors(edits, 1, model.kind)
+        opacities, sh = (opacities * factor).clamp_max(1), model.parameters["sh"]
+    if is_flat:
+        scales = torch.cat([scales, torch.full_like(scales[:, :1], THIN)], dim=1)
+    values = (means, normalize(quats, dim=1), scales, opacities, sh)
+    arrays = (value[opacities > 0].numpy() for value in values)
+    return Cloud(name, is_flat, is_flat or model.shading.options.antialiased, *arrays)
+
+
+def lit(
+    model: Surfels, masks: Sequence[Tensor], edits: Sequence[PartEdit], light: Light
+) -> tuple[Tensor, Tensor]:
+    """Return opacities [N] and harmonics [N, K, 3] of surfels with one colour, as edited, in a light.
+
+    The colour is that of the mean texel under the Gaussian. Harmonics are the least squares of its looks from
+    directions all around.
+    """
+    texels = torch.zeros_like(model.parameters["colors"])
+    if model.stage == "texture":
+        model = untextured(model)
+        texels = model.parameters["texels"]
+    part = Part(model, masks)
+    edited = part.edited(edits)
+    cameras = icosphere_of(DIRECTIONS, Lens(radius=FAR))
+    views = normalize(torch.stack([-camera.position for camera in cameras]).double(), dim=1)  # [M, 3]
+    count = COEFFICIENTS[light.kind]
+    solver = torch.linalg.pinv(harmonics(views)[:, :count]).float()  # [K, M]
+    sh = texels.new_zeros(len(model), count, 3)
+    for camera, weights in zip(cameras, solver.T, strict=True):
+        base, gain = part.look(edited, camera, light, "shaded")
+        sh += weights[:, None] * (base + gain[:, None] * texels - 0.5)[:, None]
+    return edited.opacities, sh
