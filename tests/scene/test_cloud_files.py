@@ -12,6 +12,7 @@ from tests.scene.cloud_files import EXTENSION, READERS, drawn, glb, read_gltf, r
 from tests.scene.test_export import plain
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT
+from texgs.fields.gaussians.model import Baked
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.metrics.quality import psnr
@@ -93,6 +94,15 @@ def test_an_opened_file_looks_like_the_scene(tmp_path, ending):
     read = READERS[ending](WRITERS[ending](tmp_path / f"x{ending}", shown))
     least = 36 if ending.startswith(".usd") else 28  # others are drawn by another kernel
     assert psnr(drawn(read, CAMERA, WHITE), expected) > least
+
+
+@pytest.mark.parametrize("ending", READERS)
+def test_opened_gaussians_look_as_before(tmp_path, ending):
+    model = gaussians(300)
+    moved = {**model.parameters, "means": 0.2 * model.parameters["means"]}
+    model = replace(model, parameters=moved, shading=Baked(antialiased=ending == ".spz"))
+    read = READERS[ending](WRITERS[ending](tmp_path / f"x{ending}", [cloud(model)]))
+    assert psnr(drawn(read, CAMERA, WHITE), model.render(CAMERA).color) > (35 if ending == ".spz" else 90)
 
 
 # -- USD ---

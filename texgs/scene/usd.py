@@ -15,13 +15,13 @@ from texgs.fields.splats import REACH
 from texgs.raster.shading import DEGREES
 from texgs.scene.clouds import Cloud
 
-SURFLETS = (
+ATTRIBUTES = (
     "Position",
     "Orientation",
     "Scale",
     "Opacity",
     "SphericalHarmonics",
-)  # attributes of their schemas
+)  # in schemas of their own
 
 
 def write_usd(path: str | Path, clouds: Sequence[Cloud]) -> Path:
@@ -70,7 +70,7 @@ def _define(root: Any, cloud: Cloud) -> None:
     prim = root.GetStage().DefinePrim(root.GetPath().AppendChild(name), kind)
     prim.SetDisplayName(cloud.name)
     if cloud.is_flat:  # the other has all its schemas
-        for schema in ("KernelGaussianSurflet", *(f"{each}Attribute" for each in SURFLETS)):
+        for schema in ("KernelGaussianSurflet", *(f"{each}Attribute" for each in ATTRIBUTES)):
             prim.AddAppliedSchema(f"ParticleField{schema}API")
     reach = REACH * cloud.scales.max(axis=1, keepdims=True)
     extent = np.stack([(cloud.means - reach).min(axis=0), (cloud.means + reach).max(axis=0)])
