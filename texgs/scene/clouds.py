@@ -89,10 +89,8 @@ def lit(
     The colour is that of the mean texel under the Gaussian. Harmonics are the least squares of its looks from
     directions all around.
     """
-    texels = torch.zeros_like(model.parameters["colors"])
-    if model.stage == "texture":
-        model = untextured(model)
-        texels = model.parameters["texels"]
+    model = untextured(model) if model.stage == "texture" else model
+    texels = model.parameters.get("texels", torch.zeros_like(model.parameters["colors"]))
     part = Part(model, masks)
     edited = part.edited(edits)
     cameras = icosphere_of(DIRECTIONS, Lens(radius=FAR))

@@ -60,9 +60,7 @@ def _define(root: Any, cloud: Cloud) -> None:
     """Define the prim of a model: values without activations, quaternions xyzw as USD has them in memory."""
     from pxr import Tf, Vt
 
-    def vectors(values: np.ndarray) -> Any:
-        return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values.reshape(-1, 3)))
-
+    vectors = Vt.Vec3fArray.FromNumpy
     name = Tf.MakeValidIdentifier(cloud.name)
     while root.GetChild(name):
         name += "_"
@@ -80,7 +78,7 @@ def _define(root: Any, cloud: Cloud) -> None:
         "scales": vectors(cloud.scales),
         "opacities": Vt.FloatArray.FromNumpy(cloud.opacities),
         "radiance:sphericalHarmonicsDegree": DEGREES[cloud.sh.shape[1]],
-        "radiance:sphericalHarmonicsCoefficients": vectors(cloud.sh),
+        "radiance:sphericalHarmonicsCoefficients": vectors(cloud.sh.reshape(-1, 3)),
         "extent": vectors(extent),
     }
     for attribute, value in values.items():
