@@ -1,7 +1,7 @@
 import itertools
 import subprocess
 import sys
-from collections import Counter
+from collections import Counter, namedtuple
 from fractions import Fraction
 
 import numpy as np
@@ -223,3 +223,11 @@ def test_memory_does_not_grow_with_the_volume(tmp_path, edge, reduce):
     peak = int(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     # Python and numpy take 40 MB, a slab of 8 MB and what is computed from it the rest.
     assert peak < 150_000
+
+
+def test_a_volume_that_does_not_fit_on_the_disk_is_refused_before_it_is_written(tmp_path, monkeypatch):
+    monkeypatch.setattr("texgs.volume.prepare.disk_usage", lambda folder: namedtuple("Usage", "free")(2**30))
+    values = np.broadcast_to(np.arange(2048, dtype=np.uint8), (1024, 1024, 2048))
+    with pytest.raises(ArgumentError, match="needs 2 GiB of disk, but 1 GiB are free; crop or reduce it"):
+        prepare(source_of(values), tmp_path / "v.nrrd")
+    assert not list(tmp_path.iterdir())

@@ -6,12 +6,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import inf, prod
 from pathlib import Path
+from shutil import disk_usage
 from typing import BinaryIO
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
+from texgs.core.memory import GIB
 from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
 from texgs.volume.nrrd_file import WORDS, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
@@ -69,7 +71,8 @@ def prepare(
 
     Raises:
         ArgumentError: if an argument is out of range, samples are not finite or do not fit float32, the
-            volume is constant, or fewer than two samples are left along an axis. Nothing is written then.
+            volume is constant, fewer than two samples are left along an axis, or there is too little space
+            on the disk. Nothing is written then.
     """
     if nan_value is not None and not abs(nan_value) <= np.finfo(np.float32).max:
         raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
@@ -80,6 +83,9 @@ def prepare(
     tally, ((x0, x1), (y0, y1), (z0, z1)) = _Tally(source.name), bounds
 
     def write(file: BinaryIO) -> None:
+        if (needed := prod(dims) * dtype.itemsize) > (free := disk_usage(target.parent).free):
+            sizes = f"{needed / GIB:.3g} GiB of disk, but {free / GIB:.3g} GiB are free"
+            raise ArgumentError(f"{source.name}: needs {sizes}; crop or reduce it")
         offset = write_header(file, dims, dtype, spacing, origin)
         steps = slab_bounds(source, z0, z1, multiple=reduce)
         for start, stop in steps if progress is None else progress(steps, len(steps)):
