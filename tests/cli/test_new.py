@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 import yaml
 
+from tests.volume.zarr_files import LABELS, all_axes, axes_of, write_image
 from texgs.cli import new
 from texgs.cli.main import main
 from texgs.config.compose import compose
 from texgs.config.project import ROOT, groups, members
 from texgs.core.io import write_json
+from texgs.volume.nrrd_file import open_grid
 from texgs.volume.transfer import TransferFunction
 
 # no text to YAML, or no name of a file
@@ -49,6 +51,25 @@ def test_a_data_set_with_suggested_tfs(conf, scan, capsys):
     assert (conf.parent / "results" / "my_scan" / "transfer" / "transfer.png").exists()
     text = (conf / "dataset" / "my_scan.yaml").read_text()
     assert yaml.safe_load(text)["volume"]["file"] == str(scan)
+
+
+def test_an_image_with_channels_and_time_says_what_is_taken_and_keeps_what_was_asked_for(conf, scan, capsys):
+    values = all_axes(np.load(scan), steps=3)
+    path = write_image(
+        conf.parent / "cells.ome.zarr", [values], axes_of("tczyx"), [(1, 1, 2, 1, 1)], labels=LABELS
+    )
+    assert main(["new", str(path)]) == 2
+    assert "expected one of 0 (DAPI), 1 (GFP), 2 (RFP), got none" in capsys.readouterr().err
+    assert main(["new", str(path), "channel=1"]) == 0
+    told = capsys.readouterr().err
+    assert "cells: step 0 of 3; dataset.volume.time chooses another\n" in told
+    np.testing.assert_array_equal(open_grid("results/cells/volume/volume.nrrd").values, np.load(scan) + 10)
+    assert main(["new", str(path), "channel=RFP", "time=2", "--force"]) == 0
+    grid = open_grid("results/cells/volume/volume.nrrd")
+    np.testing.assert_array_equal(grid.values, np.load(scan) + 220)
+    assert grid.spacing == (1, 1, 2)
+    text = (conf / "dataset" / "cells.yaml").read_text()
+    assert yaml.safe_load(text)["volume"] == {"file": str(path), "channel": "RFP", "time": 2}
 
 
 def test_a_data_set_is_only_replaced_where_that_is_asked_for_and_that_of_texgs_never(conf, scan, capsys):

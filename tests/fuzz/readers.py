@@ -11,9 +11,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import torch
 from PIL import Image
+from zarr.codecs import BloscCodec
 
 from tests.config.kept import project
 from tests.fields.gaussians.samples import sample as gaussians
@@ -25,6 +27,7 @@ from tests.volume.test_netcdf import FIELD, write_netcdf
 from tests.volume.test_text_columns import LINES, write_lines
 from tests.volume.test_tf_files import RAMP, TENT, preset
 from tests.volume.volume_files import WRITERS, sample_values
+from tests.volume.zarr_files import axes_of, write_image, zipped
 from texgs.config.kept_function import keep
 from texgs.core.camera import orbit
 from texgs.core.io import read_json, write_json
@@ -55,6 +58,7 @@ from texgs.volume.tf_files import read_tf
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import View, read_views, write_transforms
 
+BLOSC = BloscCodec()
 PICTURES = ("png", "jpg", "gif", "webp")
 RISE = TransferFunction(((0.1, 0.2), (0.3, 0.9)), ((0.1, 0.5, 0.4, 0.3),))
 FALL = TransferFunction(((0.3, 0.5), (0.3, 0.4), (0.9, 0)), ((0.3, 1, 0.4, 0.3), (0.9, 0, 0, 1)))
@@ -90,6 +94,23 @@ def slc(compression: int, folder: Path) -> Path:
         text += f"{len(runs)} X".encode() + runs if compression else plane.tobytes()
     (folder / "v.slc").write_bytes(text)
     return folder / "v.slc"
+
+
+def hdf5(folder: Path, **options: Any) -> Path:
+    with h5py.File(folder / "v.h5", "w") as file:
+        array = file.create_dataset("a/density", data=FIELD, **options)
+        for axis, name in enumerate("zyx"):
+            scale = file.create_dataset(name, data=np.arange(FIELD.shape[axis]) * 0.5)
+            scale.make_scale(name)
+            array.dims[axis].attach_scale(scale)
+    return folder / "v.h5"
+
+
+def image(version: str, folder: Path, **options: Any) -> Path:
+    keys = {"chunks": (6, 6, 7), **options}
+    return write_image(
+        folder / "v.ome.zarr", [sample_values()], axes_of("zyx"), [(3, 2, 0.5)], version=version, **keys
+    )
 
 
 def text(name: str, folder: Path) -> Path:
@@ -213,6 +234,16 @@ READERS: dict[str, Reader] = {
     "plain.slc": Reader(partial(slc, 0), read_volume),
     "packed.slc": Reader(partial(slc, 1), read_volume),
     "netcdf": Reader(lambda folder: write_netcdf(folder / "v.nc", {"t": FIELD}), read_volume),
+    "hdf5": Reader(hdf5, read_volume),
+    "hdf5 packed": Reader(partial(hdf5, chunks=(3, 4, 5), compression="gzip", fletcher32=True), read_volume),
+    "zarr 2": Reader(partial(image, "0.4"), read_volume, "v.ome.zarr/s0/.zarray"),
+    "zarr 2 image": Reader(partial(image, "0.4"), read_volume, "v.ome.zarr/.zattrs"),
+    "zarr 3": Reader(partial(image, "0.5"), read_volume, "v.ome.zarr/s0/zarr.json"),
+    "zarr 3 image": Reader(partial(image, "0.5"), read_volume, "v.ome.zarr/zarr.json"),
+    "zarr 3 chunk": Reader(partial(image, "0.5"), read_volume, "v.ome.zarr/s0/c/0/0/0"),
+    "zarr 3 shard": Reader(partial(image, "0.5", shards=(12, 12, 14)), read_volume, "v.ome.zarr/s0/c/0/0/0"),
+    "zarr blosc": Reader(partial(image, "0.5", compressors=BLOSC), read_volume, "v.ome.zarr/s0/c/0/0/0"),
+    "zarr zip": Reader(lambda folder: zipped(image("0.5", folder), folder / "v"), read_volume),
     **{
         name: Reader(partial(text, name), partial(read_volume, dims=(6, 5, 4), column=2))
         for name in ("v.txt", "v.txt.gz")

@@ -5,7 +5,6 @@ import pytest
 from scipy.io import netcdf_file
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.netcdf import VariableSource
 from texgs.volume.sources import open_source
 
 SIZES = {"lat": 4, "r": 5, "lon": 6}
@@ -67,7 +66,7 @@ def test_types(tmp_path, dtype):
     np.testing.assert_array_equal(source.slices(0, 4), values)
 
 
-def test_samples_are_1_apart_unless_a_spacing_is_given(tmp_path):
+def test_a_spacing_that_is_given_replaces_that_of_the_file(tmp_path):
     source = open_source(write_netcdf(tmp_path / "v.nc", {"t": FIELD}), spacing=(7, 8, 9), origin=(1, 2, 3))
     assert (source.spacing, source.origin) == ((7, 8, 9), (1, 2, 3))
 
@@ -84,26 +83,31 @@ def test_packed_numbers_are_decoded_and_missing_ones_are_nan(tmp_path, name):
     np.testing.assert_array_equal(whole(path), expected)
 
 
-def test_one_step_of_time_is_no_dimension_and_two_are_refused(tmp_path):
+def test_a_step_of_time_is_chosen_and_the_first_one_is_taken_with_a_note(tmp_path):
     path = write_netcdf(tmp_path / "one.nc", {"t": FIELD[None]}, axes=("step", *SIZES))
     np.testing.assert_array_equal(whole(path), FIELD)
-    path = write_netcdf(tmp_path / "two.nc", {"t": np.stack([FIELD, FIELD])}, axes=("time", *SIZES))
-    with pytest.raises(ArgumentError, match=r"got time 2 x lat 4 x r 5 x lon 6; .* cut out a step of time"):
-        open_source(path, variable="t")
-    with pytest.raises(ArgumentError, match="got none; choose one of another file, or cut"):
-        open_source(path)
+    path = write_netcdf(tmp_path / "two.nc", {"t": np.stack([FIELD, -FIELD])}, axes=("time", *SIZES))
+    source = open_source(path)
+    np.testing.assert_array_equal(source.slices(0, 4), FIELD)
+    assert source.note.startswith("step 0 of 2; dataset.volume.time chooses another; units along x, y, z are")
+    assert source.n_steps == 2
+    np.testing.assert_array_equal(whole(path, time=1), -FIELD)
+    with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 1, got 2"):
+        open_source(path, time=2)
+
+
+LONG = "expected an array of real numbers with three axes or more"
 
 
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({}, "variable: expected one with three dimensions, got none; choose one of temperature, vx, or"),
-        (
-            {"variable": "vy"},
-            "expected one with three dimensions, got vy; choose one of temperature, vx, or",
-        ),
-        ({"variable": "r"}, "expected one with three dimensions, got r 5; choose one of temperature, vx, or"),
+        ({}, rf"variable: {LONG}, got none; choose one of temperature, vx$"),
+        ({"variable": "vy"}, f"{LONG}, got vy; choose one of temperature, vx"),
+        ({"variable": "r"}, f"{LONG}, got r of 5 >f8; choose one of temperature, vx"),
         ({"variable": "vx", "column": 2}, "column: not for this format; leave them out"),
+        ({"variable": "vx", "time": 1}, "time: there is no such axis in lat 4 x r 5 x lon 6; leave it out"),
+        ({"variable": "vx", "channel": "0"}, "channel: there is no such axis in lat 4 x r 5 x lon 6"),
     ],
 )
 def test_mistakes(tmp_path, keys, message):
@@ -113,10 +117,65 @@ def test_mistakes(tmp_path, keys, message):
     assert str(caught.value).startswith(f"{path}: ")
 
 
-@pytest.mark.parametrize("start", [b"\x89HDF\r\n\x1a\n", b"CDF\x05", b"", b"text"])
-def test_other_formats_are_refused_with_the_command_that_converts_them(tmp_path, start):
+def write_axes(path, places, units, axes=("z", "y", "x"), field=FIELD):
+    """Write a field with coordinates [n] of its dimensions, and their units."""
+    with netcdf_file(path, "w") as file:
+        for axis, along, unit in zip(axes, places, units, strict=True):
+            file.createDimension(axis, len(along))
+            variable = file.createVariable(axis, "f4", (axis,))
+            variable[:], variable.units = along, unit
+        file.createVariable("t", "f4", axes)[:] = field
+    return path
+
+
+def test_spacing_and_origin_are_those_of_coordinates_in_the_unit_of_x(tmp_path):
+    places = (2 + 0.5 * np.arange(4), 100 * np.arange(5), -7 + 300 * np.arange(6))
+    source = open_source(write_axes(tmp_path / "v.nc", places, ("km", "m", "meter")))
+    assert (source.spacing, source.origin, source.note) == ((300, 100, 500), (-7, 0, 2000), "")
+    np.testing.assert_array_equal(source.slices(0, 4), FIELD)
+
+
+def test_axes_whose_coordinates_fall_are_turned(tmp_path):
+    places = (9 - 2 * np.arange(4), 8 - np.arange(5), np.arange(6))
+    source = open_source(write_axes(tmp_path / "v.nc", places, 3 * ["m"]))
+    assert (source.spacing, source.origin) == ((1, 1, 2), (0, 4, 3))
+    np.testing.assert_array_equal(source.slices(0, 4), FIELD[::-1, ::-1])
+    np.testing.assert_array_equal(source.slices(1, 3), FIELD[::-1, ::-1][1:3])
+
+
+def test_axes_with_the_names_x_y_z_are_these(tmp_path):
+    places = [np.arange(n) for n in (6, 5, 4)]
+    path = write_axes(tmp_path / "v.nc", places, 3 * ["m"], ("x", "y", "z"), FIELD.transpose())
+    np.testing.assert_array_equal(whole(path), FIELD)
+
+
+def test_uneven_coordinates_are_refused_unless_a_spacing_is_given(tmp_path):
+    places = ([0, 1, 4, 9], np.arange(5), np.arange(6))
+    path = write_axes(tmp_path / "v.nc", places, 3 * ["m"])
+    with pytest.raises(ArgumentError, match=r"expected even distances along z; resample, or set spacing"):
+        open_source(path)
+    assert open_source(path, spacing=(1, 1, 3)).spacing == (1, 1, 3)
+
+
+def test_units_that_cannot_be_compared_are_told(tmp_path):
+    path = write_axes(tmp_path / "v.nc", [np.arange(n) * 3 for n in (4, 5, 6)], ("hPa", "degrees", "degrees"))
+    source = open_source(path)
+    assert (source.spacing, source.origin) == ((1, 1, 1), (0, 0, 0))
+    assert source.note == "units along x, y, z are degrees, degrees, hPa, so that samples are 1 apart"
+
+
+def test_a_format_that_cannot_be_read_is_refused_with_the_command_that_converts_it(tmp_path):
+    (tmp_path / "v.nc").write_bytes(b"CDF\x05" + bytes(2000))
+    with pytest.raises(ArgumentError, match=r"got another one; convert it: nccopy -k nc4 OLD\.nc NEW\.nc"):
+        open_source(tmp_path / "v.nc")
+
+
+@pytest.mark.parametrize("start", [b"\x89HDF\r\n\x1a\n", b"", b"text"])
+def test_other_formats_are_refused(tmp_path, start):
     (tmp_path / "v.nc").write_bytes(start + bytes(2000))
-    with pytest.raises(ArgumentError, match=r"got NetCDF-4 or another format; .*nccopy -k classic OLD\.nc"):
+    with pytest.raises(
+        ArgumentError, match=r"v\.nc: expected an HDF5 or NetCDF file, got .*; is the file dam"
+    ):
         open_source(tmp_path / "v.nc")
 
 
@@ -124,6 +183,6 @@ def test_other_formats_are_refused_with_the_command_that_converts_them(tmp_path,
 def test_a_file_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path, capfd, share):
     path = write_netcdf(tmp_path / "v.nc", {"t": FIELD})
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
-    with pytest.raises(ArgumentError, match=r"expected a .*NetCDF file"):
-        VariableSource(path, None, None)
+    with pytest.raises(ArgumentError, match=r"expected an HDF5 or NetCDF file"):
+        open_source(path)
     assert capfd.readouterr() == ("", "")

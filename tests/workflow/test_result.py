@@ -200,6 +200,8 @@ def test_fingerprints_of_views_from_elsewhere_and_of_slices_know_all_that_jobs_r
     assert is_told(slices, slices / "z1.tif", "two")
     assert is_told(slices, slices / "z2.TIFF", "more")
     assert not is_told(slices, slices / ".DS_Store", "of the system")
+    (chunks := tmp_path / "v.zarr" / "0" / "c").mkdir(parents=True)
+    assert is_told(tmp_path / "v.zarr", chunks / "0", "a chunk")
     make(output)
     (output / "mine.yaml").write_text("one")
     assert is_told(output / "mine.yaml", output / "mine.yaml", "two"), "a file beside a result is its own"

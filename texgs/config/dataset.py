@@ -17,11 +17,17 @@ class Volume:
     )
     size: int = key(128, "samples along each side of a generated field", least=16)
     seed: int = key(0, "seed of a generated field")
-    file: str | None = key(None, "file, or folder of TIFF or DICOM slices; relative to data_folder")
+    file: str | None = key(
+        None, "file, or folder of TIFF or DICOM slices, or of Zarr; relative to data_folder"
+    )
     series: str | None = key(
         None, "number or UID of the series to read, where a folder of DICOM slices has several"
     )
-    variable: str | None = key(None, "name of the variable to read, where a NetCDF file has several")
+    variable: str | None = key(
+        None, "array to read, by its path in the file, where Zarr, HDF5 or NetCDF has several"
+    )
+    channel: str | None = key(None, "label or number of the channel to read, from 0, where there are several")
+    time: int = key(0, "step to read, from 0, where an array has an axis of time", least=0)
     column: int | None = key(None, "number of the column to read, from 1, where text has several", least=1)
     url: str | None = key(None, "where the file is downloaded from when it is not there")
     sha256: str | None = key(None, "checksum of the download")

@@ -1,57 +1,83 @@
-"""Classic NetCDF, slab by slab, by SciPy: VTK takes a file that is cut off, and fills it up with zeros."""
+"""HDF5 and NetCDF, by h5py, and classic NetCDF, by SciPy: VTK fills up what is cut off with zeros."""
 
 from __future__ import annotations
 
+import posixpath
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
-from texgs.volume.grid import ONES, ZEROS, Triple, dims_of
-from texgs.volume.slabs import Source
+from texgs.volume.axes import along, nameless
+from texgs.volume.grid import Triple
+from texgs.volume.layers import CODED, LayerSource, StoredArray, one_of
 
 CLASSIC = (b"CDF\x01", b"CDF\x02")  # the latter with offsets of 64 bits
-CODED = ("scale_factor", "add_offset", "_FillValue", "missing_value")  # attributes of samples to decode
+NO_COORDINATES = b"This is a netCDF dimension but not a netCDF variable"  # begins the NAME of such a scale
 
 
-class VariableSource(Source):
-    """A variable with three dimensions, of which the last is x and those of size 1 do not count."""
+def open_netcdf(
+    path: Path, spacing: Triple | None, origin: Triple | None, variable: str | None = None, **keys: Any
+) -> LayerSource:
+    """Open an array of a file in HDF5 or NetCDF by its path; further keys are those of `LayerSource`.
 
-    def __init__(
-        self, path: Path, spacing: Triple | None, origin: Triple | None, variable: str | None = None
-    ) -> None:
-        from scipy.io import netcdf_file
+    Names and coordinates of axes are those of dimensions in NetCDF, and of dimension scales in HDF5.
+    """
+    start = np.fromfile(path, np.uint8, 4).tobytes()
+    if start.startswith(b"CDF") and start not in CLASSIC:
+        raise ArgumentError(
+            "expected NetCDF-4 or classic NetCDF, got another one; convert it: nccopy -k nc4 OLD.nc NEW.nc"
+        )
+    with reading_as("an HDF5 or NetCDF file"):
+        stored = _classic(path, variable) if start in CLASSIC else _hdf5(path, variable)
+        return LayerSource(path, stored, (spacing, origin), **keys)
 
-        if np.fromfile(path, np.uint8, 4).tobytes() not in CLASSIC:
-            raise ArgumentError(
-                "expected a classic NetCDF file, got NetCDF-4 or another format; "
-                "convert it: nccopy -k classic OLD.nc NEW.nc"
-            )
-        with reading_as("a NetCDF file"):
-            self._file = netcdf_file(path, maskandscale=True)
-        shapes = {
-            name: [(axis, n) for axis, n in zip(each.dimensions, each.shape, strict=True) if n != 1]
-            for name, each in self._file.variables.items()
-        }
-        fields = [name for name, shape in shapes.items() if len(shape) == 3]
-        self._variable = variable or (fields[0] if len(fields) == 1 else "")
-        if self._variable not in fields:
-            dimensions = " x ".join(f"{axis} {n}" for axis, n in shapes.get(self._variable, []))
-            raise ArgumentError(
-                "dataset.volume.variable: expected one with three dimensions, got "
-                f"{dimensions or variable or 'none'}; choose one of {', '.join(fields) or 'another file'}, "
-                "or cut out a step of time: ncks -d time,0 OLD.nc NEW.nc"
-            )
-        stored = self._file.variables[self._variable]  # not kept: SciPy warns of one that outlives its file
-        dtype = np.dtype(np.float32) if any(hasattr(stored, name) for name in CODED) else stored.data.dtype
-        dims = dims_of(tuple(n for _, n in shapes[self._variable]))
-        super().__init__(path.name, dims, dtype, spacing or ONES, origin or ZEROS)
 
-    def slices(self, start: int, stop: int) -> np.ndarray:
-        """Return samples [stop - start, Y, X], NaN where they are missing."""
-        variable = self._file.variables[self._variable]
-        index: list[slice | int] = [0 if n == 1 else slice(None) for n in variable.shape]
-        index[index.index(slice(None))] = slice(start, stop)
-        samples = variable[tuple(index)].astype(self.dtype)
-        return np.ma.filled(samples, np.nan) if np.ma.isMaskedArray(samples) else samples
+def _classic(path: Path, variable: str | None) -> StoredArray:
+    """Find a variable of classic NetCDF, and keep no part of it: SciPy warns of what outlives its file."""
+    from scipy.io import netcdf_file
+
+    file = netcdf_file(path)
+    name = one_of({name: each.data for name, each in file.variables.items()}, variable)
+    field = file.variables[name]
+    sizes = zip(field.dimensions, field.shape, strict=True)
+    axes = [along(axis, n, file.variables.get(axis)) for axis, n in sizes]
+    attributes = {key: getattr(field, key, "") for key in CODED}
+    return StoredArray(
+        lambda index: np.array(file.variables[name][index]),
+        field.data.dtype,
+        axes,
+        [1] * len(axes),
+        attributes,
+    )
+
+
+def _hdf5(path: Path, variable: str | None) -> StoredArray:
+    """Find an array of HDF5."""
+    import h5py
+
+    with suppress(ImportError):
+        import_module("hdf5plugin")  # registers more filters
+    file, arrays = h5py.File(path, "r"), {}
+    file.visititems(lambda name, item: arrays.update({name: item}) if _is_array(item) else None)
+    array = arrays[one_of(arrays, variable)]
+    stored = array.id.get_create_plist()
+    if not all(h5py.h5z.filter_avail(stored.get_filter(k)[0]) for k in range(stored.get_nfilters())):
+        raise ArgumentError("expected samples packed by gzip, got another filter; pip install hdf5plugin")
+    axes = []
+    for axis, n in zip(array.dims, array.shape, strict=True):
+        scale = axis[0] if len(axis) else None
+        name = axis.label or "?" if scale is None else posixpath.basename(scale.name)
+        axes.append(along(name, n, scale if _is_array(scale) else None))
+    axes = axes if {axis.name for axis in axes} - {"?"} else nameless(array.shape)
+    return StoredArray(array.__getitem__, array.dtype, axes, array.chunks or [1] * array.ndim, array.attrs)
+
+
+def _is_array(item: Any) -> bool:
+    """Return whether an item of HDF5 is an array with samples, and not only the name of a dimension."""
+    is_there = hasattr(item, "dtype") and bool(item.shape)
+    return is_there and not bytes(item.attrs.get("NAME", b"")).startswith(NO_COORDINATES)

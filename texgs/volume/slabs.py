@@ -16,6 +16,8 @@ SLAB_BYTES = 1 << 23  # reads of this size run at the disk's speed, and memory s
 class Source(ABC):
     """A volume that can be read slab by slab; its lattice is as for `Grid`, its name for messages."""
 
+    note = ""  # for the user: what was chosen of several, or taken for granted
+
     def __init__(self, name: str, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> None:
         check_lattice(dims, dtype, spacing, origin)
         self.name, self.dims, self.spacing, self.origin = name, dims, spacing, origin

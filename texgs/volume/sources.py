@@ -22,13 +22,15 @@ from texgs.volume.grid import (
     dims_of,
     require_room,
 )
-from texgs.volume.netcdf import VariableSource
+from texgs.volume.netcdf import open_netcdf
+from texgs.volume.ome_zarr import is_zarr, open_zarr
 from texgs.volume.slabs import ArraySource, RawSource, Source, size_text
 from texgs.volume.text_columns import ColumnSource
 from texgs.volume.tiff import open_tiff, tiffs_in
 
 # Tried in this order where the size of a plain file does not fit the type given.
 COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
+IN_FILES = ("variable", "channel", "time")  # keys of an array among others
 
 
 def open_source(
@@ -43,7 +45,8 @@ def open_source(
     Formats: .raw, .bin, .dat (plain samples, described by the arguments); .npy (an array [Z, Y, X]); .tif,
     .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs in natural order; a folder of
     DICOM slices; .nrrd, .nhdr; .mhd, .mha; .nii, .nii.gz; .mrc; .gipl; .slc; .vti and .vtk (image data, first
-    point array); .nc (classic NetCDF); .txt, .txt.gz (a line per sample). x is the fastest axis throughout.
+    point array); .nc, .nc4 (NetCDF); .h5, .hdf5; a folder of Zarr, or its .zip, .ozx; .txt, .txt.gz (a line
+    per sample). x is the fastest axis throughout, unless an array has axes with the names x, y, z.
     Axes are permuted and flipped to the closest ones of physical space where the format tells about it:
     R, A, S of NIfTI; L, P, S of DICOM. They are not resampled where they are oblique.
 
@@ -53,7 +56,8 @@ def open_source(
         origin: replaces the file's, x, y, z.
         keys: what only some formats take, see `KEYS`: `dims`, samples along x, y, z; `dtype`, numpy's name of
             the sample type, such as "uint16"; `endian`, "little" or "big"; `skip`, bytes before the first
-            sample; `series`, number or UID of one of several; `variable`, its name; `column`, from 1.
+            sample; `series`, number or UID of one of several; `variable`, the path of an array in the file;
+            `channel`, its label or number, from 0; `time`, a step, from 0 (the default); `column`, from 1.
 
     Raises:
         ArgumentError, ShapeError: if the file is missing, cannot be read, is unknown, damaged or no scalar
@@ -96,6 +100,8 @@ def _open(path: Path, spacing: Triple | None, origin: Triple | None, said: dict[
     opener, takes = OPENERS.get(suffix), KEYS.get(suffix, ())
     if path.is_dir():
         opener, takes = (open_tiff, ()) if tiffs_in(path) else (open_foreign, ("series",))
+        if is_zarr(path) or suffix == ".zarr":
+            opener, takes = open_zarr, IN_FILES
     if opener is None:
         raise ArgumentError(
             f"unknown suffix {suffix!r}; expected {', '.join(OPENERS)}, or a folder of slices"
@@ -183,11 +189,12 @@ OPENERS: dict[str, Callable[..., Source]] = {
     **dict.fromkeys((".nii", ".nii.gz"), _open_nifti),
     **dict.fromkeys((".nrrd", ".nhdr", ".mhd", ".mha", ".mrc", ".gipl"), open_foreign),  # by SimpleITK
     **dict.fromkeys((".vti", ".vtk", ".slc"), open_foreign),  # by VTK
-    ".nc": VariableSource,
+    **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5"), open_netcdf),
+    **dict.fromkeys((".zip", ".ozx"), open_zarr),
     **dict.fromkeys((".txt", ".txt.gz"), ColumnSource),
 }
 KEYS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((".raw", ".bin", ".dat"), ("dims", "dtype", "endian", "skip")),
-    ".nc": ("variable",),
+    **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5", ".zip", ".ozx"), IN_FILES),
     **dict.fromkeys((".txt", ".txt.gz"), ("dims", "column")),
 }

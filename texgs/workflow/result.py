@@ -181,7 +181,8 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
     """Return the checksum of an input: of the result that it belongs to, with the identity of its job.
 
     A file from elsewhere counts with its contents. A header counts with its samples as well, a folder with
-    its slices, and the transforms_train.json of views from elsewhere with all images and points beside it.
+    its slices or all files, and the transforms_train.json of views from elsewhere with all images and points
+    beside it.
     """
     folder = path.parent
     made_files = recorded(folder)
@@ -193,7 +194,7 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
         members = [each for each in folder.rglob("*") if each.suffix in (".json", ".png")]
         members += [points for points in [folder / POINTS] if points.is_file()]
     elif path.is_dir():
-        files = [each for each in path.iterdir() if each.is_file()]  # DICOM slices have any suffix, or none
+        files = [each for each in path.rglob("*") if each.is_file()]  # chunks and DICOM have any suffix
         members = [each for each in files if each.suffix.lower() in SLICES] or files
     elif samples := samples_of(path):
         return combined([(path.name, checksums.of(path)), (samples.name, checksums.of(samples))])

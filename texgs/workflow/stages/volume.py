@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -37,9 +38,12 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     from texgs.volume.prepare import prepare
 
-    volume = settings.volume
+    volume, generator = settings.volume, settings.volume.generator
+    field = source(volume, inputs["source"]) if generator is None else generated(volume, generator)
+    if field.note:
+        sys.stderr.write(f"{settings.dataset}: {field.note}\n")
     summary = prepare(
-        source(volume, inputs["source"]) if volume.generator is None else generated(volume, volume.generator),
+        field,
         output / "volume.nrrd",
         crop=volume.crop and tuple(volume.crop),  # type: ignore[arg-type]
         reduce=volume.reduce,
@@ -74,6 +78,7 @@ def source(volume: Volume, path: Path) -> Source:
     said: dict[str, Any] = {name: values and tuple(values) for name, values in given.items()}
     said |= {"dtype": volume.dtype, "endian": volume.endian, "skip": volume.skip}
     said |= {"series": volume.series, "variable": volume.variable, "column": volume.column}
+    said |= {"channel": volume.channel, "time": volume.time}
     return open_source(path, **said)
 
 

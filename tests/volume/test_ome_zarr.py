@@ -1,0 +1,287 @@
+"""Zarr and OME-Zarr, written by Zarr, against NumPy arrays."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+import zarr
+from zarr.storage import LocalStore
+
+from tests.volume.volume_files import sample_values, whole
+from tests.volume.zarr_files import LABELS, add_image, all_axes, axes_of, write_image, zipped
+from texgs.core.errors import ArgumentError
+from texgs.volume.prepare import prepare
+from texgs.volume.sources import open_source
+
+VALUES = sample_values()  # [11, 12, 13]
+LEVELS, SCALES = [VALUES, VALUES[::2, ::2, ::2]], [(3, 2, 0.5), (6, 4, 1)]
+VERSIONS = pytest.mark.parametrize("version", ["0.4", "0.5"])
+
+
+@VERSIONS
+@pytest.mark.parametrize("kind", ["folder", "zip", "folder in a zip"])
+def test_the_finest_level_with_its_lattice(tmp_path, version, kind):
+    shifts = [(30, 20, 10), (31.5, 21, 10.25)]
+    path = write_image(tmp_path / "v.ome.zarr", LEVELS, axes_of("zyx"), SCALES, shifts, version=version)
+    if kind != "folder":
+        path = zipped(path, tmp_path / "v", inner=kind != "zip")
+    source = open_source(path)
+    assert (source.dims, source.dtype, source.note) == ((13, 12, 11), np.uint16, "")
+    assert (source.spacing, source.origin) == ((0.5, 2, 3), (10, 20, 30))
+    np.testing.assert_array_equal(source.slices(0, 11), VALUES)
+    np.testing.assert_array_equal(source.slices(4, 6), VALUES[4:6])
+    for variable in ("s1", "/s1/"):
+        source = open_source(path, variable=variable)
+        assert (source.spacing, source.origin) == ((1, 4, 6), (10.25, 21, 31.5))
+        np.testing.assert_array_equal(source.slices(0, 6), LEVELS[1])
+
+
+@VERSIONS
+@pytest.mark.parametrize("names", ["".join(c) + "zyx" for n in range(3) for c in combinations("tc", n)])
+def test_axes_in_every_order_that_is_legal(tmp_path, version, names):
+    values = all_axes(VALUES)[tuple(slice(None) if name in names else 1 for name in "tczyx")]
+    scale = [*[1] * (len(names) - 3), 3, 2, 0.5]
+    path = write_image(tmp_path / "v.zarr", [values], axes_of(names), [scale], version=version)
+    keys = {"time": 1} if "t" in names else {}
+    keys |= {"channel": "1"} if "c" in names else {}
+    source = open_source(path, **keys)
+    assert source.spacing == (0.5, 2, 3)
+    assert source.n_steps == (2 if "t" in names else 1)
+    np.testing.assert_array_equal(source.slices(0, 11), VALUES + 110)
+
+
+def test_axes_of_space_in_another_order_and_time_and_channels_by_type(tmp_path):
+    values = all_axes(VALUES).transpose(0, 1, 4, 2, 3)
+    axes = axes_of("tcxzy")
+    axes[0]["name"], axes[1]["name"] = "frame", "stain"
+    path = write_image(tmp_path / "v.zarr", [values], axes, [(1, 1, 0.5, 3, 2)])
+    source = open_source(path, channel="2", time=1)
+    assert source.spacing == (0.5, 2, 3)
+    np.testing.assert_array_equal(source.slices(0, 11), VALUES + 120)
+
+
+def test_channels_by_label_or_number(tmp_path):
+    values = all_axes(VALUES, steps=1)[0]
+    path = write_image(tmp_path / "v.zarr", [values], axes_of("czyx"), [(1, 1, 1, 1)], labels=LABELS)
+    np.testing.assert_array_equal(whole(path, channel="GFP"), VALUES + 10)
+    np.testing.assert_array_equal(whole(path, channel="2"), VALUES + 20)
+    for keys, got in (({}, "none"), ({"channel": "CY5"}, "CY5"), ({"channel": "3"}, "3")):
+        with pytest.raises(
+            ArgumentError, match=rf"channel: expected one of 0 \(DAPI\), 1 \(GFP\), 2 \(RFP\), got {got}$"
+        ):
+            open_source(path, **keys)
+    path = write_image(tmp_path / "one.zarr", [values[:1]], axes_of("czyx"), [(1, 1, 1, 1)], labels=["GFP"])
+    np.testing.assert_array_equal(whole(path), VALUES)
+
+
+def test_a_step_of_time_is_chosen_and_the_first_one_is_taken_with_a_note(tmp_path):
+    values = all_axes(VALUES, channels=1)[:, 0]
+    path = write_image(tmp_path / "v.zarr", [values], axes_of("tzyx"), [(60, 1, 1, 1)])
+    source = open_source(path)
+    np.testing.assert_array_equal(source.slices(0, 11), VALUES)
+    assert source.note == "step 0 of 2; dataset.volume.time chooses another"
+    with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 1, got 2$"):
+        open_source(path, time=2)
+
+
+@pytest.mark.parametrize("units", [("meter", "millimeter", "micrometer"), ("km", "m", "mm")])
+def test_units_of_length_become_that_of_x(tmp_path, units):
+    axes = [{"name": name, "type": "space", "unit": unit} for name, unit in zip("zyx", units, strict=True)]
+    source = open_source(write_image(tmp_path / "v.zarr", [VALUES], axes, [(1, 2, 3)]))
+    np.testing.assert_allclose(source.spacing, (3, 2000, 1e6))
+
+
+def test_transforms_of_the_image_come_after_those_of_its_levels(tmp_path):
+    more = {
+        "coordinateTransformations": [
+            {"type": "scale", "scale": [2, 3, 4]},
+            {"type": "translation", "translation": [5, 6, 7]},
+        ]
+    }
+    path = write_image(tmp_path / "v.zarr", [VALUES], axes_of("zyx"), [(1, 2, 3)], [(1, 1, 1)], more=more)
+    source = open_source(path)
+    assert (source.spacing, source.origin) == ((12, 6, 2), (4 + 7, 3 + 6, 2 + 5))
+
+
+@pytest.mark.parametrize(
+    ("free", "level"), [(2 * VALUES.nbytes, 0), (2 * VALUES.nbytes - 1, 1), (2 * LEVELS[1].nbytes - 1, 1)]
+)
+def test_the_finest_level_that_fits_half_of_the_memory_is_taken_or_else_the_last(
+    tmp_path, monkeypatch, free, level
+):
+    path = write_image(tmp_path / "v.zarr", LEVELS, axes_of("zyx"), SCALES)
+    monkeypatch.setattr("texgs.volume.ome_zarr.free_memory", lambda: free)
+    source = open_source(path)
+    np.testing.assert_array_equal(source.slices(0, source.dims[2]), LEVELS[level])
+    told = "level s1 of s0, s1, by the memory that is free; dataset.volume.variable=s0 takes the finest"
+    assert source.note == (told if level else "")
+    np.testing.assert_array_equal(whole(path, variable="s0"), VALUES)
+
+
+def images_in(path):
+    """An image with labels, in a folder of images as bioformats2raw writes them."""
+    root = zarr.open_group(path, mode="w")
+    image = root.create_group("0")
+    add_image(image, LEVELS, axes_of("zyx"), SCALES)
+    add_image(image.create_group("labels/cells"), [VALUES % 5], axes_of("zyx"), [SCALES[0]])
+    root.create_group("OME").attrs["ome"] = {"version": "0.5", "series": ["0"]}
+    return root
+
+
+def test_the_only_image_of_a_folder_of_images_and_its_labels_by_their_path(tmp_path):
+    root = images_in(tmp_path / "v.zarr")
+    np.testing.assert_array_equal(whole(tmp_path / "v.zarr"), VALUES)
+    source = open_source(tmp_path / "v.zarr", variable="0/labels/cells")
+    np.testing.assert_array_equal(source.slices(0, 11), VALUES % 5)
+    assert source.spacing == (0.5, 2, 3)
+    assert open_source(tmp_path / "v.zarr", variable="0/s1").spacing == (1, 4, 6)
+    add_image(root.create_group("1"), [VALUES], axes_of("zyx"), [SCALES[0]])
+    with pytest.raises(ArgumentError, match=r"variable: expected .*, got none; choose one of 0, 1$"):
+        open_source(tmp_path / "v.zarr")
+    with pytest.raises(
+        ArgumentError, match=r"got 2; choose one of 0, 0/labels/cells, 0/labels/cells/s0, 0/s0"
+    ):
+        open_source(tmp_path / "v.zarr", variable="2")
+
+
+@pytest.mark.parametrize("zarr_format", [2, 3])
+def test_arrays_that_are_no_images(tmp_path, zarr_format):
+    path = tmp_path / "a.zarr"
+    zarr.create_array(path, data=VALUES, chunks=(4, 5, 6), zarr_format=zarr_format)
+    np.testing.assert_array_equal(whole(path), VALUES)
+    group = zarr.open_group(tmp_path / "g", mode="w", zarr_format=zarr_format)  # without a suffix
+    group.create_array("a/density", data=VALUES)
+    group.create_array("flat", data=VALUES[0])
+    np.testing.assert_array_equal(whole(tmp_path / "g"), VALUES)
+    group.create_array("b", data=VALUES + 1)
+    with pytest.raises(ArgumentError, match=r"got none; choose one of a/density, b$"):
+        open_source(tmp_path / "g")
+    with pytest.raises(ArgumentError, match=r"got flat of 12 x 13 uint16; choose one of flat|a/density, b$"):
+        open_source(tmp_path / "g", variable="flat")
+
+
+@pytest.mark.parametrize("zarr_format", [2, 3])
+def test_coordinates_and_packed_numbers_as_xarray_writes_them(tmp_path, zarr_format):
+    group = zarr.open_group(tmp_path / "v.zarr", mode="w", zarr_format=zarr_format)
+
+    def add(name, values, axes, **attributes):
+        named = {"dimension_names": axes} if zarr_format == 3 else {}
+        array = group.create_array(name, data=values, **named)
+        array.attrs.update(attributes | ({"_ARRAY_DIMENSIONS": axes} if zarr_format == 2 else {}))
+
+    add("lev", 9.0 - 3 * np.arange(11), ["lev"], units="m")
+    add("lat", 2.0 * np.arange(12), ["lat"], units="m")
+    add("lon", 0.5 * np.arange(13), ["lon"], units="m")
+    add("t", VALUES, ["lev", "lat", "lon"], scale_factor=0.5, _FillValue=7)
+    source = open_source(tmp_path / "v.zarr")
+    assert (source.spacing, source.origin) == ((0.5, 2, 3), (0, 0, -21))
+    np.testing.assert_array_equal(source.slices(0, 11), np.where(VALUES == 7, np.nan, 0.5 * VALUES)[::-1])
+
+
+@pytest.mark.parametrize(
+    "options", [{"chunks": (4, 5, 6)}, {"chunks": (2, 12, 13)}, {"chunks": (4, 6, 7), "shards": (12, 12, 14)}]
+)
+def test_every_chunk_is_read_once_and_no_more_than_a_layer_at_a_time(tmp_path, monkeypatch, options):
+    monkeypatch.setattr("texgs.volume.slabs.SLAB_BYTES", 1)
+    monkeypatch.setattr("texgs.volume.layers.SLAB_BYTES", 1)
+    path = write_image(tmp_path / "v.zarr", [VALUES], axes_of("zyx"), [SCALES[0]], **options)
+    shapes, files = [], []
+    item, get = zarr.Array.__getitem__, LocalStore.get
+
+    def counted(self, at):
+        values = item(self, at)
+        shapes.append(values.shape)
+        return values
+
+    async def told(self, key, prototype, byte_range=None):
+        files.append((key, byte_range))
+        return await get(self, key, prototype, byte_range)
+
+    monkeypatch.setattr(zarr.Array, "__getitem__", counted)
+    monkeypatch.setattr(LocalStore, "get", told)
+    prepare(open_source(path), tmp_path / "v.nrrd", reduce=3)
+    depth = options["chunks"][0]
+    assert [shape[0] for shape in shapes] == [min(depth, 11 - z) for z in range(0, 11, depth)]
+    chunks = [each for each in files if "/c/" in each[0]]
+    assert len(chunks) >= 3
+    assert "shards" in options or len(set(chunks)) == len(chunks)
+
+
+def test_a_folder_that_is_no_zarr_and_a_zip_that_is_none(tmp_path):
+    (tmp_path / "v.zarr").mkdir()
+    with pytest.raises(ArgumentError, match=r"v\.zarr: expected a folder or zip of Zarr, got "):
+        open_source(tmp_path / "v.zarr")
+    (tmp_path / "notes.txt").write_text("text")
+    for content in ({"a/b.txt": "text"}, {}):
+        folder = tmp_path / f"of{len(content)}"
+        folder.mkdir()
+        for name, text in content.items():
+            (folder / name).parent.mkdir()
+            (folder / name).write_text(text)
+        with pytest.raises(ArgumentError, match=r"v\.zip: expected a folder or zip of Zarr, got "):
+            open_source(zipped(folder, tmp_path / "v"))
+    (tmp_path / "w.zip").write_bytes(b"PK\x03\x04 nonsense")
+    with pytest.raises(
+        ArgumentError, match=r"expected a folder or zip of Zarr, got File is not a zip file; is"
+    ):
+        open_source(tmp_path / "w.zip")
+
+
+@pytest.mark.parametrize(
+    ("values", "axes", "message"),
+    [
+        (VALUES[0], "yx", "with three axes or more, got / of 12 x 13 uint16; choose one of another file"),
+        (
+            VALUES + 1j,
+            "zyx",
+            "with three axes or more, got / of 11 x 12 x 13 complex128; choose one of another file",
+        ),
+        (
+            VALUES[:, :, :1],
+            "zyx",
+            "with three axes or more, got / of 11 x 12 x 1 uint16; choose one of another file",
+        ),
+        (
+            VALUES[:0],
+            "zyx",
+            "with three axes or more, got / of 0 x 12 x 13 uint16; choose one of another file",
+        ),
+        (
+            all_axes(VALUES)[0],
+            "qzyx",
+            "expected three axes of space besides time and channel, got q 3 x z 11",
+        ),
+        (VALUES, "zy", "expected a folder or zip of Zarr, got zip"),
+    ],
+)
+def test_images_that_are_no_volume(tmp_path, values, axes, message):
+    path = write_image(tmp_path / "v.zarr", [values], axes_of(axes), [[1.0] * len(axes)])
+    with pytest.raises(ArgumentError, match=message):
+        open_source(path)
+
+
+def test_scales_that_make_no_sense(tmp_path):
+    for scale in ((0, 1, 1), (float("nan"), 1, 1), (1e400, 1, 1)):
+        path = write_image(tmp_path / "v.zarr", [VALUES], axes_of("zyx"), [scale])
+        with pytest.raises(ArgumentError, match=r"spacing: expected three finite numbers above 0, got"):
+            open_source(path)
+    assert open_source(path, spacing=(1, 2, 3), origin=(0, 0, 0)).spacing == (1, 2, 3)
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "s0/zarr.json", "s0/c/0/0/0"])
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.97])
+def test_a_part_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path, capfd, name, share):
+    path = write_image(tmp_path / "v.zarr", [VALUES], axes_of("zyx"), [SCALES[0]])
+    content = (path / name).read_bytes()
+    (path / name).write_bytes(content[: int(share * len(content))])
+    with pytest.raises(
+        ArgumentError, match=r"v\.zarr: expected (a folder or zip of Zarr|an array that is whole), g"
+    ):
+        whole(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_keys_of_other_formats_are_refused(tmp_path):
+    path = write_image(tmp_path / "v.zarr", [VALUES], axes_of("zyx"), [SCALES[0]])
+    with pytest.raises(ArgumentError, match="series: not for this format; leave them out"):
+        open_source(path, series="1")

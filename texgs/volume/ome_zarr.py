@@ -1,0 +1,115 @@
+"""Zarr folders and zips (formats 2 and 3), with the levels, axes and channels of OME-Zarr (0.4 and 0.5)."""
+
+from __future__ import annotations
+
+import posixpath
+import warnings
+from collections.abc import Mapping
+from math import prod
+from pathlib import Path, PurePosixPath
+from typing import Any
+from zipfile import ZipFile
+
+import numpy as np
+
+from texgs.core.io import reading_as
+from texgs.core.memory import free_memory
+from texgs.volume.axes import Axis, along, nameless
+from texgs.volume.grid import Triple
+from texgs.volume.layers import LayerSource, StoredArray, one_of
+
+METADATA = ("zarr.json", ".zgroup", ".zarray")  # files of a node: of format 3, and of format 2
+SHORT = {"time": "t", "channel": "c"}  # names of axes, by types of OME-Zarr
+SHARE = 2  # the samples of a level that is chosen take this part of the free memory at most
+
+
+def is_zarr(folder: Path) -> bool:
+    """Return whether a folder holds an array or a group of Zarr."""
+    return any((folder / name).is_file() for name in METADATA)
+
+
+def open_zarr(
+    path: Path, spacing: Triple | None, origin: Triple | None, variable: str | None = None, **keys: Any
+) -> LayerSource:
+    """Open an array of a Zarr folder or zip by its path, or an image; further keys are as in `LayerSource`.
+
+    Of an image it is the finest level whose samples take at most half of the free memory, as the volume that
+    is prepared from it should; else the coarsest. A note says which, unless it is the finest of all.
+    """
+    import zarr
+
+    with reading_as("a folder or zip of Zarr"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of files beside arrays, and of what is new in the format
+        root, note = _root(path), ""
+        nodes = {"": root} | (dict(root.members(max_depth=None)) if isinstance(root, zarr.Group) else {})
+        images = {name: levels for name in nodes if (levels := _levels(name, nodes))}
+        arrays = {name: node for name, node in nodes.items() if isinstance(node, zarr.Array)}
+        arrays |= {name: nodes[next(iter(levels))] for name, levels in images.items()}
+        outer = {each: node for each, node in arrays.items() if images.keys().isdisjoint(_above(each))}
+        name = one_of(arrays if variable else outer, variable)
+        if name in images:
+            name, note = _fitting(list(images[name]), nodes)
+        known = {level: axes for levels in images.values() for level, axes in levels.items()}
+        array, axes = nodes[name], known.get(name) or _named_axes(name, nodes)
+        stored = StoredArray(array.__getitem__, array.dtype, axes, array.chunks, dict(array.attrs), note)
+        return LayerSource(path, stored, (spacing, origin), **keys)
+
+
+def _root(path: Path) -> Any:
+    """Return the array or group at the root, which may be in a folder of the zip."""
+    import zarr
+    from zarr.storage import LocalStore, ZipStore
+
+    if path.is_dir():
+        return zarr.open(LocalStore(path, read_only=True), mode="r")
+    with ZipFile(path) as file:
+        tops = {name.split("/")[0] for name in file.namelist()}
+    folder = tops.pop() if len(tops) == 1 and tops.isdisjoint(METADATA) else ""
+    return zarr.open(ZipStore(path, mode="r"), mode="r", path=folder)
+
+
+def _above(name: str) -> list[str]:
+    """Return the paths of the groups that a node is in."""
+    return [str(each).strip(".") for each in PurePosixPath(name).parents]
+
+
+def _levels(name: str, nodes: Mapping[str, Any]) -> dict[str, list[Axis]]:
+    """Return the paths of the levels of an image with their axes, the finest first; none for other nodes."""
+    said = nodes[name].attrs.get("ome", nodes[name].attrs)  # of 0.5, of 0.4
+    if not said.get("multiscales"):
+        return {}
+    image, levels = said["multiscales"][0], {}
+    labels = tuple(str(channel.get("label", "")) for channel in said.get("omero", {}).get("channels", ()))
+    for level in image["datasets"]:
+        steps, starts = np.ones(len(image["axes"])), np.zeros(len(image["axes"]))
+        for each in (*level["coordinateTransformations"], *image.get("coordinateTransformations", ())):
+            scale, shift = each.get("scale", 1.0), each.get("translation", 0.0)
+            steps, starts = steps * scale, starts * scale + shift
+        path = posixpath.join(name, level["path"])
+        lines = zip(image["axes"], nodes[path].shape, starts.tolist(), steps.tolist(), strict=True)
+        levels[path] = [
+            Axis(
+                SHORT.get(axis.get("type"), axis["name"]), n, axis.get("unit", ""), start, step, labels=labels
+            )
+            for axis, n, start, step in lines
+        ]
+    return levels
+
+
+def _fitting(levels: list[str], nodes: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the finest level that fits, or else the last one, and a note where it is not the finest."""
+    room = free_memory() // SHARE
+    sizes = [prod(nodes[each].shape[-3:]) * nodes[each].dtype.itemsize for each in levels]
+    name = next((each for each, size in zip(levels, sizes, strict=True) if size <= room), levels[-1])
+    note = f"level {name} of {', '.join(levels)}, by the memory that is free"
+    return name, "" if name == levels[0] else f"{note}; dataset.volume.variable={levels[0]} takes the finest"
+
+
+def _named_axes(name: str, nodes: Mapping[str, Any]) -> list[Axis]:
+    """Return the axes of an array that is no level, with coordinates beside it where xarray wrote it."""
+    array, folder = nodes[name], posixpath.dirname(name)
+    names = getattr(array.metadata, "dimension_names", None) or array.attrs.get("_ARRAY_DIMENSIONS")
+    if not names or None in names:
+        return nameless(array.shape)
+    sizes = zip(names, array.shape, strict=True)
+    return [along(each, n, nodes.get(posixpath.join(folder, each))) for each, n in sizes]
