@@ -41,6 +41,7 @@ from texgs.fields.palette.file import read_palette, write_palette
 from texgs.fields.surfels.compact import open_model, write_compact
 from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.ply import read_ply, write_ply
+from texgs.fields.surfels.step_file import at_step, write_step
 from texgs.fields.surfels.variants import with_texture, write_texture
 from texgs.fit.checkpoint import latest
 from texgs.models.networks import read_tensors
@@ -263,6 +264,10 @@ READERS: dict[str, Reader] = {
     "palette": Reader(lambda folder: write_palette(folder / "p", box()), read_palette),
     "texture": Reader(
         lambda folder: write_texture(folder / "t", sample()), lambda path: with_texture(sample(), path)
+    ),
+    "step": Reader(
+        lambda folder: write_step(folder / "s", sample(), sample(seed=1), {}),
+        lambda path: at_step(sample(), path),
     ),
     "segment": Reader(
         lambda folder: write_segment(folder / "s", sample(), torch.arange(7) < 3),

@@ -1,0 +1,69 @@
+"""Files of steps of a series: how the surfels of one step differ from those of the key model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError, located
+from texgs.core.tensor_file import read_tensor_file, write_tensor_file
+from texgs.fields.surfels.model import Surfels
+
+FORMAT = "texgs-step"
+VERSION = 1
+# What differences are whole numbers of, for all that changes in a series. A pixel of a view of 800 x 800 is
+# about 2^-9 world units wide; scales are logarithms, opacities logits.
+UNITS = {"means": 2**-14, "quats": 2**-13, "scales": 2**-10, "opacities": 2**-10, "colors": 2**-13}
+MOST = 2**15 - 1  # units of a difference
+
+
+def write_step(path: str | Path, key: Surfels, model: Surfels, metadata: Mapping[str, Any]) -> Path:
+    """Write the surfels of a step, which are those of the key model elsewhere, in one step.
+
+    A safetensors file with whole numbers [N, ...] int16, by the names of `UNITS`; the differences, rounded.
+    Quaternions are of length 1 there. Metadata are JSON, such as where the step is from.
+    """
+    own, other = _comparable(key), _comparable(model)
+    check.shape("means", other["means"], "N 3", N=len(key))
+    check.finite(**other)
+    flip = (own["quats"] * other["quats"]).sum(dim=1, keepdim=True) < 0
+    other["quats"] = torch.where(flip, -other["quats"], other["quats"])  # the same rotation
+    tensors = {
+        name: ((other[name] - own[name]) / unit).round().clamp(-MOST, MOST).to(torch.int16)
+        for name, unit in UNITS.items()
+    }
+    return write_tensor_file(path, FORMAT, {"version": VERSION, "metadata": dict(metadata)}, tensors)
+
+
+def at_step(key: Surfels, path: str | Path) -> Surfels:
+    """Return the key model with its surfels where they are in the step of a file.
+
+    Raises:
+        ArgumentError, ShapeError: if the file is missing, damaged or of another model.
+    """
+    _, steps = read_tensor_file(Path(path), FORMAT, VERSION)
+    own = _comparable(key)
+    with located(path):
+        for name, x in own.items():
+            if name not in steps or steps[name].shape != x.shape or steps[name].dtype != torch.int16:
+                found = ", ".join(f"{each} {list(steps[each].shape)}" for each in steps) or "nothing"
+                raise ArgumentError(
+                    f"expected a step of this model of {len(key)} surfels, got {found}; make the series again"
+                )
+    moved = {name: own[name] + UNITS[name] * steps[name].to(own[name]) for name in UNITS}
+    return replace(key, parameters={**key.parameters, **moved})
+
+
+def _comparable(model: Surfels) -> dict[str, Tensor]:
+    """Return what changes in a series, with quaternions of length 1."""
+    if "colors" not in model.parameters:
+        raise ArgumentError(f"model: expected stage shading or texture, got {model.stage}; fit it further")
+    own = {name: model.parameters[name] for name in UNITS}
+    return {**own, "quats": normalize(own["quats"], dim=1)}

@@ -1,0 +1,108 @@
+"""How what a transfer function shows moves from one volume of a series to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn.functional import grid_sample
+
+from texgs.volume.framing import shown_corners, shown_values
+from texgs.volume.grid import Grid
+from texgs.volume.transfer import TransferFunction
+
+if TYPE_CHECKING:
+    import SimpleITK as sitk
+
+MARGIN = 6  # samples around what is shown
+MOST = 96  # samples along a side that are registered; of more, blocks are averaged
+LEVELS = ((4, 60), (2, 40), (1, 20))  # samples of a block, and iterations, one level after the other
+SMOOTHNESS = 0.7  # standard deviation that displacements are smoothed with after each iteration, blocks
+BELOW = 0.1  # of the range of values that show: so far below it values still tell where matter goes
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Displacements on a lattice; between its points they are linear, beyond it those of its faces."""
+
+    displacements: Tensor  # [Z, Y, X, 3] world units, float32
+    first: Tensor  # [3] world coordinates x, y, z of the first point of the lattice
+    last: Tensor  # [3] of the last one
+
+    def at(self, points: Tensor) -> Tensor:
+        """Return the displacements [N, 3] of points [N, 3], world units."""
+        relative = 2 * (points - self.first) / (self.last - self.first) - 1
+        field = self.displacements.permute(3, 0, 1, 2)[None]
+        places = relative.reshape(1, 1, 1, -1, 3)
+        moved = grid_sample(field, places, padding_mode="border", align_corners=True)
+        return moved[0, :, 0, 0].T
+
+
+def motion(before: Grid, after: Grid, tf: TransferFunction) -> Motion:
+    """Find where what a function shows of a volume is in the next one, which lies on the same lattice.
+
+    Values that the function shows are registered by symmetric demons (Vercauteren et al. 2007) from coarse to
+    fine, in the box in which either volume shows something.
+
+    Raises:
+        ArgumentError: if either shows nothing.
+    """
+    import SimpleITK as sitk  # slow to import
+
+    dims = np.array(before.dims)
+    corners = np.concatenate([shown_corners(grid, [tf]) for grid in (before, after)])
+    voxel = np.array(before.aabb[1]) * 2 / (dims - 1)
+    corners = corners / voxel + (dims - 1) / 2  # in samples
+    low = np.maximum(np.floor(corners.min(axis=0)).astype(int) - MARGIN, 0)
+    high = np.minimum(np.ceil(corners.max(axis=0)).astype(int) + MARGIN + 1, dims)
+    field = registered([shown_image(grid, tf, low, high) for grid in (before, after)])
+    displacements = torch.from_numpy(sitk.GetArrayFromImage(field) * voxel).float()
+    first = np.array(field.GetOrigin())
+    last = first + np.array(field.GetSpacing()) * (np.array(field.GetSize()) - 1)
+    ends = (torch.from_numpy((end - (dims - 1) / 2) * voxel).float() for end in (first, last))
+    return Motion(displacements, *ends)
+
+
+def registered(images: Sequence[sitk.Image]) -> sitk.Image:
+    """Return displacements in samples from the first image to the second one, from coarse to fine."""
+    import SimpleITK as sitk
+
+    start: list[sitk.Image] = []
+    for block, iterations in LEVELS:
+        fixed, moving = (shrunk(image, block) for image in images)
+        demons = sitk.FastSymmetricForcesDemonsRegistrationFilter()
+        demons.SetNumberOfIterations(iterations)
+        demons.SetStandardDeviations(SMOOTHNESS)
+        beyond = (
+            0.0,
+            sitk.sitkVectorFloat64,
+            True,
+        )  # the lattice those of its faces
+        start = [sitk.Resample(each, fixed, sitk.Transform(), sitk.sitkLinear, *beyond) for each in start]
+        start = [demons.Execute(fixed, moving, *start)]
+    return start[0]
+
+
+def shown_image(grid: Grid, tf: TransferFunction, low: np.ndarray, high: np.ndarray) -> sitk.Image:
+    """Return the values of a box, relative to the range that a function shows, on a lattice in samples."""
+    import SimpleITK as sitk
+
+    ranges = shown_values(tf)
+    least, most = float(ranges[0][0]), float(ranges[-1][1])
+    box = tuple(slice(*ends) for ends in zip(low[::-1], high[::-1], strict=True))
+    values = np.nan_to_num(grid.values[box].astype(np.float32), nan=least, posinf=most, neginf=least)
+    image = sitk.GetImageFromArray(((values - least) / (most - least)).clip(-BELOW, 1))
+    image.SetOrigin(low.astype(float).tolist())
+    blocks = [-(-size // MOST) for size in image.GetSize()]
+    return sitk.BinShrink(image, blocks)
+
+
+def shrunk(image: sitk.Image, block: int) -> sitk.Image:
+    """Average blocks of samples, where an axis has two blocks at least."""
+    import SimpleITK as sitk
+
+    return sitk.BinShrink(image, [max(1, min(block, size // 2)) for size in image.GetSize()])
