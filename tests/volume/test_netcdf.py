@@ -104,7 +104,7 @@ LONG = "expected an array of real numbers with three axes or more"
     [
         ({}, rf"variable: {LONG}, got none; choose one of temperature, vx$"),
         ({"variable": "vy"}, f"{LONG}, got vy; choose one of temperature, vx"),
-        ({"variable": "r"}, f"{LONG}, got r of 5 >f8; choose one of temperature, vx"),
+        ({"variable": "r"}, f"{LONG}, got r of 5 float64; choose one of temperature, vx"),
         ({"variable": "vx", "column": 2}, "column: not for this format; leave them out"),
         ({"variable": "vx", "time": 1}, "time: there is no such axis in lat 4 x r 5 x lon 6; leave it out"),
         ({"variable": "vx", "channel": "0"}, "channel: there is no such axis in lat 4 x r 5 x lon 6"),

@@ -1,5 +1,7 @@
 """Zarr and OME-Zarr, written by Zarr, against NumPy arrays."""
 
+import struct
+from base64 import b64encode
 from itertools import combinations
 
 import numpy as np
@@ -65,6 +67,7 @@ def test_channels_by_label_or_number(tmp_path):
     path = write_image(tmp_path / "v.zarr", [values], axes_of("czyx"), [(1, 1, 1, 1)], labels=LABELS)
     np.testing.assert_array_equal(whole(path, channel="GFP"), VALUES + 10)
     np.testing.assert_array_equal(whole(path, channel="2"), VALUES + 20)
+    np.testing.assert_array_equal(whole(path, channel=0), VALUES)
     for keys, got in (({}, "none"), ({"channel": "CY5"}, "CY5"), ({"channel": "3"}, "3")):
         with pytest.raises(
             ArgumentError, match=rf"channel: expected one of 0 \(DAPI\), 1 \(GFP\), 2 \(RFP\), got {got}$"
@@ -176,6 +179,22 @@ def test_coordinates_and_packed_numbers_as_xarray_writes_them(tmp_path, zarr_for
     source = open_source(tmp_path / "v.zarr")
     assert (source.spacing, source.origin) == ((0.5, 2, 3), (0, 0, -21))
     np.testing.assert_array_equal(source.slices(0, 11), np.where(VALUES == 7, np.nan, 0.5 * VALUES)[::-1])
+    group["t"].attrs["_FillValue"] = b64encode(struct.pack("<d", 9.0)).decode()  # that of a float in format 3
+    np.testing.assert_array_equal(
+        whole(tmp_path / "v.zarr"), np.where(VALUES == 9, np.nan, 0.5 * VALUES)[::-1]
+    )
+
+
+@pytest.mark.parametrize("axes", [{}, {"axes": ["t", "c", "z", "y", "x"]}])
+def test_versions_before_0_4_tell_no_spacing(tmp_path, axes):
+    group = zarr.open_group(tmp_path / "v.zarr", mode="w", zarr_format=2)
+    group.create_array("0", data=all_axes(VALUES))
+    group.attrs["multiscales"] = [
+        {"version": "0.3" if axes else "0.1", "datasets": [{"path": "./0"}], **axes}
+    ]
+    source = open_source(tmp_path / "v.zarr", time=1, channel="2")
+    assert source.spacing == (1, 1, 1)
+    np.testing.assert_array_equal(source.slices(0, 11), VALUES + 120)
 
 
 @pytest.mark.parametrize(
@@ -279,6 +298,14 @@ def test_a_part_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path
     ):
         whole(path)
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_file_with_the_suffix_of_a_folder(tmp_path):
+    (tmp_path / "v.zarr").write_bytes(b"zarr")
+    with pytest.raises(
+        ArgumentError, match=r"unknown suffix '.zarr'; expected .*, or a folder of slices or Zarr"
+    ):
+        open_source(tmp_path / "v.zarr")
 
 
 def test_keys_of_other_formats_are_refused(tmp_path):

@@ -39,8 +39,7 @@ class LayerSource(Source):
     Axes are z, y, x in the order they are stored, unless their names say otherwise, and run upwards with
     coordinates. What is read is layers of whole chunks along z. One stays in memory, so that slabs in order
     read every chunk once; only where a layer takes more than a quarter of the free memory, it is read in
-    parts, and its chunks once for each. `given` replaces
-    spacing and origin; `n_steps` is the number of steps of time.
+    parts, and its chunks once for each. `given` replaces spacing and origin, `n_steps` counts steps of time.
     """
 
     def __init__(

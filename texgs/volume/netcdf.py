@@ -42,18 +42,16 @@ def _classic(path: Path, variable: str | None) -> StoredArray:
     from scipy.io import netcdf_file
 
     file = netcdf_file(path)
-    name = one_of({name: each.data for name, each in file.variables.items()}, variable)
+    like = {
+        name: np.broadcast_to(each.data.dtype.type(), each.shape) for name, each in file.variables.items()
+    }
+    name = one_of(like, variable)
     field = file.variables[name]
     sizes = zip(field.dimensions, field.shape, strict=True)
     axes = [along(axis, n, file.variables.get(axis)) for axis, n in sizes]
     attributes = {key: getattr(field, key, "") for key in CODED}
-    return StoredArray(
-        lambda index: np.array(file.variables[name][index]),
-        field.data.dtype,
-        axes,
-        [1] * len(axes),
-        attributes,
-    )
+    dtype, chunks = field.data.dtype, [1] * len(axes)
+    return StoredArray(lambda at: np.array(file.variables[name][at]), dtype, axes, chunks, attributes)
 
 
 def _hdf5(path: Path, variable: str | None) -> StoredArray:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import posixpath
 import warnings
+from base64 import b64decode
 from collections.abc import Mapping
+from itertools import chain
 from math import prod
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -19,7 +21,7 @@ from texgs.volume.grid import Triple
 from texgs.volume.layers import LayerSource, StoredArray, one_of
 
 METADATA = ("zarr.json", ".zgroup", ".zarray")  # files of a node: of format 3, and of format 2
-SHORT = {"time": "t", "channel": "c"}  # names of axes, by types of OME-Zarr
+SHORT: dict[Any, str] = {"time": "t", "channel": "c"}  # names of axes, by types of OME-Zarr
 SHARE = 2  # the samples of a level that is chosen take this part of the free memory at most
 
 
@@ -51,7 +53,10 @@ def open_zarr(
             name, note = _fitting(list(images[name]), nodes)
         known = {level: axes for levels in images.values() for level, axes in levels.items()}
         array, axes = nodes[name], known.get(name) or _named_axes(name, nodes)
-        stored = StoredArray(array.__getitem__, array.dtype, axes, array.chunks, dict(array.attrs), note)
+        attributes = dict(array.attrs)
+        if isinstance(fill := attributes.get("_FillValue"), str):  # a number as xarray packs it in format 3
+            attributes["_FillValue"] = np.frombuffer(b64decode(fill), "<f8")
+        stored = StoredArray(array.__getitem__, array.dtype, axes, array.chunks, attributes, note)
         return LayerSource(path, stored, (spacing, origin), **keys)
 
 
@@ -70,7 +75,7 @@ def _root(path: Path) -> Any:
 
 def _above(name: str) -> list[str]:
     """Return the paths of the groups that a node is in."""
-    return [str(each).strip(".") for each in PurePosixPath(name).parents]
+    return ["/".join(each.parts) for each in PurePosixPath(name).parents]
 
 
 def _levels(name: str, nodes: Mapping[str, Any]) -> dict[str, list[Axis]]:
@@ -80,19 +85,21 @@ def _levels(name: str, nodes: Mapping[str, Any]) -> dict[str, list[Axis]]:
         return {}
     image, levels = said["multiscales"][0], {}
     labels = tuple(str(channel.get("label", "")) for channel in said.get("omero", {}).get("channels", ()))
+    # Versions before 0.4 only name their axes, or not even that, and have no transformations.
+    axes: list[Any] = [
+        {"name": each} if isinstance(each, str) else each for each in image.get("axes", "tczyx")
+    ]
+    names = [SHORT.get(axis.get("type"), axis["name"]) for axis in axes]
+    units = [axis.get("unit", "") for axis in axes]
     for level in image["datasets"]:
-        steps, starts = np.ones(len(image["axes"])), np.zeros(len(image["axes"]))
-        for each in (*level["coordinateTransformations"], *image.get("coordinateTransformations", ())):
+        steps, starts = np.ones(len(axes)), np.zeros(len(axes))
+        transforms = [each.get("coordinateTransformations", ()) for each in (level, image)]
+        for each in chain(*transforms):
             scale, shift = each.get("scale", 1.0), each.get("translation", 0.0)
             steps, starts = steps * scale, starts * scale + shift
-        path = posixpath.join(name, level["path"])
-        lines = zip(image["axes"], nodes[path].shape, starts.tolist(), steps.tolist(), strict=True)
-        levels[path] = [
-            Axis(
-                SHORT.get(axis.get("type"), axis["name"]), n, axis.get("unit", ""), start, step, labels=labels
-            )
-            for axis, n, start, step in lines
-        ]
+        path = posixpath.normpath(posixpath.join(name, level["path"]))
+        lines = zip(names, nodes[path].shape, units, starts.tolist(), steps.tolist(), strict=True)
+        levels[path] = [Axis(*line, labels=labels) for line in lines]
     return levels
 
 

@@ -30,6 +30,7 @@ from texgs.volume.tiff import open_tiff, tiffs_in
 
 # Tried in this order where the size of a plain file does not fit the type given.
 COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
+DEFAULTS = {"endian": "little", "skip": 0, "time": 0}  # of keys, which every format may be given
 IN_FILES = ("variable", "channel", "time")  # keys of an array among others
 
 
@@ -65,7 +66,7 @@ def open_source(
         OutOfMemoryError: if the format is one that is read as a whole, and the samples do not fit.
     """
     path = Path(path)
-    said = {key: value for key, value in keys.items() if value not in (None, "little", 0)}
+    said = {key: value for key, value in keys.items() if value not in (None, DEFAULTS.get(key))}
     try:
         with located(path):
             _try_to_read(path)
@@ -104,7 +105,7 @@ def _open(path: Path, spacing: Triple | None, origin: Triple | None, said: dict[
             opener, takes = open_zarr, IN_FILES
     if opener is None:
         raise ArgumentError(
-            f"unknown suffix {suffix!r}; expected {', '.join(OPENERS)}, or a folder of slices"
+            f"unknown suffix {suffix!r}; expected {', '.join(OPENERS)}, or a folder of slices or Zarr"
         )
     if unfit := [key for key in said if key not in takes]:
         raise ArgumentError(f"{', '.join(unfit)}: not for this format; leave them out")
