@@ -77,15 +77,16 @@ def of_volume(browser: Any, file: Path, folder: Path) -> dict[str, object]:
     start = perf_counter()
     volume = page_volume(scene)
     packed_in = perf_counter() - start
-    written = write_page(folder / "page.html", scene, NAME, volume=volume)
-    opened_in = [opened(browser, written.path) for _ in range(OPENINGS)]
+    file_of_page = folder / "page.html"
+    write_page(file_of_page, scene, NAME, volume=volume)
+    opened_in = [opened(browser, file_of_page) for _ in range(OPENINGS)]
     page, description = opened_renderer(browser, scene, volume)
     closeness = compared(page, description, scene, file)
     turning, changing = times(page, description, file)
     return {
         "samples": volume.codes.shape,
         "mb": len(volume.packed) / 1e6,
-        "page_mb": written.path.stat().st_size / 1e6,
+        "page_mb": file_of_page.stat().st_size / 1e6,
         "renderer": page.evaluate(NAME_OF_CARD),
         "seconds": {"packed": packed_in, "opened": opened_in},
         "functions": len(closeness),
@@ -113,7 +114,7 @@ def opened_renderer(browser: Any, scene: Scene, volume: PageVolume) -> tuple[Any
     """Return a page that draws a scene as it is told, and the description of the scene."""
     composed, page = scene.open(), browser.new_page()
     description = describe(NAME, scene, composed) | {"volume": volume.describe(scene)}
-    open_renderer(page, pack(Path(NAME), composed), description, b64encode(volume.packed).decode())
+    open_renderer(page, pack(composed), description, b64encode(volume.packed).decode())
     return page, description
 
 

@@ -1,3 +1,36 @@
-"""Editable, relightable, stylisable 3D scenes of textured 2D Gaussians from scientific volumes."""
+"""Editable, relightable, stylisable 3D scenes of textured 2D Gaussians from scientific volumes.
+
+In Python: `Volume`, `fit`, `open` and `Scene`; they are loaded when they are first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from texgs.api.fit import fit
+    from texgs.api.functions import Functions
+    from texgs.api.scene import Scene
+    from texgs.api.scene import open_scene as open
+    from texgs.api.volume import Volume
+    from texgs.volume.transfer import TransferFunction
 
 __version__ = "0.1.0"
+__all__ = ["Functions", "Scene", "TransferFunction", "Volume", "fit", "open"]
+
+HOMES = {
+    "Functions": "texgs.api.functions",
+    "Scene": "texgs.api.scene",
+    "TransferFunction": "texgs.volume.transfer",
+    "Volume": "texgs.api.volume",
+    "fit": "texgs.api.fit",
+    "open": "texgs.api.scene",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Return what the interface offers; nothing of it is imported before."""
+    if name not in HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(HOMES[name]), "open_scene" if name == "open" else name)

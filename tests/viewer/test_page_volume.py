@@ -101,7 +101,7 @@ def page(chromium, scene):
 def open_in(page, scene):
     composed, volume = scene.open(), page_volume(scene, 100)
     page.description = describe("test", scene, composed) | {"volume": volume.describe(scene)}
-    packed = pack(scene.volume.file, composed)
+    packed = pack(composed)
     open_renderer(page, packed, page.description, b64encode(volume.packed).decode())
 
 

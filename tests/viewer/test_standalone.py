@@ -160,7 +160,7 @@ def test_cuts_are_hollow_in_the_page_and_on_its_poster(scene, tmp_path):
     named = replace(opened, volume=SceneVolume(tmp_path / "gone.nrrd", {}))
     pages = [standalone.write_page(tmp_path / "cut.html", each, "cut") for each in (opened, named)]
     assert pages[0].poster == pages[1].poster
-    assert "Cuts are hollow here" in pages[0].path.read_text()
+    assert "Cuts are hollow here" in pages[0].text
 
 
 def test_it_holds_a_picture_of_the_first_view(file):

@@ -58,7 +58,7 @@ def scene(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def packed(scene, tmp_path_factory):
-    return pack(tmp_path_factory.mktemp("packed") / "page.html", scene.open())
+    return pack(scene.open())
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +204,7 @@ def test_texels_beyond_eight_bits_have_sixteen(chromium, tmp_path):
     model.parameters["texels"][::2] += 1.5
     scene = Scene({"A": SceneModel(write_model(tmp_path / "a.safetensors", model), PartEdit(ambient=0.2))})
     composed = scene.open()
-    packed = pack(tmp_path / "page.html", composed)
+    packed = pack(composed)
     description = describe("bright", scene, composed)
     page = chromium.new_page()
     open_renderer(page, packed, description)
@@ -234,5 +234,5 @@ def test_texels_that_no_page_can_hold_are_refused(tmp_path):
     model = ball(5)
     model.parameters["texels"][3, 1] = 300
     scene = Scene({"A": SceneModel(write_model(tmp_path / "a.safetensors", model))})
-    with pytest.raises(ArgumentError, match=r"page.html: texels: expected at most 255.992, got 300; fit"):
-        pack(tmp_path / "page.html", scene.open())
+    with pytest.raises(ArgumentError, match=r"^texels: expected at most 255.992, got 300; fit"):
+        pack(scene.open())

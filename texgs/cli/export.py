@@ -140,4 +140,5 @@ def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
     if arguments.volume is not None:
         volume = page_volume(scene, arguments.volume)
         print(f"Volume in the page: {volume}", file=sys.stderr)
-    return write_page(arguments.to, scene, arguments.to.stem, checked(arguments.source, scene), volume).path
+    write_page(arguments.to, scene, arguments.to.stem, checked(arguments.source, scene), volume)
+    return Path(arguments.to)

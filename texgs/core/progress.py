@@ -59,9 +59,10 @@ def log_point(values: Mapping[str, float], step: int) -> None:
 def progress(iterable: Iterable[T], total: int | None = None, *, title: str, unit: str) -> Iterator[T]:
     """Yield the items of a loop; report on stderr how many are done, how fast, and the time left.
 
-    A terminal shows one moving bar. Anything else, such as the log file of a job, gets a plain line at most
-    every five seconds and one at the end, also where the loop was left early; none where there is nothing to
-    do. The rates of these lines are means since the start. The unit names one item, such as "view".
+    A terminal or a notebook shows one moving bar. Anything else, such as the log file of a job, gets a plain
+    line at most every five seconds and one at the end, also where the loop was left early; none where there
+    is nothing to do. The rates of these lines are means since the start. The unit names one item, such as
+    "view".
 
     Example:
         >>> list(progress("ab", title="letters", unit="letter"))
@@ -78,9 +79,12 @@ def progress(iterable: Iterable[T], total: int | None = None, *, title: str, uni
 
 def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterable[T]:
     """Return the items, in a bar or with plain lines."""
-    if not sys.stderr.isatty():
+    if "ipykernel" in sys.modules:
+        from tqdm.auto import tqdm  # a widget where the notebook has those
+    elif not sys.stderr.isatty():
         return _lines(iterable, total, title, unit)
-    from tqdm import tqdm  # slow to import
+    else:
+        from tqdm import tqdm  # slow to import
 
     bar: Iterable[T] = tqdm(iterable, desc=title, total=total, unit=unit, dynamic_ncols=True)
     return bar

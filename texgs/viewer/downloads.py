@@ -45,7 +45,8 @@ class Downloads:
             return write_frames(path, self._film(scene, asked), asked.fps, comment=words)
         if asked.kind in PAGES:
             volume = page_volume(scene) if asked.kind == "volume" else None
-            return write_page(path, scene, name, self._edits.checked(scene), volume).path
+            write_page(path, scene, name, self._edits.checked(scene), volume)
+            return path
         return export.export_scene(path, scene, export.Export(asked.kind))
 
     def file(self, name: str) -> Path | None:

@@ -6,7 +6,7 @@ import hmac
 import ipaddress
 import re
 import socket
-from collections.abc import Collection
+from collections.abc import Awaitable, Callable, Collection
 from contextlib import suppress
 from urllib.parse import urlsplit
 
@@ -16,7 +16,7 @@ from aiohttp.typedefs import Handler, Middleware
 HOST = re.compile(r"[A-Za-z0-9._:\[\]-]+")
 POLICY = (  # not every browser takes the socket for a part of 'self'
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-    "connect-src 'self' ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    "connect-src 'self' ws://{host}; base-uri 'none'; form-action 'none'"
 )
 HEADERS = {
     "Cache-Control": "no-store",
@@ -52,10 +52,20 @@ def guard(token: str, host: str) -> Middleware:
     return middleware
 
 
-async def add_headers(request: web.Request, response: web.StreamResponse) -> None:
-    """Let no browser keep an answer or take it for something else; errors are answers, too."""
-    policy = "default-src 'none'" if response.status >= 400 else POLICY.format(host=request.headers["Host"])
-    response.headers.update({**HEADERS, "Content-Security-Policy": policy})
+def headers(is_framed: bool) -> Callable[[web.Request, web.StreamResponse], Awaitable[None]]:
+    """Return what lets no browser keep an answer or take it for something else; errors are answers, too.
+
+    Pages may be inside of others, such as notebooks, where they are `is_framed`: the token keeps others out.
+    """
+    ancestors = "" if is_framed else "; frame-ancestors 'none'"
+
+    async def add_headers(request: web.Request, response: web.StreamResponse) -> None:
+        policy = "default-src 'none'"
+        if response.status < 400:
+            policy = POLICY.format(host=request.headers["Host"]) + ancestors
+        response.headers.update({**HEADERS, "Content-Security-Policy": policy})
+
+    return add_headers
 
 
 def is_own_host(header: str, host: str, names: Collection[str]) -> bool:

@@ -6,8 +6,7 @@ import io
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path
 from shutil import rmtree
 from time import monotonic
@@ -17,13 +16,13 @@ import torch
 from PIL import Image
 
 from texgs.config.recipes import Edit
-from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed
 from texgs.core.names import part_file
 from texgs.edit.method import method_of
+from texgs.edit.orbit_task import OrbitTask, orbit_task
 from texgs.edit.readable import raised
-from texgs.edit.task import EditedScene, Task, parts_with_surfels
+from texgs.edit.task import EditedScene, parts_with_surfels
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import write_texture
 from texgs.models.instruction import understand, vocabulary
@@ -35,10 +34,7 @@ from texgs.scene.scene import Scene
 from texgs.viewer.messages import Look, Orbit
 from texgs.viewer.scratch import scratch_folder
 from texgs.viewer.styles import MOST, Styles
-from texgs.volume.cameras import icosphere_of
-from texgs.volume.view_set import View
 
-VIEWS, SIZE = 92, 400  # that parts learn from, and pixels of their sides
 QUICK = 352  # of those along the axes, which the scene fills
 BETWEEN = 2.0  # seconds between textures on their way that are shown
 KEPT = 20  # of those of each part, and of previews: frames may be on their way
@@ -47,24 +43,6 @@ THUMBNAIL = 112  # rows of pixels
 # The first is taken whose weights are on this machine.
 FULL = ("default", "patches")  # recipes for pictures
 Show = Callable[[str, NewLook], None]  # of a part, and its look
-
-
-@dataclass(frozen=True, eq=False)
-class OrbitTask(Task[Any]):
-    """An edit that learns from new views around the scene, under its light: training views are not needed."""
-
-    side: Orbit | None = None  # from which the only view is made; None: from all
-
-    def training_views(self, model: str) -> Sequence[View]:
-        """Return the cameras on a sphere; there are no images."""
-        return [View(camera, Path(), self.scene.light) for camera in self._cameras]
-
-    @cached_property
-    def _cameras(self) -> list[Camera]:
-        """Return the same ones for all parts."""
-        if self.side:
-            return [orbit(self.side.azimuth, self.side.polar, *self.lens)]
-        return icosphere_of(VIEWS, self.lens)
 
 
 class Looks:
@@ -109,8 +87,7 @@ class Looks:
         views are one from there.
         """
         method = method_of(edit)
-        lens = scene.framed().lens().square(SIZE)
-        task = OrbitTask(method.of(edit), edit, scene, {}, output, self._device, 1, lens, "look", side=side)
+        task = orbit_task(scene, edit, output, self._device, (side.azimuth, side.polar) if side else None)
         task = self._raised(replace(task, draws=False))
         preview = ThrottledPreview(show, looks_of(task.scene, edit.parts, scene), self._scratch)
         is_alone = not output.parent.exists()

@@ -21,7 +21,7 @@ from texgs.viewer.beside import Beside
 from texgs.viewer.description import bounds, describe, presets
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
-from texgs.viewer.guard import add_headers, guard
+from texgs.viewer.guard import guard, headers
 from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Pick, Save, Segment, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
@@ -42,9 +42,13 @@ class Server:
     """What the handlers of requests share. The models of the scene are read at once."""
 
     def __init__(
-        self, opened: Opened, device: torch.device | str = "cpu", styles: Path | None = None
+        self,
+        opened: Opened,
+        device: torch.device | str = "cpu",
+        styles: Path | None = None,
+        session: Session | None = None,
     ) -> None:
-        session = Session(opened.scene, device)
+        session = session or Session(opened.scene, device)  # somebody else may edit the scene, too
         self._title, composed = title_of(opened.source), session.composition
         self._bounds, self._device = bounds(opened.scene, composed), device
         self._opened = self._latest = (files_of_models(opened.scene), composed)  # models as they were fitted
@@ -53,7 +57,7 @@ class Server:
         self._beside = Beside(session, self._origins)
         self.frames = Frames(session, self._beside)
         self._changing = asyncio.Lock()  # a change that reads files takes its time in another thread
-        self.work = Work(self.frames, self.edits, self._changing, self._tell_all, device, styles)
+        self.work = Work(self.frames, self.edits, self._changing, self.tell_all, device, styles)
         self._choices = {
             "styles": self.work.styles.names,
             "words": list(WORDS),
@@ -64,8 +68,11 @@ class Server:
         self._count = 0  # of pages so far
         self._run = secrets.token_hex(8)  # tells pages that they have met another server
 
-    def application(self, token: str, host: str = "127.0.0.1") -> web.Application:
-        """Return the application to serve on a host; the token is the first part of every path."""
+    def application(self, token: str, host: str = "127.0.0.1", *, is_framed: bool = False) -> web.Application:
+        """Return the application to serve on a host; the token is the first part of every path.
+
+        Other pages, such as notebooks, may show pages that are framed.
+        """
         app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST)
         handlers = {
             "": self.index,
@@ -77,7 +84,7 @@ class Server:
         }
         app.router.add_routes([web.get(f"/{token}/{path}", each) for path, each in handlers.items()])
         app.router.add_post(f"/{token}/styles", self.new_style)
-        app.on_response_prepare.append(add_headers)
+        app.on_response_prepare.append(headers(is_framed))
         app.on_shutdown.append(self._say_goodbye)
         app.cleanup_ctx.append(self._closing)
         return app
@@ -198,9 +205,9 @@ class Server:
                         self.edits.change(message, page.number)
             finally:
                 page.answered += 1
-            self._tell_all()
+            self.tell_all()
 
-    def _tell_all(self) -> None:
+    def tell_all(self) -> None:
         """Tell all pages what the scene is now."""
         news = self.scene_message()
         for each in self._pages:

@@ -19,7 +19,7 @@ from torch import Tensor
 
 from texgs import __version__
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.io import write_bytes
 from texgs.fields.surfels.compact import STEP, compact_tensors
 from texgs.fields.surfels.composition import Composition
@@ -39,23 +39,30 @@ EXPORT = re.compile(r"^export ((?:async )?(?:function|class|const) (\w+))", re.M
 
 
 @dataclass(frozen=True)
-class WrittenPage:
+class ScenePage:
     """A page, and what is known of it."""
 
-    path: Path
+    text: str
     surfels: int
     poster: bytes  # a JPEG of the first view
 
 
 def write_page(
     path: Path, scene: Scene, name: str, checked: str = "", volume: PageVolume | None = None
-) -> WrittenPage:
-    """Create or replace the page of a scene of surfels in one step; the same scene gives the same bytes.
+) -> ScenePage:
+    """Create or replace the page of a scene of surfels in one step; see `scene_page`."""
+    with located(path):
+        page = scene_page(scene, name, checked, volume)
+    write_bytes(path, page.text.encode())
+    return page
+
+
+def scene_page(scene: Scene, name: str, checked: str = "", volume: PageVolume | None = None) -> ScenePage:
+    """Return the page of a scene of surfels; the same scene gives the same text.
 
     The surfels are rounded as in compact model files. Hidden models are in the page: they can be shown there.
 
     Args:
-        path: of the page.
         scene: to show.
         name: of the scene, the title.
         checked: what `texgs check` has found; it stands in the metadata, and below.
@@ -63,11 +70,11 @@ def write_page(
     """
     composed = scene.open()
     if not isinstance(composed, Composition):
-        raise ArgumentError(f"{path}: expected a scene of surfels, got another kind; fit surfels for this")
-    surfels = pack(path, composed)
+        raise ArgumentError("expected a scene of surfels, got another kind; fit surfels for this")
+    surfels = pack(composed)
     if len(surfels) > LARGEST:
         raise ArgumentError(
-            f"{path}: expected surfels of at most {LARGEST >> 20} MiB, got {len(surfels) >> 20} MiB for "
+            f"expected surfels of at most {LARGEST >> 20} MiB, got {len(surfels) >> 20} MiB for "
             f"{len(composed)} of them; export fewer models"
         )
     description = describe(name, scene, composed)
@@ -77,8 +84,7 @@ def write_page(
         description["transfer"] = Origins(scene).transfer
         twin = twin_of(scene)
     picture = poster(scene, composed, description["views"][0], description["fov_y"], twin)
-    write_bytes(path, page_of(description, surfels, picture, checked, volume).encode())
-    return WrittenPage(path, len(composed), picture)
+    return ScenePage(page_of(description, surfels, picture, checked, volume), len(composed), picture)
 
 
 def page_of(
@@ -130,7 +136,7 @@ def digest(text: str) -> str:
     return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
 
 
-def pack(path: Path, composition: Composition) -> str:
+def pack(composition: Composition) -> str:
     """Return the tensors of all models as text, named NUMBER.PARAMETER, and `labels` [N] of segments.
 
     The same scene gives the same text. Browsers unpack zlib by themselves, but not xz.
@@ -141,8 +147,8 @@ def pack(path: Path, composition: Composition) -> str:
     for number, part in enumerate(composition.parts):
         model = part.model.to("cpu")
         if "texels" in model.parameters:
-            require_range(path, model.parameters["texels"])
-        own = compact_tensors(path, model)
+            require_range(model.parameters["texels"])
+        own = compact_tensors(model)
         if part.labels is not None:
             own["labels"] = part.labels.cpu().numpy().astype(np.uint8 if part.segments < 256 else np.int32)
         tensors |= {f"{number}.{name}": values for name, values in own.items()}
@@ -152,12 +158,12 @@ def pack(path: Path, composition: Composition) -> str:
     return b64encode(zlib.compress(save(tensors, {"optics": json.dumps(facts)}), 9)).decode()
 
 
-def require_range(path: Path, texels: Tensor) -> None:
+def require_range(texels: Tensor) -> None:
     """Require texels [T, 3] that 16 bits hold."""
     largest = float(texels.abs().max()) if len(texels) else 0.0
     if largest > MOST_STEPS * STEP:
         raise ArgumentError(
-            f"{path}: texels: expected at most {MOST_STEPS * STEP:g}, got {largest:g}; fit the texture again"
+            f"texels: expected at most {MOST_STEPS * STEP:g}, got {largest:g}; fit the texture again"
         )
 
 

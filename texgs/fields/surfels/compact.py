@@ -17,7 +17,7 @@ from torch.nn.functional import normalize
 
 from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading, write_bytes
 from texgs.core.memory import require_memory
 from texgs.core.ply_file import is_ply
@@ -56,7 +56,8 @@ def write_compact(
     model = model.to("cpu")
     if seen is not None:
         model = _without_unseen(model, seen.cpu())
-    packed = lzma.compress(save(compact_tensors(path, model, step)), preset=6)
+    with located(path):
+        packed = lzma.compress(save(compact_tensors(model, step)), preset=6)
     return write_bytes(path, json.dumps(header, separators=(",", ":")).encode() + b"\n" + packed)
 
 
@@ -100,11 +101,11 @@ def seen_surfels(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
 # -- writing ---
 
 
-def compact_tensors(path: str | Path, model: Surfels, step: float = STEP) -> dict[str, np.ndarray]:
-    """Return the tensors of a compact file at `path`, see `write_compact`, of a model on the CPU."""
+def compact_tensors(model: Surfels, step: float = STEP) -> dict[str, np.ndarray]:
+    """Return the tensors of a compact file, see `write_compact`, of a model on the CPU."""
     stored = {name: _rounded(name, x.detach()) for name, x in model.parameters.items() if name not in LISTS}
     if model.stage == "texture":
-        stored |= _texture(path, model.parameters, step)
+        stored |= _texture(model.parameters, step)
     return stored
 
 
@@ -129,7 +130,7 @@ def _rounded(name: str, values: Tensor) -> np.ndarray:
     return (values if exact else half).contiguous().numpy()
 
 
-def _texture(path: str | Path, p: Mapping[str, Tensor], step: float) -> dict[str, np.ndarray]:
+def _texture(p: Mapping[str, Tensor], step: float) -> dict[str, np.ndarray]:
     """Return sizes, and texels in steps as green, red - green and blue - green: channels are much alike.
 
     `codes` [B, 3, T] uint8 are bytes of whole numbers whose last bit is the sign, from low to high: all
@@ -139,7 +140,7 @@ def _texture(path: str | Path, p: Mapping[str, Tensor], step: float) -> dict[str
     steps = (texels.double() / step).round()
     if bool((steps.abs() > MOST_STEPS).any()):
         raise ArgumentError(
-            f"{path}: texels: expected at most {MOST_STEPS * step:g}, got {float(texels.abs().max()):g}; "
+            f"texels: expected at most {MOST_STEPS * step:g}, got {float(texels.abs().max()):g}; "
             "write a lossless model file"
         )
     red, green, blue = steps.int().T

@@ -37,9 +37,10 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     scene = read_scene(inputs["scene"])
     parts = [settings.dataset, settings.fit.name, *([settings.look] if settings.look != "none" else [])]
-    page = write_page(output / "scene.html", scene, " ".join(parts))
+    file = output / "scene.html"
+    page = write_page(file, scene, " ".join(parts))
     write_bytes(output / "poster.jpg", page.poster)
-    mib = page.path.stat().st_size / MIB
+    mib = file.stat().st_size / MIB
     result = PageResult(settings.look, page.surfels, mib, mib <= settings.embedded)
     return Outcome(result, {"poster.jpg": SHOWN})
 

@@ -1,0 +1,133 @@
+"""Fits from Python: the stages of the workflow without a project, and the fit in seconds."""
+
+import json
+
+import numpy as np
+import pytest
+
+import texgs
+from texgs.api.fit import fit
+from texgs.core.errors import ArgumentError, ConfigError
+from texgs.metrics.quality import compare
+from texgs.scene.scene_file import read_scene
+from texgs.volume.cameras import spiral
+
+TFS = {
+    "outer": texgs.TransferFunction([[0.2, 0.0], [0.3, 0.1], [0.4, 0.0]], [[0.3, 0.2, 0.4, 0.9]]),
+    "inner": texgs.TransferFunction([[0.6, 0.0], [0.8, 0.5], [1.0, 0.5]], [[0.8, 0.9, 0.5, 0.1]]),
+}
+SMALL = ("views.train.frequency=1", "fit.shading.iterations=30", "views.step=1")
+
+
+@pytest.fixture(scope="module")
+def ball():
+    x, y, z = np.meshgrid(*[np.linspace(-1, 1, 20)] * 3, indexing="ij")
+    return texgs.Volume(np.sqrt(np.maximum(0, 1 - x * x - y * y - z * z)).astype(np.float32), name="ball")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("results")
+
+
+@pytest.fixture(scope="module")
+def scene(ball, folder):
+    return fit(ball, TFS, size=32, overrides=SMALL, folder=folder)
+
+
+def test_it_is_what_the_workflow_makes(scene, folder):
+    assert scene.parts == ["outer", "inner"]
+    made = read_scene(folder / "ball" / "scene" / "quick" / "compose" / "scene.yaml")
+    assert made == scene.session.scene
+    assert made.volume.tfs == TFS
+    numbers = json.loads((folder / "ball" / "inner" / "quick" / "texture" / "metrics.json").read_text())
+    assert numbers["numbers"]["train_views"] == 12
+    assert numbers["numbers"]["width"] == 32
+
+
+def test_a_second_fit_in_the_folder_does_nothing(scene, ball, folder):
+    files = {path: path.stat().st_mtime_ns for path in folder.rglob("model.safetensors")}
+    again = fit(ball, TFS, size=32, overrides=SMALL, folder=folder)
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("model.safetensors")} == files
+    assert np.array_equal(np.asarray(again.render(width=32)), np.asarray(scene.render(width=32)))
+
+
+def test_psnr_is_the_mean_beside_the_volume(scene):
+    session = scene.session
+    lens = session.scene.framed().lens(width=24, height=24)
+    each = [compare(*session.beside(camera, session.scene))["psnr"] for camera in spiral(3, *lens)]
+    assert scene.psnr(views=3, width=24) == pytest.approx(np.mean(each))
+    assert min(each) > 15
+
+
+def test_the_volume_stays_as_long_as_the_scene(ball):
+    made = fit(texgs.Volume(ball.grid.values), {"TF01": TFS["inner"]}, size=32, overrides=SMALL)
+    assert np.asarray(made.render(width=24, mode="volume")).std() > 1  # nothing else holds the volume
+
+
+def test_surfels_as_polygons_lie_where_the_volume_does(scene):
+    mesh = scene.to_pyvista()
+    assert mesh.n_cells == len(scene.session.composition)
+    assert mesh.n_points == 6 * mesh.n_cells
+    inside = scene.session.composition.parts[1].model.parameters["means"].numpy()
+    physical = (inside + 0.5) * 19  # the volume goes from 0 to 19
+    assert np.allclose(mesh.cell_centers().points[-len(inside) :], physical, atol=1e-3)
+    normals, corners = mesh.cell_data["Normals"][5], mesh.points[30:36] - mesh.points[30:36].mean(axis=0)
+    assert np.abs(corners @ normals).max() < 1e-4 * np.abs(corners).max()
+    scene["outer"].visible = False
+    try:
+        rest = scene.to_pyvista()
+        assert rest.n_cells == len(inside)
+        assert rest.cell_data["rgba"].dtype == np.uint8
+        assert rest.cell_data["rgba"][:, 0].mean() > rest.cell_data["rgba"][:, 2].mean() + 100  # orange
+    finally:
+        scene["outer"].visible = True
+
+
+def test_models_in_seconds(ball, monkeypatch, tmp_path):
+    monkeypatch.setattr("texgs.fit.now.FREQUENCY", 1)
+    monkeypatch.setattr("texgs.fit.now.SURFELS", 300)
+    monkeypatch.setattr("texgs.fit.now.PASSES", (20, 20))
+    overlapping = {**TFS, "all": texgs.TransferFunction([[0.1, 0.0], [1, 0.1]], [[0, 1, 1, 1]])}
+    scene = fit(ball, overlapping, "now", size=32, folder=tmp_path)
+    assert scene.parts == ["outer", "inner", "all"]
+    assert (tmp_path / "inner.safetensors").is_file()
+    assert scene.psnr(views=2, width=24) > 15
+    assert texgs.open(tmp_path).parts == scene.parts
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"volume": np.zeros((3, 3, 3))}, ArgumentError, "volume: expected a texgs.Volume, got ndarray"),
+        ({"recipe": "quik"}, ConfigError, "quik"),
+        ({"size": 8}, ArgumentError, "size: expected at least 16 pixels, got 8"),
+        ({"overrides": ["views.trian=3"]}, ConfigError, "views.trian: no such key"),
+        ({"functions": [TFS["inner"], TFS["inner"]]}, ArgumentError, "TF01 and TF02"),
+        ({"functions": {"1x": TFS["inner"]}}, ConfigError, "1x"),
+        ({"functions": TFS["inner"].scaled(0, 9)}, ArgumentError, "expected a range within the data"),
+        ({"recipe": "now", "functions": {"a/b": TFS["inner"]}}, ArgumentError, "functions"),
+    ],
+)
+def test_what_cannot_be_fitted_is_told(ball, change, error, words):
+    with pytest.raises(error, match=words):
+        fit(**{"volume": ball, "functions": TFS, "size": 32, **change})
+
+
+def test_an_interrupted_fit_goes_on(ball, monkeypatch, tmp_path):
+    from texgs.workflow.stages import texture
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("texgs.fit.texels.texturize", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            fit(ball, TFS["inner"], size=32, overrides=SMALL, folder=tmp_path)
+    assert texture
+    assert not list(tmp_path.rglob("texture/model.safetensors"))
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("shading/model.safetensors")}
+    scene = fit(ball, TFS["inner"], size=32, overrides=SMALL, folder=tmp_path)
+    assert scene.parts == ["TF01"]
+    assert before
+    assert {path: path.stat().st_mtime_ns for path in before} == before

@@ -1,0 +1,41 @@
+"""The viewer of a scene that Python holds: edits on pages reach Python, and the other way round."""
+
+import asyncio
+from urllib.parse import urlsplit
+
+import aiohttp
+
+import texgs
+from tests.scene.balls import write_balls
+from tests.viewer.pages import Browser
+
+
+async def talk(address, scene):
+    parts = urlsplit(address)
+    headers = {"Origin": f"{parts.scheme}://{parts.netloc}"}
+    async with aiohttp.ClientSession() as client:
+        async with client.get(address) as answer:
+            assert answer.status == 200
+            assert "frame-ancestors" not in answer.headers["Content-Security-Policy"]
+        async with client.get(address[:-5] + "/") as answer:
+            assert answer.status == 403
+        async with client.ws_connect(address + "socket", headers=headers) as socket:
+            page = Browser(socket)
+            await page.next("scene")
+            edit = {"part": "TF01", "key": "opacity", "value": 0.25, "step": 1}
+            await page.send(type="edit", **edit)
+            await page.past("TF01 opacity 0.25")
+            assert scene["TF01"].opacity == 0.25
+            scene["TF02"].visible = False
+            news = await page.past("TF01 opacity 0.25", "TF02 visible False")
+            assert [model["edit"]["visible"] for model in news["scene"]["models"]] == [True, False]
+
+
+def test_pages_and_python_edit_the_same_scene(tmp_path):
+    scene = texgs.open(write_balls(tmp_path))
+    shown = scene.show(live=True)
+    assert shown._repr_html_().startswith(f'<iframe src="{shown.address}"')
+    asyncio.run(talk(shown.address, scene))
+    assert scene.undo()
+    assert scene["TF02"].visible
+    assert scene.show(live=True).address == shown.address

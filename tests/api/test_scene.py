@@ -1,0 +1,212 @@
+"""Scenes in Python: values of parts, looks, pictures, files, and what a cell of a notebook shows."""
+
+import base64
+import html
+import io
+import re
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import texgs
+from tests.scene.balls import write_balls
+from texgs.cli.main import main
+from texgs.core.errors import ArgumentError
+from texgs.core.image import read_rgba
+from texgs.core.light import Light
+from texgs.scene.scene_file import read_scene
+from texgs.viewer.standalone import scene_page
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch, tmp_path_factory):
+    """Few and small views and no weights, wherever the tests run."""
+    monkeypatch.setattr("texgs.edit.orbit_task.VIEWS", 12)
+    monkeypatch.setattr("texgs.edit.orbit_task.SIZE", 96)
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path_factory.mktemp("none")))
+    monkeypatch.setenv("TEXGS_CACHE", str(tmp_path_factory.mktemp("cache")))
+
+
+@pytest.fixture
+def scene(tmp_path):
+    return texgs.open(write_balls(tmp_path))
+
+
+def pixels(scene, **view):
+    return np.asarray(scene.render(width=48, **view)).astype(int)
+
+
+# ---- Values -----------------------------------------------------------------
+
+
+def test_values_of_parts_are_those_of_the_scene_file(scene, tmp_path):
+    part = scene["TF01"]
+    part.opacity, part.palette, part.visible = 0.4, "#ff8000", False
+    edit = read_scene(scene.session.save(tmp_path / "edited.yaml")).models["TF01"].edit
+    assert (edit.opacity, edit.visible) == (0.4, False)
+    assert edit.palette == pytest.approx((1, 128 / 255, 0))
+    assert (part.opacity, part.visible) == (0.4, False)
+    part.palette = None
+    assert scene["TF01"].palette is None
+    assert scene.undo()
+    assert scene["TF01"].palette is not None
+    assert scene.redo()
+    assert scene["TF01"].palette is None
+    assert not scene.redo()
+
+
+def test_light_background_and_cuts(scene):
+    scene.light = (30, 40)
+    scene.background = "#000000"
+    assert scene.light == Light("directional", 30.0, 40.0)
+    assert scene.background == (0.0, 0.0, 0.0)
+    assert pixels(scene)[0, 0].tolist() == [0, 0, 0]
+    scene.light = "headlight"
+    assert scene.light == Light("headlight")
+    assert scene.edit("cut=x,0", "TF02.opacity=2") is scene
+    assert len(scene.session.scene.cuts.planes) == 1
+    assert scene["TF02"].opacity == 2
+
+
+def test_slips_are_sentences(scene):
+    with pytest.raises(AttributeError):
+        scene["TF01"].opactiy = 0.5
+    with pytest.raises(ArgumentError, match=r"models.TF01.opacity: expected a factor from 0"):
+        scene["TF01"].opacity = -1
+    with pytest.raises(ArgumentError, match=r"expected a model of the scene \(TF01, TF02\), got TF03"):
+        scene["TF03"]
+    with pytest.raises(ArgumentError, match='light: expected "headlight", or azimuth and polar angle'):
+        scene.light = 3, 4, 5
+    with pytest.raises(ArgumentError, match="what: expected one of view, test"):
+        scene.film("x.mp4", "spin")
+    with pytest.raises(ArgumentError, match=r"nowhere.yaml: no such file"):
+        texgs.open("nowhere.yaml")
+    assert repr(scene) == "Scene\n  TF01: as fitted\n  TF02: as fitted"
+    assert scene["TF01"].opacity == 1
+    assert list(scene) == ["TF01", "TF02"]
+    assert len(scene) == 2
+
+
+# ---- Pictures ---------------------------------------------------------------
+
+
+def test_a_picture_is_that_of_texgs_render(scene, tmp_path):
+    scene.light = (80, 10)
+    file = scene.session.save(tmp_path / "lit.yaml")
+    words = ["--azimuth", "50", "--polar", "-10", "--width", "40", "--height", "30", "--fov", "25"]
+    assert main(["render", str(file), *words, "--output", str(tmp_path / "a.png")]) == 0
+    picture = scene.render(50, -10, 40, 30, fov_y=25)
+    assert np.array_equal(np.asarray(picture), read_rgba(tmp_path / "a.png")[..., :3])
+    near = scene.render(50, -10, 40, 30, radius=1.5, target=(0.1, 0, 0), mode="normal", transparent=True)
+    words = ["--radius", "1.5", "--target", "0.1", "0", "0", "--mode", "normal", "--transparent", *words[:-2]]
+    assert main(["render", str(file), *words, "--output", str(tmp_path / "b.png")]) == 0
+    assert np.array_equal(np.asarray(near), read_rgba(tmp_path / "b.png"))
+
+
+def test_films_have_the_frames_of_pictures(scene, tmp_path):
+    folder = scene.film(tmp_path / "turn", frames=3, width=32)
+    frames = [read_rgba(folder / f"{number:04}.png")[..., :3] for number in range(3)]
+    for number, frame in enumerate(frames):
+        assert np.array_equal(frame, np.asarray(scene.render(30 + 120 * number, 20, 32)))
+    assert scene.film(tmp_path / "light.gif", "light", frames=2, width=32).stat().st_size > 0
+
+
+# ---- Looks ------------------------------------------------------------------
+
+
+def test_a_style_is_one_step_that_can_be_undone(scene):
+    before = pixels(scene)
+    red = np.zeros((40, 50, 3), np.uint8)
+    red[..., 0] = 255
+    scene.style(red, recipe="preview", parts=["TF01"])
+    styled = pixels(scene)
+    assert (styled - before)[..., 0].max() > 30
+    assert scene.session.scene.models["TF02"].texture is None
+    scene.undo()
+    assert np.array_equal(pixels(scene), before)
+
+
+def test_an_instruction_by_filters(scene):
+    before = pixels(scene)
+    scene.instruct("make it gold", guidance="filters", recipe="quick", size=64)
+    assert np.abs(pixels(scene) - before).max() > 30
+    assert scene.session.past == ["TF01, TF02 make it gold"]
+
+
+def test_what_a_look_lacks_is_told(scene):
+    with pytest.raises(ArgumentError, match=r"image.patern: no such key, did you mean pattern"):
+        scene.style("glass", patern=2)
+    with pytest.raises(ArgumentError, match=r"image.pattern: expected more than 0, got -1"):
+        scene.style("glass", pattern=-1)
+    with pytest.raises(ArgumentError, match=r"edit.parts: expected some of TF01, TF02, got TF09"):
+        scene.style("glass", recipe="preview", parts=["TF09"])
+    assert not scene.session.past
+
+
+def test_a_click_makes_a_part(scene):
+    part = scene.segment("spot", (24, 24), model="TF01", size=48, views=12, masks="grabcut")
+    assert part.name == "TF01/spot"
+    assert "TF01/spot" in scene.parts
+    part.palette = "#00ff00"
+    assert scene.session.scene.models["TF01"].segments["spot"].edit.palette == (0, 1, 0)
+    with pytest.raises(ArgumentError, match="model: expected one of TF01, TF02, got none"):
+        scene.segment("other", (24, 24), size=48)
+
+
+# ---- Files ------------------------------------------------------------------
+
+
+def test_a_saved_scene_needs_nothing_else(tmp_path):
+    scene = texgs.open(write_balls(tmp_path))
+    scene.style("glass", recipe="preview", parts=["TF01"])
+    scene.segment("spot", (24, 24), model="TF02", size=48, views=12, masks="grabcut").opacity = 0.3
+    expected = pixels(scene)
+    folder = tmp_path / "kept"
+    file = scene.save(folder)
+    assert scene.save(folder) == file  # onto itself, from elsewhere
+    moved = folder.rename(tmp_path / "moved")
+    for path in tmp_path.glob("*.safetensors"):
+        path.unlink()
+    del scene
+    again = texgs.open(moved)
+    assert np.array_equal(pixels(again), expected)
+    assert again.save(moved) == moved / "scene.yaml"  # in place
+    assert np.array_equal(pixels(texgs.open(moved)), expected)
+
+
+def test_exports_by_their_endings(scene, tmp_path):
+    page = scene.export(tmp_path / "a.html")
+    assert page.read_text() == scene_page(scene.session.scene, "a").text
+    assert scene.export(tmp_path / "a.ply", "points", opacity=0.0).read_bytes().startswith(b"ply")
+
+
+# ---- Notebooks --------------------------------------------------------------
+
+
+def test_a_cell_has_the_page_itself_and_a_picture(scene):
+    shown = scene._repr_mimebundle_()
+    source = re.fullmatch(r'<iframe srcdoc="([^"]*)".*', shown["text/html"], re.DOTALL)[1]
+    assert html.unescape(source) == scene_page(scene.session.scene, "TF01, TF02").text
+    assert Image.open(io.BytesIO(base64.b64decode(shown["image/jpeg"]))).size == (512, 512)
+    assert re.fullmatch(r"[\d,]+ surfels; \d+\.\d MB of this notebook", shown["text/plain"])
+
+
+def test_a_large_page_is_a_picture_that_says_so(scene):
+    shown = scene.show(largest=0.01)._repr_mimebundle_()
+    assert shown["text/html"].startswith(f'<img src="data:image/jpeg;base64,{shown["image/jpeg"]}">')
+    assert "scene.show(largest=" in shown["text/plain"]
+
+
+def test_models_of_one_file_and_psnr_without_a_volume(tmp_path):
+    write_balls(tmp_path)
+    scene = texgs.open(tmp_path / "TF01.safetensors")
+    assert scene.parts == ["TF01"]
+    with pytest.raises(ArgumentError, match="volume: expected the volume that the scene was made from"):
+        scene.psnr()
+
+
+def test_interface_lists_what_it_has():
+    assert {"Volume", "open", "Scene"} <= set(texgs.__all__)
+    with pytest.raises(AttributeError, match="has no attribute 'opne'"):
+        texgs.opne  # noqa: B018

@@ -1,0 +1,165 @@
+"""Volumes from arrays of other libraries: the same samples at the same places, and pictures of them."""
+
+import io
+
+import numpy as np
+import pytest
+import pyvista
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+import texgs
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.light import Light
+from texgs.volume.caster import Caster
+from texgs.volume.framing import frame_of
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.overlay import overlay
+from texgs.volume.render import Appearance
+
+xarray = pytest.importorskip("xarray", reason="needs xarray: pip install '.[dev]'")
+
+RED = texgs.TransferFunction([[0.5, 0.0], [1.0, 0.5]], [[0.5, 1.0, 0.0, 0.0]])
+BLUE = texgs.TransferFunction([[0.0, 0.0], [0.2, 0.1], [0.4, 0.0]], [[0.0, 0.0, 0.0, 1.0]])
+
+
+def field(*shape):
+    """A smooth field [Z, Y, X] that tells its axes from each other, float32."""
+    z, y, x = np.meshgrid(*(np.linspace(-1, 1, size) for size in shape), indexing="ij")
+    return np.exp(-(x**2 + 2 * y**2 + 3 * z**2) + 0.3 * x + 0.2 * y).astype(np.float32)
+
+
+def test_an_array_keeps_its_samples_and_places():
+    values = field(5, 6, 7)
+    volume = texgs.Volume(values, spacing=(1, 2, 3), origin=(4, 5, 6), name="hill")
+    assert np.array_equal(volume.grid.values, values)
+    assert (volume.grid.spacing, volume.grid.origin) == ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+    assert volume.summary.minimum == values.min()
+    assert volume.summary.maximum == values.max()
+    assert repr(volume) == f"Volume hill: 7 x 6 x 5 float32, {values.min():g} to {values.max():g}"
+
+
+@given(
+    st.tuples(*[st.integers(2, 5)] * 3),
+    st.tuples(*[st.floats(0.1, 10)] * 3),
+    st.tuples(*[st.floats(-9, 9)] * 3),
+)
+def test_pyvista_gives_and_takes_the_same(shape, spacing, origin):
+    values = field(*shape)
+    before = texgs.Volume(values, spacing=spacing, origin=origin)
+    image = before.to_pyvista()
+    x, y, z = (size - 1 for size in image.dimensions)
+    corner = image.points[image.find_closest_point(np.add(origin, np.multiply(spacing, (x, y, z))))]
+    assert np.allclose(corner, np.add(origin, np.multiply(spacing, (x, y, z))), rtol=1e-6)
+    after = texgs.Volume.from_pyvista(image)
+    assert np.array_equal(after.grid.values, values)
+    assert after.grid.spacing == pytest.approx(spacing)
+    assert after.grid.origin == pytest.approx(origin)
+
+
+def test_what_pyvista_finds_at_a_point_is_the_sample_there():
+    values = field(4, 5, 6)
+    image = texgs.Volume(values, spacing=(1, 2, 3), origin=(10, 0, 0), name="hill").to_pyvista()
+    at = pyvista.PolyData(np.array([[10 + 2 * 1.0, 3 * 2.0, 1 * 3.0]])).sample(image)
+    assert at.point_data["hill"][0] == values[1, 3, 2]
+
+
+def test_xarray_is_known_by_names_and_coordinates():
+    values = field(4, 5, 6)
+    falling = {"x": np.linspace(0, 5, 6), "y": np.linspace(8, 0, 5), "z": [1.0, 1.5, 2.0, 2.5]}
+    array = xarray.DataArray(values.transpose(2, 0, 1), dims=("x", "z", "y"), coords=falling)
+    volume = texgs.Volume(array)
+    assert np.array_equal(volume.grid.values, values[:, ::-1])
+    assert volume.grid.spacing == (1.0, 2.0, 0.5)
+    assert volume.grid.origin == (0.0, 0.0, 1.0)
+    unnamed = texgs.Volume(xarray.DataArray(values, dims=("level", "lat", "lon")))
+    assert np.array_equal(unnamed.grid.values, values)
+    assert unnamed.grid.spacing == (1.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (np.zeros((3, 3)), "expected a scalar field .Z, Y, X., got the shape .3, 3."),
+        (np.zeros((3, 3, 3)), "every sample is 0"),
+        (np.zeros((3, 3, 3), complex), "expected integers, floats or bool, got complex128"),
+        (np.full((3, 3, 3), np.nan), "expected finite samples, got 27"),
+        (np.array(["a"]), "expected a scalar field"),
+        (xarray.DataArray(np.zeros((2, 3, 3, 3)), dims=("time", "z", "y", "x")), r"isel\(time=0\)"),
+        (
+            xarray.DataArray(field(3, 3, 3), dims=("z", "y", "x"), coords={"x": [0, 1, 5]}),
+            "expected equal steps along x, got 1 to 4",
+        ),
+        ("no-such-file.nrrd", "no such file or folder"),
+    ],
+)
+def test_what_is_no_volume_is_refused(data, words):
+    with pytest.raises((ArgumentError, ShapeError), match=words):
+        texgs.Volume(data)
+
+
+def test_cells_and_turned_axes_of_pyvista_are_refused():
+    image = pyvista.ImageData(dimensions=(4, 4, 4))
+    image.cell_data["density"] = np.arange(27.0)
+    with pytest.raises(ArgumentError, match="cell_data_to_point_data"):
+        texgs.Volume(image)
+    turned = texgs.Volume(field(3, 4, 5)).to_pyvista()
+    turned.direction_matrix = [[0, 1, 0], [1, 0, 0], [0, 0, 1]]
+    with pytest.raises(ArgumentError, match="expected axes along x, y, z"):
+        texgs.Volume(turned)
+
+
+def test_files_are_opened_and_turned_upright(tmp_path):
+    values = field(4, 5, 6)
+    first = texgs.Volume(values, folder=tmp_path)
+    assert (tmp_path / "volume.nrrd").is_file()
+    again = texgs.Volume(first.file, up="+z")
+    assert np.array_equal(again.grid.values, values.transpose(1, 0, 2)[::-1])
+    assert np.array_equal(open_grid(again.file).values, again.grid.values)
+
+
+def test_a_picture_is_what_the_caster_sees_over_the_background():
+    volume = texgs.Volume(field(20, 21, 22))
+    picture = volume.render({"a": RED, "b": BLUE}, 10, 15, 40, 30, light=(50, 20), background="#ff8000")
+    lens = frame_of(volume.grid, [RED, BLUE]).lens(width=40, height=30)
+    tf, caster = overlay({"a": RED, "b": BLUE}), Caster(volume.grid, Appearance())
+    rgba = caster.cast(tf, orbit(10, 15, *lens), Light("directional", 50, 20)).rgba.double().numpy()
+    expected = rgba[..., :3] + (1 - rgba[..., 3:]) * np.array([1, 128 / 255, 0])
+    assert np.abs(np.asarray(picture) - 255 * expected.clip(0, 1)).max() <= 0.5001
+
+
+def test_suggested_functions_plot_themselves():
+    volume = texgs.Volume(field(16, 16, 16))
+    functions = volume.suggest(2)
+    assert list(functions) == ["TF01", "TF02"]
+    assert Image.open(io.BytesIO(functions._repr_png_())).size == (1000, 450)
+
+
+def test_at_the_end_of_a_cell_there_are_facts_and_a_picture():
+    html = texgs.Volume(field(8, 9, 10), name="a<b")._repr_html_()
+    assert (
+        "10 x 9 x 8" in html
+    )
+    assert (
+        "a&lt;b" in html
+    )
+    assert (
+        "data:image/png;base64," in html
+    )
+    assert (
+        "a<b" not in html
+    )
+
+
+def test_functions_and_light_are_checked():
+    volume = texgs.Volume(field(8, 8, 8))
+    with pytest.raises(ArgumentError, match="functions: expected at least one transfer function, got none"):
+        volume.render([])
+    with pytest.raises(ArgumentError, match=r"TF01: expected a texgs.TransferFunction, got str"):
+        volume.render(["red"])
+    with pytest.raises(ArgumentError, match='light: expected "headlight"'):
+        volume.render(RED, light="sun")
+    with pytest.raises(ArgumentError, match="width: expected at least 1 pixel, got 0"):
+        volume.render(RED, width=0)

@@ -1,0 +1,1 @@
+"""The Python interface: volumes and scenes as objects that show themselves in notebooks."""

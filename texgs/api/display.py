@@ -1,0 +1,113 @@
+"""Pictures and pages of scenes as notebooks show them."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Sequence
+from html import escape
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+from texgs.core.camera import Camera, orbit
+from texgs.core.errors import ArgumentError
+from texgs.core.lens import Frame
+from texgs.core.light import Light
+from texgs.core.names import is_number
+
+if TYPE_CHECKING:
+    import numpy as np
+    from PIL.Image import Image
+
+MB = 1e6
+HEIGHT = 560  # of a page in a cell, pixels
+
+
+class Page:
+    """What a cell shows of a scene: a page to orbit and edit, and a picture where no page may run.
+
+    The page is in the notebook itself: it needs no server, no network and no texgs.
+
+    Args:
+        text: of the page; nothing where it is too large.
+        poster: a picture of it, JPEG.
+        note: what stands below.
+        height: of the page in the cell, pixels.
+    """
+
+    def __init__(self, text: str, poster: bytes, note: str, height: int = HEIGHT) -> None:
+        self.text, self.poster, self.note, self.height = text, poster, note, height
+
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
+        """Return the page and the picture; a notebook that does not trust pages shows the picture."""
+        picture = b64encode(self.poster).decode()
+        if self.text:
+            shown = frame_of_page(f'srcdoc="{escape(self.text)}"', self.height)
+        else:
+            shown = f'<img src="data:image/jpeg;base64,{picture}">'
+        return {
+            "text/html": f"{shown}<div><small>{escape(self.note)}</small></div>",
+            "image/jpeg": picture,
+            "text/plain": self.note,
+        }
+
+
+class LivePage:
+    """A frame around the viewer, for a notebook on this machine."""
+
+    def __init__(self, address: str, height: int = HEIGHT) -> None:
+        self.address, self.height = address, height
+
+    def _repr_html_(self) -> str:
+        """Return the frame."""
+        return frame_of_page(f'src="{escape(self.address)}"', self.height)
+
+
+def frame_of_page(source: str, height: int) -> str:
+    """Return the element that shows a page of `src="..."` or `srcdoc="..."`."""
+    style = f"width:100%;height:{height}px;border:0"
+    return f'<iframe {source} style="{style}" allowfullscreen></iframe>'
+
+
+def camera_of(
+    framed: Frame,
+    azimuth: float,
+    polar: float,
+    width: int,
+    height: int | None = None,
+    fov_y: float = 30.0,
+    radius: float | None = None,
+    target: Sequence[float] | None = None,
+) -> Camera:
+    """Return the camera that shows all that is framed; distance and target may be others."""
+    for name, size in (("width", width), ("height", width if height is None else height)):
+        if not isinstance(size, int) or size < 1:
+            raise ArgumentError(f"{name}: expected at least 1 pixel, got {size}")
+    lens = framed.lens(fov_y, width, width if height is None else height)
+    radius = lens.radius if radius is None else radius
+    return orbit(azimuth, polar, *lens._replace(radius=radius, target=target or lens.target))
+
+
+def as_light(value: Light | str | Sequence[float]) -> Light:
+    """Return a light from "headlight", or azimuth and polar angle in degrees."""
+    if isinstance(value, Light):
+        return value
+    if value == "headlight":
+        return Light("headlight")
+    if not isinstance(value, str) and len(value) == 2 and all(map(is_number, value)):
+        return Light("directional", *map(float, value))
+    raise ArgumentError(f'light: expected "headlight", or azimuth and polar angle in degrees, got {value!r}')
+
+
+def picture_of(pixels: np.ndarray) -> Image:
+    """Return pixels [H, W, 3 or 4], uint8, as an image of Pillow, which notebooks show."""
+    from PIL.Image import fromarray
+
+    return fromarray(pixels)
+
+
+def inline(picture: Image, alt: str) -> str:
+    """Return an element of HTML that holds a picture."""
+    file = BytesIO()
+    picture.save(file, "PNG")
+    data = b64encode(file.getvalue()).decode()
+    return f'<img alt="{escape(alt)}" src="data:image/png;base64,{data}">'

@@ -1,0 +1,134 @@
+"""A scene of a volume: what the workflow does for a data set, in this process and without a project."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from texgs.api.functions import AnyFunctions, named
+from texgs.api.scene import Scene
+from texgs.api.volume import Volume
+from texgs.core.errors import ArgumentError
+from texgs.core.names import file_name
+from texgs.scene.session import Session
+from texgs.volume.transfer import TransferFunction
+
+if TYPE_CHECKING:
+    from texgs.config.schema import Config
+
+NOW = "now"
+TEST_VIEWS = 12  # for the numbers of a fit; `Scene.psnr` measures more
+LEAST = 16  # pixels
+
+
+def fit(
+    volume: Volume,
+    functions: AnyFunctions | None = None,
+    recipe: str = "quick",
+    *,
+    size: int = 400,
+    seed: int = 0,
+    device: str = "cpu",
+    overrides: Sequence[str] = (),
+    folder: str | Path | None = None,
+) -> Scene:
+    """Fit a basic model for each transfer function, and return them as a scene.
+
+    Args:
+        volume: to fit.
+        functions: basic transfer functions, by name or in order, whose ranges do not overlap; default those
+            suggested. With the recipe `now` ranges may overlap.
+        recipe: "now" (some 20 seconds a function), "quick", "default", "paper" or another file of conf/fit.
+        size: of the views, pixels.
+        seed: of all random numbers.
+        device: "cpu" or "cuda".
+        overrides: more keys of the configuration, such as "views.train.frequency=3"; not for `now`.
+        folder: for all files. A fit that was interrupted goes on there, and one that is done is opened.
+            Default: one that is gone with the scene.
+
+    Raises:
+        ArgumentError: if functions overlap, a key or a recipe is unknown, or nothing is visible.
+    """
+    if not isinstance(volume, Volume):
+        raise ArgumentError(f"volume: expected a texgs.Volume, got {type(volume).__name__}")
+    if size < LEAST:
+        raise ArgumentError(f"size: expected at least {LEAST} pixels, got {size}")
+    shown = named(volume.suggest() if functions is None else functions)
+    kept = TemporaryDirectory(prefix="texgs-") if folder is None else folder
+    place = Path(kept.name if isinstance(kept, TemporaryDirectory) else kept)
+    if recipe == NOW:
+        file = fit_now_into(volume, shown, size, seed, device, place)
+    else:
+        words = (f"fit={recipe}", f"device={device}", f"views.width={size}", f"views.height={size}")
+        file = compose_in(volume, shown, (*words, f"fit.seed={seed}", *overrides), place)
+    return Scene(Session.open(file, device), volume, kept)
+
+
+def fit_now_into(
+    volume: Volume,
+    functions: Mapping[str, TransferFunction],
+    size: int,
+    seed: int,
+    device: str,
+    folder: Path,
+) -> Path:
+    """Fit models in memory, and write them and a scene into a folder; return the scene's file."""
+    from texgs.fields.surfels.model_file import write_model
+    from texgs.fit.now import fit_now
+    from texgs.scene.copied import SCENE
+    from texgs.scene.scene import Scene as Models
+    from texgs.scene.scene import SceneModel
+    from texgs.scene.scene_file import write_scene
+    from texgs.scene.twin import SceneVolume
+    from texgs.volume.caster import Caster
+    from texgs.volume.framing import frame_of
+    from texgs.volume.render import Appearance
+
+    look, frame, models = Appearance(), frame_of(volume.grid, functions.values()), {}
+    caster = Caster(volume.grid, look, device)
+    for name, tf in functions.items():
+        *_, model = fit_now(caster, look, tf, frame.lens(width=size, height=size), name, seed)
+        file = folder / file_name("functions", f"{name}.safetensors")
+        models[name] = SceneModel(write_model(file, model))
+    made_of = SceneVolume(volume.file, functions, look)
+    return write_scene(folder / SCENE, Models(models, volume=made_of, frame=frame))
+
+
+def compose_in(
+    volume: Volume, functions: Mapping[str, TransferFunction], words: tuple[str, ...], folder: Path
+) -> Path:
+    """Run the stages up to the scene with results in a folder; return the scene's file."""
+    from texgs.workflow.ensure import ensure
+    from texgs.workflow.stage import made
+    from texgs.workflow.stage_table import STAGES, jobs
+
+    config = configuration(volume, functions, words, folder)
+    known = {stage.output(each): (stage, each) for stage, each in jobs(config)}
+    ensure(STAGES["compose"], config, known, tell=lambda line: None)
+    return made("compose", config)
+
+
+def configuration(
+    volume: Volume, functions: Mapping[str, TransferFunction], words: tuple[str, ...], folder: Path
+) -> Config:
+    """Return the configuration of a data set that is a volume with basic transfer functions."""
+    from texgs.config.compose import compose
+    from texgs.config.dataset import BasicTF, Dataset
+    from texgs.config.dataset import Volume as VolumeKeys
+    from texgs.config.project import check_name
+    from texgs.volume.transfer import check_disjoint
+
+    check_disjoint(functions)
+    for name in (volume.name, *functions):
+        check_name("name", name)
+    few = (f"views.test.count={TEST_VIEWS}", f"views.relit={TEST_VIEWS}", "views.turntable=1")
+    config = compose(("tracking=none", "edit=none", *few, "metric.vtk_frames=0", *words))
+    basic = {
+        name: BasicTF([*map(list, tf.opacity)], [*map(list, tf.color)]) for name, tf in functions.items()
+    }
+    keys = VolumeKeys(generator=None, file=str(volume.file.resolve()))
+    dataset = Dataset(name=volume.name, title=volume.name, volume=keys, basic_tfs=basic)
+    return replace(config, dataset=dataset, results=str(folder))

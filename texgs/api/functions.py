@@ -1,0 +1,57 @@
+"""Transfer functions by name, which plot themselves over the histogram of their volume."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.prepare import Summary
+from texgs.volume.transfer import TransferFunction
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+AnyFunctions = Mapping[str, TransferFunction] | Sequence[TransferFunction] | TransferFunction
+
+
+class Functions(dict[str, TransferFunction]):
+    """Basic transfer functions of a volume. At the end of a cell they are a picture.
+
+    Args:
+        functions: by name.
+        summary: of the volume: its histogram is what is behind them.
+    """
+
+    def __init__(self, functions: Mapping[str, TransferFunction], summary: Summary) -> None:
+        super().__init__(functions)
+        self._summary = summary
+
+    def plot(self) -> Figure:
+        """Return a figure of matplotlib: opacities and colours over the number of voxels, on a log axis."""
+        from texgs.volume.tf_plot import plot
+
+        known = self._summary
+        return plot(known.histogram, known.minimum, known.maximum, self)
+
+    def _repr_png_(self) -> bytes:
+        """Return the plot, for notebooks."""
+        file = BytesIO()
+        self.plot().savefig(file, format="png")
+        return file.getvalue()
+
+
+def named(functions: AnyFunctions) -> dict[str, TransferFunction]:
+    """Return functions by name; those without one are TF01, TF02, ..."""
+    if isinstance(functions, TransferFunction):
+        functions = [functions]
+    if not isinstance(functions, Mapping):
+        functions = {f"TF{number:02d}": each for number, each in enumerate(functions, start=1)}
+    for name, each in functions.items():
+        if not isinstance(each, TransferFunction):
+            raise ArgumentError(f"{name}: expected a texgs.TransferFunction, got {type(each).__name__}")
+    if not functions:
+        raise ArgumentError("functions: expected at least one transfer function, got none")
+    return dict(functions)

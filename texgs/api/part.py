@@ -1,0 +1,66 @@
+"""One part of a scene, whose values are those of its edit: reading and setting them is all there is to it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
+
+from texgs.fields.part_edit import PartEdit
+from texgs.scene.parts import entry_of
+
+if TYPE_CHECKING:
+    from texgs.api.scene import Scene
+
+T = TypeVar("T")
+
+
+class Value(Generic[T]):
+    """A value of a part's edit; None takes it back."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._key = name
+
+    @overload
+    def __get__(self, part: None, owner: type) -> Value[T]: ...
+
+    @overload
+    def __get__(self, part: Part, owner: type) -> T: ...
+
+    def __get__(self, part: Part | None, owner: type) -> Value[T] | T:
+        if part is None:
+            return self
+        return cast(T, getattr(entry_of(part.scene.session.scene, part.name).edit, self._key))
+
+    def __set__(self, part: Part, value: Any) -> None:
+        if value is None:
+            part.scene.session.reset(part.name, self._key)
+        else:
+            part.scene.session.set(part.name, self._key, value)
+        part.scene.changed(f"{part.name} {self._key} {'as fitted' if value is None else value}")
+
+
+class Part:
+    """A model of a scene, MODEL, or a segment of one, MODEL/SEGMENT; see `texgs.fields.part_edit.PartEdit`.
+
+    Setting a value raises an ArgumentError for one that is out of range or that the model cannot show.
+    """
+
+    __slots__ = ("name", "scene")  # a slip in the name of a value is an AttributeError
+
+    visible = Value[bool]()
+    palette = Value["tuple[float, float, float] | None"]()  # set red, green, blue from 0 to 1, or "#rrggbb"
+    opacity = Value[float]()  # factors of what was fitted, from 0 on
+    ambient = Value[float]()
+    diffuse = Value[float]()
+    specular = Value[float]()
+    shininess = Value[float]()
+    tint = Value["tuple[float, float, float]"]()  # of highlights
+
+    def __init__(self, scene: Scene, name: str) -> None:
+        entry_of(scene.session.scene, name)  # which is there
+        self.scene, self.name = scene, name
+
+    def __repr__(self) -> str:
+        """Return the name, and what is edited."""
+        edit = entry_of(self.scene.session.scene, self.name).edit
+        changed = [f"{key}={value}" for key, value in vars(edit).items() if value != getattr(PartEdit(), key)]
+        return f"{self.name}: {', '.join(changed) or 'as fitted'}"

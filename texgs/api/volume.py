@@ -1,0 +1,167 @@
+"""A volume from an array, an ImageData of PyVista, a DataArray of xarray or a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from texgs.api.arrays import grid_of, three
+from texgs.api.display import as_light, camera_of, inline, picture_of
+from texgs.api.functions import AnyFunctions, Functions, named
+from texgs.core.io import write_json
+from texgs.fields.part_edit import color
+from texgs.scene.frame import quantized
+from texgs.scene.scene import WHITE
+from texgs.volume.caster import Caster
+from texgs.volume.framing import frame_of
+from texgs.volume.grid import Grid
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.overlay import overlay
+from texgs.volume.prepare import prepare
+from texgs.volume.render import Appearance
+from texgs.volume.slabs import ArraySource
+from texgs.volume.sources import open_source
+from texgs.volume.suggest import suggest
+
+if TYPE_CHECKING:
+    import pyvista
+    from PIL.Image import Image
+
+    from texgs.core.light import Light
+
+SMALL = 320  # pixels of the picture at the end of a cell
+
+
+class Volume:
+    """A scalar field on a regular lattice, in a file of its own that is mapped, not read.
+
+    The world is the volume, centred, with a longest side of 1. At the end of a cell it is a table and a
+    picture with suggested transfer functions.
+
+    Args:
+        data: an array [Z, Y, X], image data of PyVista, a DataArray of xarray, or the path of a file or a
+            folder of slices of any format that texgs reads.
+        spacing: distance of samples along x, y, z; default that of the data, else 1.
+        origin: position of the first sample, x, y, z; default that of the data, else 0.
+        up: axis of the data that becomes +y of the world: "+y", "-y", "+z", ...
+        nan_value: takes the place of samples that are not finite, which are refused without it.
+        name: of the volume, in titles.
+        folder: for the file; default one that is gone with the object.
+        **keys: what only some formats take, such as `dims` and `dtype` of raw samples, see
+            `texgs.volume.sources.open_source`.
+
+    Raises:
+        ArgumentError, ShapeError: if the data are no scalar field on a regular lattice, or a file cannot be
+            read; in one sentence.
+    """
+
+    def __init__(
+        self,
+        data: Any,
+        *,
+        spacing: Sequence[float] | None = None,
+        origin: Sequence[float] | None = None,
+        up: str = "+y",
+        nan_value: float | None = None,
+        name: str = "data",
+        folder: str | Path | None = None,
+        **keys: Any,
+    ) -> None:
+        self.name = name
+        self._scratch = TemporaryDirectory(prefix="texgs-") if folder is None else None
+        self.folder = Path(folder if folder is not None else self._scratch.name)  # type: ignore[union-attr]
+        if isinstance(data, str | Path):
+            steps, first = three("spacing", spacing), three("origin", origin)
+            source = open_source(data, spacing=steps, origin=first, **keys)
+        else:
+            source = ArraySource(grid_of(data, spacing, origin), name)
+        self.summary = prepare(source, self.file, up=up, nan_value=nan_value)
+        write_json(self.file.with_name("volume.json"), vars(self.summary))
+
+    @classmethod
+    def from_pyvista(cls, image: pyvista.ImageData, **options: Any) -> Volume:
+        """Return the volume of image data of PyVista; the same as `Volume(image)`."""
+        return cls(image, **options)
+
+    @property
+    def file(self) -> Path:
+        """Return the file, volume.nrrd, which ParaView opens, too."""
+        return self.folder / "volume.nrrd"
+
+    @cached_property
+    def grid(self) -> Grid:
+        """Return the samples [Z, Y, X] with spacing and origin, +y up."""
+        return open_grid(self.file)
+
+    def suggest(self, count: int | None = None) -> Functions:
+        """Return basic transfer functions by name, from the histogram; `count` of them, or what shows."""
+        known = self.summary
+        low, high = known.minimum, known.maximum
+        suggested = suggest(known.histogram, low, high, count)
+        return Functions({name: tf.rounded(low, high) for name, tf in suggested.items()}, known)
+
+    def render(
+        self,
+        functions: AnyFunctions | None = None,
+        azimuth: float = 30.0,
+        polar: float = 20.0,
+        width: int = 800,
+        height: int | None = None,
+        *,
+        light: Light | str | tuple[float, float] = "headlight",
+        background: str | Sequence[float] = WHITE,
+        step: float = Appearance().step,
+    ) -> Image:
+        """Return a picture by direct volume rendering, framed by what is visible.
+
+        Args:
+            functions: transfer functions, whose extinctions add up where they overlap; default those
+                suggested.
+            azimuth: of the camera, degrees.
+            polar: of the camera above the horizon, degrees.
+            width: pixels.
+            height: pixels; default the width.
+            light: "headlight", or azimuth and polar angle in degrees.
+            background: red, green, blue from 0 to 1, or "#rrggbb".
+            step: distance of samples along rays, voxels.
+        """
+        shown = named(self.suggest() if functions is None else functions)
+        caster = Caster(self.grid, replace(Appearance(), step=step))
+        view = camera_of(frame_of(self.grid, shown.values()), azimuth, polar, width, height)
+        rgba = caster.cast(overlay(shown), view, as_light(light)).rgba
+        behind = rgba.new_tensor(color("background", background))
+        return picture_of(quantized(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))
+
+    def to_pyvista(self) -> pyvista.ImageData:
+        """Return image data of PyVista, +y up, in the units of the volume; the samples are not copied."""
+        import pyvista
+
+        image = pyvista.ImageData(
+            dimensions=self.grid.dims, spacing=self.grid.spacing, origin=self.grid.origin
+        )
+        image.point_data[self.name] = self.grid.values.reshape(-1)
+        return image
+
+    def __repr__(self) -> str:
+        """Return size, type and range."""
+        known = self.summary
+        size = " x ".join(map(str, known.dims))
+        return f"Volume {self.name}: {size} {known.dtype}, {known.minimum:g} to {known.maximum:g}"
+
+    def _repr_html_(self) -> str:
+        """Return facts and a picture, for notebooks."""
+        known = self.summary
+        rows = {
+            "samples": " x ".join(map(str, known.dims)),
+            "type": known.dtype,
+            "values": f"{known.minimum:g} to {known.maximum:g}",
+            "spacing": ", ".join(f"{step:g}" for step in known.spacing),
+        }
+        cells = "".join(f"<tr><th>{key}</th><td>{escape(value)}</td></tr>" for key, value in rows.items())
+        picture = inline(self.render(width=SMALL), self.name)
+        return f"<b>{escape(self.name)}</b><div>{picture}<table>{cells}</table></div>"
