@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+import pyvista
 from PIL import Image
 
 import texgs
@@ -179,6 +180,24 @@ def test_exports_by_their_endings(scene, tmp_path):
     page = scene.export(tmp_path / "a.html")
     assert page.read_text() == scene_page(scene.session.scene, "a").text
     assert scene.export(tmp_path / "a.ply", "points", opacity=0.0).read_bytes().startswith(b"ply")
+
+
+def test_polygons_for_paraview_are_those_of_pyvista(scene, tmp_path):
+    scene["TF02"].visible = False
+    written, mesh = pyvista.read(scene.export(tmp_path / "a.vtp")), scene.to_pyvista()
+    assert np.array_equal(written.points, mesh.points)
+    assert np.array_equal(written.cell_data["rgba"], mesh.cell_data["rgba"])
+    assert main(["export", str(scene.save(tmp_path / "s")), "--to", str(tmp_path / "b.vtp")]) == 0
+    assert np.array_equal(pyvista.read(tmp_path / "b.vtp").points, mesh.points)
+
+
+def test_exports_of_other_endings_are_refused(scene):
+    with pytest.raises(
+        ArgumentError, match=r"expected a file that ends in .ply or .html .*, got x.obj"
+    ):
+        scene.export("x.obj")
+    with pytest.raises(ArgumentError, match=r"expected a file that ends in .ply, got x.html"):
+        scene.export("x.html", "mesh")
 
 
 # ---- Notebooks --------------------------------------------------------------

@@ -139,18 +139,10 @@ def test_suggested_functions_plot_themselves():
 
 def test_at_the_end_of_a_cell_there_are_facts_and_a_picture():
     html = texgs.Volume(field(8, 9, 10), name="a<b")._repr_html_()
-    assert (
-        "10 x 9 x 8" in html
-    )
-    assert (
-        "a&lt;b" in html
-    )
-    assert (
-        "data:image/png;base64," in html
-    )
-    assert (
-        "a<b" not in html
-    )
+    assert "10 x 9 x 8" in html
+    assert "a&lt;b" in html
+    assert "data:image/png;base64," in html
+    assert "a<b" not in html
 
 
 def test_functions_and_light_are_checked():

@@ -185,7 +185,7 @@ def test_a_grid_makes_no_cloud(scene, tmp_path, capsys):
     ("words", "message"),
     [
         (["--to", "x.obj"], f"--to: expected a file that ends in {' or '.join(ENDINGS)}, got x.obj"),
-        (["--to", "x.usd"], ".html or .usdc or .usda or .glb or .spz, got x.usd"),
+        (["--to", "x.usd"], ".html or .usdc or .usda or .glb or .spz or .vtp, got x.usd"),
         (["--to", "x.ply", "--kind", "usd"], "--to: expected a file that ends in .usdc or .usda, got x.ply"),
         (["--to", "x.glb", "--model", "C"], "--model: expected one of A, B, got C"),
         (["--to", "x.ply", "--kind", "compact"], "--to: expected a file that ends in .texgs, got x.ply"),

@@ -12,7 +12,8 @@ from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texels import mean_texels, owners
-from texgs.scene.export import joined, write_points
+from texgs.scene.export import write_points
+from texgs.scene.joined import joined
 
 EDITS = [PartEdit(palette=(0.9, 0.1, 0.4), opacity=0.6), PartEdit(visible=False), PartEdit(opacity=3.0)]
 

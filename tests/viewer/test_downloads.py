@@ -72,6 +72,8 @@ async def test_the_scene_is_written_as_it_is_shown(browser, client):
 async def test_what_a_scene_cannot_be_is_told(browser, client, kind):
     await browser.send(type="export", kind=kind, view=VIEW)
     said = (await browser.next("notice"))["text"]
-    assert f"expected one of mp4, gif, 3dgs, 2dgs, points, mesh, html, usd, gltf, spz, got '{kind}'" in said
+    assert (
+        f"expected one of mp4, gif, 3dgs, 2dgs, points, mesh, html, usd, gltf, spz, vtp, got '{kind}'" in said
+    )
     async with client.get(f"/{TOKEN}/files/scene.html") as answer:
         assert answer.status == 404

@@ -16,7 +16,7 @@ from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.light import Light
-from texgs.core.names import part_file
+from texgs.core.names import EXPORTS, part_file
 from texgs.scene.changes import apply_all
 from texgs.scene.copied import write_copy
 from texgs.scene.frame import Mode
@@ -25,6 +25,7 @@ from texgs.scene.session import Session
 
 if TYPE_CHECKING:
     import numpy as np
+    import pyvista
     from PIL.Image import Image
 
     from texgs.api.live import Viewer
@@ -327,18 +328,27 @@ class Scene:
         """Write a file for other programs, and return its path; see `texgs export --help`.
 
         Args:
-            path: the ending says what, such as .html, .ply or .vtp.
-            kind: what, where the ending has several.
+            path: its ending says what: .html, .ply, .usdc, .usda, .glb, .spz, .vtp.
+            kind: what, where an ending has several; default 3dgs for .ply.
             **options: of `texgs.scene.export.Export`.
+
+        Raises:
+            ArgumentError: if the ending is unknown or another kind's, or the scene cannot be written so.
         """
-        from texgs.scene.export import Export, export_scene
+        from texgs.scene.export import OF_MODELS, Export, export_scene
         from texgs.viewer.standalone import write_page
 
-        path = Path(path)
-        if path.suffix == ".html":
-            write_page(path, self.session.scene, path.stem)
+        path, scene = Path(path), self.session.scene
+        able = {key: endings for key, endings in EXPORTS.items() if key not in OF_MODELS}
+        chosen = kind or next((key for key, endings in able.items() if path.suffix in endings), "")
+        if path.suffix not in able.get(chosen, ()):
+            endings = dict.fromkeys(ending for each in able.values() for ending in each)
+            expected = " or ".join(able.get(chosen, endings))
+            raise ArgumentError(f"path: expected a file that ends in {expected}, got {path}")
+        if chosen == "html":
+            write_page(path, scene, path.stem)
             return path
-        return export_scene(path, self.session.scene, Export(kind or "3dgs", **options))
+        return export_scene(path, scene, Export(chosen, **options))
 
     # ---- Notebooks ------------------------------------------------------------
 
@@ -370,11 +380,16 @@ class Scene:
         """Return the page, for notebooks."""
         return self.show()._repr_mimebundle_()  # type: ignore[union-attr]
 
-    def to_pyvista(self) -> Any:
-        """Return the visible surfels as a mesh of PyVista; see `texgs.scene.polydata.polydata_of`."""
+    def to_pyvista(self) -> pyvista.PolyData:
+        """Return the visible surfels as polygons of PyVista; see `texgs.scene.polydata.polydata_of`."""
+        from texgs.fields.surfels.composition import Composition
+        from texgs.scene.joined import joined
         from texgs.scene.polydata import polydata_of
 
-        return polydata_of(self.session.scene, self.session.composition)
+        scene, composed = self.session.scene, self.session.composition
+        if not isinstance(composed, Composition):
+            raise ArgumentError("to_pyvista: expected a scene of surfels, got another kind; fit surfels")
+        return polydata_of(joined(composed.parts, scene.edits), scene.volume)
 
     def __repr__(self) -> str:
         """Return the parts, and what is edited about them."""

@@ -30,7 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--kind",
         choices=EXPORTS,
         help="3dgs or 2dgs for viewers of Gaussians, release as the paper's code has them, points with "
-        "colours, mesh, compact, html, a page that shows and edits the scene, or with light in the colours "
+        "colours, mesh, vtp, polygons for ParaView, compact, html, a page that shows and edits the scene, or "
+        "with light in the colours "
         "usd (OpenUSD), gltf (KHR_gaussian_splatting) or spz; default by the ending, 3dgs for .ply",
     )
     parser.add_argument(

@@ -15,7 +15,7 @@ SCENES = (".yaml", ".yml")  # suffixes of scene files
 EXPORTS = {  # endings of what `texgs export` writes, by its kind
     **dict.fromkeys(("3dgs", "2dgs", "release", "points", "mesh"), (".ply",)),
     **{"compact": (".texgs",), "html": (".html",)},
-    **{"usd": (".usdc", ".usda"), "gltf": (".glb",), "spz": (".spz",)},
+    **{"usd": (".usdc", ".usda"), "gltf": (".glb",), "spz": (".spz",), "vtp": (".vtp",)},
 }
 POINTS = "points3d.ply"  # where fits start, in a folder of views
 SLICES = (".tif", ".tiff")  # suffixes of the files in a folder of slices

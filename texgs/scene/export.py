@@ -10,7 +10,6 @@ from typing import cast
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
@@ -21,19 +20,20 @@ from texgs.fields.field import Field, Look
 from texgs.fields.gaussians.files import write_ply as write_gaussians
 from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
 from texgs.fields.kinds import Kind, kinds
-from texgs.fields.part_edit import MOST_OPAQUE, PartEdit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.compact import seen_surfels, write_compact
-from texgs.fields.surfels.composition import Composition, Part, by_part
+from texgs.fields.surfels.composition import Composition, Part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.ply import write_ply as write_surfels
-from texgs.fields.surfels.texels import mean_texels
 from texgs.raster import Render
 from texgs.raster.shading import Y00
 from texgs.scene.bounds import bounds_of
 from texgs.scene.clouds import clouds_of
 from texgs.scene.gltf import write_gltf
+from texgs.scene.joined import joined
 from texgs.scene.mesh import VERTEX, fill, fuse, write_mesh
+from texgs.scene.polydata import write_vtp
 from texgs.scene.scene import Scene
 from texgs.scene.spz import write_spz
 from texgs.scene.usd import write_usd
@@ -90,7 +90,8 @@ def export_scene(path: Path, scene: Scene, export: Export) -> Path:
         return _write_fused(path, export, export.cameras(scene.framed(composed)), render, field.depth)
     if isinstance(composed, JoinedGaussians):
         return write_gaussians(path, composed.edited(edits))
-    return _write(path, export, joined(cast(Composition, composed).parts, edits))
+    model = joined(cast(Composition, composed).parts, edits)
+    return write_vtp(path, model, scene.volume) if export.kind == "vtp" else _write(path, export, model)
 
 
 def export_model(path: Path, model: Field, export: Export) -> Path:
@@ -113,6 +114,8 @@ def _write(path: Path, export: Export, model: Surfels) -> Path:
     if export.kind == "compact":
         cameras = export.cameras(bounds_of([model])) if export.drop_unseen else []
         return write_compact(path, model, seen_surfels(model, cameras) if cameras else None)
+    if export.kind == "vtp":
+        return write_vtp(path, joined([Part(model)], [PartEdit()]) if model.stage != "surfels" else model)
     if export.kind == "points":
         return write_points(path, model, export.opacity)
     return write_surfels(path, model, export.kind)
@@ -128,19 +131,6 @@ def _write_fused(
         return render(camera, background=black, outputs=(depth,))
 
     return write_mesh(path, fuse(shown, cameras, export.voxel))
-
-
-def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
-    """Return the visible surfels of a scene as one model of stage surfels, whatever light shone on them.
-
-    Edits are one for each part, and behind it those of its segments; palette, opacity and visibility count.
-    The model has one harmonic, that of the colour without light (palette + offset + mean texel).
-    """
-    surfels = [_surfels(part, own) for part, own in zip(parts, by_part(parts, edits), strict=True)]
-    together = {name: torch.cat([each[name] for each in surfels]) for name in surfels[0]}
-    if not len(together["means"]):
-        raise ArgumentError("models: expected at least one visible surfel, got none; show a model")
-    return Surfels(together, parts[0].model.shading)
 
 
 def write_points(path: str | Path, model: Surfels, least_opacity: float = 0.5) -> Path:
@@ -164,18 +154,3 @@ def write_points(path: str | Path, model: Surfels, least_opacity: float = 0.5) -
     vertices = np.empty(len(color), VERTEX)
     fill(vertices, means[opaque], color.clamp(0, 1).mul(255).round())
     return write_atomic(path, PlyData([PlyElement.describe(vertices, "vertex")], byte_order="<").write)
-
-
-def _surfels(part: Part, edits: Sequence[PartEdit]) -> dict[str, Tensor]:
-    """Return the raw parameters of a part's visible surfels."""
-    p = part.model.parameters
-    colors = part.colored(edits).double()
-    if "texels" in p:
-        colors = colors + mean_texels(p)
-    opacities = part.opacity(edits)
-    surfels = {
-        **{name: p[name] for name in ("means", "quats", "scales")},
-        "opacities": opacities.clamp_max(MOST_OPAQUE).logit(),
-        "sh": ((colors - 0.5) / Y00).float()[:, None],
-    }
-    return {name: x[opacities > 0] for name, x in surfels.items()}

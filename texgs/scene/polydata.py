@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
 
-from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
-from texgs.fields.field import Composed
+from texgs.core.io import write_bytes
 from texgs.fields.splats import geometry
-from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
 from texgs.raster.shading import Y00
-from texgs.scene.export import joined
-from texgs.scene.scene import Scene
+from texgs.scene.twin import SceneVolume
 from texgs.volume.nrrd_file import open_grid
 
 if TYPE_CHECKING:
@@ -24,21 +24,15 @@ SIDES = 6  # of a polygon
 REACH = 1.5  # standard deviations from its middle to its corners
 
 
-def polydata_of(scene: Scene, composed: Composed) -> pyvista.PolyData:
-    """Return the visible surfels of a scene: hexagons of 1.5 standard deviations, without light.
+def polydata_of(model: Surfels, volume: SceneVolume | None = None) -> pyvista.PolyData:
+    """Return surfels, see `joined`, as hexagons of 1.5 standard deviations.
 
-    They lie in the coordinates of the scene's volume, +y up, so that they fit `Volume.to_pyvista`; in world
-    units where the scene names none. Cells have `rgba` (uint8, straight alpha), `opacity` and `Normals`;
-    colours are those without light, of the palette, offset and mean texel.
-
-    Raises:
-        ArgumentError: if the scene has no surfels, or none is visible.
+    They lie in the coordinates of the volume, +y up; in world units where there is none. Cells have `rgba`
+    (uint8, straight alpha), `opacity` and `Normals`; colours are those without light, of the palette, offset
+    and mean texel.
     """
     import pyvista
 
-    if not isinstance(composed, Composition):
-        raise ArgumentError("to_pyvista: expected a scene of surfels, got another kind; fit surfels for this")
-    model = joined(composed.parts, scene.edits)
     means, quats, scales, opacities = geometry(model.parameters)
     turns = quats_to_matrices(quats)
     angles = torch.arange(SIDES, device=means.device) * (2 * np.pi / SIDES)
@@ -47,7 +41,7 @@ def polydata_of(scene: Scene, composed: Composed) -> pyvista.PolyData:
     points = (means[:, None] + offsets).reshape(-1, 3).cpu().numpy()
     numbers = np.arange(len(points)).reshape(-1, SIDES)
     faces = np.concatenate([np.full((len(numbers), 1), SIDES), numbers], axis=1)
-    mesh = pyvista.PolyData(in_volume(points, scene), faces=faces.ravel())
+    mesh = pyvista.PolyData(in_volume(points, volume), faces=faces.ravel())
     color = (0.5 + Y00 * model.parameters["sh"][:, 0]).clamp(0, 1)
     rgba = torch.cat([color, opacities.reshape(-1, 1)], dim=1)
     mesh.cell_data["rgba"] = (255 * rgba).round().to(torch.uint8).cpu().numpy()
@@ -57,10 +51,18 @@ def polydata_of(scene: Scene, composed: Composed) -> pyvista.PolyData:
     return mesh
 
 
-def in_volume(points: np.ndarray, scene: Scene) -> np.ndarray:
-    """Return points [N, 3] of the world in the physical coordinates of a scene's volume, if it has one."""
-    if scene.volume is None:
+def in_volume(points: np.ndarray, volume: SceneVolume | None) -> np.ndarray:
+    """Return points [N, 3] of the world in the physical coordinates of a volume, if there is one."""
+    if volume is None:
         return points
-    grid = open_grid(scene.volume.file)
+    grid = open_grid(volume.file)
     middle = np.array(grid.origin) + 0.5 * np.array(grid.sides)
     return np.asarray(points / grid.scale + middle)
+
+
+def write_vtp(path: str | Path, model: Surfels, volume: SceneVolume | None = None) -> Path:
+    """Create or replace a .vtp file of `polydata_of` in one step; ParaView opens it."""
+    with TemporaryDirectory() as folder:  # VTK writes to a path only
+        file = Path(folder, "surfels.vtp")
+        polydata_of(model, volume).save(file)
+        return write_bytes(path, file.read_bytes())

@@ -17,6 +17,6 @@ FIELD = Kind(
     ("texgs-model", "texgs-compact", "ply scale_1"),
     ALL,
     functions,
-    exports=("3dgs", "2dgs", "release", "points", "mesh", "compact", "html", "usd", "gltf", "spz"),
+    exports=("3dgs", "2dgs", "release", "points", "mesh", "compact", "html", "usd", "gltf", "spz", "vtp"),
     depth="median",
 )

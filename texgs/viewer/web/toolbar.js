@@ -8,7 +8,7 @@ import { PictureDialog } from "./size_inputs.js";
 const EXPORTS = {
   mp4: "Film, MP4", gif: "Film, GIF", html: "Web page", volume: "Web page with the volume, 2 MB more",
   "3dgs": "3D Gaussians, PLY", "2dgs": "2D Gaussians, PLY", points: "Points, PLY", mesh: "Mesh, PLY",
-  usd: "Splats with light, OpenUSD", gltf: "Splats with light, glTF", spz: "Splats with light, SPZ",
+  usd: "Splats with light, OpenUSD", gltf: "Splats with light, glTF", spz: "Splats with light, SPZ", vtp: "Surfels as polygons, VTK",
 };
 const get = (id) => document.getElementById(id);
 
