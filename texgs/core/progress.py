@@ -4,6 +4,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
+from importlib.util import find_spec
 from operator import length_hint
 from time import monotonic
 from typing import TypeVar
@@ -79,10 +80,10 @@ def progress(iterable: Iterable[T], total: int | None = None, *, title: str, uni
 
 def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterable[T]:
     """Return the items, in a bar or with plain lines."""
-    if "ipykernel" in sys.modules:
-        from tqdm.auto import tqdm  # a widget where the notebook has those
-    elif not sys.stderr.isatty():
+    if not ("ipykernel" in sys.modules or sys.stderr.isatty()):
         return _lines(iterable, total, title, unit)
+    if "ipykernel" in sys.modules and find_spec("ipywidgets"):
+        from tqdm.notebook import tqdm
     else:
         from tqdm import tqdm  # slow to import
 
