@@ -1,6 +1,6 @@
 """Editable, relightable, stylisable 3D scenes of textured 2D Gaussians from scientific volumes.
 
-In Python: `Volume`, `fit`, `open` and `Scene`; they are loaded when they are first used.
+In Python: `Volume`, `fit`, `open`, `Scene` and `results`; they are loaded when they are first used.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from texgs.api.fit import fit
     from texgs.api.functions import Functions
+    from texgs.api.results import results
     from texgs.api.scene import Scene
     from texgs.api.scene import open_scene as open
     from texgs.api.volume import Volume
     from texgs.volume.transfer import TransferFunction
 
 __version__ = "0.1.0"
-__all__ = ["Functions", "Scene", "TransferFunction", "Volume", "fit", "open"]
+__all__ = ["Functions", "Scene", "TransferFunction", "Volume", "fit", "open", "results"]
 
 HOMES = {
     "Functions": "texgs.api.functions",
@@ -26,6 +27,7 @@ HOMES = {
     "Volume": "texgs.api.volume",
     "fit": "texgs.api.fit",
     "open": "texgs.api.scene",
+    "results": "texgs.api.results",
 }
 
 

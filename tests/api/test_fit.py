@@ -52,6 +52,16 @@ def test_a_second_fit_in_the_folder_does_nothing(scene, ball, folder):
     assert np.array_equal(np.asarray(again.render(width=32)), np.asarray(scene.render(width=32)))
 
 
+def test_results_are_a_table(scene, folder):
+    table = texgs.results(folder)
+    row = table[(table.stage == "texture") & (table.tf == "inner")].iloc[0]
+    file = folder / "ball" / "inner" / "quick" / "texture" / "metrics.json"
+    assert row.psnr == json.loads(file.read_text())["numbers"]["psnr"]
+    assert (row.dataset, row.recipe) == ("ball", "quick")
+    with pytest.raises(ArgumentError, match="expected results of texgs run, got none"):
+        texgs.results(folder / "nothing")
+
+
 def test_psnr_is_the_mean_beside_the_volume(scene):
     session = scene.session
     lens = session.scene.framed().lens(width=24, height=24)

@@ -192,9 +192,7 @@ def test_polygons_for_paraview_are_those_of_pyvista(scene, tmp_path):
 
 
 def test_exports_of_other_endings_are_refused(scene):
-    with pytest.raises(
-        ArgumentError, match=r"expected a file that ends in .ply or .html .*, got x.obj"
-    ):
+    with pytest.raises(ArgumentError, match=r"expected a file that ends in .ply or .html .*, got x.obj"):
         scene.export("x.obj")
     with pytest.raises(ArgumentError, match=r"expected a file that ends in .ply, got x.html"):
         scene.export("x.html", "mesh")
