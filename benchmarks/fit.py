@@ -18,8 +18,8 @@ from texgs.core.light import Light
 from texgs.core.process import keep_freed_memory
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
-from texgs.fit.loop import Fit
-from texgs.fit.settings import Densify, Losses, Phase, Rates
+from texgs.fitting.loop import Fit
+from texgs.fitting.settings import Densify, Losses, Phase, Rates
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 

@@ -17,7 +17,7 @@ import torch
 from benchmarks import machine
 from benchmarks.command import call
 from texgs.fields.surfels.model import Surfels
-from texgs.fit.now import fit_now
+from texgs.fitting.now import fit_now
 from texgs.metrics.quality import evaluate, mean
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.origins import find_upwards
@@ -71,4 +71,4 @@ def quality(model: Surfels, splits: dict[str, Sequence[View]]) -> dict[str, floa
 
 
 if __name__ == "__main__":
-    call(main, "benchmarks.now texgs.fit.now")
+    call(main, "benchmarks.now texgs.fitting.now")

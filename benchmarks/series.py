@@ -25,8 +25,8 @@ from texgs.fields.surfels.compact import write_compact
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.step_file import at_step, write_step
-from texgs.fit.now import fit_now
-from texgs.fit.series import next_step
+from texgs.fitting.now import fit_now
+from texgs.fitting.series import next_step
 from texgs.metrics.quality import psnr
 from texgs.volume.cameras import spiral
 from texgs.volume.caster import Caster
@@ -118,4 +118,4 @@ def quality(model: Surfels, grid: Grid, tf: TransferFunction) -> float:
 
 
 if __name__ == "__main__":
-    call(main, "benchmarks.series texgs.fit.series")
+    call(main, "benchmarks.series texgs.fitting.series")

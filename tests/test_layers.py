@@ -17,7 +17,7 @@ FLOORS = (
     ("raster",),
     ("volume", "models"),
     ("fields",),
-    ("fit", "scene"),
+    ("fitting", "scene"),
     ("metrics",),
     ("edit",),
     ("config",),

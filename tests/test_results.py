@@ -40,9 +40,9 @@ def test_results_of_older_code_are_marked(page):
 def clone(tmp_path, monkeypatch):
     """A repository with a stage that imports a module, a result of it, a picture of that, and a page."""
     files = {
-        "texgs/workflow/stages/shading.py": "from texgs.fit import loop\n",
-        "texgs/fit/loop.py": "RATE = 1\n",
-        "texgs/fit/other.py": "RATE = 1\n",
+        "texgs/workflow/stages/shading.py": "from texgs.fitting import loop\n",
+        "texgs/fitting/loop.py": "RATE = 1\n",
+        "texgs/fitting/other.py": "RATE = 1\n",
         "benchmarks/results/a.csv": "",
         "benchmarks/results/index.csv": "file,command,machine,revision,code,digest\n",
         "docs/b.png": "",
@@ -71,7 +71,7 @@ def called(monkeypatch, capsys, *words):
     return capsys.readouterr().out
 
 
-def change(clone, text, name="texgs/fit/loop.py"):
+def change(clone, text, name="texgs/fitting/loop.py"):
     (clone / name).write_text(text)
 
 
@@ -84,7 +84,7 @@ def test_a_result_and_its_picture_are_of_older_code_until_it_is_measured_again(c
     change(clone, "RATE = 2\n")
     assert re.findall(r"^\S+", called(monkeypatch, capsys), flags=re.MULTILINE)[:2] == ["a.csv", "b.png"]
     told = called(monkeypatch, capsys, path, "--mark")
-    assert told.startswith(f"a.csv {results.index().revision['a.csv']} texgs.fit.loop\n")
+    assert told.startswith(f"a.csv {results.index().revision['a.csv']} texgs.fitting.loop\n")
     page, about, readme = (clone / name for name in ("docs/page.md", "docs/accuracy.md", "README.md"))
     dagger = "[†](accuracy.md)"
     assert page.read_text() == (
@@ -102,8 +102,8 @@ def test_a_result_and_its_picture_are_of_older_code_until_it_is_measured_again(c
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("texgs/fit/other.py", "RATE = 2\n"),
-        ("texgs/fit/loop.py", "RATE  =  1  # one\n"),
+        ("texgs/fitting/other.py", "RATE = 2\n"),
+        ("texgs/fitting/loop.py", "RATE  =  1  # one\n"),
         ("docs/page.md", ""),
     ],
 )

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import texgs
-from texgs.api.fit import fit
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.metrics.quality import compare
 from texgs.scene.scene_file import read_scene
@@ -32,7 +31,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def scene(ball, folder):
-    return fit(ball, TFS, size=32, overrides=SMALL, folder=folder)
+    return texgs.fit(ball, TFS, size=32, overrides=SMALL, folder=folder)
 
 
 def test_it_is_what_the_workflow_makes(scene, folder):
@@ -47,7 +46,7 @@ def test_it_is_what_the_workflow_makes(scene, folder):
 
 def test_a_second_fit_in_the_folder_does_nothing(scene, ball, folder):
     files = {path: path.stat().st_mtime_ns for path in folder.rglob("model.safetensors")}
-    again = fit(ball, TFS, size=32, overrides=SMALL, folder=folder)
+    again = texgs.fit(ball, TFS, size=32, overrides=SMALL, folder=folder)
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("model.safetensors")} == files
     assert np.array_equal(np.asarray(again.render(width=32)), np.asarray(scene.render(width=32)))
 
@@ -71,7 +70,7 @@ def test_psnr_is_the_mean_beside_the_volume(scene):
 
 
 def test_the_volume_stays_as_long_as_the_scene(ball):
-    made = fit(texgs.Volume(ball.grid.values), {"TF01": TFS["inner"]}, size=32, overrides=SMALL)
+    made = texgs.fit(texgs.Volume(ball.grid.values), {"TF01": TFS["inner"]}, size=32, overrides=SMALL)
     assert np.asarray(made.render(width=24, mode="volume")).std() > 1  # nothing else holds the volume
 
 
@@ -95,11 +94,11 @@ def test_surfels_as_polygons_lie_where_the_volume_does(scene):
 
 
 def test_models_in_seconds(ball, monkeypatch, tmp_path):
-    monkeypatch.setattr("texgs.fit.now.FREQUENCY", 1)
-    monkeypatch.setattr("texgs.fit.now.SURFELS", 300)
-    monkeypatch.setattr("texgs.fit.now.PASSES", (20, 20))
+    monkeypatch.setattr("texgs.fitting.now.FREQUENCY", 1)
+    monkeypatch.setattr("texgs.fitting.now.SURFELS", 300)
+    monkeypatch.setattr("texgs.fitting.now.PASSES", (20, 20))
     overlapping = {**TFS, "all": texgs.TransferFunction([[0.1, 0.0], [1, 0.1]], [[0, 1, 1, 1]])}
-    scene = fit(ball, overlapping, "now", size=32, folder=tmp_path)
+    scene = texgs.fit(ball, overlapping, "now", size=32, folder=tmp_path)
     assert scene.parts == ["outer", "inner", "all"]
     assert (tmp_path / "inner.safetensors").is_file()
     assert scene.psnr(views=2, width=24) > 15
@@ -121,7 +120,7 @@ def test_models_in_seconds(ball, monkeypatch, tmp_path):
 )
 def test_what_cannot_be_fitted_is_told(ball, change, error, words):
     with pytest.raises(error, match=words):
-        fit(**{"volume": ball, "functions": TFS, "size": 32, **change})
+        texgs.fit(**{"volume": ball, "functions": TFS, "size": 32, **change})
 
 
 def test_an_interrupted_fit_goes_on(ball, monkeypatch, tmp_path):
@@ -131,13 +130,13 @@ def test_an_interrupted_fit_goes_on(ball, monkeypatch, tmp_path):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr("texgs.fit.texels.texturize", interrupted)
+        patched.setattr("texgs.fitting.texels.texturize", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            fit(ball, TFS["inner"], size=32, overrides=SMALL, folder=tmp_path)
+            texgs.fit(ball, TFS["inner"], size=32, overrides=SMALL, folder=tmp_path)
     assert texture
     assert not list(tmp_path.rglob("texture/model.safetensors"))
     before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("shading/model.safetensors")}
-    scene = fit(ball, TFS["inner"], size=32, overrides=SMALL, folder=tmp_path)
+    scene = texgs.fit(ball, TFS["inner"], size=32, overrides=SMALL, folder=tmp_path)
     assert scene.parts == ["TF01"]
     assert before
     assert {path: path.stat().st_mtime_ns for path in before} == before

@@ -16,8 +16,8 @@ from texgs.fields.files import open_field
 from texgs.fields.gaussians.model import JoinedGaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import read_model
-from texgs.fit import checkpoint
-from texgs.fit.loop import Fit
+from texgs.fitting import checkpoint
+from texgs.fitting.loop import Fit
 from texgs.report import fit_figure
 from texgs.scene.scene_file import read_scene
 from texgs.volume import view_set

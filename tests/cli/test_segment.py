@@ -14,7 +14,7 @@ from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
-from texgs.fit.texels import textured
+from texgs.fitting.texels import textured
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment

@@ -4,7 +4,7 @@ import torch
 from torch.nn.functional import normalize
 
 from tests.edit.scenes import on_sphere
-from tests.fit.scenes import logit
+from tests.fitting.scenes import logit
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material

@@ -3,7 +3,7 @@
 import torch
 from torch.nn.functional import normalize
 
-from tests.fit.scenes import HEADLIGHT, RADIUS, cameras
+from tests.fitting.scenes import HEADLIGHT, RADIUS, cameras
 from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.edit.keys import EditKeys
@@ -11,7 +11,7 @@ from texgs.edit.style_picture import StylePicture
 from texgs.edit.task import Task
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
-from texgs.fit.texels import textured
+from texgs.fitting.texels import textured
 from texgs.volume.images import Images
 
 SHELL = 0.4  # radius, world units

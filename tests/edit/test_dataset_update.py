@@ -9,7 +9,7 @@ from tests.edit.guidances import Returns, Tint
 from tests.edit.scenes import images_of
 from tests.edit.test_gaussians import ball as gaussians
 from tests.fields.voxels.test_voxels import ball as voxels
-from tests.fit.scenes import cameras
+from tests.fitting.scenes import cameras
 from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.dataset_update import PhotometricLoss, azimuth, field_views, update_field, update_steps
 from texgs.edit.gaussians import GaussianLearner, radii
@@ -19,7 +19,7 @@ from texgs.edit.methods.in2n import In2nKeys
 from texgs.edit.methods.updates import UpdateSchedule
 from texgs.edit.voxels import VoxelLearner, corner
 from texgs.fields.optimizer import Rate
-from texgs.fit.settings import CommonRates
+from texgs.fitting.settings import CommonRates
 from texgs.raster.losses import ssim
 from texgs.volume.images import Box
 

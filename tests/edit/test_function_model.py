@@ -15,7 +15,7 @@ from texgs.edit.function_model import overlap_of, tried, with_model
 from texgs.fields.gaussians.files import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
-from texgs.fit import now
+from texgs.fitting import now
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import Twin

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from tests.edit.scenes import RADIUS, sphere_points
-from tests.fit.scenes import cameras
+from tests.fitting.scenes import cameras
 from texgs.edit.gaussians import HIGHER, stylize_gaussians
 from texgs.edit.methods.stylesplat import StyleSplatKeys
 from texgs.edit.objective import Objective

@@ -6,7 +6,7 @@ import torch
 from torch.nn.functional import avg_pool2d, normalize
 
 from tests.edit.scenes import ball
-from tests.fit.scenes import RADIUS
+from tests.fitting.scenes import RADIUS
 from texgs.core.camera import orbit
 from texgs.core.errors import ShapeError
 from texgs.edit.canvas import rasterized

@@ -6,8 +6,8 @@ import pytest
 import torch
 
 from tests.edit.scenes import plain_style
-from tests.fit.scenes import ball_images, cameras
-from tests.fit.test_palette import SETTINGS
+from tests.fitting.scenes import ball_images, cameras
+from tests.fitting.test_palette import SETTINGS
 from texgs.core.errors import ArgumentError
 from texgs.edit import palette_style
 from texgs.edit.methods.stylerf import StyleRfKeys
@@ -17,7 +17,7 @@ from texgs.edit.style_loop import learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.palette.networks import free_color, palette_color
 from texgs.fields.palette.rendering import points_on, shown
-from texgs.fit.palette import PaletteFit
+from texgs.fitting.palette import PaletteFit
 from texgs.models.pictures import picture
 from texgs.raster.voxels import camera_rays
 

@@ -7,7 +7,7 @@ import torch
 
 from tests.edit.scenes import images_of, plain_style
 from tests.fields.voxels.test_voxels import ball
-from tests.fit.scenes import cameras
+from tests.fitting.scenes import cameras
 from texgs.edit.methods.arf import ArfKeys
 from texgs.edit.objective import Objective
 from texgs.edit.style_loop import learn_style

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch.testing import assert_close
 
-from tests.fit.scenes import cameras, images_of, random_surfels
+from tests.fitting.scenes import cameras, images_of, random_surfels
 from texgs.core.camera import orbit
 from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels

@@ -43,7 +43,7 @@ from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.step_file import at_step, write_step
 from texgs.fields.surfels.variants import with_texture, write_texture
-from texgs.fit.checkpoint import latest
+from texgs.fitting.checkpoint import latest
 from texgs.models.networks import read_tensors
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import read_scene, write_scene

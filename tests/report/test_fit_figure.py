@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from tests.fit.scenes import HEADLIGHT, ball_planes, ball_seeds, cameras
+from tests.fitting.scenes import HEADLIGHT, ball_planes, ball_seeds, cameras
 from texgs.core.errors import ArgumentError
 from texgs.core.figures import Scale
 from texgs.core.image import write_png

@@ -7,7 +7,7 @@ from typing import Any
 
 from texgs.core.keys import key
 from texgs.fields.kinds import Functions, Kind
-from texgs.fit.kinds import FitSpec
+from texgs.fitting.kinds import FitSpec
 
 
 @dataclass
@@ -90,7 +90,7 @@ def write(path, ball):
 
 def fit(task):
     """The mean colour of what is opaque."""
-    from texgs.fit.kinds import Fitted
+    from texgs.fitting.kinds import Fitted
 
     start = time.monotonic()
     planes = task.images.planes.float() / 255

@@ -4,7 +4,7 @@ import pytest
 import torch
 from PIL import Image
 
-from tests.fit.scenes import HEADLIGHT, cameras
+from tests.fitting.scenes import HEADLIGHT, cameras
 from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.volume.images import load, over_white, smaller
 from texgs.volume.view_set import View

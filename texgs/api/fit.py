@@ -77,7 +77,7 @@ def fit_now_into(
 ) -> Path:
     """Fit models in memory, and write them and a scene into a folder; return the scene's file."""
     from texgs.fields.surfels.model_file import write_model
-    from texgs.fit.now import fit_now
+    from texgs.fitting.now import fit_now
     from texgs.scene.copied import SCENE
     from texgs.scene.scene import Scene as Models
     from texgs.scene.scene import SceneModel

@@ -10,8 +10,8 @@ from typing import Any
 from texgs.core.keys import key
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import methods
-from texgs.fit.kinds import fit_specs
-from texgs.fit.settings import Material, Phase, Seeds, TextureKeys
+from texgs.fitting.kinds import fit_specs
+from texgs.fitting.settings import Material, Phase, Seeds, TextureKeys
 
 
 @dataclass(frozen=True)

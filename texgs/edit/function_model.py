@@ -11,7 +11,7 @@ import torch
 from texgs.core.errors import ArgumentError
 from texgs.fields.files import kind_of
 from texgs.fields.surfels.model import Surfels
-from texgs.fit.now import fit_now
+from texgs.fitting.now import fit_now
 from texgs.scene.scene import Scene, SceneModel
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of

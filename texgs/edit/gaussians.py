@@ -18,8 +18,8 @@ from texgs.edit.style_picture import StylePicture
 from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.optimizer import Optimizer
 from texgs.fields.splats import GEOMETRY, join, split
-from texgs.fit.loop import extent, rates
-from texgs.fit.settings import Rates
+from texgs.fitting.loop import extent, rates
+from texgs.fitting.settings import Rates
 from texgs.models.vgg import Vgg
 from texgs.volume.images import Images
 

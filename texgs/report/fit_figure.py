@@ -17,7 +17,7 @@ from texgs.fields.field import Field
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
-from texgs.fit.losses import material_maps
+from texgs.fitting.losses import material_maps
 from texgs.metrics.quality import psnr
 from texgs.raster import rasterize
 from texgs.raster.shading import MATERIAL

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from texgs.fit.kinds import fit_specs
+from texgs.fitting.kinds import fit_specs
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import DATA, LABEL, beside_paper, cells, in_order, is_alike, rank
 from texgs.report.results import FitResult, MeshResult

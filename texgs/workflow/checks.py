@@ -10,7 +10,7 @@ from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import kinds, require
 from texgs.fields.surfels.material import require_material
-from texgs.fit.kinds import fit_specs
+from texgs.fitting.kinds import fit_specs
 from texgs.workflow.edits import lineage, looks_of
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.stage import Stage

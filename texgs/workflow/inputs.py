@@ -12,7 +12,7 @@ from texgs.config.project import is_scene_file, members
 from texgs.config.schema import NO_SWEEP, Config
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.edit.method import NO_METHOD
-from texgs.fit.kinds import fit_specs
+from texgs.fitting.kinds import fit_specs
 from texgs.workflow.locate import tf_names, views_folder
 from texgs.workflow.stage import edit_folder, folder_of, made, plain
 from texgs.workflow.sweep import changes, fit_variant

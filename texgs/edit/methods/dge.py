@@ -9,7 +9,7 @@ from texgs.core.keys import key
 from texgs.edit.method import Method
 from texgs.edit.methods.igs2gs import rates
 from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, run
-from texgs.fit.settings import CommonRates
+from texgs.fitting.settings import CommonRates
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from texgs.core.keys import key
 from texgs.edit.method import Method
 from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, run
-from texgs.fit.settings import CommonRates
+from texgs.fitting.settings import CommonRates
 
 
 def rates(zeroth: float, means_final: float) -> CommonRates:

@@ -1,7 +1,7 @@
 """Kinds of field: what each can do, and how its files are known, read, written and made a scene.
 
-A kind is one module of this package, which defines FIELD. How it is fitted stands in `texgs.fit.kinds`, or as
-FIT in the same module.
+A kind is one module of this package, which defines FIELD. How it is fitted stands in `texgs.fitting.kinds`,
+or as FIT in the same module.
 """
 
 from __future__ import annotations

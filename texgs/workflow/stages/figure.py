@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.fit.kinds import fit_specs
+from texgs.fitting.kinds import fit_specs
 from texgs.report.results import Result
 from texgs.workflow.inputs import is_fit, view_set
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, made, read

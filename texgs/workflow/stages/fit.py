@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed
 from texgs.core.memory import MIB
-from texgs.fit.kinds import FitSpec, FitTask, fit_specs
-from texgs.fit.settings import Phase
+from texgs.fitting.kinds import FitSpec, FitTask, fit_specs
+from texgs.fitting.settings import Phase
 from texgs.report.results import FitResult
 from texgs.workflow.inputs import is_fit_of, view_set
 from texgs.workflow.stage import Outcome, Rule, Stage, read
@@ -73,9 +73,9 @@ class FitJob:
         """
         from texgs.core.geometry import z_order_of
         from texgs.fields.surfels.model import Surfels
-        from texgs.fit.checkpoint import FOLDER, run_to_end
-        from texgs.fit.densify import is_shared
-        from texgs.fit.loop import Fit
+        from texgs.fitting.checkpoint import FOLDER, run_to_end
+        from texgs.fitting.densify import is_shared
+        from texgs.fitting.loop import Fit
 
         fit = Fit(parameters, shading, self.images, phase, self.fit.seed)
         seconds = run_to_end(fit, self.output / FOLDER, self.title)
@@ -98,7 +98,7 @@ class FitJob:
         """Return the result, with the quality on views of some splits; the checkpoint goes."""
         import torch
 
-        from texgs.fit import checkpoint
+        from texgs.fitting import checkpoint
         from texgs.volume.images import smaller
 
         camera = smaller(self.views.train[0].camera, self.fit.reduce)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from texgs.fit.settings import Material, Phase
+from texgs.fitting.settings import Material, Phase
 from texgs.workflow.inputs import is_changed, is_fit_of, model_of
 from texgs.workflow.stage import Outcome, Stage, read
 from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from texgs.fit.settings import Phase, Seeds
+from texgs.fitting.settings import Phase, Seeds
 from texgs.workflow.inputs import is_changed, is_fit_of, prepared_volume, view_set
 from texgs.workflow.stage import Config, Outcome, Stage, read
 from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
@@ -44,7 +44,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.fields.surfels.model import Surfels
     from texgs.fields.surfels.model_file import write_model
     from texgs.fields.surfels.shading import ShadingModel
-    from texgs.fit.seeds import seed_surfels
+    from texgs.fitting.seeds import seed_surfels
     from texgs.volume.nrrd_file import open_grid
 
     fit, phase, job = settings.fit, settings.phase, FitJob.of(settings, inputs, output)

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from texgs.fit.settings import TextureKeys
+from texgs.fitting.settings import TextureKeys
 from texgs.workflow.inputs import is_fit_of, model_of
 from texgs.workflow.stage import Outcome, Stage, read
 from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
@@ -25,7 +25,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     It reads `model`, of the stage before, and `views`, the transforms_train.json.
     """
     from texgs.fields.surfels.model_file import read_model, write_model
-    from texgs.fit.texels import texturize
+    from texgs.fitting.texels import texturize
 
     job = FitJob.of(settings, inputs, output)
     before = read_model(inputs["model"]).to(job.device)

@@ -5,17 +5,17 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.fit.scenes import assert_same, ball_images, ball_planes, blank_images, images_of, quality
+from tests.fitting.scenes import assert_same, ball_images, ball_planes, blank_images, images_of, quality
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.palette.networks import base_color, density, palette_color
 from texgs.fields.palette.rendering import points_on, view_harmonics
-from texgs.fit import checkpoint
-from texgs.fit.checkpoint import run_to_end
-from texgs.fit.kinds.palette import HashKeys, PaletteKeys
-from texgs.fit.kinds.voxels import Decay, GridStage, VoxelKeys
-from texgs.fit.palette import PaletteFit, base_loss
-from texgs.fit.palette_colors import object_palette
+from texgs.fitting import checkpoint
+from texgs.fitting.checkpoint import run_to_end
+from texgs.fitting.kinds.palette import HashKeys, PaletteKeys
+from texgs.fitting.kinds.voxels import Decay, GridStage, VoxelKeys
+from texgs.fitting.palette import PaletteFit, base_loss
+from texgs.fitting.palette_colors import object_palette
 
 VOXELS = VoxelKeys(
     stages=[GridStage(16, 30), GridStage(32, 30)],

@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.fit.scenes import (
+from tests.fitting.scenes import (
     HEADLIGHT,
     ball_seeds,
     blank_images,
@@ -23,9 +23,9 @@ from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, material, raw_material
 from texgs.fields.surfels.texels import owners
-from texgs.fit.settings import Densify, TextureKeys
-from texgs.fit.texels import look, sizes_for_budget, textured, texturize, without_offset
-from texgs.fit.texture_solve import FARTHEST, curvature, refine, sampled_error, solve, texel_map
+from texgs.fitting.settings import Densify, TextureKeys
+from texgs.fitting.texels import look, sizes_for_budget, textured, texturize, without_offset
+from texgs.fitting.texture_solve import FARTHEST, curvature, refine, sampled_error, solve, texel_map
 from texgs.raster import Texture, rasterize, reference
 from texgs.raster.losses import l1_dssim
 from texgs.raster.reference import shading

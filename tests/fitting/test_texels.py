@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch.testing import assert_close
 
-from tests.fit.scenes import (
+from tests.fitting.scenes import (
     ball_images,
     ball_seeds,
     blank_images,
@@ -22,8 +22,16 @@ from texgs.core.errors import ArgumentError
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, in_full_light, material, raw_material
 from texgs.fields.surfels.texels import offsets_of
-from texgs.fit.settings import TextureKeys
-from texgs.fit.texels import Sight, look, mean_color, sizes_for_budget, sizes_where_seen, textured, texturize
+from texgs.fitting.settings import TextureKeys
+from texgs.fitting.texels import (
+    Sight,
+    look,
+    mean_color,
+    sizes_for_budget,
+    sizes_where_seen,
+    textured,
+    texturize,
+)
 from texgs.raster.arguments import check_texture
 from texgs.raster.types import Texture
 

@@ -7,7 +7,7 @@ from math import pi, sin
 from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.keys import key
 from texgs.fields.kinds.voxels import FIELD
-from texgs.fit.kinds import FitSpec, FitTask, Fitted
+from texgs.fitting.kinds import FitSpec, FitTask, Fitted
 
 
 @dataclass(frozen=True)
@@ -87,8 +87,8 @@ class VoxelKeys:
 def fit(task: FitTask[VoxelKeys]) -> Fitted:
     """Fit a grid to random rays, coarse to fine, from the last checkpoint if there is one."""
     from texgs.fields.voxels.model import Voxels
-    from texgs.fit.checkpoint import FOLDER, run_to_end
-    from texgs.fit.voxels import VoxelFit
+    from texgs.fitting.checkpoint import FOLDER, run_to_end
+    from texgs.fitting.voxels import VoxelFit
 
     if task.device.type != "cpu":
         raise DeviceError(f"device: expected cpu, got {task.device}; voxels are fitted on the CPU")

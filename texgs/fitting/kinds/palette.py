@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.keys import key
 from texgs.fields.kinds.palette import FIELD
-from texgs.fit.kinds import FitSpec, FitTask, Fitted
-from texgs.fit.kinds.voxels import GridStage, VoxelKeys
+from texgs.fitting.kinds import FitSpec, FitTask, Fitted
+from texgs.fitting.kinds.voxels import GridStage, VoxelKeys
 
 STAGES = (GridStage(64, 60), GridStage(128, 150), GridStage(256, 100))
 
@@ -63,8 +63,8 @@ class PaletteKeys:
 
 def fit(task: FitTask[PaletteKeys]) -> Fitted:
     """Fit networks to random rays, from the last checkpoint if there is one."""
-    from texgs.fit.checkpoint import FOLDER, run_to_end
-    from texgs.fit.palette import PaletteFit
+    from texgs.fitting.checkpoint import FOLDER, run_to_end
+    from texgs.fitting.palette import PaletteFit
 
     if task.device.type != "cpu":
         raise DeviceError(f"device: expected cpu, got {task.device}; palette fields are fitted on the CPU")

@@ -15,11 +15,11 @@ from texgs.core.lens import Lens
 from texgs.core.progress import progress
 from texgs.fields.surfels.model import TEXTURE, Surfels
 from texgs.fields.surfels.texels import untextured
-from texgs.fit.loop import Fit
-from texgs.fit.now import HEADLIGHTS, Points, cast_views, ends_of_rays, surfels_on
-from texgs.fit.now import RATES as RATES_OF_SEEDS
-from texgs.fit.seeds import shown
-from texgs.fit.settings import Densify, Losses, Phase, Rates
+from texgs.fitting.loop import Fit
+from texgs.fitting.now import HEADLIGHTS, Points, cast_views, ends_of_rays, surfels_on
+from texgs.fitting.now import RATES as RATES_OF_SEEDS
+from texgs.fitting.seeds import shown
+from texgs.fitting.settings import Densify, Losses, Phase, Rates
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid

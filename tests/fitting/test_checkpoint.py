@@ -7,8 +7,8 @@ from safetensors.torch import save
 
 from texgs.core.errors import ArgumentError, FitError
 from texgs.core.progress import curve_logger
-from texgs.fit import checkpoint
-from texgs.fit.checkpoint import ResumableFit, run_to_end
+from texgs.fitting import checkpoint
+from texgs.fitting.checkpoint import ResumableFit, run_to_end
 
 from .scenes import assert_same, new_fit, run
 

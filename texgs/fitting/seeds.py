@@ -17,9 +17,9 @@ from texgs.fields.ply_columns import take
 from texgs.fields.splats import split, zeroth
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
-from texgs.fit.hull import Box, hull_points, mean_colors, random_points
-from texgs.fit.loop import Fit
-from texgs.fit.settings import Densify, Losses, Phase, Rates, Seeds
+from texgs.fitting.hull import Box, hull_points, mean_colors, random_points
+from texgs.fitting.loop import Fit
+from texgs.fitting.settings import Densify, Losses, Phase, Rates, Seeds
 from texgs.volume.grid import Grid
 from texgs.volume.images import Images, smaller
 from texgs.volume.isosurface import visible_voxels

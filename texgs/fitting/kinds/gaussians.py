@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.fields.kinds.gaussians import FIELD
-from texgs.fit.kinds import FitSpec, FitTask, Fitted
-from texgs.fit.settings import CommonRates, Densify, Losses, Phase, Rates, Seeds
+from texgs.fitting.kinds import FitSpec, FitTask, Fitted
+from texgs.fitting.settings import CommonRates, Densify, Losses, Phase, Rates, Seeds
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ def fit(task: FitTask[GaussianKeys]) -> Fitted:
     """Fit Gaussians to the views, from the last checkpoint if there is one."""
     from texgs.fields.gaussians.model import Baked, Gaussians
     from texgs.fields.splats import join
-    from texgs.fit.checkpoint import FOLDER, run_to_end
-    from texgs.fit.loop import Fit
-    from texgs.fit.seeds import seed_gaussians
+    from texgs.fitting.checkpoint import FOLDER, run_to_end
+    from texgs.fitting.loop import Fit
+    from texgs.fitting.seeds import seed_gaussians
 
     keys = task.settings
     start = seed_gaussians(task.images, task.views, keys.seeds, keys.sh_degree, task.seed)

@@ -14,7 +14,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT
-from texgs.fit import now
+from texgs.fitting import now
 from texgs.volume.caster import Caster
 from texgs.volume.generate import sphere
 from texgs.volume.transfer import TransferFunction

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from texgs.core.geometry import quats_to_matrices
 from texgs.fields.optimizer import Optimizer
-from texgs.fit.settings import Densify
+from texgs.fitting.settings import Densify
 from texgs.raster.shading import MATERIAL
 
 CHILDREN = 2  # of a split

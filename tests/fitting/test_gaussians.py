@@ -4,12 +4,12 @@ import torch
 from texgs.core.errors import ArgumentError
 from texgs.fields.gaussians.model import Baked, Gaussians
 from texgs.fields.splats import screen_box
-from texgs.fit import checkpoint
-from texgs.fit.kinds import FitTask
-from texgs.fit.kinds.gaussians import FIT, GaussianKeys
-from texgs.fit.loop import Fit
-from texgs.fit.seeds import seed_gaussians
-from texgs.fit.settings import CommonRates, Densify, Seeds
+from texgs.fitting import checkpoint
+from texgs.fitting.kinds import FitTask
+from texgs.fitting.kinds.gaussians import FIT, GaussianKeys
+from texgs.fitting.loop import Fit
+from texgs.fitting.seeds import seed_gaussians
+from texgs.fitting.settings import CommonRates, Densify, Seeds
 from texgs.raster.shading import Y00
 from texgs.volume.view_set import ViewSet
 

@@ -8,9 +8,9 @@ from texgs.core.camera import orbit
 from texgs.core.light import Light
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
-from texgs.fit.loop import Fit
-from texgs.fit.seeds import surfels_at
-from texgs.fit.settings import Densify, Losses, Phase, Rates
+from texgs.fitting.loop import Fit
+from texgs.fitting.seeds import surfels_at
+from texgs.fitting.settings import Densify, Losses, Phase, Rates
 from texgs.metrics.quality import psnr
 from texgs.volume.images import Images
 

@@ -11,10 +11,10 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.splats import Shading, join, visible_part
-from texgs.fit.checkpoint import ResumableFit
-from texgs.fit.densify import DensityControl
-from texgs.fit.losses import render_view, view_loss
-from texgs.fit.settings import Phase, Rates
+from texgs.fitting.checkpoint import ResumableFit
+from texgs.fitting.densify import DensityControl
+from texgs.fitting.losses import render_view, view_loss
+from texgs.fitting.settings import Phase, Rates
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 

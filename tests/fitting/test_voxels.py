@@ -5,18 +5,18 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.fit.scenes import RADIUS, ball_images, ball_planes, blank_images, images_of, quality
+from tests.fitting.scenes import RADIUS, ball_images, ball_planes, blank_images, images_of, quality
 from tests.real_data import real_data
 from texgs.config.compose import compose
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.voxels.model import Voxels
 from texgs.fields.voxels.rays import AROUND, curve, training_rays, widened
-from texgs.fit import checkpoint
-from texgs.fit.checkpoint import run_to_end
-from texgs.fit.hull import hull_box
-from texgs.fit.kinds.voxels import Decay, GridStage, VoxelKeys
-from texgs.fit.voxels import VoxelFit, grown, hull_grid, refined, seen_voxels
+from texgs.fitting import checkpoint
+from texgs.fitting.checkpoint import run_to_end
+from texgs.fitting.hull import hull_box
+from texgs.fitting.kinds.voxels import Decay, GridStage, VoxelKeys
+from texgs.fitting.voxels import VoxelFit, grown, hull_grid, refined, seen_voxels
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays
 from texgs.volume.images import load

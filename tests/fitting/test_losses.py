@@ -4,12 +4,12 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.fit.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
+from tests.fitting.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
 from texgs.fields.splats import visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, material
-from texgs.fit.losses import view_loss
-from texgs.fit.settings import Losses
+from texgs.fitting.losses import view_loss
+from texgs.fitting.settings import Losses
 from texgs.raster.reference.losses import bilateral_smoothness, ssim
 from texgs.raster.shading import MATERIAL
 

@@ -12,15 +12,15 @@ from torch import Tensor
 
 from texgs.core.errors import FitError
 from texgs.fields.voxels.rays import TrainingRays, training_rays
-from texgs.fit.checkpoint import ResumableFit
-from texgs.fit.hull import hull_box, in_hull, lattice
+from texgs.fitting.checkpoint import ResumableFit
+from texgs.fitting.hull import hull_box, in_hull, lattice
 from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, voxel_grid
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import March, Rays, Samples
 from texgs.volume.images import Images
 
 if TYPE_CHECKING:
-    from texgs.fit.kinds.voxels import GridStage, VoxelKeys
+    from texgs.fitting.kinds.voxels import GridStage, VoxelKeys
 
 PIECE = 16_384  # rays at a time
 SIDE = 8  # voxels that the sides of the coarsest grid are multiples of

@@ -5,8 +5,8 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from texgs.fields.optimizer import Optimizer, Rate
-from texgs.fit.densify import RESET_OPACITY, SHRINK, DensityControl
-from texgs.fit.settings import Densify
+from texgs.fitting.densify import RESET_OPACITY, SHRINK, DensityControl
+from texgs.fitting.settings import Densify
 
 from .scenes import logit
 

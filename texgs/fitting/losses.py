@@ -11,7 +11,7 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.fields.splats import Shading, geometry
 from texgs.fields.surfels.shading import ShadingModel, material
-from texgs.fit.settings import Losses
+from texgs.fitting.settings import Losses
 from texgs.raster import Render, rasterize
 from texgs.raster.losses import bilateral_smoothness, l1_dssim, normal_consistency, ssim
 from texgs.raster.shading import MATERIAL

@@ -6,11 +6,11 @@ from texgs.core.errors import FitError
 from texgs.core.image import write_png
 from texgs.fields.splats import split, zeroth
 from texgs.fields.surfels.shading import raw_material
-from texgs.fit import checkpoint
-from texgs.fit.checkpoint import CHECKED_EVERY
-from texgs.fit.loop import extent
-from texgs.fit.seeds import seed_surfels
-from texgs.fit.settings import Densify, Losses, Rates, Seeds
+from texgs.fitting import checkpoint
+from texgs.fitting.checkpoint import CHECKED_EVERY
+from texgs.fitting.loop import extent
+from texgs.fitting.seeds import seed_surfels
+from texgs.fitting.settings import Densify, Losses, Rates, Seeds
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import load
 from texgs.volume.view_set import View, ViewSet, read_views, write_transforms

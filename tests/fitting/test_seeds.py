@@ -7,9 +7,9 @@ from scipy.spatial.distance import cdist
 
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError
-from texgs.fit.hull import hull_points, mean_colors
-from texgs.fit.seeds import box_of, read_points, seed_surfels, shrunk, surfels_at
-from texgs.fit.settings import Seeds
+from texgs.fitting.hull import hull_points, mean_colors
+from texgs.fitting.seeds import box_of, read_points, seed_surfels, shrunk, surfels_at
+from texgs.fitting.settings import Seeds
 from texgs.volume.grid import Grid
 from texgs.volume.images import load
 from texgs.volume.view_set import ViewSet, read_views

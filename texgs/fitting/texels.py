@@ -12,8 +12,8 @@ from texgs.core.progress import progress
 from texgs.fields.splats import geometry, visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import EXTENT, offsets_of
-from texgs.fit.settings import TextureKeys
-from texgs.fit.texture_solve import refine, solve
+from texgs.fitting.settings import TextureKeys
+from texgs.fitting.texture_solve import refine, solve
 from texgs.raster import Texture, rasterize
 from texgs.raster.arguments import MOST_TEXELS
 from texgs.volume.images import Images

@@ -17,15 +17,15 @@ from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import Parameters, base_color, density, light, new_networks, palette_color
 from texgs.fields.palette.rendering import Geometry, Shown, blending_weights, points_on, shown, view_harmonics
-from texgs.fit.checkpoint import ResumableFit
-from texgs.fit.palette_colors import object_palette
-from texgs.fit.voxels import VoxelFit
+from texgs.fitting.checkpoint import ResumableFit
+from texgs.fitting.palette_colors import object_palette
+from texgs.fitting.voxels import VoxelFit
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, voxel_grid
 from texgs.volume.images import Images
 
 if TYPE_CHECKING:
-    from texgs.fit.kinds.palette import PaletteKeys
+    from texgs.fitting.kinds.palette import PaletteKeys
 
 NEIGHBOURS = 2  # rays of a step that follow each other
 BETAS = (0.9, 0.99)  # of Adam

@@ -15,7 +15,7 @@ from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.splats import geometry, visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import footprint
-from texgs.fit.settings import TextureKeys
+from texgs.fitting.settings import TextureKeys
 from texgs.raster import Texture, rasterize
 from texgs.raster.losses import l1_dssim
 from texgs.volume.images import Images, Target

@@ -19,10 +19,10 @@ from texgs.core.light import HEADLIGHT, random_lights
 from texgs.core.progress import progress
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, in_full_light, raw_material
-from texgs.fit.loop import Fit
-from texgs.fit.seeds import surfels_at
-from texgs.fit.settings import Densify, Losses, Phase, Rates, TextureKeys
-from texgs.fit.texels import texturize
+from texgs.fitting.loop import Fit
+from texgs.fitting.seeds import surfels_at
+from texgs.fitting.settings import Densify, Losses, Phase, Rates, TextureKeys
+from texgs.fitting.texels import texturize
 from texgs.volume.cameras import icosphere
 from texgs.volume.caster import Caster
 from texgs.volume.images import Images, smaller

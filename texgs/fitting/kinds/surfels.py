@@ -1,6 +1,6 @@
 """The fit of surfels: spherical harmonics, then Blinn-Phong shading, then texels; each phase is a stage."""
 
 from texgs.fields.kinds.surfels import FIELD
-from texgs.fit.kinds import FitSpec
+from texgs.fitting.kinds import FitSpec
 
 FIT: FitSpec[None] = FitSpec(FIELD, "textured 2D Gaussians", phases=("surfels", "shading", "texture"))

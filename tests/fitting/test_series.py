@@ -12,8 +12,8 @@ from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.light import HEADLIGHT
-from texgs.fit import now, series
-from texgs.fit.now import fit_now
+from texgs.fitting import now, series
+from texgs.fitting.now import fit_now
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
