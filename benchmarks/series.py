@@ -26,7 +26,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.step_file import at_step, write_step
 from texgs.fitting.now import fit_now
-from texgs.fitting.series import next_step
+from texgs.fitting.series import Follower
 from texgs.metrics.quality import psnr
 from texgs.volume.cameras import spiral
 from texgs.volume.caster import Caster
@@ -62,11 +62,11 @@ def series(name: str, folder: Path) -> dict:
     steps, tf = list(SERIES[name](SAMPLES, STEPS)), TFS[name]
     alone = {step: independent(folder, steps[step], tf, step) for step in compared()}
     key = read_model(folder / "finer-0.safetensors")
-    model, costs, rows = key, [], {}
+    model, follower, costs, rows = key, Follower(key, LOOK, tf), [], {}
     with machine.Load() as load:
         for step in range(1, STEPS):
             start, busy = perf_counter(), process_time()
-            model = next_step(model, *steps[step - 1 : step + 1], LOOK, tf, f"{name} {step}", step)
+            model = follower.step(model, *steps[step - 1 : step + 1], f"{name} {step}", step)
             costs.append((perf_counter() - start, process_time() - busy))
             file = write_step(folder / f"step-{step}.safetensors", key, model, {})
             model = at_step(key, file)

@@ -14,6 +14,7 @@ from texgs.core.geometry import quats_to_matrices
 from texgs.core.light import HEADLIGHT
 from texgs.fitting import now, series
 from texgs.fitting.now import fit_now
+from texgs.fitting.series import Follower
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
@@ -53,7 +54,7 @@ def psnr(model, grid):
 def test_surfels_move_with_a_ball_and_all_else_stays(key):
     model, before = key
     after = blob(WAY)
-    step = series.next_step(model, before, after, LOOK, TF, "ball", seed=1)
+    step = Follower(model, LOOK, TF).step(model, before, after, "ball", 1)
     assert psnr(step, after) > psnr(model, before) - 1.5
     assert psnr(step, after) > psnr(model, after) + 8
     for name in ("texels", "sizes", "offsets", "palette", "ambient", "shininess"):
@@ -65,27 +66,27 @@ def test_surfels_move_with_a_ball_and_all_else_stays(key):
 
 def test_the_same_seed_gives_the_same_step(key):
     model, before = key
-    one, other = (series.next_step(model, before, blob(WAY), LOOK, TF, "ball", seed=2) for _ in range(2))
+    one, other = (Follower(model, LOOK, TF).step(model, before, blob(WAY), "ball", 2) for _ in range(2))
     assert all(torch.equal(x, other.parameters[name]) for name, x in one.parameters.items())
 
 
 def test_matter_that_appears_gets_surfels_and_matter_that_is_gone_has_none_to_be_seen(key):
     model, before = key
     after = Grid(np.maximum(before.values, blob(OTHER).values), before.spacing)
-    step = series.next_step(model, before, after, LOOK, TF, "ball", seed=1)
+    step = Follower(model, LOOK, TF).step(model, before, after, "ball", 1)
     near = (step.parameters["means"] - torch.tensor(OTHER)).norm(dim=1) < 0.2
     assert int(near.sum()) > 100
     assert psnr(step, after) > psnr(model, after) + 1
-    back = series.next_step(step, after, before, LOOK, TF, "ball", seed=2)
+    back = Follower(model, LOOK, TF).step(step, after, before, "ball", 2)
     assert psnr(back, before) > psnr(step, before)
 
 
 def test_a_step_that_shows_nothing_hides_all_and_what_comes_back_is_seen_again(key):
     model, before = key
     nothing = blob((0, 0, 0), scale=0.1)
-    gone = series.next_step(model, before, nothing, LOOK, TF, "ball")
+    gone = Follower(model, LOOK, TF).step(model, before, nothing, "ball")
     assert psnr(gone, nothing) > 60
-    again = series.next_step(gone, nothing, before, LOOK, TF, "ball", seed=1)
+    again = Follower(model, LOOK, TF).step(gone, nothing, before, "ball", 1)
     assert psnr(again, before) > psnr(gone, before) + 1
 
 
@@ -111,7 +112,7 @@ def test_axes_are_carried_as_matter_is_turned_and_stretched():
 
 def test_surfels_that_show_least_are_planted_where_none_are(key):
     model, _ = key
-    flat, _ = series.without_texture(model)
+    flat = {**model.parameters, "colors": model.parameters["colors"] + series.plain_texture(model)}
     n = len(flat["means"])
     weights = torch.ones(n)
     weights[:7] = 0
@@ -127,9 +128,9 @@ def test_surfels_that_show_least_are_planted_where_none_are(key):
 
 def test_other_lattices_and_models_without_shading_are_refused(key):
     model, before = key
-    with pytest.raises(ArgumentError, match=r"expected the samples of the step before, .*resample"):
-        series.next_step(model, before, blob((0, 0, 0), sizes=(30, 30, 30)), LOOK, TF, "ball")
+    with pytest.raises(ArgumentError, match=r"expected the samples of the other steps, .*resample"):
+        Follower(model, LOOK, TF).step(model, before, blob((0, 0, 0), sizes=(30, 30, 30)), "ball")
     p = {name: x for name, x in model.parameters.items() if name in ("means", "quats", "scales", "opacities")}
     early = replace(model, parameters={**p, "sh": torch.zeros(len(model), 1, 3)})
     with pytest.raises(ArgumentError, match="expected stage shading or texture, got surfels"):
-        series.next_step(early, before, before, LOOK, TF, "ball")
+        Follower(early, LOOK, TF)

@@ -48,6 +48,7 @@ from texgs.models.networks import read_tensors
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
+from texgs.scene.series_file import Series, read_series, write_series
 from texgs.scene.twin import SceneVolume, Twin
 from texgs.study.ballots import read_ballot
 from texgs.study.questions import read_key, write_key
@@ -264,6 +265,10 @@ READERS: dict[str, Reader] = {
     "palette": Reader(lambda folder: write_palette(folder / "p", box()), read_palette),
     "texture": Reader(
         lambda folder: write_texture(folder / "t", sample()), lambda path: with_texture(sample(), path)
+    ),
+    "series": Reader(
+        lambda folder: write_series(Series(folder / "series.json", ["a.nrrd", "b.nrrd"], ["TF01"])),
+        read_series,
     ),
     "step": Reader(
         lambda folder: write_step(folder / "s", sample(), sample(seed=1), {}),

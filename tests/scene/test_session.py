@@ -262,7 +262,7 @@ def test_planes_have_the_numbers_of_before_all_words(session, words, left):
         ("cut.1=0,1,1,9", "along 0,0.707,0.707, got 6.36"),
         ("cut.box=4,4,4,5,5,5", "along -1,0,0, got -4"),
         ("cuts=x,0", "the scene: no such key 'cuts', did you mean cut?"),
-        ("sun=3", "the scene: no such key 'sun'; expected light, background, cut$"),
+        ("sun=3", "the scene: no such key 'sun'; expected light, background, cut, time$"),
         ("cut.box=1,2,3", "expected X0,Y0,Z0,X1,Y1,Z1, in world units or along an axis as in 64v, got 1,2,3"),
         ("cut.faces=dark", "faces: expected one of shaded, unlit, got dark"),
     ],

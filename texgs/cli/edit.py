@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.cli.options import add_device, add_lens, lens_of, option
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
-from texgs.core.names import SCENES, new_part_file, require_name
+from texgs.core.names import SCENES, natural_order, new_part_file, require_name
 
 if TYPE_CHECKING:
     import torch
@@ -86,6 +86,36 @@ def run_model(arguments: argparse.Namespace) -> int:
     file = write_model(new_part_file("model", output.parent, output.stem, arguments.name), model)
     scene = with_model(scene, arguments.name, file, tf)
     print(f"{write_scene(output, scene)}{overlap_of(scene, arguments.name)}")
+    return 0
+
+
+def add_series_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the scene of one step, the files of all, and the folder of the series."""
+    parser.add_argument("scene", type=Path, help="scene.yaml, whose volume is that of one of the steps")
+    words = "the volume of each step, or a pattern such as 'step_*.nrrd', sorted by its numbers"
+    parser.add_argument("--files", nargs="+", required=True, metavar="FILE", help=words)
+    parser.add_argument(
+        "--output", type=Path, required=True, help="folder; the same again goes on where it stopped"
+    )
+    add_device(parser)
+
+
+def run_series(arguments: argparse.Namespace) -> int:
+    """Follow the models of a scene through the volumes of a series in time, with the same surfels and texels.
+
+    `texgs edit time=3` shows a step of the new scene, `texgs render --path time` all of them.
+    """
+    from texgs.core.check import torch_device
+    from texgs.scene.scene_file import read_scene
+    from texgs.workflow.series import make_series
+
+    files = []
+    for name in arguments.files:
+        found = sorted(Path(name).parent.glob(Path(name).name), key=natural_order)
+        if not found:
+            raise ArgumentError(f"--files: expected files that are there, got {name}")
+        files += found
+    print(make_series(read_scene(arguments.scene), files, arguments.output, torch_device(arguments.device)))
     return 0
 
 

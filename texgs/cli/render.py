@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     import numpy as np
 
     from texgs.core.camera import Camera
-    from texgs.fields.field import Composed
     from texgs.raster import Render
     from texgs.scene.scene import Scene
+    from texgs.scene.session import Session
 
 MOST_FRAMES = 100_000  # an hour of film
 MOST_GAIN = 16.0
@@ -38,9 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "ambient, diffuse, specular or shininess"
     )
     option(parser, "--mode", "shaded", modes)
-    option(parser, "--path", "view", "of the camera, the light, or the last plane that cuts", choices=PATHS)
+    option(parser, "--path", "view", "of the camera, the light, the last plane, or time", choices=PATHS)
     length = parser.add_mutually_exclusive_group()
-    length.add_argument("--frames", type=int, help="default test 181, orbit 72, light and cut 61")
+    length.add_argument("--frames", type=int, help="default test 181, orbit 72, light, cut and time 61")
     length.add_argument("--seconds", type=float, help="length of a film, in place of a number of frames")
     add_lens(parser, "pixels", "pixels; default the width")
     azimuth = "azimuth of the camera, not for path test, on an orbit of the first frame, degrees"
@@ -63,29 +63,32 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.movie import write_frames
     from texgs.core.progress import progress
     from texgs.report.check import checked
-    from texgs.scene.frame import Mode, frame
+    from texgs.scene.frame import Mode
     from texgs.scene.paths import shots_of
     from texgs.scene.scene_file import read_scene
-    from texgs.scene.twin import twin_of
+    from texgs.scene.session import Session
+    from texgs.scene.twin import needs_twin
 
     if arguments.mode not in get_args(Mode):
         raise ArgumentError(f"--mode: expected one of {', '.join(get_args(Mode))}, got {arguments.mode}")
     scene = read_scene(arguments.scene)
     count = frames_of(arguments)
     output = output_of(arguments, count)
+    session = Session(scene, torch_device(arguments.device))
     with located(arguments.scene):
-        composition = scene.open(torch_device(arguments.device))
+        composition = session.composition
     lens = lens_of(arguments, scene.framed(composition))
     place = (arguments.azimuth, arguments.polar)
     shots = shots_of(scene, composition, arguments.path, count, lens, *place)
     shots = progress(shots, count, title=str(output), unit="frame")
     if arguments.compare:
-        frames = compared(arguments, scene, composition, shots)
+        frames = compared(arguments, session, shots)
     else:
         with located(arguments.scene):
-            twin = twin_of(scene, composition.device, arguments.mode)
-        shows = partial(frame, mode=arguments.mode, twin=twin, transparent=arguments.transparent)
-        frames = (shows(composition, camera, shown) for camera, shown in shots)
+            if needs_twin(scene, arguments.mode):
+                session.twin_of(scene)
+        shows = partial(session.frame, mode=arguments.mode, transparent=arguments.transparent)
+        frames = (shows(camera, scene=shown) for camera, shown in shots)
     words = checked(arguments.scene, scene)
     if arguments.caption:
         if not words:
@@ -96,10 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def compared(
-    arguments: argparse.Namespace,
-    scene: Scene,
-    composition: Composed,
-    shots: Iterable[tuple[Camera, Scene]],
+    arguments: argparse.Namespace, session: Session, shots: Iterable[tuple[Camera, Scene]]
 ) -> Iterator[np.ndarray]:
     """Yield frames of a scene beside its volume, or as fitted; what differs is printed at the end."""
     from texgs.metrics.quality import mean
@@ -110,7 +110,7 @@ def compared(
     if not 1 <= arguments.gain <= MOST_GAIN:
         raise ArgumentError(f"--gain: expected 1 to {MOST_GAIN:g}, got {arguments.gain:g}")
     is_fitted = arguments.compare == "fitted"
-    pair = pair_of(arguments, scene, composition, is_fitted)
+    pair = pair_of(arguments, session, is_fitted)
     measured, edits = defaultdict[str, list[float]](list), []
     for camera, shown in shots:
         image, truth = pair(camera, shown)
@@ -126,21 +126,22 @@ def compared(
 
 
 def pair_of(
-    arguments: argparse.Namespace, scene: Scene, composition: Composed, is_fitted: bool
+    arguments: argparse.Namespace, session: Session, is_fitted: bool
 ) -> Callable[[Camera, Scene], tuple[Render, Render]]:
     """Return what renders a scene, and what it is compared with."""
     from texgs.fields.files import kind_of
-    from texgs.scene.cut_view import beside, beside_fitted
-    from texgs.scene.twin import Twin
+    from texgs.scene.cut_view import beside_fitted
 
     if is_fitted:
-        kind = kind_of(next(iter(scene.models.values())).file)
+        kind = kind_of(next(iter(session.scene.models.values())).file)
         outputs = ("depth", "normal") if "normals" in kind.can else ("depth",)
-        fitted = scene.as_fitted.open(composition.device)
-        return lambda camera, shown: beside_fitted(composition, fitted, camera, shown, outputs)
+        open_one = session.composition_of
+        return lambda camera, shown: beside_fitted(
+            open_one(shown), open_one(shown.as_fitted), camera, shown, outputs
+        )
     with located(arguments.scene):
-        twin = Twin(scene, composition.device)
-    return lambda camera, shown: beside(composition, camera, shown, twin)
+        session.twin_of(session.scene)
+    return session.beside
 
 
 def output_of(arguments: argparse.Namespace, count: int) -> Path:

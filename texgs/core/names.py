@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from itertools import count
 from math import isfinite
@@ -82,6 +83,11 @@ def close(word: object, known: Iterable[str]) -> str:
     """Return a hint at the known word that is most like the given one; empty where none is."""
     similar = difflib.get_close_matches(str(word), list(known), n=1)
     return f", did you mean {similar[0]}?" if similar else ""
+
+
+def natural_order(path: Path) -> list[tuple[str, int]]:
+    """Return the place of a file among others by the numbers in its name: slice9 comes before slice10."""
+    return [(text, int(number or -1)) for text, number in re.findall(r"(\D*)(\d*)", path.name)]
 
 
 def is_number(value: object) -> bool:

@@ -14,6 +14,7 @@ from texgs.core.geometry import quats_to_matrices
 from texgs.core.lens import Lens
 from texgs.core.progress import progress
 from texgs.fields.surfels.model import TEXTURE, Surfels
+from texgs.fields.surfels.step_file import UNITS
 from texgs.fields.surfels.texels import untextured
 from texgs.fitting.loop import Fit
 from texgs.fitting.now import HEADLIGHTS, Points, cast_views, ends_of_rays, surfels_on
@@ -32,76 +33,72 @@ SIZE = 128  # pixels of the views of a step: surfels have their places, views on
 STEP = 1.0  # voxels between the samples of views
 ITERATIONS = 400
 SLOWER = 0.3  # times the rates of surfels that start anywhere
+RATES = Rates(**{name: SLOWER * getattr(RATES_OF_SEEDS, name) for name in UNITS}, material=0.0)
 SHARE = 0.1  # of all surfels: so many of those that show least are planted where most is missing
 HIDDEN = -12.0  # raw opacity of surfels where nothing is to be seen
 FARTHEST, STRETCH = 0.05, 2.0  # world units at which the ends of axes are carried; and how much they stretch
 
 
-def next_step(
-    model: Surfels,
-    before: Grid,
-    after: Grid,
-    look: Appearance,
-    tf: TransferFunction,
-    title: str,
-    seed: int = 0,
-) -> Surfels:
-    """Return the model of a step of a series, from that of the step before.
+class Follower:
+    """Follows what a function shows, from one volume of a series to the next.
 
     Surfels move with the matter that they show, see `motion`; those that show least are planted where matter
     has appeared, and a short fit to small views moves, turns, fades and colours all. There are as many as
-    before, in their order, and texels and material stay: segments and textures of the one model are also
-    those of the other.
+    before, in their order, and texels and material stay: segments and textures of one step are also those of
+    another.
 
     Args:
-        model: of the step before, of stage shading or texture.
-        before: its volume.
-        after: the volume of the step, on the same lattice.
-        look: how both look.
+        key: the model of any step, of stage shading or texture.
+        look: how volumes look.
         tf: what the model shows, in data values.
-        title: of progress bars.
-        seed: of lights, planted surfels and the order of views; another one for each step.
-
-    Raises:
-        ArgumentError: if the volumes lie on other lattices, or the model has no shading yet.
     """
-    if (after.dims, after.spacing) != (before.dims, before.spacing):
-        raise ArgumentError(
-            f"expected the samples of the step before, {before.dims} with spacing {before.spacing}, got "
-            f"{after.dims} with {after.spacing}; resample the volume"
+
+    def __init__(self, key: Surfels, look: Appearance, tf: TransferFunction) -> None:
+        if "ambient" not in key.parameters:
+            raise ArgumentError(f"model: expected stage shading or texture, got {key.stage}; fit it further")
+        self._shading, self._look, self._tf = key.shading, look, tf
+        self._texture = plain_texture(key)
+
+    def step(self, model: Surfels, before: Grid, after: Grid, title: str, seed: int = 0) -> Surfels:
+        """Return the model of a step, whose volume is `after`, from that of a step beside it.
+
+        Titles are those of progress bars. The seed is that of lights, planted surfels and the order of views:
+        another one for each step. Volumes on different lattices are refused.
+        """
+        if (after.dims, after.spacing) != (before.dims, before.spacing):
+            raise ArgumentError(
+                f"expected the samples of the other steps, {before.dims} with spacing {before.spacing}, got "
+                f"{after.dims} with {after.spacing}; resample the volume"
+            )
+        p = model.parameters
+        lens = lens_of(after, self._tf)
+        if lens is None:
+            hidden = torch.full_like(p["opacities"], HIDDEN)
+            return replace(model, parameters={**p, "opacities": hidden})
+        plain = {name: x for name, x in p.items() if name not in TEXTURE}
+        plain["colors"] = plain["colors"] + self._texture
+        if lens_of(before, self._tf):
+            plain = carried(plain, motion(before, after, self._tf))
+        fitted = self._fitted(
+            plain, Caster(after, replace(self._look, step=STEP), model.device), lens, title, seed
         )
-    if "ambient" not in model.parameters:
-        raise ArgumentError(f"model: expected stage shading or texture, got {model.stage}; fit it further")
-    lens = lens_of(after, tf)
-    if lens is None:
-        hidden = torch.full_like(model.parameters["opacities"], HIDDEN)
-        return replace(model, parameters={**model.parameters, "opacities": hidden})
-    flat, texture = without_texture(model)
-    if lens_of(before, tf):
-        flat = carried(flat, motion(before, after, tf))
-    caster = Caster(after, replace(look, step=STEP), model.device)
-    images = cast_views(caster, tf, lens, title, seed)
-    some = slice(None, None, HEADLIGHTS)
-    few = Images(images.planes[some], images.cameras[some], images.lights[some])
-    weights = shown(Surfels(flat, model.shading), few)
-    flat = planted(flat, ends_of_rays(caster, look, tf, images, seed), weights, seed)
-    phase = Phase(ITERATIONS, rates=RATES, losses=Losses(alpha=0.0), densify=Densify(stop=0))
-    fit = Fit(flat, model.shading, images, phase, seed)
-    for _ in progress(fit.run(), ITERATIONS, title=title, unit="view"):
-        pass
-    fitted = {name: x.detach() for name, x in fit.parameters.items()}
-    fitted["colors"] = fitted["colors"] - texture
-    return replace(model, parameters={**model.parameters, **fitted})
+        fitted["colors"] = fitted["colors"] - self._texture
+        return replace(model, parameters={**p, **fitted})
 
-
-RATES = Rates(
-    means=SLOWER * RATES_OF_SEEDS.means,
-    quats=SLOWER * RATES_OF_SEEDS.quats,
-    scales=SLOWER * RATES_OF_SEEDS.scales,
-    opacities=SLOWER * RATES_OF_SEEDS.opacities,
-    colors=SLOWER * RATES_OF_SEEDS.colors,
-    material=0.0,
-)
+    def _fitted(
+        self, plain: Mapping[str, Tensor], caster: Caster, lens: Lens, title: str, seed: int
+    ) -> dict[str, Tensor]:
+        """Plant surfels without texels, and fit all to views of a volume."""
+        images = cast_views(caster, self._tf, lens, title, seed)
+        points = ends_of_rays(caster, self._look, self._tf, images, seed)
+        some = slice(None, None, HEADLIGHTS)
+        few = Images(images.planes[some], images.cameras[some], images.lights[some])
+        plain = planted(plain, points, shown(Surfels(plain, self._shading), few), seed)
+        phase = Phase(ITERATIONS, rates=RATES, losses=Losses(alpha=0.0), densify=Densify(stop=0))
+        fit = Fit(plain, self._shading, images, phase, seed)
+        for _ in progress(fit.run(), ITERATIONS, title=title, unit="view"):
+            pass
+        return {name: x.detach() for name, x in fit.parameters.items()}
 
 
 def lens_of(grid: Grid, tf: TransferFunction) -> Lens | None:
@@ -112,14 +109,12 @@ def lens_of(grid: Grid, tf: TransferFunction) -> Lens | None:
         return None
 
 
-def without_texture(model: Surfels) -> tuple[dict[str, Tensor], Tensor]:
-    """Return the parameters with plain colours, and what of these [N, 3] is palette and mean texel."""
-    p = {name: x for name, x in model.parameters.items() if name not in TEXTURE}
+def plain_texture(model: Surfels) -> Tensor:
+    """Return palette and mean texel [N, 3]: what the colours of a model are offsets from."""
     if model.stage != "texture":
-        return p, torch.zeros_like(p["colors"])
+        return torch.zeros_like(model.parameters["colors"])
     plain = untextured(model).parameters
-    texture = plain["palette"] + plain["texels"][plain["offsets"]]
-    return {**p, "colors": p["colors"] + texture}, texture
+    return plain["palette"] + plain["texels"][plain["offsets"]]
 
 
 def carried(parameters: Mapping[str, Tensor], moves: Motion) -> dict[str, Tensor]:
@@ -156,11 +151,7 @@ def planted(
 ) -> dict[str, Tensor]:
     """Return surfels of which those that show least are new ones, at the points that are farthest from any.
 
-    Args:
-        parameters: of surfels with plain colours.
-        points: where rays end.
-        weights: [N] what views show of each surfel; all that are not seen move, too.
-        seed: of turns around normals.
+    Weights [N] are what views show of each; all that are not seen move, too. Colours are plain ones.
     """
     from scipy.spatial import cKDTree
 

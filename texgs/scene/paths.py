@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from texgs.scene.scene import Scene
 
 MARGIN = 0.1  # of the extent of what is visible: from its end to where a plane that moves starts or ends
-PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61, "cut": 61}  # frames by default
+PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61, "cut": 61, "time": 61}  # frames by default
 
 
 def shots_of(
@@ -33,14 +33,15 @@ def shots_of(
         scene: to show.
         composition: its models.
         path: what moves, one of `PATHS`: nothing in `view`; the camera on the path of test views or around
-            the scene; the light, as the paper shows relighting; or the last plane that cuts, through it all.
+            the scene; the light, as the paper shows relighting; the last plane that cuts, through it all; or
+            time, through the steps of the series.
         count: of frames.
         lens: of the camera.
         azimuth: of the camera, degrees; where it moves around the scene, of the first frame.
         polar: of the camera, degrees above the horizon; a path of test views has its own.
 
     Raises:
-        ArgumentError: if a cut is to move, and the scene has none.
+        ArgumentError: if a cut or time is to move, and the scene has none.
     """
     from texgs.core.camera import orbit
     from texgs.core.light import Light
@@ -54,6 +55,9 @@ def shots_of(
     if path == "view":
         return ((camera, scene) for _ in range(count))
     shares = (i / max(count - 1, 1) for i in range(count))
+    if path == "time":
+        last = len(scene.timeline.steps) - 1
+        return ((camera, scene.at(round(share * last))) for share in shares)
     if path == "cut":
         low, high = swept(scene, composition)
         return ((camera, moved(scene, high + share * (low - high))) for share in shares)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -13,15 +14,18 @@ from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.errors import ArgumentError, located
 from texgs.core.lens import Frame
 from texgs.core.light import Light
+from texgs.core.names import is_number
 from texgs.fields.field import Composed, Field
 from texgs.fields.files import open_field
 from texgs.fields.kinds import kinds
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.step_file import at_step
 from texgs.fields.surfels.texels import lean
 from texgs.fields.surfels.variants import labels_of, with_texture, with_variants
 from texgs.scene.bounds import bounds_of, models_of
 from texgs.scene.segment_file import read_segment
+from texgs.scene.series_file import Series
 from texgs.scene.twin import SceneVolume
 from texgs.volume.transfer import TransferFunction
 
@@ -49,6 +53,7 @@ class SceneModel:
     edit: PartEdit = field(default_factory=PartEdit)  # of what no segment holds
     texture: Path | None = None  # variant in place of the model's own texels
     segments: Mapping[str, SceneSegment] = field(default_factory=dict)
+    step: Path | None = None  # of a series: where its surfels are, see `Scene.at`
 
     @property
     def edits(self) -> list[PartEdit]:
@@ -58,7 +63,7 @@ class SceneModel:
     @property
     def files(self) -> list[Path | None]:
         """Return all that `open` reads."""
-        paths = [self.file, self.texture]
+        paths = [self.file, self.texture, self.step]
         for segment in self.segments.values():
             paths += [segment.file, segment.texture]
         return paths
@@ -66,7 +71,7 @@ class SceneModel:
     def open(self) -> tuple[Field, list[Tensor]]:
         """Return the field, of surfels with the texels of all variants, and the masks [N] of its segments."""
         fitted = open_field(self.file)
-        if isinstance(fitted, Surfels) or self.texture is not None or self.segments:
+        if isinstance(fitted, Surfels) or self.texture is not None or self.segments or self.step:
             return self.surfels(fitted)
         return fitted, []
 
@@ -79,12 +84,13 @@ class SceneModel:
         fitted = open_field(self.file) if fitted is None else fitted
         if not isinstance(fitted, Surfels):
             raise ArgumentError(f"{self.file}: expected surfels, got {fitted.kind}; fit surfels for this")
-        model = fitted if self.texture is None else with_texture(fitted, self.texture)
+        placed = fitted if self.step is None else at_step(fitted, self.step)
+        model = placed if self.texture is None else with_texture(placed, self.texture)
         masks, variants = [], []
         for name, segment in self.segments.items():
             with located(f"segments.{name}"):
                 masks.append(read_segment(segment.file, fitted))
-                own = fitted if segment.texture is None else with_texture(fitted, segment.texture)
+                own = placed if segment.texture is None else with_texture(placed, segment.texture)
             variants.append(own)
         if masks and fitted.stage == "texture":
             model = with_variants(model, labels_of(masks, len(model)), variants)
@@ -102,6 +108,8 @@ class Scene:
     volume: SceneVolume | None = None  # that it was made from, see `Twin`
     frame: Frame | None = None  # what is visible of the volume, where that is known
     functions: Mapping[str, TransferFunction] = field(default_factory=dict)  # that the mode volume shows
+    series: Series | None = None  # in time, of which the scene shows a step
+    time: int | None = None  # number of this step
 
     def __post_init__(self) -> None:
         if not self.models:
@@ -125,7 +133,28 @@ class Scene:
     @property
     def as_fitted(self) -> Scene:
         """Return the scene without what is edited about its models; light, background and cuts stay."""
-        return replace(self, models={name: SceneModel(model.file) for name, model in self.models.items()})
+        models = {name: SceneModel(model.file, step=model.step) for name, model in self.models.items()}
+        return replace(self, models=models)
+
+    @property
+    def timeline(self) -> Series:
+        """Return its series; require that it has one."""
+        if self.series is None:
+            raise ArgumentError("time: expected a scene of a series, got one without; texgs series makes one")
+        return self.series
+
+    def at(self, time: Any) -> Scene:
+        """Return the scene at a step of its series: models and volume are those of it, edits stay."""
+        series, last = self.timeline, len(self.timeline.steps) - 1
+        if not is_number(time) or time not in range(last + 1):
+            raise ArgumentError(f"time: expected the number of a step, 0 to {last}, got {time!r:.100}")
+        step = int(time)
+        models = {
+            name: replace(entry, step=series.model(name, step)) if name in series.models else entry
+            for name, entry in self.models.items()
+        }
+        volume = self.volume and replace(self.volume, file=series.volume(step))
+        return replace(self, models=models, volume=volume, time=step)
 
     @property
     def has_looks(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,6 +20,7 @@ from texgs.core.names import close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
 from texgs.fields.part_edit import PartEdit, color
 from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment
+from texgs.scene.series_file import read_series
 from texgs.scene.twin import SceneVolume
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
@@ -27,7 +28,8 @@ from texgs.volume.transfer import TransferFunction
 T = TypeVar("T")
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
-KEYS = ("texgs-scene", "light", "background", "cuts", "frame", "models", "volume", "functions")
+OF_SCENE = ("light", "background", "cuts", "frame")
+KEYS = ("texgs-scene", *OF_SCENE, "models", "volume", "functions", "series", "time")
 EDITS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDITS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
@@ -64,7 +66,11 @@ def _scene(values: Any, folder: Path) -> Scene:
     volume = volume_of(values["volume"], folder) if "volume" in values else None
     frame = table_of(Frame, values["frame"], "frame") if "frame" in values else None
     functions = functions_of(values.get("functions", {}), "functions")
-    return Scene(models, light, background, cuts, volume, frame, functions)
+    scene = Scene(models, light, background, cuts, volume, frame, functions)
+    if "series" not in values:
+        return scene
+    file = named_file("series", folder, values["series"], "a series")
+    return replace(scene, series=read_series(file)).at(values.get("time", 0))
 
 
 def write_scene(path: str | Path, scene: Scene) -> Path:
@@ -89,6 +95,8 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
         look = asdict(scene.volume.appearance)
         tfs = plain_functions(scene.volume.tfs)
         values["volume"] = {"file": relative(scene.volume.file), **look, "tfs": tfs}
+    if scene.series is not None:
+        values |= {"series": relative(scene.series.file), "time": scene.time}
     if scene.functions:
         values["functions"] = plain_functions(scene.functions)
     text = yaml.safe_dump(values, sort_keys=False, allow_unicode=True, default_flow_style=None)

@@ -174,7 +174,7 @@ class Session:
             raise ArgumentError(f"{part}: expected a new file, got {file} of an earlier scene; name another")
         name, mask = split(self.scene, part)[0], mask.cpu()
         entry = self.scene.models[name]
-        fitted, free = replace(entry, texture=None, segments={}).surfels()[0], mask.clone()
+        fitted, free = replace(entry, texture=None, segments={}, step=None).surfels()[0], mask.clone()
         for other in entry.segments.values():
             free &= ~read_segment(other.file, fitted)
         if not bool(free.any()):
@@ -230,7 +230,7 @@ class Session:
     @property
     def composition(self) -> Composed:
         """Return the models of the scene, joined; kept as long as their files are the same."""
-        return self._composition_of(self.scene)
+        return self.composition_of(self.scene)
 
     def frame(
         self,
@@ -253,7 +253,7 @@ class Session:
             transparent: whether to leave the background out.
         """
         scene = self.scene if scene is None else scene
-        composition = self._composition_of(scene)
+        composition = self.composition_of(scene)
         twin = self.twin_of(scene) if needs_twin(scene, mode) else None
         if twin is not None and step is not None:
             twin = twin.with_step(step)
@@ -262,7 +262,7 @@ class Session:
     def point_at(self, camera: Camera, mode: str, scene: Scene, pixel: tuple[int, int]) -> list[float] | None:
         """Return the point of a scene of the history that a pixel shows; see `texgs.scene.pick.point_at`."""
         twin = self.twin_of(scene) if needs_twin(scene, mode) else None
-        return point_at(self._composition_of(scene), camera, scene, mode, twin, pixel)
+        return point_at(self.composition_of(scene), camera, scene, mode, twin, pixel)
 
     def twin_of(self, scene: Scene) -> Twin:
         """Return the twin of a scene of the history; kept as long as the volume is the same."""
@@ -273,13 +273,13 @@ class Session:
 
     def beside(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
         """Return a view of a scene of the history, and the same view of its volume; see `beside`."""
-        return beside(self._composition_of(scene), camera, scene, self.twin_of(scene))
+        return beside(self.composition_of(scene), camera, scene, self.twin_of(scene))
 
     def save(self, path: str | Path) -> Path:
         """Write the scene file in one step; files in it are relative to its folder."""
         return write_scene(path, self.scene)
 
-    def _composition_of(self, scene: Scene) -> Composed:
+    def composition_of(self, scene: Scene) -> Composed:
         """Return the models of a scene, joined, as long as their files are the same."""
         states: list[object] = [state_of(file) for file in files_of(scene)]
         for each, composition in tuple(self._opened):  # another thread may put another one there

@@ -35,7 +35,7 @@ def rings(size: int, steps: int) -> Iterator[Grid]:
     axis = torch.linspace(-1, 1, size)
     z, y, x = torch.meshgrid(axis, axis, axis, indexing="ij")
     distance, azimuth = torch.hypot(x, z), torch.atan2(z, x)
-    for time in _times(steps):
+    for time in torch.linspace(0, 1, steps).tolist():
         total = torch.zeros_like(x)
         for start, waves in zip((0, pi), WAVES, strict=True):
             turn = pi * time + start
@@ -58,16 +58,12 @@ def flame(size: int, steps: int, seed: int = 0) -> Iterator[Grid]:
     place = pi * torch.linspace(0, 1, size)  # half of the box in which the motion repeats itself
     height = torch.linspace(0, 1, size)[:, None]
     z, x = torch.linspace(-1, 1, size)[:, None, None], torch.linspace(-1, 1, size)
-    for time in _times(steps):
+    for time in torch.linspace(0, 1, steps).tolist():
         along_x, along_y, along_z = sample(flow, place, place - RISE * time, place)
         above = (height + FLICKER * height * along_y) / TOP
         distance = torch.hypot(x - SWAY * height * along_x, z - SWAY * height * along_z)
         width = WIDTH * (above.clamp(0, 1) + 0.12).sqrt() * (1.2 - above).clamp_min(0.02)
         yield Grid((torch.exp(-((distance / width) ** 2)) * (1 - above**3).clamp(0, 1)).numpy())
-
-
-def _times(steps: int) -> list[float]:
-    return [index / max(steps - 1, 1) for index in range(steps)]
 
 
 SERIES: dict[str, Callable[..., Iterator[Grid]]] = {"rings": rings, "flame": flame}

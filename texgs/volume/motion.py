@@ -77,11 +77,7 @@ def registered(images: Sequence[sitk.Image]) -> sitk.Image:
         demons = sitk.FastSymmetricForcesDemonsRegistrationFilter()
         demons.SetNumberOfIterations(iterations)
         demons.SetStandardDeviations(SMOOTHNESS)
-        beyond = (
-            0.0,
-            sitk.sitkVectorFloat64,
-            True,
-        )  # the lattice those of its faces
+        beyond = (0.0, sitk.sitkVectorFloat64, True)  # the lattice displacements are those of its faces
         start = [sitk.Resample(each, fixed, sitk.Transform(), sitk.sitkLinear, *beyond) for each in start]
         start = [demons.Execute(fixed, moving, *start)]
     return start[0]

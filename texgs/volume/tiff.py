@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -14,7 +13,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
-from texgs.core.names import SLICES
+from texgs.core.names import SLICES, natural_order
 from texgs.volume.grid import ONES, ZEROS, Grid, Triple, dims_of, require_room
 from texgs.volume.slabs import ArraySource, RawSource, Source
 
@@ -95,11 +94,7 @@ def open_tiff(path: Path, spacing: Triple | None, origin: Triple | None) -> Sour
 
 def tiffs_in(folder: Path) -> list[Path]:
     """Return the TIFF files of a folder in natural order: slice9 comes before slice10."""
-
-    def order(path: Path) -> list[tuple[str, int]]:
-        return [(text, int(number or -1)) for text, number in re.findall(r"(\D*)(\d*)", path.name)]
-
-    return sorted((file for file in folder.iterdir() if file.suffix.lower() in SLICES), key=order)
+    return sorted((file for file in folder.iterdir() if file.suffix.lower() in SLICES), key=natural_order)
 
 
 def _page_type(page: Any) -> tuple[tuple[int, int], np.dtype]:

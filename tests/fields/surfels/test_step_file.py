@@ -80,6 +80,13 @@ def test_a_step_of_another_model_is_refused(tmp_path, name, value, message):
         at_step(key, path)
 
 
+def test_a_step_of_a_model_that_was_fitted_again_is_refused(tmp_path):
+    key = sample()
+    path = write_step(tmp_path / "step", key, moved(key), {})
+    with pytest.raises(TexgsError, match="step: expected a step of this model, got one of another"):
+        at_step(sample(seed=5), path)
+
+
 def test_a_step_that_is_no_model_of_the_series_is_not_written(tmp_path):
     key = sample()
     p = dict(key.parameters)

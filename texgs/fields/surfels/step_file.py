@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,8 @@ def write_step(path: str | Path, key: Surfels, model: Surfels, metadata: Mapping
         name: ((other[name] - own[name]) / unit).round().clamp(-MOST, MOST).to(torch.int16)
         for name, unit in UNITS.items()
     }
-    return write_tensor_file(path, FORMAT, {"version": VERSION, "metadata": dict(metadata)}, tensors)
+    description = {"version": VERSION, "key": known_by(key), "metadata": dict(metadata)}
+    return write_tensor_file(path, FORMAT, description, tensors)
 
 
 def at_step(key: Surfels, path: str | Path) -> Surfels:
@@ -48,9 +50,11 @@ def at_step(key: Surfels, path: str | Path) -> Surfels:
     Raises:
         ArgumentError, ShapeError: if the file is missing, damaged or of another model.
     """
-    _, steps = read_tensor_file(Path(path), FORMAT, VERSION)
+    description, steps = read_tensor_file(Path(path), FORMAT, VERSION)
     own = _comparable(key)
     with located(path):
+        if description.get("key") != known_by(key):
+            raise ArgumentError("expected a step of this model, got one of another; make the series again")
         for name, x in own.items():
             if name not in steps or steps[name].shape != x.shape or steps[name].dtype != torch.int16:
                 found = ", ".join(f"{each} {list(steps[each].shape)}" for each in steps) or "nothing"
@@ -59,6 +63,11 @@ def at_step(key: Surfels, path: str | Path) -> Surfels:
                 )
     moved = {name: own[name] + UNITS[name] * steps[name].to(own[name]) for name in UNITS}
     return replace(key, parameters={**key.parameters, **moved})
+
+
+def known_by(key: Surfels) -> str:
+    """Return what tells a key model from others: a checksum of its means, exact in files of all formats."""
+    return sha256(key.parameters["means"].cpu().contiguous().numpy().tobytes()).hexdigest()[:16]
 
 
 def _comparable(model: Surfels) -> dict[str, Tensor]:

@@ -19,6 +19,7 @@ from texgs.workflow.stage import Config, Outcome, Rule, Stage, plain, read
 from texgs.workflow.stages.settings import OfDataset
 
 if TYPE_CHECKING:
+    from texgs.volume.prepare import Summary
     from texgs.volume.slabs import Source
 
 TOLD = ("dims", "dtype", "spacing", "origin", "minimum", "maximum", "voxels")  # in metrics.json, too
@@ -36,26 +37,31 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `source`, the volume's file, where it is not generated.
     """
-    from texgs.volume.prepare import prepare
-
     volume, generator = settings.volume, settings.volume.generator
     field = source(volume, inputs["source"]) if generator is None else generated(volume, generator)
     if field.note:
         sys.stderr.write(f"{settings.dataset}: {field.note}\n")
-    summary = prepare(
-        field,
-        output / "volume.nrrd",
+    shown = partial(progress, title=f"{settings.dataset}: volume", unit="slab")
+    summary = prepared(volume, field, output / "volume.nrrd", shown)
+    write_json(output / "volume.json", asdict(summary))
+    size = (output / "volume.nrrd").stat().st_size / MIB
+    told = {name: plain(getattr(summary, name)) for name in TOLD}
+    return Outcome(VolumeResult(**told, volume_mib=size))
+
+
+def prepared(volume: Volume, field: Source, target: Path, shown: Any = None) -> Summary:
+    """Write the canonical file of a field as settings say."""
+    from texgs.volume.prepare import prepare
+
+    return prepare(
+        *(field, target),
         crop=volume.crop and tuple(volume.crop),  # type: ignore[arg-type]
         reduce=volume.reduce,
         method=volume.method,
         up=volume.up,
         nan_value=volume.nan_value,
-        progress=partial(progress, title=f"{settings.dataset}: volume", unit="slab"),
+        progress=shown,
     )
-    write_json(output / "volume.json", asdict(summary))
-    size = (output / "volume.nrrd").stat().st_size / MIB
-    told = {name: plain(getattr(summary, name)) for name in TOLD}
-    return Outcome(VolumeResult(**told, volume_mib=size))
 
 
 def generated(volume: Volume, generator: str) -> Source:

@@ -1,0 +1,217 @@
+"""A series from files to a scene of all steps: what comes of it, what is made only once, and mistakes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+import yaml
+
+from tests.volume.test_motion import TF, blob
+from texgs.cli.main import main
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError
+from texgs.core.image import read_rgba
+from texgs.core.io import write_json
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.variants import write_texture
+from texgs.fitting import now, series
+from texgs.fitting.now import fit_now
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.segment_file import write_segment
+from texgs.scene.session import Session
+from texgs.scene.twin import SceneVolume
+from texgs.volume.caster import Caster
+from texgs.volume.framing import frame_of
+from texgs.volume.prepare import prepare
+from texgs.volume.render import Appearance
+from texgs.volume.slabs import ArraySource
+from texgs.workflow.series import make_series
+
+CPU = torch.device("cpu")
+PLACES = [-0.06, 0.0, 0.06]  # of a ball, along x
+
+
+def write_steps(folder, places=PLACES):
+    files = []
+    for index, place in enumerate(places):
+        files.append(folder / f"step_{index + 8}.nrrd")  # 8, 9, 10
+        prepare(ArraySource(blob((place, 0, 0))), files[-1])
+    return files
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in {"SURFELS": 800, "PASSES": (80, 80), "FREQUENCY": 2}.items():
+            patch.setattr(now, name, value)
+        grid = blob((0, 0, 0))
+        lens = frame_of(grid, [TF]).lens(width=48, height=48)
+        return list(fit_now(Caster(grid, Appearance()), Appearance(), TF, lens, "ball"))[-1]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, fitted):
+    """A folder of three steps, and a scene of the middle one; fits are short."""
+    monkeypatch.setattr(now, "FREQUENCY", 2)
+    for name, value in {"SIZE": 32, "ITERATIONS": 30}.items():
+        monkeypatch.setattr(series, name, value)
+    files = write_steps(tmp_path)
+    (tmp_path / "volume.nrrd").write_bytes(files[1].read_bytes())
+    file = write_model(tmp_path / "ball.safetensors", fitted)
+    scene = Scene({"ball": SceneModel(file)}, volume=SceneVolume(tmp_path / "volume.nrrd", {"ball": TF}))
+    write_scene(tmp_path / "scene.yaml", scene)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def made(folder):
+    files = [folder / f"step_{number}.nrrd" for number in (8, 9, 10, 11)]
+    there = [file for file in files if file.exists()]
+    return read_scene(make_series(read_scene(folder / "scene.yaml"), there, folder / "s", CPU))
+
+
+def centre(scene):
+    return float(scene.models["ball"].open()[0].parameters["means"][:, 0].median())
+
+
+def test_a_command_makes_a_scene_of_all_steps(folder, capsys):
+    assert main(["series", "scene.yaml", "--files", "step_*.nrrd", "--output", "s"]) == 0
+    assert capsys.readouterr().out.strip() == "s/scene.yaml"
+    scene = read_scene("s/scene.yaml")
+    assert (scene.time, list(scene.series.steps)) == (1, ["step_8.nrrd", "step_9.nrrd", "step_10.nrrd"])
+    assert scene.frame.radius > frame_of(blob((0, 0, 0)), [TF]).radius + 0.03
+    for time, place in enumerate(PLACES):
+        assert centre(scene.at(time)) == pytest.approx(place, abs=0.02)
+    assert main(["edit", "s/scene.yaml", "time=2", "ball.opacity=0.5", "--output", "s/late.yaml"]) == 0
+    late = read_scene("s/late.yaml")
+    assert (late.time, late.models["ball"].edit) == (2, PartEdit(opacity=0.5))
+    assert yaml.safe_load((folder / "s" / "late.yaml").read_text())["series"] == "series.json"
+
+
+def test_a_film_through_time_shows_a_ball_that_moves(folder):
+    make = ["render", "s/scene.yaml", "--path", "time", "--width", "32", "--frames", "3", "--azimuth", "-90"]
+    assert made(folder).time == 1
+    assert main([*make, "--polar", "0", "--output", "film"]) == 0
+    columns = []
+    for file in sorted((folder / "film").iterdir()):
+        shown = (read_rgba(file)[..., :3] < 250).any(axis=2)
+        columns.append(np.nonzero(shown)[1].mean())
+    assert columns[0] + 1 < columns[1] < columns[2] - 1
+    assert main([*make, "--compare", "--output", "beside"]) == 0
+
+
+def test_what_is_there_is_not_made_again_and_what_is_missing_is(folder, monkeypatch):
+    made(folder)
+    files = {file: file.read_bytes() for file in (folder / "s").iterdir()}
+    (folder / "s" / "ball-00002.safetensors").unlink()
+    done = []
+    step = series.Follower.step
+    monkeypatch.setattr(series.Follower, "step", lambda *a, **k: done.append(a[4]) or step(*a, **k))
+    made(folder)
+    assert done == ["ball, step 2"]
+    assert {file: file.read_bytes() for file in (folder / "s").iterdir()} == files
+
+
+def test_segments_textures_and_edits_of_one_step_hold_for_all(folder, fitted):
+    scene = made(folder)
+    session = Session(scene.at(2))
+    mask = fitted.parameters["means"][:, 1] > 0
+    session.make_segment("ball/top", mask, folder / "top.safetensors", {})
+    p = fitted.parameters
+    look = replace(fitted, parameters={**p, "texels": 0 * p["texels"], "colors": 0 * p["colors"] + 0.1})
+    session.set_texture("ball/top", write_texture(folder / "look.safetensors", look))
+    session.save(folder / "s" / "edited.yaml")
+    edited = read_scene(folder / "s" / "edited.yaml")
+    for time in range(3):
+        model, (top,) = edited.at(time).models["ball"].open()
+        assert torch.equal(top, mask)
+        assert torch.equal(model.parameters["colors"][mask], look.parameters["colors"][mask])
+        assert not torch.equal(model.parameters["colors"][~mask], look.parameters["colors"][~mask])
+    camera = orbit(20, 10, 4, 30, 16, 16)
+    frames = [session.frame(camera, scene=edited.at(time)) for time in range(3)]
+    assert not np.array_equal(frames[0], frames[2])
+    assert [file.name for file in edited.at(0).as_fitted.models["ball"].files if file] == [
+        "ball.safetensors",
+        "ball-00000.safetensors",
+    ]
+
+
+def test_a_segment_that_was_made_before_the_series_holds_in_it(folder, fitted):
+    scene = read_scene(folder / "scene.yaml")
+    file = write_segment(folder / "old.safetensors", fitted, fitted.parameters["means"][:, 1] > 0)
+    session = Session(scene)
+    session.add_segment("ball/top", file)
+    write_scene(folder / "scene.yaml", session.scene)
+    for time in range(3):
+        assert len(made(folder).at(time).models["ball"].open()[1]) == 1
+
+
+def test_the_volume_is_prepared_as_that_of_the_scene_was(folder):
+    """The workflow's record says how: here each second sample."""
+    results = folder / "results"
+    for index, file in enumerate(write_steps(folder)):
+        prepare(ArraySource(blob((PLACES[index], 0, 0), sizes=(80, 72, 64))), file)
+    volume = results / "balls" / "volume" / "volume.nrrd"
+    volume.parent.mkdir(parents=True)
+    prepare(ArraySource(blob((0, 0, 0), sizes=(80, 72, 64))), volume, reduce=2)
+    write_json(volume.with_name("metrics.json"), {"config_sha": "abc"})
+    (results / ".conf").mkdir()
+    (results / ".conf" / "volume-abc.yaml").write_text("volume: {file: x.nrrd, reduce: 2}\n")
+    scene = read_scene(folder / "scene.yaml")
+    write_scene(folder / "scene.yaml", replace(scene, volume=replace(scene.volume, file=volume)))
+    assert made(folder).time == 1
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (
+            lambda f: [(f / f"step_{n}.nrrd").unlink() for n in (8, 10)],
+            "two files at least, got .*step_9.nrrd",
+        ),
+        (lambda f: (f / "step_10.nrrd").rename(f / "step_11.nrrd"), "a file each 1, got none between step_9"),
+        (
+            lambda f: prepare(ArraySource(blob((0, 0, 0), sizes=(20, 20, 20))), f / "step_10.nrrd"),
+            r"step_10.nrrd: expected \(40, 36, 32\) samples",
+        ),
+        (lambda f: (f / "step_10.nrrd").write_bytes(b"NRRD0004\n"), "step_10.nrrd: "),
+        (
+            lambda f: (f / "step_9.nrrd").write_bytes((f / "step_8.nrrd").read_bytes()),
+            "one of them to be the vol",
+        ),
+    ],
+)
+def test_mistakes_are_told_by_their_file(folder, spoil, message):
+    spoil(folder)
+    with pytest.raises(ArgumentError, match=message):
+        made(folder)
+    assert not (folder / "s" / "scene.yaml").exists()
+
+
+def test_a_folder_of_another_series_and_damaged_steps_are_refused(folder):
+    scene = made(folder)
+    with pytest.raises(ArgumentError, match=r"time: expected the number of a step, 0 to 2, got 3"):
+        scene.at(3)
+    with pytest.raises(ArgumentError, match=r"time: expected the number of a step, 0 to 2, got 1\.5"):
+        scene.at(1.5)
+    with pytest.raises(ArgumentError, match="expected a scene of a series, got one without"):
+        read_scene(folder / "scene.yaml").at(0)
+    step = folder / "s" / "ball-00002.safetensors"
+    step.write_bytes(step.read_bytes()[:-9])
+    with pytest.raises(ArgumentError, match=r"models.ball: .*ball-00002.safetensors: "):
+        scene.at(2).open()
+    with pytest.raises(ArgumentError, match=r"ball-00002.safetensors: .*cut short or damaged"):
+        made(folder)
+    (folder / "step_10.nrrd").unlink()
+    with pytest.raises(ArgumentError, match="expected a folder of these files, got one of others"):
+        made(folder)
+
+
+def test_no_file_of_a_pattern_is_told(folder, capsys):
+    assert main(["series", "scene.yaml", "--files", "none_*.nrrd", "--output", "s"]) == 2
+    assert "--files: expected files that are there, got none_*.nrrd" in capsys.readouterr().err
+    assert main(["render", "scene.yaml", "--path", "time", "--output", "f.mp4"]) == 2
+    assert "expected a scene of a series, got one without" in capsys.readouterr().err

@@ -1,0 +1,125 @@
+"""Make a scene of a series in time: the models of a scene of one step, followed through the files of all."""
+
+from __future__ import annotations
+
+import filecmp
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from texgs.config.dataset import Volume
+from texgs.core.errors import ArgumentError, located
+from texgs.core.io import read_json
+from texgs.core.keys import typed
+from texgs.core.plain_yaml import parse_yaml
+from texgs.core.progress import progress
+from texgs.fields.surfels.step_file import at_step, write_step
+from texgs.fitting.series import Follower
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
+from texgs.scene.series_file import Series, read_series, write_series
+from texgs.scene.twin import SceneVolume, volume_of
+from texgs.volume.framing import shown_corners, smallest_ball
+from texgs.volume.nrrd_file import open_grid
+from texgs.workflow.stages.volume import prepared, source
+
+NUMBER = re.compile(r"\d+(?=\D*$)")
+
+
+def make_series(scene: Scene, files: Sequence[Path], folder: Path, device: torch.device) -> Path:
+    """Follow the models of a scene through a series of volumes, and write a scene of all steps.
+
+    The volumes are prepared as that of the scene was, which has to be one of them: its step is the one that
+    models are followed from, on and back. What an earlier call has left in the folder is not made again.
+
+    Args:
+        scene: of surfels, with its volume.
+        files: the volume of each step, in their order.
+        folder: of the series: its scene.yaml, series.json, volumes and steps of models.
+        device: that models are fitted on.
+
+    Raises:
+        ArgumentError: if files are missing or lie on another lattice, or the folder has another series.
+    """
+    volume = volume_of(scene)
+    require_steps(files)
+    series = Series(folder / "series.json", [file.name for file in files], list(scene.models))
+    if series.file.exists() and read_series(series.file) != series:
+        raise ArgumentError(f"{folder}: expected a folder of these files, got one of others; choose another")
+    write_series(series)
+    prepare_steps(series, files, volume)
+    steps = range(len(files))
+    same = (step for step in steps if filecmp.cmp(series.volume(step), volume.file, shallow=False))
+    if (start := next(same, None)) is None:
+        raise ArgumentError(f"--files: expected one of them to be the volume of the scene, {volume.file}")
+    for name, entry in scene.models.items():
+        with located(f"models.{name}"):
+            for order in (range(start, len(files)), range(start, -1, -1)):
+                follow(series, name, entry, volume, order, device)
+    seen = [shown_corners(open_grid(series.volume(step)), volume.tfs.values()) for step in steps]
+    whole = replace(scene, series=series, frame=smallest_ball(np.concatenate(seen)))
+    return write_scene(folder / "scene.yaml", whole.at(start))
+
+
+def require_steps(files: Sequence[Path]) -> None:
+    """Require several files, whose names differ by numbers of one distance where they have any."""
+    if len(files) < 2:
+        got = ", ".join(map(str, files)) or "none"
+        raise ArgumentError(f"--files: expected two files at least, got {got}; 'step_*.nrrd' names several")
+    found = [NUMBER.search(file.stem) for file in files]
+    numbers = [int(match[0]) for match in found if match]
+    gaps = [after - before for before, after in pairwise(numbers)]
+    for index, gap in enumerate(gaps if len(numbers) == len(files) else []):
+        if gap > min(gaps):
+            raise ArgumentError(
+                f"--files: expected a file each {min(gaps)}, got none between {files[index].name} and "
+                f"{files[index + 1].name}; name the files of one part of the series"
+            )
+
+
+def prepare_steps(series: Series, files: Sequence[Path], volume: SceneVolume) -> None:
+    """Prepare the volumes that are missing, as that of the scene was, and require its lattice."""
+    settings, grid = settings_of(volume.file), open_grid(volume.file)
+    for step, file in enumerate(progress(files, title="volumes", unit="step")):
+        target = series.volume(step)
+        with located(file):
+            if not target.exists():
+                prepared(settings, source(settings, file), target)
+            other = open_grid(target)
+            if other.dims != grid.dims or not np.allclose(other.spacing, grid.spacing):
+                raise ArgumentError(
+                    f"expected {grid.dims} samples with spacing {grid.spacing} as of the scene's volume, got "
+                    f"{other.dims} with {other.spacing}; resample the file"
+                )
+
+
+def settings_of(file: Path) -> Volume:
+    """Return how the workflow has read and prepared a volume; plainly, where it was not the workflow."""
+    facts = file.with_name("metrics.json")
+    sha = read_json(facts).get("config_sha") if facts.is_file() else None
+    record = file.resolve().parents[2] / ".conf" / f"volume-{sha}.yaml"
+    if not record.is_file():
+        return Volume()
+    return replace(typed(Volume, parse_yaml(record.read_text(encoding="utf-8"))["volume"]), url=None)
+
+
+def follow(
+    series: Series, name: str, entry: SceneModel, volume: SceneVolume, order: range, device: torch.device
+) -> None:
+    """Make the files of a model's steps that are missing, in an order that begins with its own step."""
+    key = replace(entry, texture=None, segments={}, step=None).surfels()[0]
+    model, follower, before = key, None, order[0]
+    for step in order:
+        file = series.model(name, step)
+        if not file.exists():
+            if step != order[0]:
+                follower = follower or Follower(key.to(device), volume.appearance, volume.tfs[name])
+                grids = [open_grid(series.volume(each)) for each in (before, step)]
+                model = follower.step(model.to(device), grids[0], grids[1], f"{name}, step {step}", step)
+            write_step(file, key, model.to("cpu"), {"file": series.steps[step]})
+        model, before = at_step(key, file), step
