@@ -18,6 +18,7 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.fitting import now, series
 from texgs.fitting.now import fit_now
+from texgs.scene.copied import write_copy
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment
@@ -137,6 +138,18 @@ def test_segments_textures_and_edits_of_one_step_hold_for_all(folder, fitted):
         "ball.safetensors",
         "ball-00000.safetensors",
     ]
+
+
+def test_a_copy_of_the_scene_has_all_steps(folder):
+    scene = made(folder)
+    write_copy(folder / "copy", scene.at(2))
+    (folder / "s").rename(folder / "gone")
+    (folder / "copy").rename(folder / "elsewhere")
+    copy = read_scene(folder / "elsewhere" / "scene.yaml")
+    assert copy.time == 2
+    assert centre(copy) == centre(read_scene(folder / "gone" / "scene.yaml").at(2))
+    assert all(copy.at(time).volume.file.is_relative_to(folder / "elsewhere") for time in range(3))
+    assert all(copy.at(time).volume.file.exists() for time in range(3))
 
 
 def test_a_segment_that_was_made_before_the_series_holds_in_it(folder, fitted):

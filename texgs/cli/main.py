@@ -128,7 +128,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"texgs {verb}: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        goes_on = verb in STAGE_VERBS or verb == "run"
+        goes_on = verb in STAGE_VERBS or verb in ("run", "series")
         end = "goes on where it stopped" if goes_on else "starts again"
         print(f"texgs {verb}: interrupted; the same command {end}", file=sys.stderr)
         return 130

@@ -10,6 +10,7 @@ from typing import TypeVar
 from texgs.core.names import file_name
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import write_scene
+from texgs.scene.series_file import Series, write_series
 
 Entry = TypeVar("Entry", SceneModel, SceneSegment)
 SCENE = "scene.yaml"
@@ -25,8 +26,9 @@ def write_copy(folder: str | Path, scene: Scene) -> Path:
     for name, model in scene.models.items():
         segments = {key: copies.entry(each, name, key) for key, each in model.segments.items()}
         models[name] = replace(copies.entry(model, name), segments=segments)
+    series = scene.series and copies.series(scene.series)
     volume = scene.volume and replace(scene.volume, file=copies.copy(scene.volume.file, "volume"))
-    return write_scene(copies.folder / SCENE, replace(scene, models=models, volume=volume))
+    return write_scene(copies.folder / SCENE, replace(scene, models=models, volume=volume, series=series))
 
 
 class Copies:
@@ -40,6 +42,16 @@ class Copies:
         """Return a model or a segment with copies of its file and its texture."""
         texture = entry.texture and self.copy(entry.texture, *names, "texture")
         return replace(entry, file=self.copy(entry.file, *names), texture=texture)
+
+    def series(self, series: Series) -> Series:
+        """Return the series with copies of its volumes and steps of models."""
+        copied = replace(series, file=self.folder / series.file.name)
+        for step in range(len(series.steps)):
+            for name in series.models:
+                self.copy(series.model(name, step), copied.model(name, step).stem)
+            self.copy(series.volume(step), copied.volume(step).stem)
+        write_series(copied)
+        return copied
 
     def copy(self, file: Path, *names: str) -> Path:
         """Return the copy of a file, which has these names and its ending."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import SimpleITK as sitk
 import torch
 from torch import Tensor
 from torch.nn.functional import grid_sample
@@ -14,9 +14,6 @@ from torch.nn.functional import grid_sample
 from texgs.volume.framing import shown_corners, shown_values
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
-
-if TYPE_CHECKING:
-    import SimpleITK as sitk
 
 MARGIN = 6  # samples around what is shown
 MOST = 96  # samples along a side that are registered; of more, blocks are averaged
@@ -46,13 +43,8 @@ def motion(before: Grid, after: Grid, tf: TransferFunction) -> Motion:
     """Find where what a function shows of a volume is in the next one, which lies on the same lattice.
 
     Values that the function shows are registered by symmetric demons (Vercauteren et al. 2007) from coarse to
-    fine, in the box in which either volume shows something.
-
-    Raises:
-        ArgumentError: if either shows nothing.
+    fine, in the box in which either volume shows something. One that shows nothing is refused.
     """
-    import SimpleITK as sitk  # slow to import
-
     dims = np.array(before.dims)
     corners = np.concatenate([shown_corners(grid, [tf]) for grid in (before, after)])
     voxel = np.array(before.aabb[1]) * 2 / (dims - 1)
@@ -69,8 +61,6 @@ def motion(before: Grid, after: Grid, tf: TransferFunction) -> Motion:
 
 def registered(images: Sequence[sitk.Image]) -> sitk.Image:
     """Return displacements in samples from the first image to the second one, from coarse to fine."""
-    import SimpleITK as sitk
-
     start: list[sitk.Image] = []
     for block, iterations in LEVELS:
         fixed, moving = (shrunk(image, block) for image in images)
@@ -85,8 +75,6 @@ def registered(images: Sequence[sitk.Image]) -> sitk.Image:
 
 def shown_image(grid: Grid, tf: TransferFunction, low: np.ndarray, high: np.ndarray) -> sitk.Image:
     """Return the values of a box, relative to the range that a function shows, on a lattice in samples."""
-    import SimpleITK as sitk
-
     ranges = shown_values(tf)
     least, most = float(ranges[0][0]), float(ranges[-1][1])
     box = tuple(slice(*ends) for ends in zip(low[::-1], high[::-1], strict=True))
@@ -99,6 +87,4 @@ def shown_image(grid: Grid, tf: TransferFunction, low: np.ndarray, high: np.ndar
 
 def shrunk(image: sitk.Image, block: int) -> sitk.Image:
     """Average blocks of samples, where an axis has two blocks at least."""
-    import SimpleITK as sitk
-
     return sitk.BinShrink(image, [max(1, min(block, size // 2)) for size in image.GetSize()])

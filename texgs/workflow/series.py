@@ -37,14 +37,8 @@ def make_series(scene: Scene, files: Sequence[Path], folder: Path, device: torch
     The volumes are prepared as that of the scene was, which has to be one of them: its step is the one that
     models are followed from, on and back. What an earlier call has left in the folder is not made again.
 
-    Args:
-        scene: of surfels, with its volume.
-        files: the volume of each step, in their order.
-        folder: of the series: its scene.yaml, series.json, volumes and steps of models.
-        device: that models are fitted on.
-
-    Raises:
-        ArgumentError: if files are missing or lie on another lattice, or the folder has another series.
+    The folder gets scene.yaml, series.json, and the volumes and models of steps. Files that are missing or on
+    another lattice are refused, and a folder of another series.
     """
     volume = volume_of(scene)
     require_steps(files)
