@@ -279,7 +279,7 @@ class Scene:
 
         Args:
             path: of the film.
-            what: moves: "orbit", "test" (the path of test views), "light", or "cut" (the last plane).
+            what: moves: "orbit", "test" (the path of test views), "light", "cut" (the last plane) or "time".
             frames: how many; default 72, 181, 61, 61.
             fps: frames per second.
             width: pixels.

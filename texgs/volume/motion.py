@@ -63,7 +63,8 @@ def registered(images: Sequence[sitk.Image]) -> sitk.Image:
     """Return displacements in samples from the first image to the second one, from coarse to fine."""
     start: list[sitk.Image] = []
     for block, iterations in LEVELS:
-        fixed, moving = (shrunk(image, block) for image in images)
+        blocks = [max(1, min(block, size // 2)) for size in images[0].GetSize()]  # two at least of a side
+        fixed, moving = (sitk.BinShrink(image, blocks) for image in images)
         demons = sitk.FastSymmetricForcesDemonsRegistrationFilter()
         demons.SetNumberOfIterations(iterations)
         demons.SetStandardDeviations(SMOOTHNESS)
@@ -83,8 +84,3 @@ def shown_image(grid: Grid, tf: TransferFunction, low: np.ndarray, high: np.ndar
     image.SetOrigin(low.astype(float).tolist())
     blocks = [-(-size // MOST) for size in image.GetSize()]
     return sitk.BinShrink(image, blocks)
-
-
-def shrunk(image: sitk.Image, block: int) -> sitk.Image:
-    """Average blocks of samples, where an axis has two blocks at least."""
-    return sitk.BinShrink(image, [max(1, min(block, size // 2)) for size in image.GetSize()])
