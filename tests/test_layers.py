@@ -25,8 +25,7 @@ FLOORS = (
     ("viewer",),
     ("study",),
     ("workflow",),
-    ("api",),
-    ("cli",),
+    ("api", "cli"),
 )
 FLOOR = {package: number for number, packages in enumerate(FLOORS) for package in packages}
 ONLY_OF_CLI = "study"

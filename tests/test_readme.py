@@ -219,7 +219,7 @@ def test_links_lead_somewhere_and_to_every_page(page):
 
 @pytest.mark.docs
 def test_python_examples_run(project, monkeypatch):
-    """Those of the rasterizer, of a field and of a scene."""
+    """Those of a notebook, of the rasterizer and of a field."""
     monkeypatch.chdir(project)
     monkeypatch.setenv("TEXGS_DATA", str(project))
     code, said = run(shlex.split("texgs compose dataset=engine fit=quick"))
@@ -231,7 +231,7 @@ def test_python_examples_run(project, monkeypatch):
         done = subprocess.run([sys.executable, "-c", example], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
     assert (project / "surfels.png").stat().st_size > 10_000
-    assert "opacity: 0.4" in (project / "edited.yaml").read_text()
+    assert "opacity: 0.4" in (project / "blob" / "scene.yaml").read_text()
 
 
 def test_what_a_user_writes_is_shown_as_it_is_tested():

@@ -1,6 +1,7 @@
 """Fits from Python: the stages of the workflow without a project, and the fit in seconds."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -72,6 +73,15 @@ def test_psnr_is_the_mean_beside_the_volume(scene):
 def test_the_volume_stays_as_long_as_the_scene(ball):
     made = texgs.fit(texgs.Volume(ball.grid.values), {"TF01": TFS["inner"]}, size=32, overrides=SMALL)
     assert np.asarray(made.render(width=24, mode="volume")).std() > 1  # nothing else holds the volume
+
+
+def test_other_threads_fit_and_render_the_same(scene, ball, tmp_path):
+    def work():
+        made = texgs.fit(ball, TFS, size=32, overrides=SMALL, folder=tmp_path)
+        return np.asarray(made.render(width=32))
+
+    with ThreadPoolExecutor(1) as pool:
+        assert np.array_equal(pool.submit(work).result(), np.asarray(scene.render(width=32)))
 
 
 def test_surfels_as_polygons_lie_where_the_volume_does(scene):
