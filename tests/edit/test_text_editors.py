@@ -15,6 +15,7 @@ from tests.toys.editor import Editor
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.edit.keys import EditKeys
+from texgs.edit.methods.in2n import In2nKeys
 from texgs.edit.methods.text import METHOD, TextKeys
 from texgs.fields.surfels.model_file import write_model
 from texgs.models.catalogue import PIPELINES
@@ -133,3 +134,14 @@ def test_what_is_no_editor_is_refused_with_all_that_there_are(guidance):
         "edit.text.guidance: expected instruct_pix2pix, sdxl-instruct-pix2pix, flux2-klein, qwen-image-edit, "
         f"OWNER/NAME@REVISION (40 digits), a folder of diffusers, an address or filters, got {guidance!r}"
     )
+
+
+def test_weights_of_a_loss_are_no_editor(folders, monkeypatch):
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(folders))
+    opened = []
+    monkeypatch.setattr(ImagePipeline, "open", lambda *given, **options: opened.append(given))
+    keys = In2nKeys(instruction="turn it into gold", guidance="filters", lpips=1.0)
+    assert set(keys.weights()) == {"vgg16", "lpips_vgg"}
+    assert isinstance(keys.opened(CPU), ProceduralFilters)
+    replace(keys, guidance="flux2-klein").opened(CPU)
+    assert opened == [(folders / "flux2-klein", "flux2-klein", CPU)]

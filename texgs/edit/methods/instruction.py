@@ -49,7 +49,7 @@ class InstructionKeys(MethodKeys):
         editor: Guidance
         name, options = self.guidance, ("steps", "text_scale", "image_scale", "negative")
         given = {each: x for each in options if (x := getattr(self, each)) is not None}
-        folder = locate(*self.weights()) if self.weights() else Path(name)
+        folder = locate(known) if (known := self.known_editor()) else Path(name)
         if name == "filters":
             editor = ProceduralFilters()
         elif name == "instruct_pix2pix":
@@ -68,14 +68,19 @@ class InstructionKeys(MethodKeys):
         instruction, name = require_instruction(self.instruction), self.guidance
         if name == "filters":
             understand(instruction)
-        elif not (name.startswith(WEB) or self.weights() or self.files()):
+        elif not (name.startswith(WEB) or self.known_editor() or self.files()):
             raise ArgumentError(f"{self.node}.guidance: expected {EDITORS}, got {name!r}")
 
     def weights(self) -> dict[str, str]:
         """Return the diffusion model, where one that texgs finds edits the views."""
-        name = "instruct-pix2pix" if self.guidance == "instruct_pix2pix" else self.guidance
-        is_known = self.guidance in ("instruct_pix2pix", *PIPELINES) or PINNED.fullmatch(name)
-        return {name: "guidance=filters"} if is_known else {}
+        known = self.known_editor()
+        return {known: "guidance=filters"} if known else {}
+
+    def known_editor(self) -> str:
+        """Return the name of the weights that edit the views; nothing where texgs does not find them."""
+        if self.guidance == "instruct_pix2pix":
+            return "instruct-pix2pix"
+        return self.guidance if self.guidance in PIPELINES or PINNED.fullmatch(self.guidance) else ""
 
     def files(self) -> dict[str, Path]:
         """Return the files of a pipeline in a folder, where that edits the views."""
