@@ -34,7 +34,8 @@ from texgs.workflow.code import code_of, source
 ROOT = Path(__file__).parents[1]
 RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"
 INDEX = RESULTS / "index.csv"
-PLACES = ("workflow.stages", "fitting.kinds", "fields.kinds", "edit.methods", "metrics.edits")  # of short names
+# Of short names.
+PLACES = ("workflow.stages", "fitting.kinds", "fields.kinds", "edit.methods", "metrics.edits")
 ABOUT = "accuracy.md"  # explains the mark
 LINK = re.compile(r"(\]\((?:[^)\s]*/)?([\w.-]+)\))(?:†|\[†\]\([^)]*\))?")
 

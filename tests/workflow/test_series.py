@@ -1,12 +1,14 @@
 """A series from files to a scene of all steps: what comes of it, what is made only once, and mistakes."""
 
 from dataclasses import replace
+from shutil import rmtree
 
 import numpy as np
 import pytest
 import torch
 import yaml
 
+import texgs
 from tests.volume.test_motion import TF, blob
 from texgs.cli.main import main
 from texgs.core.camera import orbit
@@ -228,3 +230,24 @@ def test_no_file_of_a_pattern_is_told(folder, capsys):
     assert "--files: expected files that are there, got none_*.nrrd" in capsys.readouterr().err
     assert main(["render", "scene.yaml", "--path", "time", "--output", "f.mp4"]) == 2
     assert "expected a scene of a series, got one without" in capsys.readouterr().err
+
+
+def test_python_moves_through_time_and_saves_all_steps(folder):
+    made(folder)
+    scene = texgs.open(folder / "s")
+    assert scene.time == 1  # that of the scene that it follows
+    places = []
+    for scene.time in range(3):
+        places.append(centre(scene.session.scene))
+    assert places == sorted(places)
+    scene.save(folder / "kept")
+    (folder / "kept").rename(folder / "moved")
+    rmtree(folder / "s")
+    (folder / "ball.safetensors").unlink()
+    again = texgs.open(folder / "moved")
+    assert again.time == 2
+    for again.time in range(3):
+        assert centre(again.session.scene) == places[again.time]
+        assert np.asarray(again.render(width=24, mode="volume")).std() > 1
+    with pytest.raises(ArgumentError, match="time: expected the number of a step, 0 to 2, got 3"):
+        again.time = 3

@@ -90,6 +90,16 @@ class Scene:
         self.session.set_background(value)
         self.changed(f"background {value}")
 
+    @property
+    def time(self) -> int | None:
+        """The number of the step that is shown, of a scene of a series; None of others."""
+        return self.session.scene.time
+
+    @time.setter
+    def time(self, step: int) -> None:
+        self.session.set_scene(self.session.scene.at(step))
+        self.changed(f"time {step}")
+
     def edit(self, *words: str) -> Scene:
         """Make the changes that words ask for, as `texgs edit` has them, such as "cut=x,0.1"; return self."""
         apply_all(self.session, words)
@@ -280,7 +290,7 @@ class Scene:
         Args:
             path: of the film.
             what: moves: "orbit", "test" (the path of test views), "light", "cut" (the last plane) or "time".
-            frames: how many; default 72, 181, 61, 61.
+            frames: how many; default 72, 181, and 61 for the others.
             fps: frames per second.
             width: pixels.
             height: pixels; default the width.
