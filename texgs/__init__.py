@@ -5,8 +5,11 @@ In Python: `Volume`, `fit`, `open`, `Scene` and `results`; they are loaded when 
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from texgs.core.process import waiting
 
 if TYPE_CHECKING:
     from texgs.api.fit import fit
@@ -32,7 +35,9 @@ HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Return what the interface offers; nothing of it is imported before."""
+    """Return what the interface offers; nothing of it is imported before, and threads that wait sleep."""
     if name not in HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    for key, value in waiting().items():
+        os.environ.setdefault(key, value)  # OpenMP reads it as torch is imported
     return getattr(import_module(HOMES[name]), "open_scene" if name == "open" else name)

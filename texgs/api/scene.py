@@ -97,7 +97,7 @@ class Scene:
 
     @time.setter
     def time(self, step: int) -> None:
-        self.session.set_scene(self.session.scene.at(step))
+        self.session.set_of_scene("time", step)
         self.changed(f"time {step}")
 
     def edit(self, *words: str) -> Scene:

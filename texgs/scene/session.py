@@ -32,11 +32,12 @@ from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.twin import Twin, needs_twin
 from texgs.volume.transfer import TransferFunction
 
-SCENE_KEYS = {
+SCENE_KEYS: dict[str, Any] = {
     "light": "headlight",
     "background": WHITE,
     "cuts": {},
     "functions": {},
+    "time": None,
 }  # what is edited of a whole scene, and without edits
 MOST_STEPS = 200  # of the history: of more, the oldest cannot be undone
 KEPT = 3  # compositions of files as they are: pages may show others in turn, as before an edit and after it
@@ -144,6 +145,8 @@ class Session:
                 self.set_cuts(cuts_of(value))
             case "functions":
                 self.set_functions(functions_of(value, key))
+            case "time":
+                self.set_scene(self.scene.at(value))
             case _:
                 self.set_background(value)
 

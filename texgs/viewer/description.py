@@ -90,6 +90,8 @@ def describe(
         "cuts": asdict(scene.cuts),
         "models": models,
         "functions": plain_functions(scene.functions),
+        "time": scene.time,
+        "steps": list(scene.series.steps) if scene.series else [],
         "tfs": plain_functions(scene.volume.tfs) if scene.volume else {},
         "modes": [mode for mode in get_args(Mode) if MODES.get(mode, "") in ("", *kind.can)],
         "bounds": known,

@@ -31,7 +31,8 @@ from texgs.viewer.work import Work
 
 WEB = Path(__file__).parent / "web"
 SERVED = (".js", ".css", ".svg")
-CHANGING = ("name", "background", "light", "cuts", "functions", "tfs", "models")  # of what a page knows
+# Of what a page knows.
+CHANGING = ("name", "background", "light", "cuts", "functions", "time", "tfs", "models")
 MOST_PAGES = 16
 PATIENCE = 2.0  # seconds for a page to close its connection
 HEARTBEAT = 20.0  # seconds, after which a page that is gone is noticed

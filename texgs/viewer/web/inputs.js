@@ -3,6 +3,11 @@
 const BURST = 1000; // milliseconds between keys that are one step of the history
 let gestures = 0; // from the first input of a control to its change, or to the last of a burst of keys
 
+/** A step of its own, for edits that are one. */
+export function newGesture() {
+  return ++gestures;
+}
+
 /** A step of its own for each use of an input. */
 export function gesture(input, edit) {
   let step = 0, isBusy = false, timer = 0;
@@ -13,7 +18,7 @@ export function gesture(input, edit) {
   input.addEventListener("input", () => {
     clearTimeout(timer);
     isBusy = true;
-    step ||= ++gestures;
+    step ||= newGesture();
     edit(step);
   });
   input.addEventListener("change", () => { // each arrow key makes one

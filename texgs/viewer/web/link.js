@@ -25,6 +25,7 @@ const OF_SCENE = {
     && (x.box === null || isBox(x.box)) && ["shaded", "unlit"].includes(x.faces),
   functions: (x, scene) => Boolean(scene.transfer) && typeof x === "object" && !Array.isArray(x)
     && Object.values(x).every(isFunction),
+  time: (x, scene) => Number.isInteger(x) && x >= 0 && x < scene.steps.length,
 };
 
 function isUsable(scene, { part, key, value }) {

@@ -12,6 +12,7 @@ import { ScenePage } from "./scene_page.js";
 import { SegmentTool } from "./segment.js";
 import { SharedState } from "./shared.js";
 import { difference } from "./state.js";
+import { TimeSlider } from "./time.js";
 import { Toolbar } from "./toolbar.js";
 import { TransferEditor } from "./transfer.js";
 
@@ -42,6 +43,7 @@ class Page extends ScenePage {
       { models: get("models"), background: get("background"), steps: get("steps") },
       { segment: (model) => this.#segment(model), look: (part) => this.beginLook(part),
         rename: (part) => this.#rename(part), remove: (part) => this.state.remove(part) });
+    this.time = new TimeSlider(this.state, get("time"));
     this.compare = new Compare(this);
     this.toolbar = new Toolbar(this, choices);
     get("transfer-section").hidden = !scene.transfer;

@@ -5,6 +5,7 @@ import { State, edited } from "./state.js";
 export class SharedState extends State {
   #connection;
   #sent = 0; // messages, of which the server answers each with the scene
+  #answered = 0;
 
   /**
    * @param {object} greeting - of the server: the scene as it is now and as it was opened, and its history
@@ -18,13 +19,19 @@ export class SharedState extends State {
 
   /** Begin to count anew: the server does so with each connection. */
   restart() {
-    this.#sent = 0;
+    this.#sent = this.#answered = 0;
   }
 
   /** Take the server's scene, unless it does not know yet what was edited here since. */
   adopt({ scene, answered, past, future, saved, file, folder, title }) {
+    this.#answered = answered;
     if (answered !== this.#sent) return;
     this.update({ scene: { ...this.scene, ...scene }, past, future, saved, file, folder, title });
+  }
+
+  /** Whether the server has not made yet what was edited here. */
+  get isPending() {
+    return this.#answered !== this.#sent;
   }
 
   edit(part, key, value, step = 0) {

@@ -11,6 +11,7 @@ const UNEDITED = {
 const MOST_STEPS = 200; // of the history: of more, the oldest cannot be undone
 const OF_SCENE = {
   light: null, background: [1, 1, 1], cuts: { planes: [], box: null, faces: "shaded" }, functions: {},
+  time: null,
 };
 
 /** Another description, with an edit made. */
