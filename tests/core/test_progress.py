@@ -38,6 +38,16 @@ def test_log_file_gets_a_line_every_five_seconds_and_a_last_one(clock, log):
     assert len(lines) == 5  # at 5, 10, 15, 20 s and the end
 
 
+def test_a_notebook_gets_a_bar_that_goes_when_it_is_done(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "ipykernel", sys)
+    monkeypatch.setattr(module, "find_spec", lambda name: None)
+    assert list(progress(range(3), title="views", unit="view")) == [0, 1, 2]
+    said = capsys.readouterr().err
+    assert "views:   0%" in said
+    assert said.endswith("\r")
+    assert "took" not in said
+
+
 def test_slow_items_and_long_times(clock, log):
     for _ in progress(range(200), title="fit", unit="step"):
         clock[0] += 90

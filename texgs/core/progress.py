@@ -7,7 +7,7 @@ from contextvars import ContextVar
 from importlib.util import find_spec
 from operator import length_hint
 from time import monotonic
-from typing import TypeVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 
@@ -80,14 +80,16 @@ def progress(iterable: Iterable[T], total: int | None = None, *, title: str, uni
 
 def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterable[T]:
     """Return the items, in a bar or with plain lines."""
-    if not ("ipykernel" in sys.modules or sys.stderr.isatty()):
+    is_notebook = "ipykernel" in sys.modules
+    if not (is_notebook or sys.stderr.isatty()):
         return _lines(iterable, total, title, unit)
-    if "ipykernel" in sys.modules and find_spec("ipywidgets"):
+    if is_notebook and find_spec("ipywidgets"):
         from tqdm.notebook import tqdm
     else:
         from tqdm import tqdm  # slow to import
 
-    bar: Iterable[T] = tqdm(iterable, desc=title, total=total, unit=unit, dynamic_ncols=True)
+    look: dict[str, Any] = {"dynamic_ncols": True, "leave": not is_notebook}  # a cell keeps no long list
+    bar: Iterable[T] = tqdm(iterable, desc=title, total=total, unit=unit, **look)
     return bar
 
 
