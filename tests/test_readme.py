@@ -39,7 +39,11 @@ PLAN = "{python} -m snakemake --snakefile {root}/Snakefile --dry-run"
 INSTEAD = (
     (r"make ", "make --directory {root} --dry-run {words}", "it installs, or runs this test again"),
     (r"\./replicate", "", "it installs; test_the_script_without_parameters_runs_the_workflow reads it"),
-    (r"texgs series ", "texgs series --help", "it needs files of steps; tests/workflow/test_series.py has some"),
+    (
+        r"texgs series ",
+        "texgs series --help",
+        "it needs files of steps; tests/workflow/test_series.py has some",
+    ),
     (r"texgs (edit|render) steps/", "{python} -c pass", "the same"),
     (r"texgs study", "texgs study --help", "it takes scenes of several methods"),
     (r"texgs view ", "texgs view --help", "it serves until it is interrupted"),

@@ -10,6 +10,7 @@ import yaml
 
 import texgs
 from tests.volume.test_motion import TF, blob
+from tests.volume.zarr_files import axes_of, write_image
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
@@ -251,3 +252,35 @@ def test_python_moves_through_time_and_saves_all_steps(folder):
         assert np.asarray(again.render(width=24, mode="volume")).std() > 1
     with pytest.raises(ArgumentError, match="time: expected the number of a step, 0 to 2, got 3"):
         again.time = 3
+
+
+def test_one_file_has_all_steps_along_its_axis_of_time(folder):
+    values = np.stack([blob((place, 0, 0)).values for place in PLACES])
+    scale = [1, *blob((0, 0, 0)).spacing[::-1]]
+    write_image(folder / "all.zarr", [values], axes_of("tzyx"), [scale])
+    assert main(["series", "scene.yaml", "--files", "all.zarr", "--output", "s"]) == 0
+    scene = read_scene(folder / "s" / "scene.yaml")
+    assert list(scene.series.steps) == ["all.zarr, step 0", "all.zarr, step 1", "all.zarr, step 2"]
+    for time, place in enumerate(PLACES):
+        assert centre(scene.at(time)) == pytest.approx(place, abs=0.02)
+
+
+def test_a_film_turns_while_time_passes(folder):
+    made(folder)
+    film = [
+        "render",
+        "s/scene.yaml",
+        "--path",
+        "orbit-time",
+        "--width",
+        "32",
+        "--frames",
+        "3",
+        "--polar",
+        "0",
+    ]
+    assert main([*film, "--output", "film"]) == 0
+    scene = texgs.open(folder / "s")
+    for number, file in enumerate(sorted((folder / "film").iterdir())):
+        scene.time = number
+        assert np.array_equal(read_rgba(file)[..., :3], np.asarray(scene.render(30 + 120 * number, 0, 32)))

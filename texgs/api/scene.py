@@ -289,8 +289,9 @@ class Scene:
 
         Args:
             path: of the film.
-            what: moves: "orbit", "test" (the path of test views), "light", "cut" (the last plane) or "time".
-            frames: how many; default 72, 181, and 61 for the others.
+            what: moves: "orbit", "test" (the path of test views), "light", "cut" (the last plane), "time" or
+                "orbit-time".
+            frames: how many; default 72 where the camera turns, "test" 181, 61 for the others.
             fps: frames per second.
             width: pixels.
             height: pixels; default the width.

@@ -92,7 +92,7 @@ def run_model(arguments: argparse.Namespace) -> int:
 def add_series_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the scene of one step, the files of all, and the folder of the series."""
     parser.add_argument("scene", type=Path, help="scene.yaml, whose volume is that of one of the steps")
-    words = "the volume of each step, or a pattern such as 'step_*.nrrd', sorted by its numbers"
+    words = "the volume of each step, a pattern such as 'step_*.nrrd', or one file with an axis of time"
     parser.add_argument("--files", nargs="+", required=True, metavar="FILE", help=words)
     parser.add_argument(
         "--output", type=Path, required=True, help="folder; the same again goes on where it stopped"

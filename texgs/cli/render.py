@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, "--mode", "shaded", modes)
     option(parser, "--path", "view", "of the camera, the light, the last plane, or time", choices=PATHS)
     length = parser.add_mutually_exclusive_group()
-    length.add_argument("--frames", type=int, help="default test 181, orbit 72, light, cut and time 61")
+    length.add_argument("--frames", type=int, help="default test 181, orbit and orbit-time 72, else 61")
     length.add_argument("--seconds", type=float, help="length of a film, in place of a number of frames")
     add_lens(parser, "pixels", "pixels; default the width")
     azimuth = "azimuth of the camera, not for path test, on an orbit of the first frame, degrees"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import repeat
 from typing import TYPE_CHECKING
 
 from texgs.core.errors import ArgumentError
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
     from texgs.scene.scene import Scene
 
 MARGIN = 0.1  # of the extent of what is visible: from its end to where a plane that moves starts or ends
-PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61, "cut": 61, "time": 61}  # frames by default
+# Frames by default.
+PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61, "cut": 61, "time": 61, "orbit-time": 72}
 
 
 def shots_of(
@@ -33,8 +35,8 @@ def shots_of(
         scene: to show.
         composition: its models.
         path: what moves, one of `PATHS`: nothing in `view`; the camera on the path of test views or around
-            the scene; the light, as the paper shows relighting; the last plane that cuts, through it all; or
-            time, through the steps of the series.
+            the scene; the light, as the paper shows relighting; the last plane that cuts, through it all;
+            time, through the steps of the series; or both, camera and time.
         count: of frames.
         lens: of the camera.
         azimuth: of the camera, degrees; where it moves around the scene, of the first frame.
@@ -55,9 +57,10 @@ def shots_of(
     if path == "view":
         return ((camera, scene) for _ in range(count))
     shares = (i / max(count - 1, 1) for i in range(count))
-    if path == "time":
+    if path in ("time", "orbit-time"):
         last = len(scene.timeline.steps) - 1
-        return ((camera, scene.at(round(share * last))) for share in shares)
+        turn = orbit_path(count, polar, *lens, start=azimuth) if path == "orbit-time" else repeat(camera)
+        return ((place, scene.at(round(share * last))) for place, share in zip(turn, shares, strict=False))
     if path == "cut":
         low, high = swept(scene, composition)
         return ((camera, moved(scene, high + share * (low - high))) for share in shares)

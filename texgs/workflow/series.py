@@ -5,7 +5,7 @@ from __future__ import annotations
 import filecmp
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -31,8 +31,23 @@ from texgs.workflow.stages.volume import prepared, source
 NUMBER = re.compile(r"\d+(?=\D*$)")
 
 
+@dataclass(frozen=True)
+class Moment:
+    """Where the volume of a step comes from: a file, or a step of its axis of time."""
+
+    file: Path
+    time: int | None = None
+
+    @property
+    def name(self) -> str:
+        """Return what the step is called."""
+        return self.file.name if self.time is None else f"{self.file.name}, step {self.time}"
+
+
 def make_series(scene: Scene, files: Sequence[Path], folder: Path, device: torch.device) -> Path:
     """Follow the models of a scene through a series of volumes, and write a scene of all steps.
+
+    A single file has all of them, along an axis of time.
 
     The volumes are prepared as that of the scene was, which has to be one of them: its step is the one that
     models are followed from, on and back. What an earlier call has left in the folder is not made again.
@@ -41,23 +56,35 @@ def make_series(scene: Scene, files: Sequence[Path], folder: Path, device: torch
     another lattice are refused, and a folder of another series.
     """
     volume = volume_of(scene)
-    require_steps(files)
-    series = Series(folder / "series.json", [file.name for file in files], list(scene.models))
+    settings = settings_of(volume.file)
+    moments = moments_of(files, settings)
+    series = Series(folder / "series.json", [moment.name for moment in moments], list(scene.models))
     if series.file.exists() and read_series(series.file) != series:
         raise ArgumentError(f"{folder}: expected a folder of these files, got one of others; choose another")
     write_series(series)
-    prepare_steps(series, files, volume)
-    steps = range(len(files))
+    prepare_steps(series, moments, settings, volume)
+    steps = range(len(moments))
     same = (step for step in steps if filecmp.cmp(series.volume(step), volume.file, shallow=False))
     if (start := next(same, None)) is None:
         raise ArgumentError(f"--files: expected one of them to be the volume of the scene, {volume.file}")
     for name, entry in scene.models.items():
         with located(f"models.{name}"):
-            for order in (range(start, len(files)), range(start, -1, -1)):
+            for order in (range(start, len(moments)), range(start, -1, -1)):
                 follow(series, name, entry, volume, order, device)
     seen = [shown_corners(open_grid(series.volume(step)), volume.tfs.values()) for step in steps]
     whole = replace(scene, series=series, frame=smallest_ball(np.concatenate(seen)))
     return write_scene(folder / "scene.yaml", whole.at(start))
+
+
+def moments_of(files: Sequence[Path], settings: Volume) -> list[Moment]:
+    """Return the steps of several files, or those along the axis of time of one."""
+    if len(files) == 1:
+        with located(files[0]):
+            count = getattr(source(replace(settings, time=0), files[0]), "n_steps", 1)
+        if count > 1:
+            return [Moment(files[0], time) for time in range(count)]
+    require_steps(files)
+    return [*map(Moment, files)]
 
 
 def require_steps(files: Sequence[Path]) -> None:
@@ -76,14 +103,15 @@ def require_steps(files: Sequence[Path]) -> None:
             )
 
 
-def prepare_steps(series: Series, files: Sequence[Path], volume: SceneVolume) -> None:
+def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, volume: SceneVolume) -> None:
     """Prepare the volumes that are missing, as that of the scene was, and require its lattice."""
-    settings, grid = settings_of(volume.file), open_grid(volume.file)
-    for step, file in enumerate(progress(files, title="volumes", unit="step")):
+    grid = open_grid(volume.file)
+    for step, moment in enumerate(progress(moments, title="volumes", unit="step")):
         target = series.volume(step)
-        with located(file):
+        with located(moment.name):
             if not target.exists():
-                prepared(settings, source(settings, file), target)
+                own = settings if moment.time is None else replace(settings, time=moment.time)
+                prepared(settings, source(own, moment.file), target)
             other = open_grid(target)
             if other.dims != grid.dims or not np.allclose(other.spacing, grid.spacing):
                 raise ArgumentError(
