@@ -8,7 +8,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.scene.parts import entry_of
 
 if TYPE_CHECKING:
-    from texgs.api.scene import Scene
+    from texgs.api.editing import Editing
 
 T = TypeVar("T")
 
@@ -55,7 +55,7 @@ class Part:
     shininess = Value[float]()
     tint = Value["tuple[float, float, float]"]()  # of highlights
 
-    def __init__(self, scene: Scene, name: str) -> None:
+    def __init__(self, scene: Editing, name: str) -> None:
         entry_of(scene.session.scene, name)  # which is there
         self.scene, self.name = scene, name
 

@@ -1,0 +1,233 @@
+"""What Python edits about a scene: values of parts, light, looks, segments; each a step to undo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Self
+
+import torch
+
+from texgs.api.display import as_light, camera_of, picture_of
+from texgs.api.part import Part
+from texgs.core.errors import ArgumentError
+from texgs.core.keys import ValueMismatch, typed
+from texgs.core.light import Light
+from texgs.core.names import part_file
+from texgs.scene.changes import apply_all
+from texgs.scene.parts import part_names
+from texgs.scene.session import Session
+
+if TYPE_CHECKING:
+    import numpy as np
+    from PIL.Image import Image
+
+    from texgs.api.live import Viewer
+
+VOTING = 512  # pixels of views that vote on the surfels of a segment
+
+
+class Editing:
+    """A scene with the history of its edits.
+
+    Args:
+        session: the scene and its history.
+        kept: what has to stay as long as the scene, such as folders of its files.
+    """
+
+    def __init__(self, session: Session, *kept: Any) -> None:
+        self.session = session
+        self._scratch = TemporaryDirectory(prefix="texgs-")
+        self._kept, self._count = kept, 0
+        self._viewer: Viewer | None = None
+
+    # ---- Parts and edits ----------------------------------------------------
+
+    @property
+    def parts(self) -> list[str]:
+        """Return the names of all models and their segments."""
+        return part_names(self.session.scene)
+
+    def __getitem__(self, name: str) -> Part:
+        """Return a part; another name is an ArgumentError that lists those that there are."""
+        return Part(self, name)
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield the names of all parts."""
+        return iter(self.parts)
+
+    def __len__(self) -> int:
+        """Return the number of parts."""
+        return len(self.parts)
+
+    @property
+    def light(self) -> Light:
+        """The light: set "headlight", or azimuth and polar angle in degrees."""
+        return self.session.scene.light
+
+    @light.setter
+    def light(self, value: Light | str | Sequence[float]) -> None:
+        self.session.set_light(as_light(value))
+        self.changed(f"light {value}")
+
+    @property
+    def background(self) -> tuple[float, float, float]:
+        """The colour behind the scene: set red, green, blue from 0 to 1, or "#rrggbb"."""
+        return self.session.scene.background
+
+    @background.setter
+    def background(self, value: str | Sequence[float]) -> None:
+        self.session.set_background(value)
+        self.changed(f"background {value}")
+
+    @property
+    def time(self) -> int | None:
+        """The number of the step that is shown, of a scene of a series; None of others."""
+        return self.session.scene.time
+
+    @time.setter
+    def time(self, step: int) -> None:
+        self.session.set_of_scene("time", step)
+        self.changed(f"time {step}")
+
+    def edit(self, *words: str) -> Self:
+        """Make the changes that words ask for, as `texgs edit` has them, such as "cut=x,0.1"; return self."""
+        apply_all(self.session, words)
+        return self.changed(" ".join(words))
+
+    def undo(self) -> bool:
+        """Take the latest change back; return whether there was one."""
+        done = self.session.undo()
+        self.changed()
+        return done
+
+    def redo(self) -> bool:
+        """Make again what was undone last; return whether there was anything."""
+        done = self.session.redo()
+        self.changed()
+        return done
+
+    def changed(self, title: str = "") -> Self:
+        """Give the latest step a title, and tell pages of the viewer that show this scene; return self."""
+        if title:
+            self.session.name_step(title)
+        if self._viewer is not None:
+            self._viewer.tell()
+        return self
+
+    # ---- Looks and segments -------------------------------------------------
+
+    def style(
+        self, picture: str | Path | Image | np.ndarray, parts: Sequence[str] = (), **settings: Any
+    ) -> Self:
+        """Give parts the style of a picture, and return self.
+
+        Args:
+            picture: a picture that texgs paints (strokes, glass, ...), a file, or an image.
+            parts: names of parts; default all.
+            **settings: keys of `edit.image` such as `recipe="preview"` or `pattern=0.5`; recipe `patches`
+                needs no weights of VGG-16.
+
+        Raises:
+            ArgumentError: for unknown keys or values, a picture that cannot be read, or missing weights.
+        """
+        return self._look("image", {"style": self._picture(picture), **settings}, parts)
+
+    def instruct(self, instruction: str, parts: Sequence[str] = (), **settings: Any) -> Self:
+        """Change the look of parts by an instruction such as "make it gold", and return self.
+
+        Args:
+            instruction: for InstructPix2Pix; or, with `guidance="filters"`, of words that filters know.
+            parts: names of parts; default all.
+            **settings: keys of `edit.text`.
+
+        Raises:
+            ArgumentError: for unknown keys, values or words, or missing weights.
+        """
+        return self._look("text", {"instruction": instruction, **settings}, parts)
+
+    def segment(
+        self,
+        name: str,
+        point: Sequence[float] | Sequence[Sequence[float]],
+        *,
+        model: str | None = None,
+        azimuth: float = 30.0,
+        polar: float = 20.0,
+        size: int = 800,
+        masks: str = "mobile_sam",
+        views: int = 42,
+    ) -> Part:
+        """Make what a click on one model is on a part of its own, and return it.
+
+        Args:
+            name: of the segment.
+            point: pixel x, y, or several, in a square picture of the model alone from there.
+            model: name; may be left out where there is one.
+            azimuth: of that picture's camera, degrees.
+            polar: of that picture's camera, degrees.
+            size: of that picture, pixels.
+            masks: what finds the object in pictures; "grabcut" needs no weights.
+            views: number of views that vote on surfels, 10 f^2 + 2.
+
+        Raises:
+            ArgumentError: if the name is taken, no surfel is there, or weights are missing.
+        """
+        from texgs.edit.clicks import Clicks
+        from texgs.edit.new_segment import model_name, new_segment
+        from texgs.models.sam import mask_model
+        from texgs.volume.cameras import icosphere_of
+
+        scene, device = self.session.scene, self.session.composition.device
+        part = f"{model_name(scene, model, 'model')}/{name}"
+        framed = scene.framed(self.session.composition)
+        pixels = torch.tensor(point, dtype=torch.float32, device=device).reshape(-1, 2) + 0.5
+        every = torch.ones(len(pixels), dtype=torch.bool, device=device)
+        clicks = Clicks(camera_of(framed, azimuth, polar, size).to(device), pixels, every)
+        around = [each.to(device) for each in icosphere_of(views, framed.lens().square(VOTING))]
+        file = self._new_folder("segment") / part_file("name", part)
+        facts = {"view": [azimuth, polar], "point": pixels.tolist(), "masks": masks}
+        made = new_segment(
+            scene, part, clicks, around, mask_model(masks, device), file, facts, title=f"segment {name}"
+        )
+        self.session.set_scene(made.scene)
+        self.changed(f"{part} new")
+        return self[part]
+
+    def _look(self, method: str, values: dict[str, Any], parts: Sequence[str]) -> Self:
+        """Give parts a new look by a method of editing with values of its settings."""
+        from texgs.config.recipes import Edit
+        from texgs.edit.method import method_of
+        from texgs.edit.orbit_task import orbit_task
+        from texgs.edit.task import parts_of
+        from texgs.scene.parts import look_of
+
+        before, device = self.session.scene, self.session.composition.device
+        try:
+            edit = typed(Edit, {"name": method, "method": method, "parts": [*parts], method: values})
+        except ValueMismatch as error:
+            raise ArgumentError(str(error)) from error
+        method_of(edit).of(edit).check()
+        task = replace(orbit_task(before, edit, self._new_folder(method), device), draws=False)
+        after = method_of(edit).run(task).scene
+        names = parts_of(before, edit.parts)
+        self.session.set_looks({name: look_of(after, name, before) for name in names})
+        return self.changed(f"{', '.join(names)} {next(iter(values.values()))}")
+
+    def _picture(self, picture: Any) -> str:
+        """Return the name or the file of a picture."""
+        if isinstance(picture, str | Path):
+            return str(picture)
+        image = picture if hasattr(picture, "save") else picture_of(picture)
+        file = self._new_folder("picture") / "style.png"
+        image.save(file)
+        return str(file)
+
+    def _new_folder(self, kind: str) -> Path:
+        """Return a new folder for files of the scene."""
+        self._count += 1
+        folder = Path(self._scratch.name, f"{self._count}-{kind}")
+        folder.mkdir()
+        return folder
