@@ -44,7 +44,11 @@ INSTEAD = (
         "texgs series --help",
         "it needs files of steps; tests/workflow/test_series.py has some",
     ),
-    (r"texgs (edit|render) steps/", "{python} -c pass", "the same"),
+    (
+        r"texgs (edit|render) steps/",
+        "",
+        "it needs such a series; test_series.py in tests/workflow runs these verbs",
+    ),
     (r"texgs study", "texgs study --help", "it takes scenes of several methods"),
     (r"texgs view ", "texgs view --help", "it serves until it is interrupted"),
     (r"texgs votes", "texgs votes --help", "it takes votes of people"),

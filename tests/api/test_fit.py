@@ -47,7 +47,8 @@ def test_it_is_what_the_workflow_makes(scene, folder):
 
 def test_a_second_fit_in_the_folder_does_nothing(scene, ball, folder):
     files = {path: path.stat().st_mtime_ns for path in folder.rglob("model.safetensors")}
-    again = texgs.fit(ball, TFS, size=32, overrides=SMALL, folder=folder)
+    same = texgs.Volume(ball.grid.values, name="ball")  # as another process has it
+    again = texgs.fit(same, TFS, size=32, overrides=SMALL, folder=folder)
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("model.safetensors")} == files
     assert np.array_equal(np.asarray(again.render(width=32)), np.asarray(scene.render(width=32)))
 
@@ -113,6 +114,7 @@ def test_models_in_seconds(ball, monkeypatch, tmp_path):
     assert (tmp_path / "inner.safetensors").is_file()
     assert scene.psnr(views=2, width=24) > 15
     assert texgs.open(tmp_path).parts == scene.parts
+    assert read_scene(tmp_path / "scene.yaml").volume.file == tmp_path / "ball.nrrd"
 
 
 @pytest.mark.parametrize(
@@ -134,8 +136,6 @@ def test_what_cannot_be_fitted_is_told(ball, change, error, words):
 
 
 def test_an_interrupted_fit_goes_on(ball, monkeypatch, tmp_path):
-    from texgs.workflow.stages import texture
-
     def interrupted(*_):
         raise KeyboardInterrupt
 
@@ -143,7 +143,6 @@ def test_an_interrupted_fit_goes_on(ball, monkeypatch, tmp_path):
         patched.setattr("texgs.fitting.texels.texturize", interrupted)
         with pytest.raises(KeyboardInterrupt):
             texgs.fit(ball, TFS["inner"], size=32, overrides=SMALL, folder=tmp_path)
-    assert texture
     assert not list(tmp_path.rglob("texture/model.safetensors"))
     before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("shading/model.safetensors")}
     scene = texgs.fit(ball, TFS["inner"], size=32, overrides=SMALL, folder=tmp_path)

@@ -111,6 +111,11 @@ def test_cells_and_turned_axes_of_pyvista_are_refused():
         texgs.Volume(turned)
 
 
+def test_an_axis_that_is_none_is_refused():
+    with pytest.raises(ArgumentError, match=r"up: expected one of \+y, -y, \+z, .*, got z"):
+        texgs.Volume(field(3, 3, 3), up="z")
+
+
 def test_files_are_opened_and_turned_upright(tmp_path):
     values = field(4, 5, 6)
     first = texgs.Volume(values, folder=tmp_path)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.fields.surfels.test_composition import ball
 from tests.scene.balls import ball_models
 from tests.viewer.pages import on_page
 from tests.viewer.test_looks import SHOT
@@ -13,6 +12,7 @@ from texgs.fields.surfels.step_file import write_step
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.series_file import Series, write_series
+from texgs.viewer.description import describe
 
 STEPS = ["a.nrrd", "b.nrrd", "c.nrrd"]
 
@@ -72,9 +72,6 @@ async def test_a_step_that_is_not_there_is_told(browser, client):
 
 
 def test_names_of_steps_are_known_to_the_page(scene_file):
-    from texgs.viewer.description import describe
-
     scene = read_scene(scene_file)
     told = describe("x", scene, scene.open())
     assert (told["time"], told["steps"]) == (1, STEPS)
-    assert len(ball(1)) == len(scene.open())

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from filecmp import cmp
+from functools import partial
 from pathlib import Path
+from shutil import copyfileobj
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
@@ -12,6 +15,7 @@ from texgs.api.functions import AnyFunctions, named
 from texgs.api.scene import Scene
 from texgs.api.volume import Volume
 from texgs.core.errors import ArgumentError
+from texgs.core.io import write_atomic
 from texgs.core.names import file_name
 from texgs.scene.session import Session
 from texgs.volume.transfer import TransferFunction
@@ -46,8 +50,8 @@ def fit(
         seed: of all random numbers.
         device: "cpu" or "cuda".
         overrides: more keys of the configuration, such as "views.train.frequency=3"; not for `now`.
-        folder: for all files. A fit that was interrupted goes on there, and one that is done is opened.
-            Default: one that is gone with the scene.
+        folder: for all files, a copy of the volume too. A fit that was interrupted goes on there, and one
+            that is done is opened. Default: one that is gone with the scene.
 
     Raises:
         ArgumentError: if functions overlap, a key or a recipe is unknown, or nothing is visible.
@@ -93,7 +97,7 @@ def fit_now_into(
         *_, model = fit_now(caster, look, tf, frame.lens(width=size, height=size), name, seed)
         file = folder / file_name("functions", f"{name}.safetensors")
         models[name] = SceneModel(write_model(file, model))
-    made_of = SceneVolume(volume.file, functions, look)
+    made_of = SceneVolume(copied(volume, folder), functions, look)
     return write_scene(folder / SCENE, Models(models, volume=made_of, frame=frame))
 
 
@@ -129,6 +133,15 @@ def configuration(
     basic = {
         name: BasicTF([*map(list, tf.opacity)], [*map(list, tf.color)]) for name, tf in functions.items()
     }
-    keys = VolumeKeys(generator=None, file=str(volume.file.resolve()))
+    keys = VolumeKeys(generator=None, file=str(copied(volume, folder).resolve()))
     dataset = Dataset(name=volume.name, title=volume.name, volume=keys, basic_tfs=basic)
     return replace(config, dataset=dataset, results=str(folder))
+
+
+def copied(volume: Volume, folder: Path) -> Path:
+    """Return a copy of the volume's file in a folder, where later processes find the same one."""
+    file = folder / file_name("volume.name", f"{volume.name}.nrrd")
+    if not (file.is_file() and cmp(file, volume.file, shallow=False)):
+        with volume.file.open("rb") as samples:
+            write_atomic(file, partial(copyfileobj, samples))
+    return file

@@ -7,7 +7,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
-from texgs.api.display import LivePage, Page, camera_of, picture_of
+from texgs.api.display import MB, LivePage, Page, camera_of, picture_of
 from texgs.api.editing import Editing
 from texgs.core.errors import ArgumentError
 from texgs.core.names import EXPORTS
@@ -161,7 +161,6 @@ class Scene(Editing):
                 this object, and the other way round.
             largest: MB of the page; of a larger one there is a picture.
         """
-        from texgs.api.display import MB
         from texgs.viewer.standalone import scene_page
 
         if live:

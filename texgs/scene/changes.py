@@ -92,9 +92,6 @@ def _change_part(session: Session, part: str, key: str, text: str) -> None:
 def _change_scene(session: Session, key: str, text: str) -> None:
     """Change the light, the background or the step; an empty text takes it back."""
     known({key: text}, ("light", "background", "cut", "time"), "the scene")
-    if key == "time":
-        session.set_scene(session.scene.at(_plain(text or "0")))
-        return
     value = _plain(text) if text else SCENE_KEYS[key]
     if key == "light" and isinstance(value, list) and len(value) == 2:
         value = dict(zip(("azimuth", "polar"), value, strict=True))

@@ -37,7 +37,7 @@ SCENE_KEYS: dict[str, Any] = {
     "background": WHITE,
     "cuts": {},
     "functions": {},
-    "time": None,
+    "time": 0,
 }  # what is edited of a whole scene, and without edits
 MOST_STEPS = 200  # of the history: of more, the oldest cannot be undone
 KEPT = 3  # compositions of files as they are: pages may show others in turn, as before an edit and after it

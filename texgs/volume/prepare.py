@@ -76,6 +76,8 @@ def prepare(
     """
     if nan_value is not None and not abs(nan_value) <= np.finfo(np.float32).max:
         raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
+    if up not in UPRIGHT:
+        raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up}")
     bounds, axes = _bounds(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
     kept = "uint8" if source.dtype.kind == "b" else source.dtype.name
