@@ -1,5 +1,7 @@
 """Folders of DICOM slices, as pydicom writes them."""
 
+from functools import partial
+
 import numpy as np
 import pydicom
 import pytest
@@ -14,7 +16,10 @@ SERIES = generate_uid()
 
 
 def write_series(folder, values, places=None, uid=SERIES, number=3, orientation=AXIAL, **tags):
-    """Write slices [Z, Y, X] of 16 bits as files whose names say nothing about their order."""
+    """Write slices [Z, Y, X] of 16 bits as files whose names say nothing about their order.
+
+    Tags are values, or functions of the number of a slice.
+    """
     normal = np.cross(orientation[:3], orientation[3:])
     places = [10 + 2.5 * z * normal for z in range(len(values))] if places is None else places
     for z, (plane, place) in enumerate(zip(values, places, strict=True)):
@@ -32,8 +37,8 @@ def write_series(folder, values, places=None, uid=SERIES, number=3, orientation=
         data.BitsAllocated, data.BitsStored, data.HighBit, data.PixelRepresentation = 16, 16, 15, 0
         data.PixelData = plane.astype("<u2").tobytes()
         for name, value in tags.items():
-            setattr(data, name, value)
-        data.save_as(folder / f"{(7 * z) % 11:02}-{number}.ima", enforce_file_format=True)
+            setattr(data, name, value(z) if callable(value) else value)
+        data.save_as(folder / f"{(7 * z) % 101:02}-{number}.ima", enforce_file_format=True)
 
 
 def test_slices_are_sorted_by_place_and_have_their_lattice(tmp_path):
@@ -104,6 +109,58 @@ def test_one_of_several_series_is_chosen(tmp_path):
 )
 def test_slices_that_are_no_lattice_are_refused(tmp_path, places, message):
     write_series(tmp_path, sample_values()[:5], places)
+    with pytest.raises(ArgumentError, match=message):
+        open_source(tmp_path)
+
+
+def write_steps(folder, tags):
+    """Three volumes in one folder and series; tags are functions of step and slice."""
+    for step in (2, 0, 1):
+        of_slices = {name: partial(value, step) for name, value in tags.items()}
+        write_series(folder, sample_values() + 100 * step, number=step, **of_slices)
+
+
+@pytest.mark.parametrize(
+    "tags",
+    [
+        {"TemporalPositionIdentifier": lambda step, z: step + 9, "AcquisitionNumber": lambda step, z: -step},
+        {"TriggerTime": lambda step, z: 8.5 * step + 0.1 * (z % 3)},
+        {"TriggerTime": lambda step, z: 0, "AcquisitionNumber": lambda step, z: 11 * step + z},
+    ],
+    ids=["position", "trigger", "acquisition"],
+)
+def test_volumes_of_one_series_are_steps_in_time(tmp_path, tags):
+    """The first tag counts that differs at each place; neither hearts nor counters are even."""
+    write_steps(tmp_path, tags)
+    for step in range(3):
+        source = open_source(tmp_path, time=step)
+        assert (source.n_steps, source.spacing) == (3, (0.5, 2, 2.5))
+        np.testing.assert_array_equal(source.slices(0, 11), sample_values() + 100 * step)
+    assert open_source(tmp_path).note == "step 0 of 3; dataset.volume.time chooses another"
+    with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 2, got 3$"):
+        open_source(tmp_path, time=3)
+
+
+def test_one_volume_has_one_step(tmp_path):
+    write_series(tmp_path, sample_values(), AcquisitionNumber=1)
+    assert (open_source(tmp_path).n_steps, open_source(tmp_path).note) == (1, "")
+    with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 0, got 1$"):
+        open_source(tmp_path, time=1)
+
+
+def test_steps_that_lack_slices_or_tags_are_refused(tmp_path):
+    write_steps(tmp_path, {"TemporalPositionIdentifier": lambda step, z: step})
+    path = tmp_path / "21-1.ima"  # slice 3
+    data = pydicom.dcmread(path)
+    path.unlink()
+    message = (
+        "expected a slice of each temporal position at each place, got 3 at 10 mm, 2 at 17.5 mm; complete"
+    )
+    with pytest.raises(ArgumentError, match=message):
+        open_source(tmp_path)
+    del data.TemporalPositionIdentifier
+    data.save_as(path)
+    message = r"got two at one, and no temporal position or trigger .*; 21-1.ima has no temporal position$"
     with pytest.raises(ArgumentError, match=message):
         open_source(tmp_path)
 

@@ -128,7 +128,7 @@ def test_what_the_other_process_runs_counts_as_code_of_a_job():
         if name not in seen and read is not None:
             seen.add(name)
             waiting += read[1]
-    assert {f"texgs.volume.{name}" for name in ("foreign", "itk_image", "vtk_image")} <= seen
+    assert {f"texgs.volume.{name}" for name in ("foreign", "dicom", "itk_image", "vtk_image")} <= seen
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import torch
 import yaml
 
 import texgs
+from tests.volume.test_dicom import write_series as write_slices
 from tests.volume.test_motion import TF, blob
 from tests.volume.zarr_files import axes_of, write_image
 from texgs.cli.main import main
@@ -32,6 +33,7 @@ from texgs.volume.framing import frame_of
 from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import ArraySource
+from texgs.volume.sources import open_source
 from texgs.workflow.series import make_series
 
 CPU = torch.device("cpu")
@@ -263,6 +265,65 @@ def test_one_file_has_all_steps_along_its_axis_of_time(folder):
     assert list(scene.series.steps) == ["all.zarr, step 0", "all.zarr, step 1", "all.zarr, step 2"]
     for time, place in enumerate(PLACES):
         assert centre(scene.at(time)) == pytest.approx(place, abs=0.02)
+
+
+def write_dicom(folder, place, **tags):
+    """A ball as 16-bit slices."""
+    folder.mkdir(parents=True, exist_ok=True)
+    grid = blob((place, 0, 0))
+    lattice = {"places": [(0, 0, 2 * z) for z in range(grid.dims[2])], "PixelSpacing": [1.5, 1]}
+    write_slices(
+        folder, np.round(1e4 * grid.values), RescaleSlope=1e-4, RescaleIntercept=0, **lattice, **tags
+    )
+
+
+def followed(folder, *files):
+    """The scene of a series, after its volume was prepared from the second of three steps."""
+    assert main(["series", "scene.yaml", "--files", *files, "--output", "s"]) == 0
+    scene = read_scene(folder / "s" / "scene.yaml")
+    assert scene.time == 1
+    for time, place in enumerate(PLACES):
+        assert centre(scene.at(time)) == pytest.approx(place, abs=0.02)
+    return list(scene.series.steps)
+
+
+def test_folders_of_slices_are_steps(folder):
+    """Their names have dates, which are not evenly apart; a file of such a name is no folder."""
+    names = ["visit_2025-11-30", "visit_2026-01-02", "visit_2026-01-09"]
+    for name, place in zip(names, PLACES, strict=True):
+        write_dicom(folder / name, place)
+    (folder / "visit_notes.txt").write_text("none")
+    prepare(open_source(folder / names[1]), folder / "volume.nrrd")
+    assert followed(folder, "visit_*/") == names
+    rmtree(folder / "s")
+    assert (
+        followed(folder, *(str(folder / name) for name in names[::-1])) == names
+    )  # of a shell, in any order
+
+
+def test_slices_in_folders_of_folders(folder):
+    for visit, place in zip((2, 10, 18), PLACES, strict=True):
+        write_dicom(folder / f"visit_{visit}" / "ct", place)
+    prepare(open_source(folder / "visit_10" / "ct"), folder / "volume.nrrd")
+    names = [f"visit_{visit}/ct" for visit in (2, 10, 18)]
+    assert followed(folder, "visit_*/ct") == names
+    (folder / "visit_18").rename(folder / "visit_26")
+    with pytest.raises(ArgumentError, match="a file each 8, got none between visit_10/ct and visit_26/ct"):
+        make_series(read_scene("scene.yaml"), [*folder.glob("visit_*/ct")], folder / "t", CPU)
+
+
+def test_one_folder_of_slices_has_all_steps(folder):
+    for step, place in enumerate(PLACES):
+        write_dicom(folder / "heart", place, number=step, TriggerTime=40 * step + 20)
+    prepare(open_source(folder / "heart", time=1), folder / "volume.nrrd")
+    assert followed(folder, "heart") == [f"heart, step {time}" for time in range(3)]
+
+
+def test_one_folder_of_files_has_all_steps(folder):
+    (folder / "run").mkdir()
+    for file in folder.glob("step_*.nrrd"):
+        file.rename(folder / "run" / file.name)
+    assert followed(folder, "run") == ["step_8.nrrd", "step_9.nrrd", "step_10.nrrd"]
 
 
 def test_a_film_turns_while_time_passes(folder):

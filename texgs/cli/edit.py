@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,7 +93,7 @@ def run_model(arguments: argparse.Namespace) -> int:
 def add_series_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the scene of one step, the files of all, and the folder of the series."""
     parser.add_argument("scene", type=Path, help="scene.yaml, whose volume is that of one of the steps")
-    words = "the volume of each step, a pattern such as 'step_*.nrrd', or one file with an axis of time"
+    words = "volume of each step, a pattern such as 'step_*.nrrd' or 'visit_*/', or a file or folder with all"
     parser.add_argument("--files", nargs="+", required=True, metavar="FILE", help=words)
     parser.add_argument(
         "--output", type=Path, required=True, help="folder; the same again goes on where it stopped"
@@ -111,7 +112,7 @@ def run_series(arguments: argparse.Namespace) -> int:
 
     files = []
     for name in arguments.files:
-        found = sorted(Path(name).parent.glob(Path(name).name), key=natural_order)
+        found = sorted(map(Path, glob(name)), key=natural_order)  # noqa: PTH207 - Path's takes no whole path
         if not found:
             raise ArgumentError(f"--files: expected files that are there, got {name}")
         files += found

@@ -27,7 +27,7 @@ class Volume:
         None, "array to read, by its path in the file, where Zarr, HDF5 or NetCDF has several"
     )
     channel: str | None = key(None, "label or number of the channel to read, from 0, where there are several")
-    time: int = key(0, "step to read, from 0, where an array has an axis of time", least=0)
+    time: int = key(0, "step to read, from 0, of an array or a series of DICOM with several", least=0)
     column: int | None = key(None, "number of the column to read, from 1, where text has several", least=1)
     url: str | None = key(None, "where the file is downloaded from when it is not there")
     sha256: str | None = key(None, "checksum of the download")

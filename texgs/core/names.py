@@ -86,8 +86,8 @@ def close(word: object, known: Iterable[str]) -> str:
 
 
 def natural_order(path: Path) -> list[tuple[str, int]]:
-    """Return the place of a file among others by the numbers in its name: slice9 comes before slice10."""
-    return [(text, int(number or -1)) for text, number in re.findall(r"(\D*)(\d*)", path.name)]
+    """Return the place of a file among others by the numbers in its path: slice9 comes before slice10."""
+    return [(text, int(number or -1)) for text, number in re.findall(r"(\D*)(\d*)", str(path))]
 
 
 def is_number(value: object) -> bool:

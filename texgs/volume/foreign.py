@@ -23,7 +23,7 @@ from texgs.core.memory import free_memory
 from texgs.volume.grid import AS_STORED, Grid, Triple, byte_count, closest, permuted_values, require_room
 from texgs.volume.headers import METAIMAGE, NRRD
 from texgs.volume.samples import stored_samples, unpacked
-from texgs.volume.slabs import ArraySource, RawSource, Source
+from texgs.volume.slabs import ArraySource, RawSource, Source, step_note
 
 BY_VTK = (".vti", ".vtk", ".slc")
 TAIL = 1024  # bytes; more than the end tag and whatever blanks an editor left behind it
@@ -33,19 +33,20 @@ COMPLAINT = re.compile(r"error|fail|cannot|corrupt|unexpected", re.IGNORECASE)
 
 
 def open_foreign(
-    path: Path, spacing: Triple | None, origin: Triple | None, series: str | None = None
+    path: Path, spacing: Triple | None, origin: Triple | None, series: str | None = None, time: int = 0
 ) -> Source:
     """Open image data with its axes along the closest ones of space, so that nothing is mirrored.
 
     Samples that are stored as in memory are read on demand, all others as a whole. Spacing and origin replace
-    those of the file; `series` is the number or UID of one of several in a folder of DICOM slices.
+    those of the file; `series` is the number or UID of one of several in a folder of DICOM slices, and `time`
+    the step of one that has several volumes.
     """
     suffix = path.suffix.lower()
     with reading_as(_kind(path)):
         if suffix == ".vti":
             _check_end(path)
         stored = stored_samples(path) if suffix in (*NRRD, *METAIMAGE) else None
-        reply, values = _ask(path, series, is_header_only=stored is not None)
+        reply, values = _ask(path, {"series": series, "time": time}, is_header_only=stored is not None)
         nx, ny, nz = reply["dims"]
         dims, axes = (nx, ny, nz), closest(np.array(reply["directions"]))
         dx, dy, dz = spacing or (reply["spacing"][axis] for axis, _ in axes)
@@ -64,7 +65,10 @@ def open_foreign(
                 if axes == AS_STORED:
                     return RawSource(stored.path, dims, dtype, offset, (dx, dy, dz), (x, y, z))
                 values = RawSource(stored.path, dims, dtype, offset).mapped()
-        return ArraySource(Grid(permuted_values(values, axes), (dx, dy, dz), (x, y, z)), path.name)
+        source = ArraySource(Grid(permuted_values(values, axes), (dx, dy, dz), (x, y, z)), path.name)
+        source.n_steps = reply.get("n_steps", 1)
+        source.note = step_note(time, source.n_steps)
+        return source
 
 
 def _kind(path: Path) -> str:
@@ -80,9 +84,9 @@ def _check_end(path: Path) -> None:
             raise ArgumentError("the file is cut off or no .vti file: expected </VTKFile> at its end")
 
 
-def _ask(path: Path, series: str | None, is_header_only: bool) -> tuple[dict[str, Any], np.ndarray]:
+def _ask(path: Path, keys: dict[str, Any], is_header_only: bool) -> tuple[dict[str, Any], np.ndarray]:
     """Let a process of its own read a file: what it says, and the samples [Z, Y, X]."""
-    request = json.dumps({"path": str(path.absolute()), "series": series, "is_header_only": is_header_only})
+    request = json.dumps({"path": str(path.absolute()), "keys": keys, "is_header_only": is_header_only})
     command = [sys.executable, "-P", "-m", "texgs.volume.foreign", request]
     size = sum(each.stat().st_size for each in (path.iterdir() if path.is_dir() else [path]))
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
@@ -115,7 +119,7 @@ def _received(stream: IO[bytes], is_header_only: bool) -> tuple[dict[str, Any] |
     return (reply, np.frombuffer(samples, dtype).reshape(dims[::-1])) if is_whole else (None, np.empty(0))
 
 
-def answer(path: Path, series: str | None, is_header_only: bool) -> None:
+def answer(path: Path, keys: dict[str, Any], is_header_only: bool) -> None:
     """Print a line of JSON about a file, or what is wrong with it, and then the samples: all in the child."""
     with os.fdopen(os.dup(1), "wb") as output, tempfile.TemporaryFile("w+", errors="replace") as printed:
         os.dup2(printed.fileno(), 1)
@@ -124,7 +128,7 @@ def answer(path: Path, series: str | None, is_header_only: bool) -> None:
         values = None
         try:
             with reading_as(_kind(path)):
-                reply, values = image_of(path, series, is_header_only)
+                reply, values = image_of(path, keys, is_header_only)
             printed.seek(0)  # what a library has printed instead of raising it
             for line in printed:
                 if COMPLAINT.search(line) and "warning" not in line.lower():
@@ -149,18 +153,22 @@ def limit_memory() -> None:
 
 
 def image_of(
-    path: Path, series: str | None, is_header_only: bool
+    path: Path, keys: dict[str, Any], is_header_only: bool
 ) -> tuple[dict[str, Any], np.ndarray | None]:
     """Read the lattice, and samples [Z, Y, X] unless only the header is asked for."""
     if path.suffix.lower() in BY_VTK:
         from texgs.volume.vtk_image import read_vtk
 
         return read_vtk(path)
-    from texgs.volume.itk_image import read_dicom, read_itk
+    if path.is_dir():
+        from texgs.volume.dicom import read_dicom
 
-    return read_dicom(path, series) if path.is_dir() else read_itk(path, is_header_only)
+        return read_dicom(path, **keys)
+    from texgs.volume.itk_image import read_itk
+
+    return read_itk(path, is_header_only)
 
 
 if __name__ == "__main__":
     request = json.loads(sys.argv[1])
-    answer(Path(request["path"]), request["series"], request["is_header_only"])
+    answer(Path(request["path"]), request["keys"], request["is_header_only"])

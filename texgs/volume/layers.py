@@ -14,7 +14,7 @@ from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
 from texgs.volume.axes import Axis, lattice, picked
 from texgs.volume.grid import Triple, require_room
-from texgs.volume.slabs import SLAB_BYTES, Source
+from texgs.volume.slabs import SLAB_BYTES, Source, step_note
 
 SHARE = 4  # one layer takes this part of the free memory at most
 LISTED = 8  # arrays in a message
@@ -39,7 +39,7 @@ class LayerSource(Source):
     Axes are z, y, x in the order they are stored, unless their names say otherwise, and run upwards with
     coordinates. What is read is layers of whole chunks along z. One stays in memory, so that slabs in order
     read every chunk once; only where a layer takes more than a quarter of the free memory, it is read in
-    parts, and its chunks once for each. `given` replaces spacing and origin, `n_steps` counts steps of time.
+    parts, and its chunks once for each. `given` replaces spacing and origin.
     """
 
     def __init__(
@@ -64,8 +64,7 @@ class LayerSource(Source):
         dtype = np.dtype(np.float32) if self._coded else stored.dtype
         super().__init__(path.name, (x.size, y.size, z.size), dtype, spacing, origin)
         self.n_steps = next((axis.size for axis in stored.axes if axis.kind == "time"), 1)
-        step = f"step {time or 0} of {self.n_steps}; dataset.volume.time chooses another"
-        self.note = "; ".join(filter(None, (stored.note, step if self.n_steps > 1 else "", remark)))
+        self.note = "; ".join(filter(None, (stored.note, step_note(time or 0, self.n_steps), remark)))
         plane, chunk = x.size * y.size * stored.dtype.itemsize, stored.chunks[self._z]
         most = max(1, free_memory() // (SHARE * plane))
         self._depth = min(chunk * max(1, SLAB_BYTES // (chunk * plane)), most)  # slices in a layer

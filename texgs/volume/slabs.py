@@ -17,6 +17,7 @@ class Source(ABC):
     """A volume that can be read slab by slab; its lattice is as for `Grid`, its name for messages."""
 
     note = ""  # for the user: what was chosen of several, or taken for granted
+    n_steps = 1  # of time, one of which this is
 
     def __init__(self, name: str, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> None:
         check_lattice(dims, dtype, spacing, origin)
@@ -84,6 +85,11 @@ def size_text(dims: Dims, stored: np.dtype, skip: int) -> str:
     skipped = f" + {skip} skipped" if skip else ""
     factors = " x ".join(map(str, [*dims, stored.itemsize]))
     return f"{factors} ({stored.name}){skipped} = {skip + byte_count(dims, stored)} bytes"
+
+
+def step_note(time: int, n_steps: int) -> str:
+    """Say which step of several was chosen."""
+    return f"step {time} of {n_steps}; dataset.volume.time chooses another" if n_steps > 1 else ""
 
 
 def slab_bounds(source: Source, start: int, stop: int, multiple: int = 1) -> list[tuple[int, int]]:

@@ -58,7 +58,8 @@ def open_source(
         keys: what only some formats take, see `KEYS`: `dims`, samples along x, y, z; `dtype`, numpy's name of
             the sample type, such as "uint16"; `endian`, "little" or "big"; `skip`, bytes before the first
             sample; `series`, number or UID of one of several; `variable`, the path of an array in the file;
-            `channel`, its label or number, from 0; `time`, a step, from 0 (the default); `column`, from 1.
+            `channel`, its label or number, from 0; `time`, a step, from 0 (the default), of arrays and of
+            DICOM; `column`, from 1.
 
     Raises:
         ArgumentError, ShapeError: if the file is missing, cannot be read, is unknown, damaged or no scalar
@@ -100,7 +101,7 @@ def _open(path: Path, spacing: Triple | None, origin: Triple | None, said: dict[
     suffix = _suffix(path)
     opener, takes = OPENERS.get(suffix), KEYS.get(suffix, ())
     if path.is_dir():
-        opener, takes = (open_tiff, ()) if tiffs_in(path) else (open_foreign, ("series",))
+        opener, takes = (open_tiff, ()) if tiffs_in(path) else (open_foreign, ("series", "time"))
         if is_zarr(path) or suffix == ".zarr":
             opener, takes = open_zarr, IN_FILES
     if opener is None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import filecmp
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
+from os.path import commonpath
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -16,6 +18,7 @@ from texgs.config.dataset import Volume
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import read_json
 from texgs.core.keys import typed
+from texgs.core.names import natural_order
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.progress import progress
 from texgs.fields.surfels.step_file import at_step, write_step
@@ -25,29 +28,25 @@ from texgs.scene.scene_file import write_scene
 from texgs.scene.series_file import Series, read_series, write_series
 from texgs.scene.twin import SceneVolume, volume_of
 from texgs.volume.framing import shown_corners, smallest_ball
+from texgs.volume.headers import NRRD
 from texgs.volume.nrrd_file import open_grid
 from texgs.workflow.stages.volume import prepared, source
 
 NUMBER = re.compile(r"\d+(?=\D*$)")
 
 
-@dataclass(frozen=True)
-class Moment:
-    """Where the volume of a step comes from: a file, or a step of its axis of time."""
+class Moment(NamedTuple):
+    """Where the volume of a step comes from: a file or folder, or a step of its axis of time."""
 
+    name: str  # what the step is called
     file: Path
     time: int | None = None
-
-    @property
-    def name(self) -> str:
-        """Return what the step is called."""
-        return self.file.name if self.time is None else f"{self.file.name}, step {self.time}"
 
 
 def make_series(scene: Scene, files: Sequence[Path], folder: Path, device: torch.device) -> Path:
     """Follow the models of a scene through a series of volumes, and write a scene of all steps.
 
-    A single file has all of them, along an axis of time.
+    A single file or folder has all of them, along an axis of time.
 
     The volumes are prepared as that of the scene was, which has to be one of them: its step is the one that
     models are followed from, on and back. What an earlier call has left in the folder is not made again.
@@ -77,30 +76,52 @@ def make_series(scene: Scene, files: Sequence[Path], folder: Path, device: torch
 
 
 def moments_of(files: Sequence[Path], settings: Volume) -> list[Moment]:
-    """Return the steps of several files, or those along the axis of time of one."""
+    """Return the steps of several files or folders, or of one: of a folder of NRRD, or along its own time."""
     if len(files) == 1:
-        with located(files[0]):
-            count = getattr(source(replace(settings, time=0), files[0]), "n_steps", 1)
+        only = files[0]
+        inner = [each for each in only.iterdir() if each.suffix in NRRD] if only.is_dir() else []
+        if inner:
+            return in_time(sorted(inner, key=natural_order))
+        with located(only):
+            count = source(replace(settings, time=0), only).n_steps
         if count > 1:
-            return [Moment(files[0], time) for time in range(count)]
-    require_steps(files)
-    return [*map(Moment, files)]
+            return [Moment(f"{only.name}, step {time}", only, time) for time in range(count)]
+    return in_time(files)
 
 
-def require_steps(files: Sequence[Path]) -> None:
-    """Require several files, whose names differ by numbers of one distance where they have any."""
+def in_time(files: Sequence[Path]) -> list[Moment]:
+    """Return the steps of several files, in the order of their numbers where all have one.
+
+    Numbers that are multiples of their least distance count steps, of which none may be missing; others are
+    dates, say.
+    """
     if len(files) < 2:
         got = ", ".join(map(str, files)) or "none"
         raise ArgumentError(f"--files: expected two files at least, got {got}; 'step_*.nrrd' names several")
-    found = [NUMBER.search(file.stem) for file in files]
-    numbers = [int(match[0]) for match in found if match]
-    gaps = [after - before for before, after in pairwise(numbers)]
-    for index, gap in enumerate(gaps if len(numbers) == len(files) else []):
-        if gap > min(gaps):
+    paths = [file.absolute() for file in files]
+    base = commonpath([path.parent for path in paths])
+    moments = [
+        Moment(path.relative_to(base).as_posix(), file) for path, file in zip(paths, files, strict=True)
+    ]
+    if None in map(number_of, moments):
+        return moments
+    moments.sort(key=lambda moment: natural_order(Path(moment.name)))
+    gaps = [(number_of(after) or 0) - (number_of(before) or 0) for before, after in pairwise(moments)]
+    least = min(gaps)
+    is_count = least > 0 and all(gap % least == 0 for gap in gaps)
+    for (before, after), gap in zip(pairwise(moments), gaps, strict=True):
+        if is_count and gap > least:
             raise ArgumentError(
-                f"--files: expected a file each {min(gaps)}, got none between {files[index].name} and "
-                f"{files[index + 1].name}; name the files of one part of the series"
+                f"--files: expected a file each {least}, got none between {before.name} and {after.name}; "
+                "name the files of one part of the series"
             )
+    return moments
+
+
+def number_of(moment: Moment) -> int | None:
+    """Return the last number in the name of a step, without what tells its format."""
+    found = NUMBER.search(str(Path(moment.name).with_suffix("")))
+    return int(found[0]) if found else None
 
 
 def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, volume: SceneVolume) -> None:
