@@ -1,6 +1,6 @@
 """The schema of galleries: pictures of a data set's scenes in rows and columns."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from texgs.core.keys import key
 
@@ -49,8 +49,8 @@ class GridKeys:
 
     name: str = key("pictures", "name of the file")
     caption: str = key("", "words below it in the report")
-    rows: list[ShotKeys] = field(default_factory=list, metadata={"help": "rows, from above"})
-    columns: list[ShotKeys] = field(default_factory=list, metadata={"help": "columns, from the left"})
+    rows: list[ShotKeys] = key([], "rows, from above")
+    columns: list[ShotKeys] = key([], "columns, from the left")
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,4 @@ class GalleryKeys:
     section: str = key("more", "section of the report in which it stands", choices=SECTIONS)
     note: str = key("", "words behind the captions of all pictures, such as what stands in for what")
     size: int = key(400, "width and height of each picture", "pixels", least=16)
-    grids: list[GridKeys] = field(
-        default_factory=list,
-        metadata={"help": "pictures; default one with a column for each look"},
-    )
+    grids: list[GridKeys] = key([], "pictures; default one with a column for each look")

@@ -4,7 +4,7 @@ Files of conf/ become instances of these classes, so an unknown key or a value o
 that names the key; `texgs views --help` prints this file.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from texgs.config.dataset import Dataset, MeshKeys
 from texgs.config.gallery import GalleryKeys
@@ -69,9 +69,7 @@ class Sweep:
     name: str = key(NO_SWEEP, "name of the sweep and of its table")
     seeds: list[int] = key([0], "seeds of fits; each variant is fitted once with each")
     edit_seeds: list[int] = key([0], "seeds of edits; each edit is made once with each")
-    variants: dict[str, list[str]] = field(
-        default_factory=dict, metadata={"help": "overrides by the name of the variant"}
-    )
+    variants: dict[str, list[str]] = key(dict, "overrides by the name of the variant")
     over: list[str] = key(
         [],
         "keys with several values, such as fit.low_pass=2,6; each combination is a variant",
@@ -95,9 +93,7 @@ class Config:
     dataset: Dataset = key(Dataset, "the data set")
     datasets: list[str] = key([], "data sets of a whole experiment; default the one of `dataset`")
     experiments: list[str] = key([], "files of conf/experiment that are one run together")
-    per_dataset: dict[str, list[str]] = field(
-        default_factory=dict, metadata={"help": "overrides that hold for one data set alone, by its name"}
-    )
+    per_dataset: dict[str, list[str]] = key(dict, "overrides that hold for one data set alone, by its name")
     common_overrides: list[str] = key(
         [], "overrides that hold for each of `experiments`, before those of the command"
     )
@@ -116,9 +112,8 @@ class Config:
     page: PageKeys = key(PageKeys, "scenes as pages for a browser")
     gallery: GalleryKeys = key(GalleryKeys, "pictures of scenes side by side")
     sweep: Sweep = key(Sweep, "variants of the experiment")
-    sweeps: dict[str, str] = field(
-        default_factory=dict,
-        metadata={"help": "sweeps of a whole experiment beside its data sets: the data set of each"},
+    sweeps: dict[str, str] = key(
+        dict, "sweeps of a whole experiment beside its data sets: the data set of each"
     )
     variant: str = key("", "which of the sweep this is, in the folder of its fits")
     tracking: Tracking = key(Tracking, "where runs are recorded")

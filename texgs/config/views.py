@@ -1,6 +1,6 @@
 """The schema of conf/views: cameras, lights and the look of the volume in them."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from texgs.core.keys import key
 from texgs.core.lens import Frame, Lens
@@ -54,17 +54,12 @@ class ViewKeys:
         "world units",
         above=0,
     )
-    lights: list[LightKeys] = field(
-        default_factory=lambda: [LightKeys(), LightKeys("random"), LightKeys("random")],
-        metadata={
-            "help": "training view i is lit by light i modulo their number; a random one is from another "
-            "direction in each view, and a headlight where the field that is fitted cannot be relit"
-        },
+    lights: list[LightKeys] = key(
+        [LightKeys(), LightKeys("random"), LightKeys("random")],
+        "training view i is lit by light i modulo their number; a random one is from another direction in "
+        "each view, and a headlight where the field that is fitted cannot be relit",
     )
-    test_lights: list[LightKeys] = field(
-        default_factory=lambda: [LightKeys()],
-        metadata={"help": "test view i is lit by light i modulo their number"},
-    )
+    test_lights: list[LightKeys] = key([LightKeys()], "test view i is lit by light i modulo their number")
     relit: int = key(24, "number of further test views, on a spiral, each under a random light", least=0)
     seed: int = key(0, "seed of random lights", least=0)
     shading: Shading = key(Shading, "material of the volume")

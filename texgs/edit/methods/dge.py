@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
@@ -29,9 +29,7 @@ class DgeKeys(UpdateKeys):
         [0.998, 0.3, 0.3, 0.021], "levels of noise of the rounds' edits, as shares; the last one holds on"
     )
     prune: bool = key(True, "Gaussians that are faint or large are removed, if geometry learns")
-    rates: CommonRates = field(
-        default_factory=lambda: rates(0.0125, 0.1), metadata={"help": "learning rates"}
-    )
+    rates: CommonRates = key(rates(0.0125, 0.1), "learning rates")
 
     def schedule(self, views: int) -> UpdateSchedule:
         """Edit some views together in each round, and learn from nothing but them."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
@@ -24,9 +24,7 @@ class Igs2gsKeys(UpdateKeys):
     passes: int = key(3, "times that each view is edited", least=1)
     every: int = key(2500, "iterations from pass to pass", least=1)
     noise: list[float] = key([0.7, 0.98], "level of noise of an edit, from and to, as a share")
-    rates: CommonRates = field(
-        default_factory=lambda: rates(0.0025, 0.01), metadata={"help": "learning rates"}
-    )
+    rates: CommonRates = key(rates(0.0025, 0.01), "learning rates")
 
     def schedule(self, views: int) -> UpdateSchedule:
         """Edit all views in passes, and learn from each when it is edited."""

@@ -1,14 +1,12 @@
 """The fit of a palette field: its settings, and what runs it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.keys import key
 from texgs.fields.kinds.palette import FIELD
 from texgs.fitting.kinds import FitSpec, FitTask, Fitted
 from texgs.fitting.kinds.voxels import GridStage, VoxelKeys
-
-STAGES = (GridStage(64, 60), GridStage(128, 150), GridStage(256, 100))
 
 
 @dataclass(frozen=True)
@@ -25,9 +23,9 @@ class HashKeys:
 class PaletteKeys:
     """How networks are fitted. The defaults are meant for two cores of a CPU and some minutes."""
 
-    voxels: VoxelKeys = field(
-        default_factory=lambda: VoxelKeys(stages=list(STAGES), degree=0),
-        metadata={"help": "fit of a grid that says where anything is, made first"},
+    voxels: VoxelKeys = key(
+        VoxelKeys([GridStage(64, 60), GridStage(128, 150), GridStage(256, 100)], degree=0),
+        "fit of a grid that says where anything is, made first",
     )
     hash: HashKeys = key(HashKeys, "lattices of the hash grids")
     seed_steps: int = key(200, "steps in which density learns that of the grid", least=0)

@@ -1,6 +1,6 @@
 """The fit of a voxel grid: its settings, the schedule of its rates, and what runs it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from math import pi, sin
 
@@ -37,27 +37,20 @@ class Decay:
         return rate * (0.01 + 0.99 * sin(0.5 * pi * step / self.ramp))
 
 
-STAGES = (GridStage(64, 60), GridStage(128, 300), GridStage(256, 800))
-
-
 @dataclass(frozen=True)
 class VoxelKeys:
     """How a grid is fitted. The defaults are meant for two cores of a CPU and a minute."""
 
-    stages: list[GridStage] = field(
-        default_factory=lambda: list(STAGES), metadata={"help": "resolutions, one after the other"}
+    stages: list[GridStage] = key(
+        [GridStage(64, 60), GridStage(128, 300), GridStage(256, 800)], "resolutions, one after the other"
     )
     degree: int = key(2, "degree of the spherical harmonics", least=0, most=2)
     half_size: float = key(1.3, "half the side of the cube that is searched", "world units", above=0)
     rays: int = key(8192, "rays in a step", least=1)
     run: int = key(2, "rays that are neighbours: longer runs take less time a step, and more steps", least=1)
     optimizer: str = key("rmsprop", "optimiser", choices=("rmsprop", "adam"))
-    density: Decay = field(
-        default_factory=lambda: Decay(40.0, 1.0, 50), metadata={"help": "rate of densities, per world unit"}
-    )
-    sh: Decay = field(
-        default_factory=lambda: Decay(4e-2, 4e-3), metadata={"help": "rate of spherical harmonics"}
-    )
+    density: Decay = key(Decay(40.0, 1.0, 50), "rate of densities, per world unit")
+    sh: Decay = key(Decay(4e-2, 4e-3), "rate of spherical harmonics")
     tv_density: float = key(1e-5, "weight of total variation of densities", least=0)
     tv_sh: float = key(2e-4, "weight of total variation of spherical harmonics", least=0)
     tv_share: float = key(0.01, "share of all blocks whose total variation a step looks at", above=0, most=1)
