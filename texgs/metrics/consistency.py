@@ -36,25 +36,13 @@ class Difference(NamedTuple):
     """How much a pair of views differs where both see the same."""
 
     square: float  # mean squared difference of colours
-    share: float  # of the pixels of the object in the first view
     distance: float | None  # perceptual; None where it is not measured
 
 
-@dataclass(frozen=True)
-class ViewConsistency:
-    """How much pairs of views differ where they see the same."""
-
-    rmse: float  # root of the mean over pairs of the mean squared difference, in units of colour
-    perceptual: float | None  # mean over pairs; None where it was not measured
-    covered: float  # mean share of the pixels of an object that a pair compares
-    pairs: int
-
-    @classmethod
-    def of(cls, pairs: Sequence[Difference]) -> ViewConsistency:
-        """Return the means of one pair or more."""
-        squares, shares, distances = zip(*pairs, strict=True)
-        mean_distance = None if distances[0] is None else fmean(distances)
-        return cls(sqrt(fmean(squares)), mean_distance, fmean(shares), len(pairs))
+def mean_differences(pairs: Sequence[Difference]) -> tuple[float, float | None]:
+    """Return the root of the mean squared difference of one pair or more, and the mean distance."""
+    squares, distances = zip(*pairs, strict=True)
+    return sqrt(fmean(squares)), None if distances[0] is None else fmean(distances)
 
 
 def difference(
@@ -75,9 +63,8 @@ def difference(
     if not bool(same.any()):
         return None
     square = float((warped - first.image)[same].double().square().mean())
-    share = float(same.sum() / (first.alpha >= OPAQUE).sum())
     exchanged = torch.where(same[..., None], warped, first.image)
-    return Difference(square, share, None if distance is None else distance(exchanged, same))
+    return Difference(square, None if distance is None else distance(exchanged, same))
 
 
 @torch.no_grad()

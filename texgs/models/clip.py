@@ -1,8 +1,8 @@
-"""Features of images and texts by CLIP (Radford et al. 2021), from a folder of transformers."""
+"""Features of images and texts by CLIP (Radford et al. 2021), and how well an edit fits its caption."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -85,3 +85,50 @@ def _unit(features: Any) -> Tensor:
     """Return features [B, D] of unit length; newer versions of transformers wrap them."""
     pooled: Tensor = features if isinstance(features, Tensor) else features.pooler_output
     return F.normalize(pooled, dim=-1)
+
+
+@torch.no_grad()
+def clip_scores(
+    clip: Clip, edited: Iterable[Tensor], originals: Iterable[Tensor], source: str, target: str
+) -> tuple[float, float]:
+    """Return similarity and directional similarity of an edit, as InstructPix2Pix measures them.
+
+    They are means over views in [-1, 1]; 1 is best (Brooks et al. 2023).
+
+    Args:
+        clip: the backbone; scores of different ones cannot be compared.
+        edited: [H, W, 3] in [0, 1] of each view.
+        originals: the same views of the scene before the edit.
+        source: caption of the original, such as "a beetle"; a caption, not an instruction.
+        target: caption of the edit, such as "a beetle made of gold".
+    """
+    captions = clip.texts([source, target])
+    after = [clip.images(image[None])[0] for image in edited]
+    before = [clip.images(image[None])[0] for image in originals]
+    if not after or len(after) != len(before):
+        raise ArgumentError(
+            f"views: expected as many of the edited scene as of the original, got {len(after)} and "
+            f"{len(before)}"
+        )
+    now, then = torch.stack(after), torch.stack(before)
+    return similarity(now, captions[1]).mean().item(), direction(then, now, *captions).mean().item()
+
+
+def similarity(images: Tensor, text: Tensor) -> Tensor:
+    """Return the cosines [V] between features of images [V, D] and of a text [D]; differentiable."""
+    size = check.shape("images", images, "V D")["D"]
+    check.shape("text", text, "D", D=size)
+    return torch.cosine_similarity(images, text[None], dim=1)
+
+
+def direction(originals: Tensor, edited: Tensor, source: Tensor, target: Tensor) -> Tensor:
+    """Return the cosines [V] between what changed in images and in captions; differentiable.
+
+    cos(f(edited) - f(original), g(target) - g(source)) with unit features f [V, D] of views and g [D] of
+    captions. An edit that changes nothing scores 0.
+    """
+    sizes = check.shape("originals", originals, "V D")
+    check.shape("edited", edited, "V D", **sizes)
+    for name, caption in (("source", source), ("target", target)):
+        check.shape(name, caption, "D", D=sizes["D"])
+    return torch.cosine_similarity(edited - originals, (target - source)[None], dim=1)

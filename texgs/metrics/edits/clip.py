@@ -10,8 +10,7 @@ from texgs.metrics.metric import Measure, MeasuredScene, Metric
 def run(measured: MeasuredScene) -> dict[str, Any]:
     """Score views with CLIP, or say why not."""
     from texgs.core.progress import progress
-    from texgs.metrics.clip import clip_scores
-    from texgs.models.clip import Clip
+    from texgs.models.clip import Clip, clip_scores
     from texgs.models.weights import unusable
 
     if measured.weights[measured.clip] is None:
@@ -24,8 +23,8 @@ def run(measured: MeasuredScene) -> dict[str, Any]:
     after = (measured.frame(place).color.clamp(0, 1) for place in places)
     frames = (composition.render(camera, scene.light, scene.edits) for camera in measured.some)
     before = (frame.color.clamp(0, 1) for frame in frames)
-    scores = clip_scores(clip, after, before, *measured.captions)
-    return {"clip": scores.backbone, "similarity": scores.similarity, "direction": scores.direction}
+    similarity, direction = clip_scores(clip, after, before, *measured.captions)
+    return {"clip": clip.name, "similarity": similarity, "direction": direction}
 
 
 METRIC = Metric(

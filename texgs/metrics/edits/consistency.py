@@ -60,11 +60,11 @@ class Pairs:
 
     def values(self) -> dict[str, Any]:
         """Return the means over pairs."""
-        from texgs.metrics.consistency import ViewConsistency
+        from texgs.metrics.consistency import mean_differences
 
-        means = {name: ViewConsistency.of(pairs) for name, pairs in self.pairs.items() if pairs}
-        rmse = {f"{name}_rmse": mean.rmse for name, mean in means.items()}
-        return rmse | {f"{name}_lpips": mean.perceptual for name, mean in means.items()}
+        means = {name: mean_differences(pairs) for name, pairs in self.pairs.items() if pairs}
+        rmse = {f"{name}_rmse": mean for name, (mean, _) in means.items()}
+        return rmse | {f"{name}_lpips": distance for name, (_, distance) in means.items()}
 
 
 def without_hidden(geometry: Scene, scene: Scene) -> Scene:
