@@ -10,7 +10,7 @@ from time import monotonic, sleep
 import pytest
 
 from texgs.core.errors import ArgumentError
-from texgs.viewer.entry import entry
+from texgs.viewer.guard import entry
 
 WAIT = 60  # seconds, on a busy machine
 

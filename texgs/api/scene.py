@@ -183,8 +183,7 @@ class Scene(Editing):
     def to_pyvista(self) -> pyvista.PolyData:
         """Return the visible surfels as polygons of PyVista; see `texgs.scene.polydata.polydata_of`."""
         from texgs.fields.surfels.composition import Composition
-        from texgs.scene.joined import joined
-        from texgs.scene.polydata import polydata_of
+        from texgs.scene.joined import joined, polydata_of
 
         scene, composed = self.session.scene, self.session.composition
         if not isinstance(composed, Composition):

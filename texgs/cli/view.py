@@ -47,8 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from texgs.core.cache import cache_folder
     from texgs.core.check import torch_device
-    from texgs.viewer.entry import entry
-    from texgs.viewer.guard import is_loopback
+    from texgs.viewer.guard import entry, is_loopback
     from texgs.viewer.server import Server
     from texgs.viewer.shared_edits import open_scene
 

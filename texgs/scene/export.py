@@ -31,9 +31,8 @@ from texgs.raster.shading import Y00
 from texgs.scene.bounds import bounds_of
 from texgs.scene.clouds import clouds_of
 from texgs.scene.gltf import write_gltf
-from texgs.scene.joined import joined
+from texgs.scene.joined import joined, write_vtp
 from texgs.scene.mesh import VERTEX, fill, fuse, write_mesh
-from texgs.scene.polydata import write_vtp
 from texgs.scene.scene import Scene
 from texgs.scene.spz import write_spz
 from texgs.scene.usd import write_usd

@@ -1,4 +1,4 @@
-"""Frames of a scene as people look at them: colours, normals, depth, alpha, material."""
+"""Frames of a scene as people look at them: colours, normals, depth, material; and the point at a pixel."""
 
 from __future__ import annotations
 
@@ -36,6 +36,8 @@ Mode = Literal[
 OVER_BLACK = ("alpha", *MATERIAL)
 SHININESS = 100.0  # shown as white
 BYTES = 64  # of memory for a pixel: the images of the rasterizer, over a background, clamped and rounded
+FAINT = 0.1  # alpha below which a pixel counts as background
+HOLLOW = {"normal", "depth", *get_args(Look)} - {"shaded"}  # modes that show no faces of cuts
 
 
 def frame(
@@ -115,3 +117,24 @@ def relative_depth(render: Render) -> Tensor:
         return torch.zeros_like(render.alpha)
     low, high = seen.min(), seen.max()
     return ((depth - low) / (high - low).clamp_min(1e-6)).clamp(0, 1)  # type: ignore[operator]
+
+
+def point_at(
+    composed: Composed, camera: Camera, scene: Scene, mode: str, twin: Twin | None, pixel: tuple[int, int]
+) -> list[float] | None:
+    """Return the point [3] of the world that a pixel (column, row) shows; None for the background.
+
+    It lies at the mean depth of the models. Where the twin is seen it lies where half of the light is gone,
+    or if it never is, at the mean depth of the volume.
+    """
+    column, row = pixel
+    alone = camera.crop(column, row, column + 1, row + 1).to(composed.device)
+    if twin is None or mode in HOLLOW:
+        seen = cut_view(composed, alone, scene, None, outputs=("depth",))
+    else:
+        functions = scene.functions if mode == "volume" else None
+        seen = twin.render(alone, scene, composed.palettes, functions=functions, outputs=("depth", "median"))
+    if seen.depth is None or float(seen.alpha) < FAINT:
+        return None
+    depth = seen.depth if seen.median is None else torch.where(seen.median > 0, seen.median, seen.depth)
+    return alone.unproject(depth.to(alone.viewmat))[0, 0].tolist()

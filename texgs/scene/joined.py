@@ -1,18 +1,32 @@
-"""The surfels of a scene as one model, for programs that have neither textures nor our light."""
+"""The surfels of a scene as one model, for programs without textures and our light; and as a mesh."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.core.geometry import quats_to_matrices
+from texgs.core.io import write_bytes
 from texgs.fields.part_edit import MOST_OPAQUE, PartEdit
+from texgs.fields.splats import geometry
 from texgs.fields.surfels.composition import Part, by_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import mean_texels
 from texgs.raster.shading import Y00
+from texgs.scene.twin import SceneVolume
+from texgs.volume.nrrd_file import open_grid
+
+if TYPE_CHECKING:
+    import pyvista
+SIDES = 6  # of a polygon
+REACH = 1.5  # standard deviations from its middle to its corners
 
 
 def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
@@ -41,3 +55,47 @@ def _surfels(part: Part, edits: Sequence[PartEdit]) -> dict[str, Tensor]:
         "sh": ((colors - 0.5) / Y00).float()[:, None],
     }
     return {name: x[opacities > 0] for name, x in surfels.items()}
+
+
+def polydata_of(model: Surfels, volume: SceneVolume | None = None) -> pyvista.PolyData:
+    """Return surfels, see `joined`, as hexagons of 1.5 standard deviations.
+
+    They lie in the coordinates of the volume, +y up; in world units where there is none. Cells have `rgba`
+    (uint8, straight alpha), `opacity` and `Normals`; colours are those without light, of the palette, offset
+    and mean texel.
+    """
+    import pyvista
+
+    means, quats, scales, opacities = geometry(model.parameters)
+    turns = quats_to_matrices(quats)
+    angles = torch.arange(SIDES, device=means.device) * (2 * np.pi / SIDES)
+    corners = REACH * torch.stack([angles.cos(), angles.sin()], dim=1)
+    offsets = torch.einsum("nij,sj,nj->nsi", turns[..., :2], corners, scales)
+    points = (means[:, None] + offsets).reshape(-1, 3).cpu().numpy()
+    numbers = np.arange(len(points)).reshape(-1, SIDES)
+    faces = np.concatenate([np.full((len(numbers), 1), SIDES), numbers], axis=1)
+    mesh = pyvista.PolyData(in_volume(points, volume), faces=faces.ravel())
+    color = (0.5 + Y00 * model.parameters["sh"][:, 0]).clamp(0, 1)
+    rgba = torch.cat([color, opacities.reshape(-1, 1)], dim=1)
+    mesh.cell_data["rgba"] = (255 * rgba).round().to(torch.uint8).cpu().numpy()
+    mesh.cell_data["opacity"] = opacities.reshape(-1).cpu().numpy()
+    mesh.cell_data["Normals"] = turns[..., 2].cpu().numpy()
+    mesh.set_active_scalars("rgba", preference="cell")
+    return mesh
+
+
+def in_volume(points: np.ndarray, volume: SceneVolume | None) -> np.ndarray:
+    """Return points [N, 3] of the world in the physical coordinates of a volume, if there is one."""
+    if volume is None:
+        return points
+    grid = open_grid(volume.file)
+    middle = np.array(grid.origin) + 0.5 * np.array(grid.sides)
+    return np.asarray(points / grid.scale + middle)
+
+
+def write_vtp(path: str | Path, model: Surfels, volume: SceneVolume | None = None) -> Path:
+    """Create or replace a .vtp file of `polydata_of` in one step; ParaView opens it."""
+    with TemporaryDirectory() as folder:  # VTK writes to a path only
+        file = Path(folder, "surfels.vtp")
+        polydata_of(model, volume).save(file)
+        return write_bytes(path, file.read_bytes())
