@@ -26,8 +26,7 @@ from benchmarks.series import LOOK, SAMPLES, SIZE, STEPS, TFS, lens_of
 from texgs.core.camera import orbit
 from texgs.core.light import HEADLIGHT
 from texgs.core.movie import write_frames
-from texgs.edit.layout import laid_out
-from texgs.edit.style_start import pixel_side
+from texgs.edit.style_start import laid_out, pixel_side
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import read_model
 from texgs.fields.surfels.step_file import at_step

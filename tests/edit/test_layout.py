@@ -10,7 +10,7 @@ from tests.fitting.scenes import RADIUS
 from texgs.core.camera import orbit
 from texgs.core.errors import ShapeError
 from texgs.edit.canvas import rasterized
-from texgs.edit.layout import RIM, laid_out
+from texgs.edit.style_start import RIM, laid_out
 from texgs.fields.surfels.texels import owners, recolored
 from texgs.raster import Texture
 

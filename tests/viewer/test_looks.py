@@ -33,8 +33,8 @@ SHOT = {**VIEW, "mode": "shaded", "camera": asdict(FRONT) | {"target": [0, 0, 0]
 @pytest.fixture(autouse=True)
 def quick(monkeypatch, tmp_path_factory):
     """Few and small views and no weights, wherever the tests run."""
-    monkeypatch.setattr("texgs.edit.orbit_task.VIEWS", 12)
-    monkeypatch.setattr("texgs.edit.orbit_task.SIZE", 96)
+    monkeypatch.setattr("texgs.edit.task.VIEWS", 12)
+    monkeypatch.setattr("texgs.edit.task.SIZE", 96)
     monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path_factory.mktemp("none")))
     monkeypatch.setenv("TEXGS_CACHE", str(tmp_path_factory.mktemp("cache")))
     monkeypatch.setattr("texgs.viewer.looks.unusable", lambda name: "they are missing")

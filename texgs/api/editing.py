@@ -200,8 +200,7 @@ class Editing:
         """Give parts a new look by a method of editing with values of its settings."""
         from texgs.config.recipes import Edit
         from texgs.edit.method import method_of
-        from texgs.edit.orbit_task import orbit_task
-        from texgs.edit.task import parts_of
+        from texgs.edit.task import orbit_task, parts_of
         from texgs.scene.parts import look_of
 
         before, device = self.session.scene, self.session.composition.device

@@ -1,21 +1,33 @@
-"""The colours that stylising starts from: close to the style already, they save most of the iterations."""
+"""The colours that stylising starts from: close to the style already, they save most of the iterations.
+
+Pictures are laid onto surfaces by place and normal, in chunks whose strokes stay whole, as StyleBlit does.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.edit.layout import laid_out
+from texgs.core.geometry import quats_to_matrices
 from texgs.edit.recipe import Start
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texels import bare_colors
+from texgs.fields.surfels.texels import EXTENT, bare_colors, owners
 
 LEAST = 1e-10  # added to the eigenvalues of covariances
+CELLS = (0.25, 0.5, 1.0)  # sides of cells that may share a chunk, in longer sides of the picture
+ALIKE = 0.8  # cosine between the normal of a surfel and the mean normal of its chunk
+DRIFT = 0.125  # longer sides of the picture between where a chunk and where the surfel alone would read it
+RIM = 0.98  # part of a sphere's radius that is read: the last pixels have some of the background
+MOST = 1 << 16  # cells along an axis
+TEXELS = 1 << 18  # at a time
+# What the picture shows to the right and down, where a surface faces x, y or z: (z, -y), (x, z), (x, -y).
+RIGHT, DOWN = ((0.0, 0, 1), (1, 0, 0), (1, 0, 0)), ((0.0, -1, 0), (0, 0, 1), (0, -1, 0))
 
 
 def start_colors(
@@ -66,3 +78,100 @@ def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
     )
     matrix = torch.linalg.solve(whiten_style, whiten)
     return matrix, mean_style[0] - matrix @ mean[0]
+
+
+@torch.no_grad()
+def laid_out(parameters: Mapping[str, Tensor], picture: Tensor, pixel: float, sphere: bool = False) -> Tensor:
+    """Return the colour of every texel [T, 3] from a picture [3, h, w] that is mirrored beyond its edges.
+
+    A surfel reads the picture where its place falls on it, seen along the axis that it faces most. Neighbours
+    that face about the same way share a chunk: a plane onto which the picture is laid without stretching.
+    Chunks are as large as curvature lets them be (Sykora et al. 2019, in the world instead of an image).
+
+    With `sphere` the picture shows a sphere that fills its shorter side, seen from +z. A surfel reads it
+    where the sphere has its normal in the world, on the side away from the middle of all surfels; what faces
+    -z has the colours of what faces +z. Chunks are parts of the sphere.
+
+    A pixel has a side in world units. Texels that no surfel owns are black.
+    """
+    check.shape("picture", picture, "3 h w")
+    p, (height, width) = parameters, picture.shape[1:]
+    axes = quats_to_matrices(p["quats"])  # [N, 3, 3], columns are both tangents and the normal
+    places, normals = p["means"] / pixel, axes[:, :, 2]
+    radius = RIM * min(height, width) / 2 if sphere else torch.inf
+    alone = on_sphere(places, normals, radius) if sphere else on_planes(places, normals)
+    middles, planes = in_chunks(places, *alone, max(height, width))
+    steps = planes @ axes[:, :, :2] * (p["scales"].exp() * EXTENT / p["sizes"] / pixel)[:, None]
+    return read_texels(p, picture, middles, steps, radius)
+
+
+def read_texels(
+    parameters: Mapping[str, Tensor], picture: Tensor, middles: Tensor, steps: Tensor, radius: float
+) -> Tensor:
+    """Return the colour of every texel [T, 3] of surfels whose middles [N, 2] are on a picture [3, h, w].
+
+    Steps [N, 2, 2] have in their columns how far it is from a texel to the next of a row, and to the next
+    row. All are in pixels right and down from the picture's middle; what is beyond a radius is read there.
+    """
+    p, half = parameters, steps.new_tensor(picture.shape[:0:-1]) / 2
+    first = middles - (steps * (p["sizes"][:, None] - 1)).sum(2) / 2  # [N, 2] the first texel of each
+    across, along = (x.contiguous() for x in steps.unbind(2))
+    colors = torch.zeros_like(p["texels"])
+    for texel, surfel in zip(*(x.split(TEXELS) for x in owners(p)), strict=True):
+        within, columns = texel - p["offsets"][surfel], p["sizes"][:, 0].long()[surfel]
+        column, row = (x.to(first)[:, None] for x in (within % columns, within // columns))
+        start, right, down = (x.index_select(0, surfel) for x in (first, across, along))
+        at = start + column * right + row * down
+        if radius < torch.inf:
+            at = at * (radius / at.norm(dim=1, keepdim=True).clamp_min(radius))
+        grid = (at / half)[None, None]
+        read = F.grid_sample(picture[None], grid, padding_mode="reflection", align_corners=False)
+        colors.index_copy_(0, texel, read[0, :, 0].T)
+    return colors
+
+
+def on_planes(places: Tensor, normals: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Return normals [N, 3] on the side of an axis, where surfels alone read a picture [N, 2], their planes.
+
+    A plane [N, 2, 3] says what the picture shows to the right and down: the same as across the axis that the
+    normal is nearest to, turned the shortest way. Up is +y.
+    """
+    axis = normals.abs().argmax(1)
+    ahead = F.one_hot(axis, 3).to(normals)
+    normals = normals * (normals * ahead).sum(1, keepdim=True).sign()
+    across = normals.new_tensor((RIGHT, DOWN))[:, axis].transpose(0, 1)  # [N, 2, 3]
+    lean = across @ normals[:, :, None] / (1 + (normals * ahead).sum(1))[:, None, None]
+    return normals, (across @ places[:, :, None])[:, :, 0], across - lean * (ahead + normals)[:, None]
+
+
+def on_sphere(places: Tensor, normals: Tensor, radius: float) -> tuple[Tensor, Tensor, Tensor]:
+    """Return the same for the picture of a sphere with a radius in pixels: all planes face +z."""
+    outward = (normals * (places - places.mean(0))).sum(1, keepdim=True).sign()
+    plane = normals.new_tensor((RIGHT[2], DOWN[2]))
+    normals = normals * outward
+    return normals, radius * normals @ plane.T, plane.expand(len(places), 2, 3)
+
+
+def in_chunks(
+    places: Tensor, normals: Tensor, alone: Tensor, planes: Tensor, side: int
+) -> tuple[Tensor, Tensor]:
+    """Return where surfels read the picture [N, 2], and their planes [N, 2, 3], once they share chunks.
+
+    A chunk has the surfels of a cell that face the same axis, and their mean place, normal and plane. A
+    surfel stays in the largest chunk that suits it, or alone.
+    """
+    facing = torch.cat([normals, -normals], 1).argmax(1)
+    rows = torch.cat([places, normals, alone, planes.flatten(1)], 1)  # [N, 14]
+    shared = alone
+    for share in CELLS:
+        x, y, z = ((places / (share * side)).floor().long() % MOST).unbind(1)
+        _, chunk = (((x * MOST + y) * MOST + z) * 6 + facing).unique(return_inverse=True)
+        count = chunk.bincount()[:, None]
+        means = rows.new_zeros(len(count), rows.shape[1]).index_add_(0, chunk, rows) / count
+        place, normal, at, plane = (each[chunk] for each in means.split((3, 3, 2, 6), 1))
+        plane = F.normalize(plane.unflatten(1, (2, 3)), dim=2)
+        at = at + (plane @ (places - place)[:, :, None])[:, :, 0]
+        suits = (normals * F.normalize(normal, dim=1)).sum(1, keepdim=True) > ALIKE
+        suits &= (at - alone).norm(dim=1, keepdim=True) < DRIFT * side
+        shared, planes = torch.where(suits, at, shared), torch.where(suits[..., None], plane, planes)
+    return shared, planes

@@ -20,9 +20,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed
 from texgs.core.names import part_file
 from texgs.edit.method import method_of
-from texgs.edit.orbit_task import OrbitTask, orbit_task
 from texgs.edit.readable import raised
-from texgs.edit.task import EditedScene, parts_with_surfels
+from texgs.edit.task import EditedScene, OrbitTask, orbit_task, parts_with_surfels
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import write_texture
 from texgs.models.instruction import understand, vocabulary

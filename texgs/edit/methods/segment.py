@@ -11,7 +11,6 @@ from texgs.core.keys import key
 from texgs.core.lens import Lens, frequency_of
 from texgs.core.names import require_name
 from texgs.edit.method import Method, MethodKeys
-from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, normalized_clicks
 
 if TYPE_CHECKING:
     import torch
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
 SHOWN = 3  # views of the segment around the object
 POLAR = 20.0  # of these views, degrees
 DIMMED = 0.15  # opacity of what is not in the segment, in its picture
+MASKS = ("mobile_sam", "sam_vit_h", "grabcut")  # the second is the paper's
 
 
 @dataclass(frozen=True)
@@ -171,3 +171,17 @@ METHOD = Method(
     needs=frozenset({"segments"}),
     is_look=False,
 )
+
+
+def mask_weights(masks: str) -> dict[str, str]:
+    """Return the weights of what finds the object, for `Method.weights`."""
+    return {} if masks == "grabcut" else {masks: "masks=grabcut"}
+
+
+def normalized_clicks(name: str, points: Sequence[Any]) -> list[list[float]]:
+    """Return clicks as shares of the sides of a picture, checked."""
+    for point in points:
+        is_pair = isinstance(point, list) and len(point) == 2
+        if not is_pair or not all(isinstance(x, int | float) and 0 <= x < 1 for x in point):
+            raise ArgumentError(f"{name}: expected two shares from 0 to below 1, got {point}")
+    return list(points)
