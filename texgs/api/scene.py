@@ -181,7 +181,7 @@ class Scene(Editing):
         return self.show()._repr_mimebundle_()  # type: ignore[union-attr]
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """Return the visible surfels as polygons of PyVista; see `texgs.scene.polydata.polydata_of`."""
+        """Return the visible surfels as polygons of PyVista; see `texgs.scene.joined.polydata_of`."""
         from texgs.fields.surfels.composition import Composition
         from texgs.scene.joined import joined, polydata_of
 

@@ -262,7 +262,7 @@ class Session:
         return frame(composition, camera, scene, mode, twin, transparent=transparent)
 
     def point_at(self, camera: Camera, mode: str, scene: Scene, pixel: tuple[int, int]) -> list[float] | None:
-        """Return the point of a scene of the history that a pixel shows; see `texgs.scene.pick.point_at`."""
+        """Return the point of a scene of the history that a pixel shows; see `texgs.scene.frame.point_at`."""
         twin = self.twin_of(scene) if needs_twin(scene, mode) else None
         return point_at(self.composition_of(scene), camera, scene, mode, twin, pixel)
 
