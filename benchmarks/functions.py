@@ -30,8 +30,7 @@ from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.session import Session
 from texgs.scene.twin import SceneVolume, Twin
-from texgs.viewer.beside import Beside
-from texgs.viewer.frames import STEPS, Frames, Pace
+from texgs.viewer.frames import STEPS, Beside, Frames, Pace
 from texgs.viewer.messages import View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.shared_edits import Opened, SharedEdits

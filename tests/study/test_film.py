@@ -9,7 +9,7 @@ from tests.fields.voxels.test_voxels import ball
 from texgs.core.lens import Frame
 from texgs.fields.voxels.file import write_voxels
 from texgs.scene.scene import Scene, SceneModel
-from texgs.study.film import cell, mosaic, write_film
+from texgs.study.ballot_page import cell, mosaic, write_film
 
 
 @pytest.mark.parametrize("count", range(1, 12))

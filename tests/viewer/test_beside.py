@@ -17,7 +17,7 @@ from texgs.raster.reference.losses import similarities
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
-from texgs.viewer.beside import Beside
+from texgs.viewer.frames import Beside
 from texgs.viewer.messages import Orbit, View
 from texgs.viewer.origins import Origins
 

@@ -32,9 +32,9 @@ from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import SceneVolume, Twin
-from texgs.viewer.beside import shown as shown_beside
 from texgs.viewer.description import describe
 from texgs.viewer.downloads import Downloads, exports_of
+from texgs.viewer.frames import shown as shown_beside
 from texgs.viewer.messages import Export, parse
 from texgs.viewer.page_volume import LEVELS, PageVolume, page_volume, within
 from texgs.viewer.standalone import pack

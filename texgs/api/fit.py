@@ -105,7 +105,7 @@ def compose_in(
     volume: Volume, functions: Mapping[str, TransferFunction], words: tuple[str, ...], folder: Path
 ) -> Path:
     """Run the stages up to the scene with results in a folder; return the scene's file."""
-    from texgs.workflow.ensure import ensure
+    from texgs.workflow.execution import ensure
     from texgs.workflow.stage import made
     from texgs.workflow.stage_table import STAGES, jobs
 

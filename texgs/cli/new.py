@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.config.project import check_name, members, own_folder, shown
     from texgs.volume.tf_files import read_tf
     from texgs.workflow.checks import check_basic_tfs
-    from texgs.workflow.ensure import ensure
+    from texgs.workflow.execution import ensure
     from texgs.workflow.stage_table import STAGES
 
     name = arguments.name or re.sub(r"[^A-Za-z0-9_]+", "_", arguments.file.name.split(".")[0])

@@ -9,7 +9,7 @@ from pathlib import Path
 from texgs.config.compose import compose
 from texgs.core.errors import ArgumentError
 from texgs.workflow.checks import check_basic_tfs, require_edit, require_fit, require_fits
-from texgs.workflow.ensure import ensure, makers
+from texgs.workflow.execution import ensure, makers
 from texgs.workflow.job import Job
 from texgs.workflow.locate import tf_names
 from texgs.workflow.stage_table import STAGES

@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
 def films_of(questions: list[Question], size: int, frames: int, device: torch.device) -> list[bytes]:
     """Draw the film of each question, MP4."""
     from texgs.scene.scene_file import read_scene
-    from texgs.study.film import write_film
+    from texgs.study.ballot_page import write_film
 
     films = []
     with TemporaryDirectory() as folder:

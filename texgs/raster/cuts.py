@@ -31,7 +31,7 @@ def cut_range(normals: Tensor, offsets: Tensor, camera: Camera) -> CutRange:
     """Find the part of each ray of a camera that lies behind all planes: where normal . x <= offset.
 
     There are 12 normals [P, 3] at most, outward, of any length but zero; offsets [P] are in these lengths and
-    world units. Not differentiable. `texgs.raster.reference.cuts` is the definition.
+    world units. Not differentiable. `texgs.raster.reference.render` is the definition.
     """
     matrices = {"viewmat": (camera.viewmat, "4 4"), "K": (camera.K, "3 3")}
     inputs = {"normals": (normals, "P 3"), "offsets": (offsets, "P"), **matrices}

@@ -17,10 +17,9 @@ from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer import messages
-from texgs.viewer.beside import Beside
 from texgs.viewer.description import bounds, describe, presets
 from texgs.viewer.downloads import exports_of
-from texgs.viewer.frames import Frames
+from texgs.viewer.frames import Beside, Frames
 from texgs.viewer.guard import guard, headers
 from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Pick, Save, Segment, View, parse
 from texgs.viewer.origins import Origins

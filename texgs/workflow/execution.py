@@ -1,19 +1,28 @@
-"""Run one job in a folder of its own, tracked, with its numbers in metrics.json."""
+"""Run one job in a folder of its own, tracked, with its numbers in metrics.json; or with those before it."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from pathlib import Path
 
+from texgs.config.compose import compose
+from texgs.config.schema import Config
+from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.progress import curve_logger
+from texgs.edit.method import NO_METHOD
 from texgs.report.results import plain
 from texgs.workflow import result, tracked
 from texgs.workflow.job import Job
-from texgs.workflow.missing import require_same
+from texgs.workflow.locate import cached_volume, source_file
+from texgs.workflow.missing import needed, require_same
 from texgs.workflow.provenance import record
 from texgs.workflow.runs import run
+from texgs.workflow.stage import Stage
+from texgs.workflow.stage_table import jobs
 
 
 def execute(job: Job, tracking: tracked.Tracking, *, force: bool = False) -> bool:
@@ -68,3 +77,58 @@ def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
         write_json(work / result.METRICS, metrics)
         result.publish(job.output)
         tracked.log_result(recorded, job, metrics)
+
+
+def fetch_volume(config: Config) -> None:
+    """Download the volume's file, where it is not on this machine."""
+    from texgs.volume.download import download
+
+    volume, path = config.dataset.volume, source_file(config)
+    if path is not None and volume.url and path == cached_volume(volume) and not path.exists():
+        download(volume.url, str(volume.sha256), path)
+
+
+def makers(words: tuple[str, ...]) -> dict[Path, tuple[Stage, Config]]:
+    """Return the jobs that can make what a stage reads, by their folders."""
+    config = compose(words)
+    fits = [(*words, f"fit={recipe}") for recipe in config.fits] or [words]
+    configs = [compose((*each, "edit=none")) for each in fits]
+    configs += [config] if config.edit.method != NO_METHOD else []
+    return {stage.output(each): (stage, each) for config in configs for stage, each in jobs(config)}
+
+
+def ensure(
+    stage: Stage,
+    config: Config,
+    known: dict[Path, tuple[Stage, Config]] | None = None,
+    *,
+    force: bool = False,
+    tell: Callable[[str], None] = print,
+) -> None:
+    """Run a stage, and before it the jobs whose files it reads, unless their results are there already.
+
+    Args:
+        stage: to run.
+        config: of it.
+        known: those jobs by their folders, of which those that were run are taken out.
+        force: run the stage itself in any case.
+        tell: gets a line for each job.
+    """
+    from texgs.models.weights import locate
+
+    if stage.name == "volume":
+        fetch_volume(config)
+    known = {} if known is None else known
+    known.pop(stage.output(config), None)
+    for path in stage.inputs(config).values():
+        if path.parent in known:
+            ensure(*known[path.parent], known, tell=tell)
+    checksums = Checksums.load()
+    job = Job.of(stage, config, checksums)
+    if stage.place == "edit" and (force or not job.is_done()):
+        for name in needed(config.edit):
+            locate(name)
+        job = Job.of(stage, config, checksums)  # with what was downloaded
+    has_run = execute(job, tracked.Tracking(config.tracking.uri, config.tracking.experiment), force=force)
+    checksums.save()
+    tell(f"{job.output}: {'done' if has_run else 'up to date'}")

@@ -11,6 +11,7 @@ from types import ModuleType
 
 import torch
 from torch import Tensor
+from torch.nn.functional import pad
 
 from texgs.core.errors import ArgumentError
 from texgs.raster.reference import gaussians, surfels
@@ -189,3 +190,14 @@ def statistics(weights: Tensor, radii: Tensor, index: Tensor, n: int) -> Statist
 def scatter(values: Tensor, index: Tensor, n: int) -> Tensor:
     """Return the values of what was kept at their places among all n; 0 elsewhere."""
     return values.new_zeros(n, *values.shape[1:]).index_copy(0, index, values)
+
+
+def cut_range(normals: Tensor, offsets: Tensor, origin: Tensor, rays: Tensor) -> tuple[Tensor, Tensor]:
+    """Return `depth_range` and `face` of rays [H, W, 3] with camera z 1 from a point; see `raster.cuts`."""
+    slope = rays @ normals.mT  # [H, W, P]: how fast a ray leaves the kept side
+    place = (offsets - normals @ origin) / slope.abs()
+    enters = torch.where(slope < 0, -place, 0).clamp_min(0)
+    near, face = pad(enters, (1, 0)).max(dim=-1)
+    far = torch.where(slope >= 0, place, torch.inf).nan_to_num(torch.inf, torch.inf, -torch.inf)
+    far = pad(far, (1, 0), value=torch.inf).amin(-1)
+    return torch.stack([near, far]), torch.where(near < far, face - 1, -1).int()
