@@ -33,6 +33,7 @@ from texgs.fields.surfels.step_file import at_step
 from texgs.fields.surfels.texels import recolored
 from texgs.volume.caster import Caster
 from texgs.volume.generate_series import SERIES
+from texgs.volume.generate_series import series as made
 
 BLOTS = 6.0  # pixels of the picture: standard deviation of what is blurred to blots of four colours
 COLORS = np.array([[0.1, 0.2, 0.5], [0.9, 0.75, 0.2], [0.85, 0.3, 0.15], [0.95, 0.95, 0.9]], np.float32)
@@ -48,7 +49,7 @@ def main(output: str, folder: str) -> None:
 @torch.no_grad()
 def flicker(name: str, folder: Path) -> dict:
     """Render all steps of a series in all ways, and return how much each differs from one to the next."""
-    grids, tf = list(SERIES[name](SAMPLES, STEPS)), TFS[name]
+    grids, tf = made(name, SAMPLES, STEPS), TFS[name]
     camera = orbit(30, 20, *lens_of(grids[STEPS // 2], tf))
     key = read_model(folder / "finer-0.safetensors")
     picture, pixel = blots(), pixel_side(key, [camera])

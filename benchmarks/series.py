@@ -32,6 +32,7 @@ from texgs.volume.cameras import spiral
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.generate_series import SERIES
+from texgs.volume.generate_series import series as made
 from texgs.volume.grid import Grid
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
@@ -59,7 +60,7 @@ def main(output: str, folder: str, *names: str) -> None:
 
 def series(name: str, folder: Path) -> dict:
     """Follow one series, and return the means of its steps, and rows of those that are compared."""
-    steps, tf = list(SERIES[name](SAMPLES, STEPS)), TFS[name]
+    steps, tf = made(name, SAMPLES, STEPS), TFS[name]
     alone = {step: independent(folder, steps[step], tf, step) for step in compared()}
     key = read_model(folder / "finer-0.safetensors")
     model, follower, costs, rows = key, Follower(key, LOOK, tf), [], {}

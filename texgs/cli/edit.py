@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.cli.options import add_device, add_lens, lens_of, option
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.lens import Lens
-from texgs.core.names import SCENES, natural_order, new_part_file, require_name
+from texgs.core.names import SCENES, new_part_file, require_name
 
 if TYPE_CHECKING:
     import torch
@@ -108,14 +107,11 @@ def run_series(arguments: argparse.Namespace) -> int:
     """
     from texgs.core.check import torch_device
     from texgs.scene.scene_file import read_scene
+    from texgs.workflow.moments import matching
     from texgs.workflow.series import make_series
 
-    files = []
-    for name in arguments.files:
-        found = sorted(map(Path, glob(name)), key=natural_order)  # noqa: PTH207 - Path's takes no whole path
-        if not found:
-            raise ArgumentError(f"--files: expected files that are there, got {name}")
-        files += found
+    with located("--files"):
+        files = matching(arguments.files)
     print(make_series(read_scene(arguments.scene), files, arguments.output, torch_device(arguments.device)))
     return 0
 

@@ -30,6 +30,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="keys of dataset.volume, such as dims=[256,256,128] dtype=uint8 spacing=[1,1,2] up=+z reduce=2",
     )
+    parser.add_argument(
+        "--series",
+        nargs="+",
+        default=[],
+        metavar="FILE",
+        help="steps of a series in time, such as 'step_*.nrrd'; the volume is one of them",
+    )
     parser.add_argument("--name", help="of the data set (the file's name)")
     parser.add_argument(
         "--count", type=int, help="number of transfer functions to suggest (as many as the histogram shows)"
@@ -51,6 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.volume.tf_files import read_tf
     from texgs.workflow.checks import check_basic_tfs
     from texgs.workflow.execution import ensure
+    from texgs.workflow.locate import series_files
     from texgs.workflow.stage_table import STAGES
 
     name = arguments.name or re.sub(r"[^A-Za-z0-9_]+", "_", arguments.file.name.split(".")[0])
@@ -64,6 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
     for path in arguments.tf or ():
         read_tf(path)  # a mistake in it is told before the volume is read
     config = configuration(name, arguments.file, arguments.overrides)
+    config = replace(config, dataset=replace(config.dataset, series=[*map(absolute, arguments.series)]))
+    series_files(config)
     ensure(STAGES["volume"], config)
     basic = basic_tfs(config, arguments.tf, arguments.count)
     listed = {key: BasicTF([*map(list, tf.opacity)], [*map(list, tf.color)]) for key, tf in basic.items()}
@@ -88,15 +98,21 @@ def configuration(name: str, file: Path, overrides: list[str]) -> Config:
     """Return the configuration as it will be with the new data set, but without basic TFs and tracking."""
     from texgs.config.dataset import Dataset, Volume
 
-    path = str(file.parent.resolve() / file.name)
-    if "${" in path:
-        raise ArgumentError(f"{path}: expected a path without ${{, which stands for another key; rename it")
-    if any("\ud800" <= letter <= "\udfff" for letter in path):
-        raise ArgumentError(f"{path!r}: expected a path in UTF-8; rename it")
+    path = absolute(file)
     words = [f"dataset.volume.{word}" for word in ("generator=null", *overrides)]
     config = compose(("tracking=none", *words))
     given = {key: getattr(config.dataset.volume, key) for key in changed(overrides)}
     return replace(config, dataset=Dataset(name=name, title=name, volume=Volume(**{**given, "file": path})))
+
+
+def absolute(file: str | Path) -> str:
+    """Return a path as configurations hold it; its last part may be a pattern."""
+    path = str(Path(file).parent.resolve() / Path(file).name)
+    if "${" in path:
+        raise ArgumentError(f"{path}: expected a path without ${{, which stands for another key; rename it")
+    if any("\ud800" <= letter <= "\udfff" for letter in path):
+        raise ArgumentError(f"{path!r}: expected a path in UTF-8; rename it")
+    return path
 
 
 def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> dict[str, TransferFunction]:
@@ -134,7 +150,8 @@ def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> di
 def document(config: Config, keys: list[str]) -> str:
     """Return the YAML of a data set, with some keys of its volume; a line per list of points."""
     dataset = asdict(config.dataset)
-    written = {key: dataset[key] for key in ("name", "title", "volume", "basic_tfs")}
+    names = ("name", "title", "volume", *(["series"] if dataset["series"] else []), "basic_tfs")
+    written = {key: dataset[key] for key in names}
     written["volume"] = {key: dataset["volume"][key] for key in keys}
     note = "# Points are [value, opacity] and [value, r, g, b]; the ranges of basic TFs must not overlap.\n"
     return note + as_yaml(written)

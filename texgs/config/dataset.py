@@ -13,7 +13,9 @@ class Volume:
     """Where the scalar field of a data set comes from: a generator, or a file that is there or downloaded."""
 
     generator: str | None = key(
-        None, "name of a built-in field", choices=("sphere", "orbital", "turbulence", "jets")
+        None,
+        "name of a built-in field",
+        choices=("sphere", "orbital", "turbulence", "jets", "rings", "flame"),
     )
     size: int = key(128, "samples along each side of a generated field", least=16)
     seed: int = key(0, "seed of a generated field")
@@ -27,7 +29,8 @@ class Volume:
         None, "array to read, by its path in the file, where Zarr, HDF5 or NetCDF has several"
     )
     channel: str | None = key(None, "label or number of the channel to read, from 0, where there are several")
-    time: int = key(0, "step to read, from 0, of an array or a series of DICOM with several", least=0)
+    time: int = key(0, "step to read or make, from 0, where there are several", least=0)
+    steps: int = key(1, "steps of a generated field that changes in time: rings or flame", least=1)
     column: int | None = key(None, "number of the column to read, from 1, where text has several", least=1)
     url: str | None = key(None, "where the file is downloaded from when it is not there")
     sha256: str | None = key(None, "checksum of the download")
@@ -85,6 +88,9 @@ class Dataset:
     stand_in: str = key("", "what the data stand in for, where the real ones are not public")
     image: int = key(800, "width and height of views", "pixels", least=1)
     volume: Volume = key(Volume, "where the scalar field comes from")
+    series: list[str] = key(
+        [], "files of the steps of a series in time, such as step_*.nrrd; volume.file is one of them"
+    )
     views_folder: str | None = key(
         None, "folder with views of one basic TF per subfolder, instead of a volume"
     )

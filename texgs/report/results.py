@@ -180,6 +180,17 @@ class PseResult(Result, section="pse"):
 
 
 @dataclass(frozen=True)
+class StepsResult(Result, section="time"):
+    """A scene that follows its volume through the steps of a series in time."""
+
+    steps: int
+    views: int  # of each step that was compared
+    step_mib: float  # that a step adds
+    compared: list[Comparison]  # some of the steps, by their names
+    step_seconds: float | None = None  # mean; not told where an interrupted job went on
+
+
+@dataclass(frozen=True)
 class TimingResult(Result):
     """Frames of a scene, and of its volume in the same job."""
 

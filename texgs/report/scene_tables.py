@@ -1,4 +1,4 @@
-"""Tables of data sets and whole scenes: `datasets`, `rendering` and `edits`."""
+"""Tables of data sets and whole scenes: `datasets`, `rendering`, `edits`, `steps` and `cuts`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,15 @@ from texgs.report.published import (
     paper,
     volumes,
 )
-from texgs.report.results import CutResult, PseResult, SheetResult, TimingResult, ViewsResult, VolumeResult
+from texgs.report.results import (
+    CutResult,
+    PseResult,
+    SheetResult,
+    StepsResult,
+    TimingResult,
+    ViewsResult,
+    VolumeResult,
+)
 from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Column, Table
 
 DATASETS = (
@@ -70,6 +78,13 @@ CLOSENESS = {
     "object_psnr": Column("PSNR on the object", 2),
     "object_ssim": Column("SSIM on the object", 4),
 }
+STEPS = (
+    *map(Column, (DATA, LABEL)),
+    *(Column(title, 0) for title in ("steps", "compared", "views")),
+    Column("s / step", 1),
+    Column("MiB / step", 2),
+    *(Column(title, 2) for title in ("PSNR", "PSNR of the worst step", "PSNR on the object")),
+)
 EDITS = (*map(Column, (DATA, LABEL, "edit")), Column("views", 0), *CLOSENESS.values())
 
 
@@ -173,6 +188,24 @@ def edits(records: Iterable[Record[Any]]) -> Table:
         for step in (*record.result.pse, *record.result.relight)
     ]
     return Table("", EDITS, rows)
+
+
+def steps(records: Iterable[Record[Any]]) -> Table:
+    """Return how close the steps of series are to their volumes, and what one costs."""
+    rows = []
+    for record in in_order(of(StepsResult, records)):
+        result = record.result
+        scores = [step.psnr for step in result.compared if step.psnr is not None]
+        quality = {
+            "s / step": result.step_seconds,
+            "MiB / step": result.step_mib,
+            "PSNR": mean(scores),
+            "PSNR of the worst step": min(scores, default=None),
+            "PSNR on the object": mean([step.object_psnr for step in result.compared]),
+        }
+        counts = {"steps": result.steps, "compared": len(result.compared), "views": result.views}
+        rows.append(cells(record, **counts, **quality))
+    return Table("", STEPS, rows)
 
 
 def cuts(records: Iterable[Record[Any]]) -> Table:

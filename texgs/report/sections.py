@@ -27,6 +27,7 @@ SECTIONS = {
     "pse": "Editing of colour, opacity and light",
     "relight": "Relighting",
     "cuts": "Cuts",
+    "time": "Through time",
     "image": "Image-driven editing",
     "text": "Text-driven editing",
     "parts": "Partial editing and other edits",

@@ -11,7 +11,7 @@ from texgs.report.edit_tables import image_driven, looks, text_driven, text_driv
 from texgs.report.fit_tables import ablation, fits, fitting, meshes, model_size
 from texgs.report.metrics_files import LeftOut, Record, note
 from texgs.report.results import EditResult, FitResult
-from texgs.report.scene_tables import cuts, datasets, edits, rendering
+from texgs.report.scene_tables import cuts, datasets, edits, rendering, steps
 from texgs.report.sweep_table import sweep
 from texgs.report.table import Table
 
@@ -154,6 +154,14 @@ OURS = (
         "cuts",
         ("cuts",),
         cuts,
+    ),
+    TableSpec(
+        "steps",
+        "Series in time",
+        "Steps that are followed from the fitted one, each against its volume.",
+        "time",
+        ("steps",),
+        steps,
     ),
     TableSpec("looks", "All measures of all edits", "", "more", EDITED, looks),
     TableSpec("meshes", "Meshes", "", "fitting", ("mesh",), meshes),

@@ -176,4 +176,4 @@ GENERATORS: dict[str, Callable[..., Grid]] = {
     "turbulence": turbulence,
     "jets": jets,
 }
-RANDOM = ("turbulence", "jets")  # those that a seed changes
+RANDOM = ("turbulence", "jets", "flame")  # those that a seed changes, also of series

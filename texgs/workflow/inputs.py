@@ -40,6 +40,12 @@ def has_scene(config: Config) -> bool:
     return is_fit(config) and config.tf is None
 
 
+def is_series(config: Config) -> bool:
+    """Return whether scenes have all steps of a series in time: those of surfels, but for sweeps."""
+    has_steps = bool(config.dataset.series) or config.dataset.volume.steps > 1
+    return has_steps and config.fit.field == "surfels" and not is_swept(config)
+
+
 def is_swept(config: Config) -> bool:
     """Return whether the configuration is of a sweep."""
     return bool(changes(config))
@@ -85,6 +91,11 @@ def models_and_volume(config: Config) -> dict[str, Path]:
     return models if config.dataset.views_folder is not None else {**models, **prepared_volume(config)}
 
 
+def fitted_scene(config: Config) -> Path:
+    """Return the scene.yaml before any edit, of all steps where the data set is a series."""
+    return made("steps" if is_series(config) else "compose", config)
+
+
 def scene_and_volume(config: Config) -> dict[str, Path]:
     """Return the scene with all that it names."""
     return {"scene": made("compose", config), **models_and_volume(config)}
@@ -94,7 +105,7 @@ def scene_before(config: Config) -> Path:
     """Return the scene.yaml that an edit starts from."""
     base = config.edit.base
     if base is None:
-        return made("compose", config)
+        return fitted_scene(config)
     if not is_scene_file(base):
         return sibling(config, base)
     if not Path(base).is_file():

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from texgs.config.dataset import BasicTF, Volume
 from texgs.config.project import check_name
 from texgs.core.cache import cache_folder
-from texgs.core.errors import ConfigError, MissingDataError
+from texgs.core.errors import ArgumentError, ConfigError, MissingDataError, located
 from texgs.core.io import is_there
 from texgs.core.names import file_name
+from texgs.workflow.moments import in_time, matching
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config
@@ -42,6 +43,30 @@ def source_file(config: Config) -> Path | None:
         f"data set {dataset.name}: {path} is not there; {volume.obtain or 'put it there'}, "
         "or name its folder with data_folder=FOLDER or TEXGS_DATA"
     )
+
+
+def series_files(config: Config) -> list[Path]:
+    """Return files or folders of the steps of a data set's series, in order; none where it has none.
+
+    MissingDataError tells which are not there. Where there are several, the volume has to be one of them.
+    """
+    name, own = config.dataset.name, source_file(config)
+    try:
+        files = matching(Path(config.data_folder, each) for each in config.dataset.series)
+    except ArgumentError as error:
+        raise MissingDataError(
+            f"data set {name}: dataset.series: {error}; put them there, or name the folder above with "
+            "data_folder=FOLDER or TEXGS_DATA"
+        ) from error
+    if len(files) < 2:
+        return files
+    if own not in files:
+        raise ConfigError(
+            f"dataset.series of {name}: expected volume.file to be one of them, got {own} beside "
+            f"{files[0]} to {files[-1].name}"
+        )
+    with located(f"dataset.series of {name}"):
+        return [moment.file for moment in in_time(files) if moment.file]
 
 
 def cached_volume(volume: Volume) -> Path:

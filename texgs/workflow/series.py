@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import filecmp
-import re
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
-from os.path import commonpath
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -30,32 +26,26 @@ from texgs.scene.twin import SceneVolume, volume_of
 from texgs.volume.framing import shown_corners, smallest_ball
 from texgs.volume.headers import NRRD
 from texgs.volume.nrrd_file import open_grid
+from texgs.workflow.moments import Moment, in_time
 from texgs.workflow.stages.volume import prepared, source
 
-NUMBER = re.compile(r"\d+(?=\D*$)")
 
-
-class Moment(NamedTuple):
-    """Where the volume of a step comes from: a file or folder, or a step of its axis of time."""
-
-    name: str  # what the step is called
-    file: Path
-    time: int | None = None
-
-
-def make_series(scene: Scene, files: Sequence[Path], folder: Path, device: torch.device) -> Path:
+def make_series(
+    scene: Scene, files: Sequence[Path], folder: Path, device: torch.device, settings: Volume | None = None
+) -> Path:
     """Follow the models of a scene through a series of volumes, and write a scene of all steps.
 
-    A single file or folder has all of them, along an axis of time.
+    A single file or folder has all of them, along an axis of time; without files they are generated.
 
     The volumes are prepared as that of the scene was, which has to be one of them: its step is the one that
     models are followed from, on and back. What an earlier call has left in the folder is not made again.
+    Settings say how volumes are read; by default the workflow's record beside the scene's volume does.
 
     The folder gets scene.yaml, series.json, and the volumes and models of steps. Files that are missing or on
     another lattice are refused, and a folder of another series.
     """
     volume = volume_of(scene)
-    settings = settings_of(volume.file)
+    settings = settings or settings_of(volume.file)
     moments = moments_of(files, settings)
     series = Series(folder / "series.json", [moment.name for moment in moments], list(scene.models))
     if series.file.exists() and read_series(series.file) != series:
@@ -65,7 +55,7 @@ def make_series(scene: Scene, files: Sequence[Path], folder: Path, device: torch
     steps = range(len(moments))
     same = (step for step in steps if filecmp.cmp(series.volume(step), volume.file, shallow=False))
     if (start := next(same, None)) is None:
-        raise ArgumentError(f"--files: expected one of them to be the volume of the scene, {volume.file}")
+        raise ArgumentError(f"steps: expected one of them to be the volume of the scene, {volume.file}")
     for name, entry in scene.models.items():
         with located(f"models.{name}"):
             for order in (range(start, len(moments)), range(start, -1, -1)):
@@ -76,7 +66,12 @@ def make_series(scene: Scene, files: Sequence[Path], folder: Path, device: torch
 
 
 def moments_of(files: Sequence[Path], settings: Volume) -> list[Moment]:
-    """Return the steps of several files or folders, or of one: of a folder of NRRD, or along its own time."""
+    """Return the steps of several files or folders, or of one: of a folder of NRRD, or along its own time.
+
+    Without files, they are those of a generator.
+    """
+    if not files and settings.generator:
+        return [Moment(f"step {time}", time=time) for time in range(settings.steps)]
     if len(files) == 1:
         only = files[0]
         inner = [each for each in only.iterdir() if each.suffix in NRRD] if only.is_dir() else []
@@ -87,41 +82,6 @@ def moments_of(files: Sequence[Path], settings: Volume) -> list[Moment]:
         if count > 1:
             return [Moment(f"{only.name}, step {time}", only, time) for time in range(count)]
     return in_time(files)
-
-
-def in_time(files: Sequence[Path]) -> list[Moment]:
-    """Return the steps of several files, in the order of their numbers where all have one.
-
-    Numbers that are multiples of their least distance count steps, of which none may be missing; others are
-    dates, say.
-    """
-    if len(files) < 2:
-        got = ", ".join(map(str, files)) or "none"
-        raise ArgumentError(f"--files: expected two files at least, got {got}; 'step_*.nrrd' names several")
-    paths = [file.absolute() for file in files]
-    base = commonpath([path.parent for path in paths])
-    moments = [
-        Moment(path.relative_to(base).as_posix(), file) for path, file in zip(paths, files, strict=True)
-    ]
-    if None in map(number_of, moments):
-        return moments
-    moments.sort(key=lambda moment: natural_order(Path(moment.name)))
-    gaps = [(number_of(after) or 0) - (number_of(before) or 0) for before, after in pairwise(moments)]
-    least = min(gaps)
-    is_count = least > 0 and all(gap % least == 0 for gap in gaps)
-    for (before, after), gap in zip(pairwise(moments), gaps, strict=True):
-        if is_count and gap > least:
-            raise ArgumentError(
-                f"--files: expected a file each {least}, got none between {before.name} and {after.name}; "
-                "name the files of one part of the series"
-            )
-    return moments
-
-
-def number_of(moment: Moment) -> int | None:
-    """Return the last number in the name of a step, without what tells its format."""
-    found = NUMBER.search(str(Path(moment.name).with_suffix("")))
-    return int(found[0]) if found else None
 
 
 def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, volume: SceneVolume) -> None:

@@ -10,7 +10,7 @@ from texgs.config.views import ViewKeys
 from texgs.edit.method import method_of, methods
 from texgs.report.results import EditMeasures
 from texgs.workflow.edits import edited_scene
-from texgs.workflow.inputs import view_settings, with_recipe
+from texgs.workflow.inputs import fitted_scene, view_settings, with_recipe
 from texgs.workflow.stage import EVERY, Config, Outcome, Rule, Stage, made, read
 from texgs.workflow.stages.edit import Settings as EditSettings
 
@@ -84,7 +84,7 @@ def inputs(config: Config) -> dict[str, Path]:
     Where the experiment has several recipes, surfaces are those of its first, for all edits alike.
     """
     first = with_recipe(config, config.fits[0]) if config.fits else config
-    scenes = {"scene": made("edit", config), "before": made("compose", config)}
+    scenes = {"scene": made("edit", config), "before": fitted_scene(config)}
     return {**edited_scene(config), **scenes, "geometry": made("compose", first)}
 
 

@@ -10,7 +10,7 @@ from texgs.core.memory import MIB
 from texgs.edit.method import methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import PageResult
-from texgs.workflow.inputs import is_fit, is_swept, models_of_scene
+from texgs.workflow.inputs import fitted_scene, is_fit, is_swept, models_of_scene
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, made, read
 from texgs.workflow.stages.settings import FitLabel, OfDataset
 
@@ -47,7 +47,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 def inputs(config: Config) -> dict[str, Path]:
     """Return the scene of an edit, or the one as fitted, with its models."""
-    return {"scene": made("compose" if is_fit(config) else "edit", config), **models_of_scene(config)}
+    scene = fitted_scene(config) if is_fit(config) else made("edit", config)
+    return {"scene": scene, **models_of_scene(config)}
 
 
 def applies(config: Config) -> bool:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.dataset import Volume
+from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
 from texgs.core.memory import MIB
 from texgs.core.progress import progress
@@ -37,8 +38,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `source`, the volume's file, where it is not generated.
     """
-    volume, generator = settings.volume, settings.volume.generator
-    field = source(volume, inputs["source"]) if generator is None else generated(volume, generator)
+    volume = settings.volume
+    field = source(volume, inputs.get("source"))
     if field.note:
         sys.stderr.write(f"{settings.dataset}: {field.note}\n")
     shown = partial(progress, title=f"{settings.dataset}: volume", unit="slab")
@@ -64,17 +65,31 @@ def prepared(volume: Volume, field: Source, target: Path, shown: Any = None) -> 
     )
 
 
-def generated(volume: Volume, generator: str) -> Source:
-    """Return the field of a generator."""
+def generated(volume: Volume) -> Source:
+    """Return the field of a generator, at its time where it changes."""
     from texgs.volume.generate import GENERATORS, RANDOM
+    from texgs.volume.generate_series import SERIES
     from texgs.volume.slabs import ArraySource
 
-    options = {"seed": volume.seed} if generator in RANDOM else {}
-    return ArraySource(GENERATORS[generator](volume.size, **options), generator)
+    name, last = str(volume.generator), volume.steps - 1
+    options: dict[str, Any] = {"seed": volume.seed} if name in RANDOM else {}
+    if volume.time > last or (last and name not in SERIES):
+        expected = f"a step from 0 to {last}" if name in SERIES else "steps=1"
+        raise ArgumentError(
+            f"volume: expected {expected} of {name}, got time={volume.time} steps={volume.steps}"
+        )
+    if name in SERIES:
+        options["time"] = volume.time / max(last, 1)
+    return ArraySource({**GENERATORS, **SERIES}[name](volume.size, **options), name)
 
 
-def source(volume: Volume, path: Path) -> Source:
-    """Return the field of a file; one that was downloaded is compared with its checksum."""
+def source(volume: Volume, path: Path | None) -> Source:
+    """Return the field of a file, or that of the generator.
+
+    A file that was downloaded is compared with its checksum.
+    """
+    if path is None:
+        return generated(volume)
     from texgs.volume.download import require_whole
     from texgs.volume.sources import open_source
 

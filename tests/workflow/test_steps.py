@@ -1,0 +1,149 @@
+"""A data set that is a series in time: its scene and edits have all steps, and a table tells of them."""
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.cli.conftest import DEMO, VIEWS, hide_weights, numbers
+from tests.volume.test_motion import blob
+from texgs.cli.main import main
+from texgs.config.compose import compose
+from texgs.core.errors import ConfigError, MissingDataError
+from texgs.fitting import series
+from texgs.report.metrics_files import read
+from texgs.report.tables import tables_of
+from texgs.scene.scene_file import read_scene
+from texgs.volume.generate_series import flame
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.prepare import prepare
+from texgs.volume.slabs import ArraySource
+from texgs.workflow.inputs import fitted_scene, scene_before
+from texgs.workflow.locate import series_files
+from texgs.workflow.stage_table import jobs
+
+RINGS = ["dataset=rings", *VIEWS[1:], *DEMO, "fit.shading.iterations=60"]
+RINGS += ["dataset.volume.size=24", "dataset.volume.steps=3", "dataset.volume.time=1"]
+GOLD = ["edit_text", *RINGS, "edit=gold", "edit.text.size=64"]
+
+
+@pytest.fixture(scope="module")
+def rings(tmp_path_factory):
+    """The scene of three steps, a look of it and its page."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("rings")
+        patch.chdir(folder)
+        hide_weights(patch, folder)
+        patch.setattr("texgs.report.before_after.TURN", 4)
+        for name, value in {"SIZE": 32, "ITERATIONS": 20}.items():
+            patch.setattr(series, name, value)
+        for words in (["steps", *RINGS], GOLD, ["page", *RINGS]):
+            assert main(words) == 0
+    return folder / "results" / "rings" / "scene" / "demo"
+
+
+@pytest.mark.stages
+def test_the_scene_of_a_generated_series_has_all_steps(rings):
+    scene = read_scene(rings / "steps" / "scene.yaml")
+    assert (scene.time, list(scene.series.steps)) == (1, ["step 0", "step 1", "step 2"])
+    volumes = [open_grid(scene.at(step).volume.file).values for step in range(3)]
+    assert len({volume.tobytes() for volume in volumes}) == 3
+    composed = read_scene(rings / "compose" / "scene.yaml")
+    assert scene.volume.file.read_bytes() == composed.volume.file.read_bytes()
+    assert (rings / "steps" / "time.mp4").stat().st_size > 1000
+
+
+@pytest.mark.stages
+def test_an_edit_of_the_series_holds_for_all_its_steps(rings):
+    before, after = (read_scene(rings / name / "scene.yaml") for name in ("steps", "edits/gold"))
+    assert [*after.series.steps] == [*before.series.steps]
+    for step in range(3):
+        own, other = (each.at(step).models["TF02"].open()[0].parameters for each in (before, after))
+        assert np.array_equal(own["means"], other["means"])
+        assert not np.array_equal(own["colors"], other["colors"])
+
+
+@pytest.mark.stages
+def test_a_table_says_how_close_steps_are_to_their_volumes(rings):
+    told = numbers(rings / "steps")
+    assert [entry["title"] for entry in told["compared"]] == ["step 0", "step 1", "step 2"]
+    assert told["step_seconds"] > 0
+    (row,) = tables_of(read([rings / "steps" / "metrics.json"]))["steps"].rows
+    assert (row["steps"], row["compared"]) == (3, 3)
+    scores = [entry["psnr"] for entry in told["compared"]]
+    assert row["PSNR"] == pytest.approx(np.mean(scores))
+    assert row["PSNR of the worst step"] == min(scores) > 10
+
+
+@pytest.fixture
+def mine(tmp_path, monkeypatch):
+    """A data set of three files, which `texgs new` has written."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TEXGS_DATA", str(tmp_path))
+    for number, place in enumerate((-0.06, 0.0, 0.06), start=8):
+        prepare(ArraySource(blob((place, 0, 0))), tmp_path / f"step_{number}.nrrd")
+    assert main(["new", "step_9.nrrd", "--series", "step_*.nrrd", "--name", "mine"]) == 0
+    return tmp_path
+
+
+def test_a_new_data_set_may_be_a_series_of_files(mine):
+    text = yaml.safe_load((mine / "conf" / "dataset" / "mine.yaml").read_text())
+    assert text["series"] == [str(mine / "step_*.nrrd")]
+    config = compose(("dataset=mine", "fit=quick"))
+    assert series_files(config) == [mine / f"step_{number}.nrrd" for number in (8, 9, 10)]
+    stages = {stage.name: each for stage, each in jobs(config)}
+    assert fitted_scene(config).parts[-2:] == ("steps", "scene.yaml")
+    assert scene_before(config) == fitted_scene(config)
+    assert "steps" in stages
+    assert "steps" not in {stage.name for stage, _ in jobs(compose(("dataset=mine", "fit=gaussians")))}
+    assert "steps" not in {stage.name for stage, _ in jobs(compose(("dataset=sphere",)))}
+
+
+@pytest.mark.parametrize(
+    ("spoil", "error", "message"),
+    [
+        (
+            lambda f: (f / "step_9.nrrd").rename(f / "step_9.nhdr"),
+            MissingDataError,
+            "step_9.nrrd is not there",
+        ),
+        (lambda f: (f / "step_10.nrrd").rename(f / "step_12.nrrd"), ConfigError, "got none between step_9"),
+    ],
+)
+def test_files_that_are_missing_are_told_before_any_job(mine, spoil, error, message):
+    spoil(mine)
+    with pytest.raises(error, match=message):
+        series_files(compose(("dataset=mine",)))
+
+
+@pytest.mark.parametrize(
+    ("listed", "error", "message"),
+    [
+        ("[other_*.nrrd]", MissingDataError, "data set mine: no file .*other_.* is there"),
+        ("[step_8.nrrd,step_10.nrrd]", ConfigError, "series of mine: expected volume.file to be one of them"),
+    ],
+)
+def test_a_series_that_lacks_the_volume_is_refused(mine, listed, error, message):
+    with pytest.raises(error, match=message):
+        series_files(compose(("dataset=mine", f"dataset.series={listed}")))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["dataset=rings", "dataset.volume.time=20"], "expected a step from 0 to 19 of rings, got time=20"),
+        (["dataset=sphere", "dataset.volume.steps=3"], "expected steps=1 of sphere, got time=0 steps=3"),
+    ],
+)
+def test_steps_that_a_generator_does_not_make_are_refused(words, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["volume", *words, "tracking=none"]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_flame_has_another_seed_and_time(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ["volume.generator=flame", "volume.size=16", "volume.steps=5", "volume.time=3", "volume.seed=7"]
+    words = ["dataset=sphere", *(f"dataset.{word}" for word in words), "tracking=none"]
+    assert main(["volume", *words]) == 0
+    grid = open_grid(tmp_path / "results" / "sphere" / "volume" / "volume.nrrd")
+    np.testing.assert_array_equal(grid.values, flame(16, 0.75, 7).values)

@@ -1,0 +1,70 @@
+"""The steps of a series in time: which files they come from, and in which order."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from glob import glob
+from itertools import pairwise
+from os.path import commonpath
+from pathlib import Path
+from typing import NamedTuple
+
+from texgs.core.errors import ArgumentError
+from texgs.core.names import natural_order
+
+NUMBER = re.compile(r"\d+(?=\D*$)")
+
+
+class Moment(NamedTuple):
+    """Where the volume of a step comes from: a file or folder, a step along its time, or a generator."""
+
+    name: str  # what the step is called
+    file: Path | None = None
+    time: int | None = None
+
+
+def matching(patterns: Iterable[str | Path]) -> list[Path]:
+    """Return what paths with wildcards stand for, files or folders; each has to stand for some."""
+    files = []
+    for pattern in patterns:
+        matches = sorted(map(Path, glob(str(pattern))), key=natural_order)  # noqa: PTH207 - Path's takes no whole path
+        if not matches:
+            raise ArgumentError(f"expected files that are there, got {pattern}")
+        files += matches
+    return files
+
+
+def in_time(files: Sequence[Path]) -> list[Moment]:
+    """Return the steps of several files, in the order of their numbers where all have one.
+
+    Numbers that are multiples of their least distance count steps, of which none may be missing; others are
+    dates, say.
+    """
+    if len(files) < 2:
+        got = ", ".join(map(str, files)) or "none"
+        raise ArgumentError(f"expected two files at least, got {got}; 'step_*.nrrd' names several")
+    paths = [file.absolute() for file in files]
+    base = commonpath([path.parent for path in paths])
+    moments = [
+        Moment(path.relative_to(base).as_posix(), file) for path, file in zip(paths, files, strict=True)
+    ]
+    if None in map(number_of, moments):
+        return moments
+    moments.sort(key=lambda moment: natural_order(Path(moment.name)))
+    gaps = [(number_of(after) or 0) - (number_of(before) or 0) for before, after in pairwise(moments)]
+    least = min(gaps)
+    is_count = least > 0 and all(gap % least == 0 for gap in gaps)
+    for (before, after), gap in zip(pairwise(moments), gaps, strict=True):
+        if is_count and gap > least:
+            raise ArgumentError(
+                f"expected a file each {least}, got none between {before.name} and {after.name}; "
+                "name the files of one part of the series"
+            )
+    return moments
+
+
+def number_of(moment: Moment) -> int | None:
+    """Return the last number in the name of a step, without what tells its format."""
+    found = NUMBER.search(str(Path(moment.name).with_suffix("")))
+    return int(found[0]) if found else None
