@@ -8,7 +8,7 @@ from tests.cli.conftest import DEMO, VIEWS, hide_weights, numbers
 from tests.volume.test_motion import blob
 from texgs.cli.main import main
 from texgs.config.compose import compose
-from texgs.core.errors import ConfigError, MissingDataError
+from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.fitting import series
 from texgs.report.metrics_files import read
 from texgs.report.tables import tables_of
@@ -106,7 +106,11 @@ def test_a_new_data_set_may_be_a_series_of_files(mine):
             MissingDataError,
             "step_9.nrrd is not there",
         ),
-        (lambda f: (f / "step_10.nrrd").rename(f / "step_12.nrrd"), ConfigError, "got none between step_9"),
+        (
+            lambda f: (f / "step_10.nrrd").rename(f / "step_12.nrrd"),
+            ArgumentError,
+            "series of mine: .* got none between step_9",
+        ),
     ],
 )
 def test_files_that_are_missing_are_told_before_any_job(mine, spoil, error, message):
@@ -118,7 +122,11 @@ def test_files_that_are_missing_are_told_before_any_job(mine, spoil, error, mess
 @pytest.mark.parametrize(
     ("listed", "error", "message"),
     [
-        ("[other_*.nrrd]", MissingDataError, "data set mine: no file .*other_.* is there"),
+        (
+            "[other_*.nrrd]",
+            MissingDataError,
+            "data set mine: dataset.series: expected files that are there, got .*other_",
+        ),
         ("[step_8.nrrd,step_10.nrrd]", ConfigError, "series of mine: expected volume.file to be one of them"),
     ],
 )
