@@ -8,8 +8,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 NAMES = """
 beetle bonsai chameleon combustion engine five_jets flame fly frog fuel heptane hydrogen iguana ionization
-ironprot isosurface jets mantle mni152 neghip orbital rings rotstrat sphere supernova supernova_isosurface tooth
-turbulence vortex wood
+ironprot isosurface jets mantle mni152 neghip orbital rings rotstrat sphere supernova supernova_isosurface
+tooth turbulence vortex wood
 """
 DATASETS = tuple(NAMES.split())
 

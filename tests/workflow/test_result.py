@@ -9,8 +9,9 @@ import pytest
 
 from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json, write_json
+from texgs.core.io import read_json, write_bytes, write_json
 from texgs.workflow import result
+from texgs.workflow.notes import note_written
 
 MINE, OTHER = {"stage": "views", "settings": "a"}, {"stage": "views", "settings": "b"}
 
@@ -262,3 +263,9 @@ def test_two_runs_do_not_share_results(tmp_path):
         result.run_alone(str(tmp_path))
     lock.release()
     result.run_alone(str(tmp_path)).release()
+
+
+def test_a_run_that_only_touches_files_notes_those_that_are_there(tmp_path):
+    made = [write_bytes(tmp_path / "tables" / "fits.csv", b"a\n"), tmp_path / "report.html"]
+    note_written(str(tmp_path), map(str, made))
+    assert [*read_json(tmp_path / ".conf" / "written.json")["value"]] == [str(made[0])]

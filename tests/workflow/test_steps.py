@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.cli.conftest import DEMO, VIEWS, hide_weights, numbers
+from tests.cli.conftest import DEMO, VIEWS, copied, hide_weights, numbers
 from tests.volume.test_motion import blob
 from texgs.cli.main import main
 from texgs.config.compose import compose
@@ -72,6 +72,27 @@ def test_a_table_says_how_close_steps_are_to_their_volumes(rings):
     scores = [entry["psnr"] for entry in told["compared"]]
     assert row["PSNR"] == pytest.approx(np.mean(scores))
     assert row["PSNR of the worst step"] == min(scores) > 10
+
+
+@pytest.mark.stages
+def test_a_job_that_was_stopped_goes_on_in_the_middle_of_the_series(rings, tmp_path, monkeypatch):
+    monkeypatch.chdir(copied(rings.parents[2], tmp_path))
+    hide_weights(monkeypatch, tmp_path)
+    step, titles = series.Follower.step, []
+
+    def stopped(*words, **more):
+        titles.append(words[4])
+        if len(titles) == 3:
+            raise KeyboardInterrupt
+        return step(*words, **more)
+
+    monkeypatch.setattr(series.Follower, "step", stopped)
+    for name, value in {"SIZE": 32, "ITERATIONS": 10}.items():
+        monkeypatch.setattr(series, name, value)
+    words = ["steps", *RINGS, "views.shading.diffuse=0.65"]
+    assert main(words) == 130
+    assert main(words) == 0
+    assert titles == ["TF01, step 2", "TF01, step 0", "TF02, step 2", "TF02, step 2", "TF02, step 0"]
 
 
 @pytest.fixture
