@@ -13,50 +13,22 @@ from texgs.raster import native
 from texgs.raster.types import DEFAULT_OPTIONS, Options, Statistics
 
 IMAGES = ("color", "alpha", "depth", "median", "normal", "distortion")
-
-
-class Surfels(native.Struct):
-    """`texgs_surfels`."""
-
-    _fields_ = native.fields(
-        "n n, i axes, p means quats scales opacities shift, i channels, "
-        "p features base gain texels sizes offsets, n n_texels"
-    )
-
-
-class Camera(native.Struct):
-    """`texgs_camera`."""
-
-    _fields_ = native.fields("p viewmat K, i width height, p depth_range")
-
-
-class RenderOptions(native.Struct):
-    """`texgs_options`."""
-
-    _fields_ = native.fields(
-        "p background, f low_pass filter_sigma dilation, i antialiased, "
-        "f alpha_min transmittance_min near_plane far_plane"
-    )
-
-
-class Image(native.Struct):
-    """`texgs_image`."""
-
-    _fields_ = native.fields("p color alpha depth median normal distortion radii")
-
-
-class Gradients(native.Struct):
-    """`texgs_gradients`."""
-
-    _fields_ = native.fields("p means quats scales opacities shift features base gain texels")
-
-
-class Contributions(native.Struct):
-    """`texgs_contributions`."""
-
-    _fields_ = native.fields("p image, i channels, p sums weight_sum weight_max pixels")
-
-
+Surfels = native.struct(
+    "texgs_surfels",
+    "n n, i axes, p means quats scales opacities shift, i channels, "
+    "p features base gain texels sizes offsets, n n_texels",
+)
+Camera = native.struct("texgs_camera", "p viewmat K, i width height, p depth_range")
+RenderOptions = native.struct(
+    "texgs_options",
+    "p background, f low_pass filter_sigma dilation, i antialiased, "
+    "f alpha_min transmittance_min near_plane far_plane",
+)
+Image = native.struct("texgs_image", "p color alpha depth median normal distortion radii")
+Gradients = native.struct("texgs_gradients", "p means quats scales opacities shift features base gain texels")
+Contributions = native.struct(
+    "texgs_contributions", "p image, i channels, p sums weight_sum weight_max pixels"
+)
 SCENE = (Surfels, Camera, RenderOptions)
 native.declare("texgs_forward", *SCENE, Image, "p")
 native.declare("texgs_backward", "p", *SCENE, Image, Image, Gradients)
@@ -99,7 +71,7 @@ class View:
     offsets: Tensor | None = None  # [N]
     depth_range: Tensor | None = None  # [2, H, W] camera z
 
-    def structures(self, surfels: SurfelTensors) -> tuple[Surfels, Camera, RenderOptions]:
+    def structures(self, surfels: SurfelTensors) -> tuple[native.Struct, ...]:
         """Return the surfels, camera and options as the library takes them."""
         o = self.options
         scene = Surfels(

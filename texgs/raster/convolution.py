@@ -28,14 +28,9 @@ TRANSFORM = (  # G of Lavin and Gray 2016, section 4.3
     (1 / 24, -1 / 12, 1 / 6),
     (0, 0, 1),
 )
-
-
-class NativeConvolution(native.Struct):
-    """`texgs_convolution`."""
-
-    _fields_ = native.fields("i width height inputs outputs, p kernel bias, i is_rectified")
-
-
+NativeConvolution = native.struct(
+    "texgs_convolution", "i width height inputs outputs, p kernel bias, i is_rectified"
+)
 native.declare("texgs_convolve", NativeConvolution, "ppp")
 
 

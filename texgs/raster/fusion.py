@@ -17,20 +17,8 @@ from texgs.raster import native
 from texgs.raster.arguments import require
 
 BLOCK = 8  # TEXGS_FUSION_BLOCK
-
-
-class NativeLattice(native.Struct):
-    """`texgs_lattice`."""
-
-    _fields_ = native.fields("3i shape, 3f lower, f spacing, p distance views color")
-
-
-class NativeView(native.Struct):
-    """`texgs_depth_view`."""
-
-    _fields_ = native.fields("p viewmat K, i width height, p depth color")
-
-
+NativeLattice = native.struct("texgs_lattice", "3i shape, 3f lower, f spacing, p distance views color")
+NativeView = native.struct("texgs_depth_view", "p viewmat K, i width height, p depth color")
 native.declare("texgs_fuse", NativeLattice, "np", NativeView, "f")
 
 

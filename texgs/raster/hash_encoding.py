@@ -19,14 +19,7 @@ from texgs.raster.arguments import require
 
 FEATURES = 2  # of each level
 CPU = torch.device("cpu")
-
-
-class NativeHash(native.Struct):
-    """`texgs_hash`."""
-
-    _fields_ = native.fields("i levels, p resolution first")
-
-
+NativeHash = native.struct("texgs_hash", "i levels, p resolution first")
 native.declare("texgs_hash_encode", NativeHash, "nppp")
 native.declare("texgs_hash_backward", NativeHash, "nppp")
 
@@ -77,7 +70,7 @@ class HashLevels:
         """Features of a point."""
         return FEATURES * self.levels
 
-    def structure(self) -> NativeHash:
+    def structure(self) -> native.Struct:
         """Return the levels as the library takes them."""
         resolutions = torch.tensor(self.resolutions, dtype=torch.int32)
         return NativeHash(self.levels, resolutions, torch.tensor(self.first))

@@ -16,7 +16,7 @@ from contextlib import nullcontext
 from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import torch
 from torch import Tensor
@@ -51,6 +51,11 @@ class Struct(Structure):
     def __init__(self, *values: Any, **named: Any) -> None:
         self.kept = values, named
         super().__init__(*map(plain, values), **{name: plain(value) for name, value in named.items()})
+
+
+def struct(name: str, layout: str) -> type[Struct]:
+    """Return the type of a structure of the library, which has a name there, and `fields`."""
+    return cast(type[Struct], type(name, (Struct,), {"_fields_": fields(layout)}))
 
 
 def plain(value: Any) -> Any:

@@ -23,16 +23,9 @@ SIDES = range(8, 1025, 4)  # voxels along an axis
 PIECE = 1 << 17  # points that are interpolated at a time
 GREY = 0.5  # colour of coefficients that are 0
 EMPTY = 1  # rows before those of voxels: that of all others
-
-
-class NativeGrid(native.Struct):
-    """`texgs_grid`."""
-
-    _fields_ = native.fields(
-        "3i size, 3f lower, f spacing, i degree, n n, p masks first occupied distance rows density"
-    )
-
-
+NativeGrid = native.struct(
+    "texgs_grid", "3i size, 3f lower, f spacing, i degree, n n, p masks first occupied distance rows density"
+)
 native.declare("texgs_grid_occupy", NativeGrid, "pp")
 
 
@@ -70,7 +63,7 @@ class VoxelGrid:
         """Return the number of voxels with a row."""
         return len(self.rows) - EMPTY
 
-    def structure(self) -> NativeGrid:
+    def structure(self) -> native.Struct:
         """Return the grid as the library takes it."""
         lattice = (self.size, self.lower, self.spacing, self.degree, len(self.rows))
         found = (self.masks, self.first, self.occupied, self.distance)

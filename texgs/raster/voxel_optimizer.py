@@ -15,14 +15,7 @@ from texgs.raster.voxels import RowGradient
 
 EPSILON = 1e-8
 BETAS = {"rmsprop": (0.0, 0.95), "adam": (0.9, 0.99)}  # of means of gradients and of their squares
-
-
-class NativeRule(native.Struct):
-    """`texgs_rule`."""
-
-    _fields_ = native.fields("f rate_density rate_base rate_sh beta1 beta2 epsilon")
-
-
+NativeRule = native.struct("texgs_rule", "f rate_density rate_base rate_sh beta1 beta2 epsilon")
 native.declare("texgs_grid_total_variation", NativeGrid, "np ff pp")
 native.declare("texgs_grid_step", NativeGrid, NativeRule, "pppp")
 

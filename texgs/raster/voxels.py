@@ -18,14 +18,9 @@ from texgs.raster.arguments import require
 from texgs.raster.voxel_grid import NativeGrid, VoxelGrid
 
 PIECE = 16_384  # rays at a time, where memory is to be saved
-
-
-class NativeMarch(native.Struct):
-    """`texgs_march`."""
-
-    _fields_ = native.fields("n n, p rays, 3f background, f step transmittance_min, p depth_range")
-
-
+NativeMarch = native.struct(
+    "texgs_march", "n n, p rays, 3f background, f step transmittance_min, p depth_range"
+)
 native.declare("texgs_grid_render", NativeGrid, NativeMarch, "pppp")
 native.declare("texgs_grid_backward", "p", NativeGrid, NativeMarch, "pppp")
 native.declare("texgs_grid_mark", "p", NativeGrid, NativeMarch, "p")
@@ -44,7 +39,7 @@ class March:
     depth_range: Tensor | None = None
     """[2, N] in lengths of a ray's direction: samples count from the first on and before the second."""
 
-    def structure(self, rays: Tensor) -> NativeMarch:
+    def structure(self, rays: Tensor) -> native.Struct:
         """Return the march along rays [N, 6] as the library takes it."""
         require({"rays": (rays, "N 6"), "depth_range": (self.depth_range, "2 N")}, constant=("depth_range",))
         depth_range = None if self.depth_range is None else self.depth_range.contiguous()
@@ -116,7 +111,7 @@ class Samples:
         """Call a function of the library for the samples."""
         native.call(name, self.handle.pointer, *self._structures(), *arguments, device=self.rays.device)
 
-    def _structures(self) -> tuple[NativeGrid, NativeMarch]:
+    def _structures(self) -> tuple[native.Struct, native.Struct]:
         """Return the grid and the march as the library takes them."""
         return self.grid.structure(), self.march.structure(self.rays)
 

@@ -41,30 +41,14 @@ BYTES = 64  # of memory for a pixel
 LEAST_WIDTH = torch.finfo(torch.float32).tiny  # of a transfer function, in data values
 MOST_SAMPLES = 2**24  # along a ray; their numbers are floats
 PADDING = 3  # bytes behind the distances of bricks, which are loaded as words
-
-
-class NativeVolume(native.Struct):
-    """`texgs_volume`."""
-
-    _fields_ = native.fields("p values, i type, 3i size, 3f half")
-
-
-class NativeTransfer(native.Struct):
-    """`texgs_transfer`."""
-
-    _fields_ = native.fields("i n, p points")
-
-
-class NativeView(native.Struct):
-    """`texgs_cast_view`."""
-
-    _fields_ = native.fields(
-        "p viewmat K, i width height, f step opacity_unit, 3f to_viewer to_light, "
-        "f ambient diffuse specular shininess, p rgba depth median normal, "
-        "p depth_range face planes, i n_planes unlit_faces"
-    )
-
-
+NativeVolume = native.struct("texgs_volume", "p values, i type, 3i size, 3f half")
+NativeTransfer = native.struct("texgs_transfer", "i n, p points")
+NativeView = native.struct(
+    "texgs_cast_view",
+    "p viewmat K, i width height, f step opacity_unit, 3f to_viewer to_light, "
+    "f ambient diffuse specular shininess, p rgba depth median normal, "
+    "p depth_range face planes, i n_planes unlit_faces",
+)
 native.declare("texgs_volume_bricks", NativeVolume, "p", result=c_int64, stream=False)
 native.declare("texgs_volume_extremes", NativeVolume, "pp")
 native.declare("texgs_volume_distance", NativeVolume, "p", NativeTransfer, "p")
@@ -107,7 +91,7 @@ class Caster:
         self._extremes = torch.empty(bricks, 2, device=self._device)
         missing = torch.zeros(1, dtype=torch.int64, device=self._device)
         self._call("texgs_volume_extremes", self._extremes, missing)
-        self._prepared = list[tuple[TransferFunction, NativeTransfer, Tensor]]()  # the last, of all copies
+        self._prepared = list[tuple[TransferFunction, native.Struct, Tensor]]()  # the last, of all copies
 
     def with_appearance(self, appearance: Appearance) -> Caster:
         """Return a caster of the same volume with another shading and sampling; nothing is read again."""
@@ -179,7 +163,7 @@ class Caster:
                 f"step: expected at most {MOST_SAMPLES} samples on a ray, got {samples:.3g}; raise it"
             )
 
-    def _prepare(self, tf: TransferFunction) -> tuple[NativeTransfer, Tensor]:
+    def _prepare(self, tf: TransferFunction) -> tuple[native.Struct, Tensor]:
         """Return a function for the library, and how far each brick is from one in which something shows."""
         prepared = self._prepared[0] if self._prepared else None  # another thread may prepare another one
         if prepared is None or prepared[0] != tf:
