@@ -14,8 +14,7 @@ from texgs.fitting import checkpoint
 from texgs.fitting.checkpoint import run_to_end
 from texgs.fitting.kinds.palette import HashKeys, PaletteKeys
 from texgs.fitting.kinds.voxels import Decay, GridStage, VoxelKeys
-from texgs.fitting.palette import PaletteFit, base_loss
-from texgs.fitting.palette_colors import object_palette
+from texgs.fitting.palette import PaletteFit, base_loss, object_palette
 
 VOXELS = VoxelKeys(
     stages=[GridStage(16, 30), GridStage(32, 30)],

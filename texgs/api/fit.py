@@ -130,9 +130,7 @@ def configuration(
         check_name("name", name)
     few = (f"views.test.count={TEST_VIEWS}", f"views.relit={TEST_VIEWS}", "views.turntable=1")
     config = compose(("tracking=none", "edit=none", *few, "metric.vtk_frames=0", *words))
-    basic = {
-        name: BasicTF([*map(list, tf.opacity)], [*map(list, tf.color)]) for name, tf in functions.items()
-    }
+    basic = {name: BasicTF(**tf.to_dict()) for name, tf in functions.items()}
     keys = VolumeKeys(generator=None, file=str(copied(volume, folder).resolve()))
     dataset = Dataset(name=volume.name, title=volume.name, volume=keys, basic_tfs=basic)
     return replace(config, dataset=dataset, results=str(folder))

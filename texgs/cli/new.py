@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     series_files(config)
     ensure(STAGES["volume"], config)
     basic = basic_tfs(config, arguments.tf, arguments.count)
-    listed = {key: BasicTF([*map(list, tf.opacity)], [*map(list, tf.color)]) for key, tf in basic.items()}
+    listed = {key: BasicTF(**tf.to_dict()) for key, tf in basic.items()}
     config = replace(config, dataset=replace(config.dataset, basic_tfs=listed))
     ensure(STAGES["transfer"], config)
     text = document(config, ["file", *changed(arguments.overrides)])

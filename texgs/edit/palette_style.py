@@ -21,7 +21,7 @@ from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import free_color, light, new_networks, palette_color
 from texgs.fields.palette.rendering import RAYS, Shown, points_on, shown, view_harmonics
 from texgs.fields.voxels.rays import training_rays
-from texgs.fitting.palette_colors import cluster_colors
+from texgs.fitting.palette import cluster_colors
 from texgs.models.vgg import Vgg
 from texgs.raster.voxels import camera_rays
 from texgs.volume.images import Images

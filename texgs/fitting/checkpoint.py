@@ -49,7 +49,7 @@ class ResumableFit(ABC):
 
     def note(self, loss: Tensor, tensors: Mapping[str, Tensor]) -> None:
         """Note the loss of the iteration that is done, and require finite tensors."""
-        require_finite(self.iteration, tensors)
+        require_finite(f"iteration {self.iteration}", tensors)
         self.losses.append(float(loss))
 
     def state(self) -> dict[str, Tensor]:
@@ -67,14 +67,16 @@ class ResumableFit(ABC):
         self.losses = state["losses"].tolist()
 
 
-def require_finite(iteration: int, tensors: Mapping[str, Tensor]) -> None:
+def require_finite(
+    where: object,
+    tensors: Mapping[str, Tensor],
+    advice: str = "start again with lower rates, the last checkpoint is kept",
+) -> None:
     """Stop a fit that has gone wrong; its loss alone does not tell: surfels with NaN are skipped."""
     try:
         check.finite(**tensors)
     except ArgumentError as error:
-        raise FitError(
-            f"iteration {iteration}: {error}; start again with lower rates, the last checkpoint is kept"
-        ) from error
+        raise FitError(f"{where}: {error}; {advice}") from error
 
 
 def run_to_end(fit: ResumableFit, folder: Path, title: str) -> float:
@@ -118,7 +120,7 @@ def _tell(fit: ResumableFit, n_told: int) -> int:
 def save(folder: str | Path, fit: ResumableFit) -> Path:
     """Write the state of a fit, and return the file; the one before stays until this one is complete."""
     state = {name: x.contiguous() for name, x in fit.state().items()}
-    require_finite(fit.iteration, state)
+    require_finite(f"iteration {fit.iteration}", state)
     return write_tensors(Path(folder) / NAME, state)
 
 

@@ -6,10 +6,12 @@ fit of a voxel grid, and for rays near the object over white in place of all ray
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -18,7 +20,6 @@ from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import Parameters, base_color, density, light, new_networks, palette_color
 from texgs.fields.palette.rendering import Geometry, Shown, blending_weights, points_on, shown, view_harmonics
 from texgs.fitting.checkpoint import ResumableFit
-from texgs.fitting.palette_colors import object_palette
 from texgs.fitting.voxels import VoxelFit
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, voxel_grid
@@ -33,6 +34,8 @@ MIXED = ("palette", "mixture", "trunk", "light")  # networks that learn in the l
 TRUSTED = 0.5  # of the grid's densities, for where rays may end
 LEAST_DENSITY = 0.1  # of its voxels, so that points of rays are there
 SEEDS = 16_384  # of these voxels, in a step in which density learns that of the grid
+DRAWN = 50_000  # colours that are clustered
+OPAQUE = 128  # of 255: alpha from which a pixel tells a colour
 
 
 @dataclass(frozen=True)
@@ -208,3 +211,35 @@ def error_over_white(shows: Shown, colors: Tensor, target: Tensor) -> Tensor:
     values = torch.cat([colors, torch.ones_like(colors[:, :1])], dim=1)
     color, alpha = shows.blend(values, len(target)).split([3, 1], dim=1)
     return (color + 1 - alpha - target).square().mean()
+
+
+def cluster_colors(colors: Tensor, count: int, seed: int = 0) -> Tensor:
+    """Return mean colours [count, 3] of clusters of colours [n, 3], the largest cluster first.
+
+    Clusters are of red, green and blue relative to their sum, so that light and shadow on one material are
+    one cluster. Where there are fewer, the last colours are those of the largest cluster. PaletteNeRF and
+    StyleRF-VolVis take the corners of a hull of colours and places (RGBXY) instead. Transfer functions have a
+    colour each: clusters find these too, and are a call of a library.
+    """
+    from scipy.cluster.vq import kmeans2
+
+    random = np.random.default_rng(seed)
+    chosen = torch.from_numpy(random.permutation(len(colors))[:DRAWN])
+    colors = colors[chosen].double()
+    hues = colors / colors.sum(1, keepdim=True).clamp_min(1e-3)
+    distinct = len(np.unique(hues.numpy().round(6), axis=0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of empty clusters
+        _, labels = kmeans2(hues.numpy(), min(count, distinct), minit="++", seed=random)
+    members = [colors[torch.from_numpy(labels == label)] for label in range(count)]
+    members.sort(key=len, reverse=True)
+    return torch.stack([(each if len(each) else members[0]).mean(0) for each in members]).float()
+
+
+def object_palette(images: Images, count: int, seed: int) -> Tensor:
+    """Cluster the colours of all pixels that are opaque enough, or of the most opaque ones, [count, 3]."""
+    alpha = images.planes[:, 3]
+    opaque = alpha >= min(int(alpha.max()), OPAQUE)
+    share = alpha[opaque, None].float() / 255
+    colors = images.planes.permute(0, 2, 3, 1)[opaque][:, :3].float() / 255
+    return cluster_colors(((colors - 1 + share) / share).clamp(0, 1), count, seed)

@@ -7,14 +7,13 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
-from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError, FitError
 from texgs.core.progress import progress
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.splats import geometry, visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import footprint
+from texgs.fitting.checkpoint import require_finite
 from texgs.fitting.settings import TextureKeys
 from texgs.raster import Texture, rasterize
 from texgs.raster.losses import l1_dssim
@@ -53,7 +52,8 @@ def solve(
         rate = STEP * (LAST_STEP / STEP) ** (step / len(order))
         with torch.no_grad():
             texels.addcmul_(gradient, scale, value=-rate).clamp_(-FARTHEST, FARTHEST)
-    _require_finite("the training views or the model of the phase before are damaged", texels=texels)
+    advice = "the training views or the model of the phase before are damaged"
+    require_finite("texture", {"texels": texels}, advice)
     solved = replace(model, parameters={**model.parameters, "texels": texels.detach()})
     return solved if sampled_error(solved, images) <= sampled_error(model, images) else model
 
@@ -87,13 +87,6 @@ def _inverse(curvatures: Tensor, ridge: float) -> Tensor:
     return torch.where(damped > 0, 1 / damped, 0.0)
 
 
-def _require_finite(advice: str, **tensors: Tensor) -> None:
-    try:
-        check.finite(**tensors)
-    except ArgumentError as error:
-        raise FitError(f"texture: {error}; {advice}") from error
-
-
 def refine(model: Surfels, images: Images, keys: TextureKeys, seed: int, title: str) -> Surfels:
     """Fit the texels, and the palette with them, to one view after the other by L1 + D-SSIM and sparsity.
 
@@ -121,7 +114,7 @@ def refine(model: Surfels, images: Images, keys: TextureKeys, seed: int, title: 
         with torch.no_grad():
             optimizer.parameters["palette"].clamp_(0, 1)
     fitted = {name: x.detach() for name, x in optimizer.parameters.items()}
-    _require_finite("look for values that are not in the model before", **fitted)
+    require_finite("texture", fitted, "look for values that are not in the model before")
     return replace(model, parameters={**model.parameters, **fitted})
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from texgs.core.errors import ArgumentError, DeviceError
+from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.fields.kinds.palette import FIELD
 from texgs.fitting.kinds import FitSpec, FitTask, Fitted
@@ -64,8 +64,6 @@ def fit(task: FitTask[PaletteKeys]) -> Fitted:
     from texgs.fitting.checkpoint import FOLDER, run_to_end
     from texgs.fitting.palette import PaletteFit
 
-    if task.device.type != "cpu":
-        raise DeviceError(f"device: expected cpu, got {task.device}; palette fields are fitted on the CPU")
     run = PaletteFit(task.images, task.settings, task.seed)
     seconds = run_to_end(run, task.output / FOLDER, task.title)
     field = run.field(task.metadata)

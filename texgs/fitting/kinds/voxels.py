@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import pi, sin
 
-from texgs.core.errors import ArgumentError, DeviceError
+from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.fields.kinds.voxels import FIELD
 from texgs.fitting.kinds import FitSpec, FitTask, Fitted
@@ -83,8 +83,6 @@ def fit(task: FitTask[VoxelKeys]) -> Fitted:
     from texgs.fitting.checkpoint import FOLDER, run_to_end
     from texgs.fitting.voxels import VoxelFit
 
-    if task.device.type != "cpu":
-        raise DeviceError(f"device: expected cpu, got {task.device}; voxels are fitted on the CPU")
     run = VoxelFit(task.images, task.settings, task.seed)
     seconds = run_to_end(run, task.output / FOLDER, task.title)
     notes = {"lattice": list(run.grid.size)}
