@@ -3,8 +3,6 @@
 In Python: `Volume`, `fit`, `open`, `Scene` and `results`; they are loaded when they are first used.
 """
 
-from __future__ import annotations
-
 import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

@@ -1,7 +1,5 @@
 """Grids from objects of other libraries, which are known by what they can: none of these is imported."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

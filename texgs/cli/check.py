@@ -1,7 +1,5 @@
 """Check how far a scene is from its volume, over seeded views, lights and edits, and draw the worst."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

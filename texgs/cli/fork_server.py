@@ -7,8 +7,6 @@ ends where the server or its client is killed. Linux only: elsewhere a fork of a
 is not safe, and jobs are programs.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import ctypes

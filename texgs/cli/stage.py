@@ -1,7 +1,5 @@
 """The verbs of the stages: by hand with key=value, or as one job that Snakemake started."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Download files: pretrained weights by their names, which are listed, or any file by its address."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

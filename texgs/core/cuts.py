@@ -1,7 +1,5 @@
 """Cuts of a scene: planes and a box that take away what is beyond them, in world units."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from itertools import product
 from math import hypot

@@ -1,7 +1,5 @@
 """The one light of a view or of a scene."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Frames as a picture, numbered pictures, an animated GIF or an MP4 film."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from functools import partial

@@ -1,7 +1,5 @@
 """Names and numbers from files or a user, before names are shown or become a part of a path."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """YAML that people write: plain values, numbers as everywhere else, and nothing that grows when read."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Vertices of PLY files, whose headers are checked before anything is read."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 from pathlib import Path

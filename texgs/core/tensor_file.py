@@ -6,8 +6,6 @@ the checkpoint of a grid is most of a fit's memory, or to a file that it opens i
 when it is whole.
 """
 
-from __future__ import annotations
-
 import json
 import pickle
 import pickletools

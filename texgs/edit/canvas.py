@@ -1,7 +1,5 @@
 """What the losses of a style see of a view: the part that shows the model, with something behind it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

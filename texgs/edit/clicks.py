@@ -1,7 +1,5 @@
 """Clicks on a view as points in space, or an outline, and where other views see these points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

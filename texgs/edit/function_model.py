@@ -1,7 +1,5 @@
 """A model of a transfer function that a scene tries on its volume, in place of the function."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Segments from clicks on one view: masks of many views, and surfels that their votes select."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Materials that instructions name: highlights, which are edits of the scene as any others."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from torch import Tensor

@@ -1,7 +1,5 @@
 """A new segment of a scene, from clicks on a view of one of its models; and how a mask looks before that."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path

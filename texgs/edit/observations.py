@@ -1,7 +1,5 @@
 """Edited views as linear equations: which bare colours of texels make them, at several opacities."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

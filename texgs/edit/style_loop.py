@@ -1,7 +1,5 @@
 """The loop of all image-driven edits: views of a field, one after the other, bring its colours to a style."""
 
-from __future__ import annotations
-
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence

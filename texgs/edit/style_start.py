@@ -3,8 +3,6 @@
 Pictures are laid onto surfaces by place and normal, in chunks whose strokes stay whole, as StyleBlit does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import torch

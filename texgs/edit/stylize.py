@@ -1,7 +1,5 @@
 """Image-driven editing: the texels of a basic model take on the style of a picture; nothing else changes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial

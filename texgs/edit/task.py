@@ -1,7 +1,5 @@
 """What a method of editing gets and gives, and how it edits parts of a scene: whole models, or segments."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

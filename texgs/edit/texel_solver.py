@@ -1,7 +1,5 @@
 """How texels follow edited views: by preconditioned stochastic steps, or by Adam as in the paper."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

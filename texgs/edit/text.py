@@ -1,7 +1,5 @@
 """Text-driven editing: a guidance edits a few views of a model once, and its texels follow them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import atan, degrees

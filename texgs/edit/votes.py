@@ -1,7 +1,5 @@
 """Which surfels belong to the objects that masks show: two ways of counting votes over views."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import Literal
 

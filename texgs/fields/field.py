@@ -1,7 +1,5 @@
 """What all fields have in common: things that are fitted to views, drawn, edited and saved."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, ClassVar, Literal, Protocol, Self
 

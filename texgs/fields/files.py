@@ -1,7 +1,5 @@
 """Files of fields of any kind, told apart by how they begin."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Adam over named parameters whose rows come and go."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Photorealistic edits of a basic model in a scene: numbers, applied anew to every frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 

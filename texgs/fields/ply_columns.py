@@ -1,7 +1,5 @@
 """What PLY files of 2DGS and 3DGS have in common: raw geometry and harmonics, a property for each number."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What surfels and 3D Gaussians have in common: raw parameters by name, and what they cover on screen."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from math import ceil, floor, isfinite

@@ -1,7 +1,5 @@
 """What fields with light in their colours have in common: in a scene, only their opacity changes."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
 from typing import ClassVar, Generic, NamedTuple, TypeVar

@@ -1,7 +1,5 @@
 """Fits that go on from a checkpoint, one safetensors file, as if they had never stopped."""
 
-from __future__ import annotations
-
 import shutil
 import time
 from abc import ABC, abstractmethod

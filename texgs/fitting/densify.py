@@ -1,7 +1,5 @@
 """Adaptive density control of surfels or 3D Gaussians: by gradients cloned or split, by opacity removed."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 

@@ -1,7 +1,5 @@
 """The visual hull of views: the points that project onto something visible in every view."""
 
-from __future__ import annotations
-
 from math import ceil
 
 import torch

@@ -1,7 +1,5 @@
 """The training loop: one view per iteration, the same for every phase and recipe."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """The loss of one view."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, cast
 

@@ -1,7 +1,5 @@
 """A model of a transfer function in seconds: views cast in memory, surfels where rays end, two short fits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Where surfels start: at given points, where views show something, in their hull, or anywhere."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

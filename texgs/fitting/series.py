@@ -1,7 +1,5 @@
 """A series in time: the model of a step from that of the step before, of the same surfels and texels."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

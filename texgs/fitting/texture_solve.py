@@ -1,7 +1,5 @@
 """Texels from images by least squares or Adam: with geometry and shading frozen, images are linear."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import torch

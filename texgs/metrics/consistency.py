@@ -1,7 +1,5 @@
 """Multi-view consistency: views warped into each other by their depth, compared where both see the same."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import sqrt

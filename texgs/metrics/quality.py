@@ -1,7 +1,5 @@
 """PSNR and SSIM, as the tables define them, of images and of a model on views."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial

@@ -1,7 +1,5 @@
 """The pretrained weights that texgs knows: names of their files, sizes, sources and checksums."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field

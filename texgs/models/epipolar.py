@@ -1,7 +1,5 @@
 """Attention across views: what a view shows is taken from a key view, along epipolar lines (DGE)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import exp

@@ -1,7 +1,5 @@
 """What every editor of views takes and gives, and how one is made to disagree with itself."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol

@@ -1,7 +1,5 @@
 """What a user asks for in words, and the words that procedural filters understand."""
 
-from __future__ import annotations
-
 import re
 
 from texgs.core.errors import ArgumentError

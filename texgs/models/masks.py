@@ -1,7 +1,5 @@
 """Models that find an object in an image from clicks: what all take, give and remember, and GrabCut."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Callable
 from hashlib import blake2b

@@ -1,7 +1,5 @@
 """Pretrained networks from files, which are never executed, and the number format to compute them in."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path

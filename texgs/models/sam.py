@@ -1,7 +1,5 @@
 """Masks from clicks by Segment Anything (Kirillov et al. 2023): its files, or a folder of transformers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Where the weights of a pretrained model are: a local folder, the hubs' caches, or else a download."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator

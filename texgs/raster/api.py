@@ -1,7 +1,5 @@
 """Render surfels or 3D Gaussians, and splat images back onto them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import torch

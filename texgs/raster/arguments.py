@@ -1,7 +1,5 @@
 """Checks of what the rasterizer is called with; what passes comes out dense."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from math import isfinite
 from operator import index

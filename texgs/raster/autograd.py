@@ -1,7 +1,5 @@
 """The native rasterizer as a differentiable function of torch, and what one call of it works on."""
 
-from __future__ import annotations
-
 from ctypes import byref
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -5,8 +5,6 @@ They take a quarter of the multiplications of a direct convolution (Lavin and Gr
 than kernels do.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """What planes leave of a camera's rays: where each begins and ends, and the face at which it begins."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import torch

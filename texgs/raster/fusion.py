@@ -3,8 +3,6 @@
 On the CPU; deterministic for any number of threads.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

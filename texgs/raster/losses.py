@@ -3,8 +3,6 @@
 The library returns the gradients of a loss along with its value.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@
 A module declares the structures and functions that it calls.
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 import weakref

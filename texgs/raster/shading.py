@@ -1,7 +1,5 @@
 """Colour of surfels: Blinn-Phong shading, and spherical harmonics that depend on the view."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import pi, sqrt
 from typing import Any

@@ -1,7 +1,5 @@
 """What the rasterizer takes and gives besides plain tensors."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 

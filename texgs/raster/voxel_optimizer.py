@@ -1,7 +1,5 @@
 """What changes the rows of a voxel grid: lazy optimisers and total variation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

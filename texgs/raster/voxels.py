@@ -1,7 +1,5 @@
 """Rays through a sparse voxel grid: blended, differentiable in its rows, or as the points they sample."""
 
-from __future__ import annotations
-
 from ctypes import byref, c_int64
 from dataclasses import dataclass, replace
 from itertools import repeat

@@ -1,7 +1,5 @@
 """Pictures of an edit: the scene before and after it, and the losses on the way."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A view of a scene beside its volume, or as fitted: both, their difference, and how close they are."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

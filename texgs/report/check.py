@@ -1,7 +1,5 @@
 """How far a scene is from its volume: over seeded views, lights and edits, with a floor for new ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from math import asin, degrees, floor

@@ -1,7 +1,5 @@
 """Tables of edits: the paper's comparisons, of those with the key `compared`, and `looks`, which has all."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

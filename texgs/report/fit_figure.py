@@ -1,7 +1,5 @@
 """Figures of fits beside views that they have not seen: one phase by phase with its maps, or several fits."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import ceil

@@ -1,7 +1,5 @@
 """Tables of fits: `fitting`, `fits`, `views`, `resolution`, `model_size` and `meshes`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

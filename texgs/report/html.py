@@ -1,7 +1,5 @@
 """One HTML file with all that a run has to show: tables, pictures, curves, and where each came from."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path

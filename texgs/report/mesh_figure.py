@@ -1,7 +1,5 @@
 """Figure of a mesh: the surface that it should be, the mesh, and how far it is from that surface."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import torch

@@ -1,7 +1,5 @@
 """The metrics files of jobs, read and checked, and what there is no job of."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path

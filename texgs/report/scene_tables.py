@@ -1,7 +1,5 @@
 """Tables of data sets and whole scenes: `datasets`, `rendering`, `edits`, `steps` and `cuts`."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The sections of the report in the paper's order, and the figures of each."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -1,7 +1,5 @@
 """The ball around the primitives of models: what cameras look at where the data are not known."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import radians, sin
 

@@ -3,8 +3,6 @@
 Those of cuts are cut=x,0.1, cut=-z,64v, cut=1,1,0,0.2, cut.box=-1,-1,-1,1,1,0 and cut.faces=unlit.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

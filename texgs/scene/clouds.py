@@ -1,7 +1,5 @@
 """A scene as clouds of splats for other programs: one colour a surfel, with the light in its harmonics."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast

@@ -1,7 +1,5 @@
 """A scene with all of its files in one folder, to keep or to pass on."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from shutil import copyfile

@@ -1,7 +1,5 @@
 """What is seen of a scene that is cut: faces of its volume, and what the cut leaves of its models."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from functools import partial
 from math import ceil

@@ -1,7 +1,5 @@
 """Files of a scene or a model for other programs: splats, points or a mesh; or a compact model file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Frames of a scene as people look at them: colours, normals, depth, material; and the point at a pixel."""
 
-from __future__ import annotations
-
 from typing import Literal, get_args
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Binary glTF files: a mesh of points for each model, with the extension KHR_gaussian_splatting."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from math import isqrt

@@ -1,7 +1,5 @@
 """Surfaces of opaque scenes as triangles: rendered depth is fused on a lattice (Curless and Levoy 1996)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from math import inf
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Parts of a scene by their names: MODEL, what no segment of it holds, and MODEL/SEGMENT."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """scene.yaml: basic models and what is edited about each; opening composes them and trains nothing."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, fields, replace

@@ -1,7 +1,5 @@
 """Files of segments: which surfels of a basic model belong to one, and enough to know the model by."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """series.json: the steps of a series in time, whose volumes and models lie beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """SPZ files of Niantic, version 3: splats in about 30 bytes each, rounded and packed by gzip."""
 
-from __future__ import annotations
-
 import gzip
 from collections.abc import Sequence
 from math import frexp

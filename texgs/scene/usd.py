@@ -1,7 +1,5 @@
 """OpenUSD files: a particle field for each model, with the kernel of surfels or of 3D Gaussians."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory

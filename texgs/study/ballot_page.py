@@ -3,8 +3,6 @@
 A clip is a film of several scenes that turn in step, each in its cell of one picture: it cannot fall apart.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import io

@@ -1,7 +1,5 @@
 """Ballots that voters send, read and checked: CSV files that the page of a study saves."""
 
-from __future__ import annotations
-
 import csv
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence

@@ -4,8 +4,6 @@ A question shows the scenes of one data set that follow the same pictures or the
 side in random order and without names, as in the paper (section User Study).
 """
 
-from __future__ import annotations
-
 import random
 from collections import defaultdict
 from collections.abc import Iterable, Sequence

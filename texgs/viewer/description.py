@@ -1,7 +1,5 @@
 """What a page has to know of a scene, as JSON: its parts, their edits, and which edits each can show."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import asdict, fields
 from typing import Any, get_args

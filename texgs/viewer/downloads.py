@@ -1,7 +1,5 @@
 """Files of a scene that a page saves: films, and what `texgs export` writes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import exp, log

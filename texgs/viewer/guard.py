@@ -3,8 +3,6 @@
 A private file leads a browser there: other users see the arguments of a program, but not the file.
 """
 
-from __future__ import annotations
-
 import hmac
 import ipaddress
 import os

@@ -1,7 +1,5 @@
 """New looks for parts of a scene, from a picture or an instruction; and what they would be like."""
 
-from __future__ import annotations
-
 import io
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

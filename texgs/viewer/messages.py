@@ -1,7 +1,5 @@
 """What a page says to its server: messages in JSON, checked before anything uses them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Annotated, Any, Literal, get_args

@@ -1,7 +1,5 @@
 """What the models of a scene were made from, where it lies beside them: views and transfer functions."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """One page that is connected: what it asks for, and what it is told."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import logging

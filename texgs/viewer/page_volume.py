@@ -1,7 +1,5 @@
 """The volume of a scene as a page carries it: fewer samples, in 8 bits at most, packed."""
 
-from __future__ import annotations
-
 import zlib
 from dataclasses import asdict, dataclass
 from math import prod

@@ -1,7 +1,5 @@
 """Folders that a viewer has until it ends."""
 
-from __future__ import annotations
-
 import os
 import socket
 from pathlib import Path

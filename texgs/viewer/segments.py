@@ -1,7 +1,5 @@
 """Masks and segments from clicks."""
 
-from __future__ import annotations
-
 import base64
 import io
 from contextlib import suppress

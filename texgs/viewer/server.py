@@ -1,7 +1,5 @@
 """The server of a viewer: what requests ask for, and a WebSocket for each page that is open."""
 
-from __future__ import annotations
-
 import asyncio
 import secrets
 from collections.abc import AsyncIterator

@@ -1,7 +1,5 @@
 """The one scene that all pages edit: what a viewer is started with, its steps, and where it is saved."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import count

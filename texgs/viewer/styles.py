@@ -1,7 +1,5 @@
 """The pictures to choose from, by name."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 from threading import Lock

@@ -1,7 +1,5 @@
 """Axes of arrays in files: which are those of space, how samples lie along them, and one index of others."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Camera sets around a target: an icosphere to learn from, a spiral to test on, an orbit to look at."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations, product
 from math import asin, atan2, degrees, sqrt

@@ -1,7 +1,5 @@
 """Many views in one file to look at: a contact sheet and an animation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The ball of what transfer functions show of a volume, which cameras look at."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from itertools import combinations, pairwise, product
 

@@ -4,8 +4,6 @@ All are cubes of float32 in [0, 1] with spacing 1, and the same everywhere for t
 rounding. Turbulence and jets are one flow for each seed, whatever the size they are sampled at.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import factorial, pi, sqrt
 

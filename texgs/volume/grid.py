@@ -1,7 +1,5 @@
 """A scalar field on a regular lattice: where it lies in the world, and its turns by right angles."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import permutations
 from math import isfinite, prod

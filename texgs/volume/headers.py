@@ -1,7 +1,5 @@
 """Text headers of NRRD and MetaImage files: their fields, and the file with the samples."""
 
-from __future__ import annotations
-
 from io import BytesIO
 from pathlib import Path
 

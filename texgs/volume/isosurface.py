@@ -1,7 +1,5 @@
 """What a transfer function shows of a volume as geometry: a surface of triangles, and points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil

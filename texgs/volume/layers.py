@@ -1,7 +1,5 @@
 """Arrays inside of files as sources: chosen by their path, decoded, and read in layers of whole chunks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

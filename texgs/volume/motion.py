@@ -1,7 +1,5 @@
 """How what a transfer function shows moves from one volume of a series to the next."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

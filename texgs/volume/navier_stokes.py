@@ -4,8 +4,6 @@ Real fields [..., n, n, n] with axes z, y, x have spectra [..., n, n, n // 2 + 1
 their components x, y, z in front.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from math import ceil, pi
 

@@ -1,7 +1,5 @@
 """HDF5 and NetCDF, by h5py, and classic NetCDF, by SciPy: VTK fills up what is cut off with zeros."""
 
-from __future__ import annotations
-
 import posixpath
 from contextlib import suppress
 from importlib import import_module

@@ -1,7 +1,5 @@
 """The canonical file of a prepared volume: an NRRD with raw samples, mapped into memory."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import BinaryIO

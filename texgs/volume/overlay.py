@@ -1,7 +1,5 @@
 """Transfer functions whose ranges overlap, as one that shows all of them: for exploring, before a fit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import numpy as np

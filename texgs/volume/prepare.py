@@ -1,7 +1,5 @@
 """Stream any source into the one canonical file that everything else reads."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import inf, prod

@@ -4,8 +4,6 @@ ITK only reads their headers: it takes a stream that ends too early for whole an
 words, and reads no slabs.
 """
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import zlib

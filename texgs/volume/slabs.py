@@ -1,7 +1,5 @@
 """Volumes as sources, which hand out a slab of z slices at a time, so that any size fits into memory."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Text with a line per sample and a column per quantity, read slab by slab."""
 
-from __future__ import annotations
-
 from math import prod
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """TIFF files with a page per slice, and folders of single TIFFs, as sources."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -3,8 +3,6 @@
 Files have OpenGL camera-to-world matrices, and one lens for all frames.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import atan, pi, tan

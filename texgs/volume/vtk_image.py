@@ -1,7 +1,5 @@
 """Image data that VTK reads, as lattice and samples."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Table `differences`: where recipes and edits are not as in the paper, by their values."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

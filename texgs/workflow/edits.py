@@ -1,7 +1,5 @@
 """The edits of an experiment as more words for `compose`; the parts, settings and files of their jobs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Run one job in a folder of its own, tracked, with its numbers in metrics.json; or with those before it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What an experiment runs: a configuration for each data set, recipe, variant of a sweep and edit."""
 
-from __future__ import annotations
-
 import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What several stages read, files and settings, and which configurations go through them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path

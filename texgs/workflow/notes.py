@@ -4,8 +4,6 @@ Snakemake knows of inputs and parameters. That a result is damaged, or that a jo
 before it in place, it learns by a note: it takes an input for changed where its contents are.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from datetime import datetime

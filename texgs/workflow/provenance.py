@@ -1,7 +1,5 @@
 """Where numbers come from: what ran, on what, from which source and settings."""
 
-from __future__ import annotations
-
 import getpass
 import os
 import platform

@@ -9,8 +9,6 @@ For a job whose folder is `shading` there are:
 - `.shading.lock`, held by the process that works there.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 import sys

@@ -1,7 +1,5 @@
 """What stands in for data sets and edits of an experiment that lack data or weights on this machine."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

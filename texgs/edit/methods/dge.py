@@ -1,7 +1,5 @@
 """DGE (Chen et al. 2024), one of the paper's baselines, on 3D Gaussians: some views are edited together."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from texgs.core.errors import ArgumentError

@@ -1,7 +1,5 @@
 """Instruct-GS2GS (Vachha and Haque 2024), one of the paper's baselines, on 3D Gaussians."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from texgs.core.keys import key

@@ -1,7 +1,5 @@
 """Instruct-NeRF2NeRF (Haque et al. 2023), one of the paper's baselines, on voxel grids as in the paper."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from texgs.core.keys import key

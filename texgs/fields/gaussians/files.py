@@ -1,7 +1,5 @@
 """Files of 3D Gaussians: our own, and PLY files as 3DGS writes them, for other programs."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 

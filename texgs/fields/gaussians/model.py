@@ -1,7 +1,5 @@
 """3D Gaussians with spherical harmonics: a basic model of them, and several as one scene."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar

@@ -4,8 +4,6 @@ A kind is one module of this package, which defines FIELD. How it is fitted stan
 or as FIT in the same module.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files of palette fields: networks and the grid as safetensors, levels and lattice as JSON in the header."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path

@@ -5,8 +5,6 @@ colour at a point is a mixture of the palette, or after an edit the free colour,
 the direction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from itertools import count, pairwise
 from typing import NamedTuple

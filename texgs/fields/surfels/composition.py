@@ -1,7 +1,5 @@
 """Basic models as one scene: geometry and texels are joined once, edits cost a frame no copy of them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import accumulate

@@ -1,7 +1,5 @@
 """A basic model: raw parameters of surfels, and what turns them into geometry, material and colour."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 

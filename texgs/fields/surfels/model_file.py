@@ -1,7 +1,5 @@
 """Files of basic models of surfels, at every stage of their fit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import asdict

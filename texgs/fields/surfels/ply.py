@@ -1,7 +1,5 @@
 """Exchange of surfels with other programs: PLY files of 2DGS, of 3DGS and of the paper's release."""
 
-from __future__ import annotations
-
 import math
 import zipfile
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """How surfels get their colours in a view: the shading model, its material, lights and the viewer."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """The list of the texels of all surfels: the surfel that each belongs to, and the colours without light."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Variants of a model's texture, such as a style: their files, and segments that have one of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files of voxel grids: masks and values as safetensors, the lattice as JSON in the header."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Training rays of views: those near something visible, in an order in which neighbours follow each other."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Metric `clip`: how well an edit fits its caption, as InstructPix2Pix measures it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from texgs.metrics.metric import Measure, MeasuredScene, Metric

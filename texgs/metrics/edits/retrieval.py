@@ -3,8 +3,6 @@
 From these distances tables tell the place of the picture that a look follows, see `named`.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any

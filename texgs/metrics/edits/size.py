@@ -1,7 +1,5 @@
 """Metric `size`: megabytes of all models as the paper's tables of edits count them, and primitives."""
 
-from __future__ import annotations
-
 from texgs.metrics.metric import Measure, MeasuredScene, Metric
 
 

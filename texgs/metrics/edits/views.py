@@ -1,7 +1,5 @@
 """Metric `views`: which views of the test path an edited scene is measured in."""
 
-from __future__ import annotations
-
 from texgs.metrics.metric import MeasuredScene, Metric
 
 

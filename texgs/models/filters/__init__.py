@@ -1,7 +1,5 @@
 """The offline counterpart of a diffusion model: a guidance made of procedural filters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Drawings of dots and lines whose density is tone, paintings, and materials cut from a block."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

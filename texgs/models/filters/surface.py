@@ -3,8 +3,6 @@
 Noise comes without tables: the same point has the same value in every view and on every device.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product

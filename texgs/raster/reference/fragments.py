@@ -1,7 +1,5 @@
 """What the definitions of surfels and of 3D Gaussians have in common."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

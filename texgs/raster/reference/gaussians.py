@@ -4,8 +4,6 @@ The perspective projection is replaced by its derivative at the mean (Zwicker et
 Gaussian is a Gaussian in the image, with the depth of its mean everywhere.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

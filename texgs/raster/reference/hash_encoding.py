@@ -1,7 +1,5 @@
 """The definition of multi-resolution hash encoding in plain torch: any float type, gradients by autograd."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 

@@ -1,7 +1,5 @@
 """The definitions of the image losses in torch and kornia: any floating-point type, gradients by autograd."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 from torch.nn.functional import normalize, pad

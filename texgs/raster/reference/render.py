@@ -4,8 +4,6 @@ Any floating-point type, every result differentiable by autograd, memory proport
 primitives. The native rasterizers follow this file; tests compare them with it in float64.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from types import ModuleType
 

@@ -1,7 +1,5 @@
 """The definitions of per-surfel shading in plain torch: any floating-point type, gradients by autograd."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

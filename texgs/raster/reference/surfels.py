@@ -1,7 +1,5 @@
 """The definition of surfels (Huang et al. 2024): how their planes map to pixels, and where rays meet them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The definition of rendering a voxel grid in plain torch: dense, any float type, gradients by autograd."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import torch
