@@ -11,12 +11,15 @@ import pyvista
 from PIL import Image
 
 import texgs
-from tests.scene.balls import write_balls
+from tests.scene.balls import ball_models, write_balls
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.core.image import read_rgba
 from texgs.core.light import Light
-from texgs.scene.scene_file import read_scene
+from texgs.fields.surfels.step_file import write_step
+from texgs.scene.scene import Scene as Seen
+from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.series_file import Series, write_series
 from texgs.viewer.standalone import scene_page
 
 
@@ -213,6 +216,22 @@ def test_a_large_page_is_a_picture_that_says_so(scene):
     shown = scene.show(largest=0.01)._repr_mimebundle_()
     assert shown["text/html"].startswith(f'<img src="data:image/jpeg;base64,{shown["image/jpeg"]}">')
     assert "scene.show(largest=" in shown["text/plain"]
+
+
+def test_a_page_holds_the_steps_of_a_series_or_one(tmp_path):
+    models = ball_models(tmp_path, "TF01")
+    key, series = models["TF01"].open()[0], Series(tmp_path / "series.json", ["a", "b"], ["TF01"])
+    for time in range(2):
+        write_step(series.model("TF01", time), key, key, {})
+    write_series(series)
+    scene = texgs.open(write_scene(tmp_path / "scene.yaml", Seen(models, series=series).at(1)))
+    assert [scene.show(steps=steps).text.count('class="step"') for steps in ("all", "one", 1)] == [2, 1, 2]
+    assert (
+        scene.export(tmp_path / "x.html", steps="one").read_text()
+        == scene_page(scene.session.scene, "x", steps="one").text
+    )
+    with pytest.raises(ArgumentError, match=r"steps: expected all, one or a number N .*, got 'none'"):
+        scene.show(steps="none")
 
 
 def test_models_of_one_file_and_psnr_without_a_volume(tmp_path):

@@ -20,13 +20,13 @@ from texgs.viewer.standalone import joined_modules
 START = """
 const { WebglRenderer } = modules["webgl.js"];
 Object.assign(globalThis, modules["sort.js"], modules["tensors.js"]);
-globalThis.start = async (packed, scene, volume) => {
+globalThis.start = async (packed, scene, volume, steps) => {
   const canvas = document.body.appendChild(document.createElement("canvas"));
   globalThis.renderer = new WebglRenderer(canvas, (text) => console.log(text));
-  await renderer.open(packed, scene, volume);
+  await renderer.open(packed, scene, volume, steps);
 };
-globalThis.shoot = (camera, scene, shown) => {
-  const pixels = renderer.pixels(camera, scene, shown);
+globalThis.shoot = async (camera, scene, shown) => {
+  const pixels = await renderer.at(scene.time, () => renderer.pixels(camera, scene, shown));
   let text = "";
   for (let i = 0; i < pixels.length; i += 4096) text += String.fromCharCode(...pixels.subarray(i, i + 4096));
   return btoa(text);
@@ -34,11 +34,11 @@ globalThis.shoot = (camera, scene, shown) => {
 """
 
 
-def open_renderer(page, packed, description, volume=""):
-    """Give a blank page the renderer with a scene, and its volume."""
+def open_renderer(page, packed, description, volume="", steps=()):
+    """Give a blank page the renderer with a scene, its volume and its steps in time."""
     page.set_content(f"<!doctype html><body><script type=module>{joined_modules('webgl.js')}{START}</script>")
     page.wait_for_function("globalThis.start !== undefined")
-    page.evaluate("(words) => start(...words)", [packed, description, volume])
+    page.evaluate("(words) => start(...words)", [packed, description, volume, list(steps)])
 
 
 def view_of(camera):

@@ -131,7 +131,7 @@ class Scene(Editing):
         Args:
             path: its ending says what: .html, .ply, .usdc, .usda, .glb, .spz, .vtp.
             kind: what, where an ending has several; default 3dgs for .ply.
-            **options: of `texgs.scene.export.Export`.
+            **options: of `texgs.scene.export.Export`; of .html, `steps`, see `show`.
 
         Raises:
             ArgumentError: if the ending is unknown or another kind's, or the scene cannot be written so.
@@ -147,19 +147,22 @@ class Scene(Editing):
             expected = " or ".join(able.get(chosen, endings))
             raise ArgumentError(f"path: expected a file that ends in {expected}, got {path}")
         if chosen == "html":
-            write_page(path, scene, path.stem)
+            write_page(path, scene, path.stem, **options)
             return path
         return export_scene(path, scene, Export(chosen, **options))
 
     # ---- Notebooks ------------------------------------------------------------
 
-    def show(self, *, live: bool = False, largest: float = LARGEST_PAGE) -> Page | LivePage:
+    def show(
+        self, *, live: bool = False, largest: float = LARGEST_PAGE, steps: str | int = "all"
+    ) -> Page | LivePage:
         """Return what a cell shows: a page that is part of the notebook; or the viewer, live.
 
         Args:
             live: show the viewer, on this machine, as long as this process runs: edits there are edits of
                 this object, and the other way round.
             largest: MB of the page; of a larger one there is a picture.
+            steps: of a series in time, that the page holds: "all", "one" or a number N, each N-th.
         """
         from texgs.viewer.standalone import scene_page
 
@@ -168,12 +171,15 @@ class Scene(Editing):
 
             self._viewer = self._viewer or Viewer(self.session, Path(self._scratch.name))
             return LivePage(self._viewer.address)
-        page = scene_page(self.session.scene, ", ".join(self.session.scene.models))
+        page = scene_page(self.session.scene, ", ".join(self.session.scene.models), steps=steps)
         size, text = len(page.text.encode()) / MB, page.text
         note = f"{page.surfels:,} surfels; {size:.1f} MB of this notebook"
         if size > largest:
             text = ""
             note = f"A picture: the page has {size:.1f} MB. scene.show(largest={size:.0f}) shows it."
+            note += (
+                ' scene.show(steps="one") has one step.' if page.steps and len(page.steps.packed) > 1 else ""
+            )
         return Page(text, page.poster, note)
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:

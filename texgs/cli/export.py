@@ -49,6 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"html: with the volume of the scene in so many MB ({PAGE_VOLUME:g}), to show any transfer "
         "function, the volume beside the scene, and faces of cuts",
     )
+    words = "html: steps of a series that the page holds: all (default), one, the scene's, or each N-th"
+    parser.add_argument("--steps", metavar="all|one|N", help=words)
     option(parser, "--opacity", 0.5, "points: leave out surfels with less opacity")
     option(parser, "--voxel", 1 / 256, "edge of a cell of a mesh, world units")
     option(parser, "--views", 92, "number of views that a mesh is made from")
@@ -66,8 +68,9 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.scene.scene_file import read_scene
 
     kind = kind_of(arguments)
-    if arguments.volume is not None and kind != "html":
-        raise ArgumentError(f"--volume: expected --to a page, .html, got {arguments.to}; leave it out")
+    for name in ("volume", "steps"):
+        if getattr(arguments, name) is not None and kind != "html":
+            raise ArgumentError(f"--{name}: expected --to a page, .html, got {arguments.to}; leave it out")
     scene = read_scene(arguments.source) if arguments.source.suffix in SCENES else None
     if kind == "html":
         print(of_page(arguments, scene))
@@ -141,5 +144,8 @@ def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
     if arguments.volume is not None:
         volume = page_volume(scene, arguments.volume)
         print(f"Volume in the page: {volume}", file=sys.stderr)
-    write_page(arguments.to, scene, arguments.to.stem, checked(arguments.source, scene), volume)
+    found, steps = checked(arguments.source, scene), arguments.steps or "all"
+    page = write_page(arguments.to, scene, arguments.to.stem, found, volume, steps)
+    if page.steps is not None:
+        print(f"Series in the page: {page.steps}", file=sys.stderr)
     return Path(arguments.to)

@@ -28,6 +28,7 @@ from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin, twin_of
 from texgs.viewer.description import describe, presets
 from texgs.viewer.origins import Origins
+from texgs.viewer.page_steps import PageSteps, page_steps
 from texgs.viewer.page_volume import PageVolume
 
 LARGEST = 256 * 2**20  # bytes; browsers hold a text of twice as many
@@ -45,19 +46,31 @@ class ScenePage:
     text: str
     surfels: int
     poster: bytes  # a JPEG of the first view
+    steps: PageSteps | None  # of the scene's series
 
 
 def write_page(
-    path: Path, scene: Scene, name: str, checked: str = "", volume: PageVolume | None = None
+    path: Path,
+    scene: Scene,
+    name: str,
+    checked: str = "",
+    volume: PageVolume | None = None,
+    steps: str | int = "all",
 ) -> ScenePage:
     """Create or replace the page of a scene of surfels in one step; see `scene_page`."""
     with located(path):
-        page = scene_page(scene, name, checked, volume)
+        page = scene_page(scene, name, checked, volume, steps)
     write_bytes(path, page.text.encode())
     return page
 
 
-def scene_page(scene: Scene, name: str, checked: str = "", volume: PageVolume | None = None) -> ScenePage:
+def scene_page(
+    scene: Scene,
+    name: str,
+    checked: str = "",
+    volume: PageVolume | None = None,
+    steps: str | int = "all",
+) -> ScenePage:
     """Return the page of a scene of surfels; the same scene gives the same text.
 
     The surfels are rounded as in compact model files. Hidden models are in the page: they can be shown there.
@@ -67,28 +80,37 @@ def scene_page(scene: Scene, name: str, checked: str = "", volume: PageVolume | 
         name: of the scene, the title.
         checked: what `texgs check` has found; it stands in the metadata, and below.
         volume: of the scene, which the page then shows with any transfer function, and behind cuts.
+        steps: of its series, that the page moves through; see `page_steps`.
     """
     composed = scene.open()
     if not isinstance(composed, Composition):
         raise ArgumentError("expected a scene of surfels, got another kind; fit surfels for this")
-    surfels = pack(composed)
-    if len(surfels) > LARGEST:
+    surfels, moved = pack(composed), page_steps(scene, steps)
+    if (size := len(surfels) + (moved.size if moved else 0)) > LARGEST:
         raise ArgumentError(
-            f"expected surfels of at most {LARGEST >> 20} MiB, got {len(surfels) >> 20} MiB for "
-            f"{len(composed)} of them; export fewer models"
+            f"expected surfels of at most {LARGEST >> 20} MiB, got {size >> 20} MiB for "
+            f"{len(composed)} of them; export fewer models{' or steps' if moved else ''}"
         )
     description = describe(name, scene, composed)
+    if moved is not None:
+        description["held"] = list(moved.packed)
     twin = None
     if volume is not None:
         description |= {"volume": volume.describe(scene), "presets": presets()}
         description["transfer"] = Origins(scene).transfer
         twin = twin_of(scene)
     picture = poster(scene, composed, description["views"][0], description["fov_y"], twin)
-    return ScenePage(page_of(description, surfels, picture, checked, volume), len(composed), picture)
+    html = page_of(description, surfels, picture, checked, volume, moved)
+    return ScenePage(html, len(composed), picture, moved)
 
 
 def page_of(
-    description: dict[str, Any], surfels: str, picture: bytes, checked: str, volume: PageVolume | None = None
+    description: dict[str, Any],
+    surfels: str,
+    picture: bytes,
+    checked: str,
+    volume: PageVolume | None,
+    steps: PageSteps | None,
 ) -> str:
     """Return the page of a description, see `describe`, packed surfels, and a JPEG that is shown first.
 
@@ -114,6 +136,8 @@ def page_of(
             surfels=Markup(surfels),
             volume=Markup(b64encode(volume.packed).decode()) if volume else "",
             volume_words=f"The page has the volume in {volume}." if volume else "",
+            steps=steps,
+            time=description["time"],
             poster=b64encode(picture).decode(),
         )
     )

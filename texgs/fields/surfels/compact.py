@@ -131,11 +131,7 @@ def _rounded(name: str, values: Tensor) -> np.ndarray:
 
 
 def _texture(p: Mapping[str, Tensor], step: float) -> dict[str, np.ndarray]:
-    """Return sizes, and texels in steps as green, red - green and blue - green: channels are much alike.
-
-    `codes` [B, 3, T] uint8 are bytes of whole numbers whose last bit is the sign, from low to high: all
-    planes but the first are nearly all zero.
-    """
+    """Return sizes, and `codes` of texels in steps as green, red - green, blue - green: these are alike."""
     texels = p["texels"].detach()[owners(p)[0]]
     steps = (texels.double() / step).round()
     if bool((steps.abs() > MOST_STEPS).any()):
@@ -144,11 +140,18 @@ def _texture(p: Mapping[str, Tensor], step: float) -> dict[str, np.ndarray]:
             "write a lossless model file"
         )
     red, green, blue = steps.int().T
-    whole = torch.stack([green, red - green, blue - green])  # [3, T]
+    codes = codes_of(torch.stack([green, red - green, blue - green]))
+    return {"codes": codes, "sizes": p["sizes"].detach().contiguous().numpy()}
+
+
+def codes_of(whole: Tensor) -> np.ndarray:
+    """Return int32 [C, N] as bytes [B, C, N] of numbers whose last bit is the sign, from low to high.
+
+    All planes but the first are nearly all zero where numbers are small.
+    """
     signed = whole << 1 ^ whole >> 31
     width = 1 + sum(bool((signed >> 8 * k).any()) for k in (1, 2, 3))
-    planes = [signed >> 8 * k & 255 for k in range(width)]
-    return {"codes": torch.stack(planes).byte().numpy(), "sizes": p["sizes"].detach().contiguous().numpy()}
+    return torch.stack([signed >> 8 * k & 255 for k in range(width)]).byte().numpy()
 
 
 # -- reading ---

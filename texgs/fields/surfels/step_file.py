@@ -31,17 +31,25 @@ def write_step(path: str | Path, key: Surfels, model: Surfels, metadata: Mapping
     A safetensors file with whole numbers [N, ...] int16, by the names of `UNITS`; the differences, rounded.
     Quaternions are of length 1 there. Metadata are JSON, such as where the step is from.
     """
+    tensors = {
+        name: (x / UNITS[name]).round().clamp(-MOST, MOST).to(torch.int16)
+        for name, x in differences(key, model).items()
+    }
+    description = {"version": VERSION, "key": known_by(key), "metadata": dict(metadata)}
+    return write_tensor_file(path, FORMAT, description, tensors)
+
+
+def differences(key: Surfels, model: Surfels) -> dict[str, Tensor]:
+    """Return by how much a model differs from the key model, by the names of `UNITS`.
+
+    Quaternions have length 1, and the sign that is nearer.
+    """
     own, other = _comparable(key), _comparable(model)
     check.shape("means", other["means"], "N 3", N=len(key))
     check.finite(**other)
     flip = (own["quats"] * other["quats"]).sum(dim=1, keepdim=True) < 0
     other["quats"] = torch.where(flip, -other["quats"], other["quats"])  # the same rotation
-    tensors = {
-        name: ((other[name] - own[name]) / unit).round().clamp(-MOST, MOST).to(torch.int16)
-        for name, unit in UNITS.items()
-    }
-    description = {"version": VERSION, "key": known_by(key), "metadata": dict(metadata)}
-    return write_tensor_file(path, FORMAT, description, tensors)
+    return {name: other[name] - own[name] for name in UNITS}
 
 
 def at_step(key: Surfels, path: str | Path) -> Surfels:

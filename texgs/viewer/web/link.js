@@ -1,5 +1,7 @@
 // What a link says of a scene, checked as the server does it: what cannot be used is left out, and named.
 
+import { timesOf } from "./state.js";
+
 const MOST = 1e6; // of a coordinate
 const MOST_FACTOR = 1000, MOST_PLANES = 6;
 
@@ -25,7 +27,7 @@ const OF_SCENE = {
     && (x.box === null || isBox(x.box)) && ["shaded", "unlit"].includes(x.faces),
   functions: (x, scene) => Boolean(scene.transfer) && typeof x === "object" && !Array.isArray(x)
     && Object.values(x).every(isFunction),
-  time: (x, scene) => Number.isInteger(x) && x >= 0 && x < scene.steps.length,
+  time: (x, scene) => timesOf(scene).includes(x),
 };
 
 function isUsable(scene, { part, key, value }) {
@@ -33,7 +35,8 @@ function isUsable(scene, { part, key, value }) {
     name === part || segments.some((each) => `${name}/${each.name}` === part);
   const known = part === "" ? Object.keys(OF_SCENE) : scene.models.find(isPartOf)?.can ?? [];
   const check = known.includes(key) && (part === "" ? OF_SCENE : OF_PART)[key];
-  return Boolean(check) && ((value ?? null) === null || check(value, scene));
+  const isReset = (value ?? null) === null && key !== "time"; // a step is always shown
+  return Boolean(check) && (isReset || check(value, scene));
 }
 
 /** Edits in a link that a scene can have; the names of others are added to `wrong`. */

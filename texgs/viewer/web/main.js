@@ -43,7 +43,7 @@ class Page extends ScenePage {
       { models: get("models"), background: get("background"), steps: get("steps") },
       { segment: (model) => this.#segment(model), look: (part) => this.beginLook(part),
         rename: (part) => this.#rename(part), remove: (part) => this.state.remove(part) });
-    this.time = new TimeSlider(this.state, get("time"));
+    this.time = new TimeSlider(this.state, get("time"), () => this.state.isPending);
     this.compare = new Compare(this);
     this.toolbar = new Toolbar(this, choices);
     get("transfer-section").hidden = !scene.transfer;

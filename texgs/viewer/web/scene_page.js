@@ -101,7 +101,8 @@ export class ScenePage {
     this.renderer.draw(this.camera, this.state.scene, { moving, ...this.#shown });
     for (const each of this.#marks) each.draw();
     clearTimeout(this.#resting);
-    this.#resting = setTimeout(() => this.#rest(moving), Math.max(REST, 2 * (this.renderer.took ?? 0)));
+    const still = Math.max(REST, 2 * (this.renderer.took ?? 0), this.time?.pause ?? 0);
+    this.#resting = setTimeout(() => this.#rest(moving), still);
   }
 
   /** The camera was moved. */

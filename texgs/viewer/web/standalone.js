@@ -8,7 +8,9 @@ import { Panel } from "./panel.js";
 import { ScenePage } from "./scene_page.js";
 import { PictureDialog } from "./size_inputs.js";
 import { State, difference } from "./state.js";
+import { TimeSlider } from "./time.js";
 import { TransferEditor } from "./transfer.js";
+import { OF_TWIN } from "./twin.js";
 import { WebglRenderer } from "./webgl.js";
 
 const get = (id) => document.getElementById(id);
@@ -20,17 +22,37 @@ class StandalonePage extends ScenePage {
     new EditHistory(this);
     get("still").onclick = () => this.#save();
     new PictureDialog(this, (how) => this.#save(how));
+    if (scene.held) this.time = new TimeSlider(this.state, get("time"), () => renderer.isBusy);
     if (scene.volume) {
       this.compare = new Compare(this);
       new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
     }
-    this.state.addEventListener("change", () => this.#tellWords());
+    this.state.addEventListener("change", () => {
+      this.#tellWords();
+      if (scene.volume) this.#limitModes();
+    });
     this.follow();
   }
 
   draw(moving) {
     super.draw(moving);
     this.compare?.show();
+  }
+
+  /** Show something else; the volume in the page is that of the step with which it begins. */
+  show(values) {
+    const isNone = OF_TWIN.includes(values.mode ?? this.shown.mode) && this.#isElsewhere;
+    if (isNone) this.notices.tell(`The volume in this page is that of step ${this.state.original.time}: go there to see it.`, "info");
+    super.show(isNone ? { ...values, mode: "shaded" } : values);
+  }
+
+  get #isElsewhere() {
+    return this.state.scene.time !== this.state.original.time;
+  }
+
+  #limitModes() {
+    for (const option of get("mode").options) option.disabled = this.#isElsewhere && OF_TWIN.includes(option.value);
+    if (OF_TWIN.includes(this.shown.mode)) this.show({});
   }
 
   #tellWords() {
@@ -41,8 +63,8 @@ class StandalonePage extends ScenePage {
   }
 
   /** Save a picture of the view, by default in the pixels of the screen. */
-  #save(how) {
-    const canvas = this.renderer.still(this.camera, this.state.scene, { ...this.shown, ...how });
+  async #save(how) {
+    const canvas = await this.renderer.still(this.camera, this.state.scene, { ...this.shown, ...how });
     canvas.toBlob((blob) => download(blob, `${this.state.scene.name}.png`));
   }
 }
@@ -75,7 +97,8 @@ async function start() {
   notices.keep("Unpacking the scene.");
   try {
     const renderer = new WebglRenderer(get("picture"), (text) => notices.keep(text));
-    await renderer.open(get("surfels").textContent, scene, get("volume")?.textContent);
+    const steps = [...document.querySelectorAll(".step")].map((step) => step.textContent);
+    await renderer.open(get("surfels").textContent, scene, get("volume")?.textContent, steps);
     get("poster").hidden = true;
     get("picture").hidden = false;
     new StandalonePage(scene, renderer, notices);

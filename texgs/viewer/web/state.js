@@ -14,6 +14,9 @@ const OF_SCENE = {
   time: null,
 };
 
+/** Numbers of the steps in time that can be shown: all, or those that a page holds. */
+export const timesOf = ({ steps, held }) => held ?? [...steps.keys()];
+
 /** Another description, with an edit made. */
 export function edited(scene, { part, key, value }) {
   if (part === "") return { ...scene, [key]: value ?? OF_SCENE[key] };

@@ -4,7 +4,7 @@ import { dot } from "./camera.js";
 import { COLUMNS } from "./parts.js";
 import { makeProgram, makeTexture } from "./program.js";
 import { SURFEL_FRAGMENT, SURFEL_VERTEX } from "./shaders.js";
-import { LAYERS, WIDTH } from "./surfels.js";
+import { LAYERS, PLACED, WIDTH } from "./surfels.js";
 import { Target } from "./target.js";
 
 const BEYOND = 1e9; // a depth that nothing has
@@ -78,6 +78,13 @@ export class SurfelPass {
     gl.disable(gl.BLEND);
     this.target.end();
     return this.target.picture;
+  }
+
+  /** Takes other places of the same surfels: the layers of `PLACED`. */
+  place(surfels) {
+    const gl = this._gl, { texture, target } = this._textures.surfels, height = surfels.length / (4 * WIDTH * LAYERS.length);
+    gl.bindTexture(target, texture);
+    gl.texSubImage3D(target, 0, 0, 0, 0, WIDTH, height, PLACED.length, gl.RGBA, gl.FLOAT, surfels);
   }
 
   /** The least and the largest mean depth of pixels that are not faint, where depth was blended; BEYOND if none is. */

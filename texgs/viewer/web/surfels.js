@@ -1,7 +1,10 @@
 // Surfels of all models, laid out as the textures that the shaders read.
 
+import { wholeNumbers } from "./tensors.js";
+
 export const WIDTH = 2048; // texels in a row of every texture; WebGL2 always has so many
-export const LAYERS = ["place", "quats", "scales", "colors", "material"]; // of 4 floats; place: mean and opacity
+export const PLACED = ["place", "quats", "scales", "colors"]; // layers of 4 floats that change in time; place: mean and opacity
+export const LAYERS = [...PLACED, "material"];
 const SHININESS = [1, 100]; // range of the bounded exponent
 
 const sigmoid = (x) => 1 / (1 + Math.exp(-x));
@@ -23,13 +26,30 @@ export function joinSurfels(tensors, optics, rows) {
   const lookups = new Uint32Array(layer);
   let first = 0;
   let firstTexel = 0;
+  placeSurfels(surfels, tensors, models.length);
   for (const model of models) {
-    LAYERS.forEach((name, k) => model[name](surfels.subarray(k * layer + 4 * first)));
+    model.material(surfels.subarray(PLACED.length * layer + 4 * first));
     fillLookups(lookups.subarray(4 * first), model, firstTexel);
     first += model.count;
     firstTexel += model.texels.length / 3;
   }
   return { count, surfels, lookups, texels: joinTexels(models) };
+}
+
+/** Fills the layers that change in time. */
+export function placeSurfels(surfels, tensors, models) {
+  const layer = surfels.length / LAYERS.length;
+  let first = 0;
+  for (let number = 0; number < models; number++) {
+    const of = (name) => tensors.get(`${number}.${name}`).data, count = of("opacities").length;
+    const [place, quats, scales, colors] = PLACED.map((_, k) => surfels.subarray(k * layer + 4 * first));
+    fill(place, of("means"), count, 3);
+    of("opacities").forEach((opacity, i) => { place[4 * i + 3] = sigmoid(opacity); });
+    fill(quats, of("quats"), count, 4);
+    fill(scales, of("scales").map(Math.exp), count, 2);
+    fill(colors, of("colors"), count, 3);
+    first += count;
+  }
 }
 
 /** `length` made whole rows of WIDTH texels with so many channels each. */
@@ -38,24 +58,17 @@ function padded(length, channels) {
   return Math.max(1, Math.ceil(length / row)) * row;
 }
 
-/** One model: how it fills each layer, and its texels. */
+/** One model: how it fills the layer of its material, and its texels. */
 function readModel(tensors, number, optics, row) {
   const of = (name) => tensors.get(`${number}.${name}`)?.data;
   const [count] = tensors.get(`${number}.means`).shape;
-  const [means, opacities, scales, material] = [of("means"), of("opacities"), of("scales"), materialOf(of, optics)];
+  const material = materialOf(of, optics);
   return {
     count,
     row,
     labels: of("labels"),
     sizes: of("sizes"),
     texels: texelsOf(tensors.get(`${number}.codes`)),
-    place: (to) => {
-      fill(to, means, count, 3);
-      for (let i = 0; i < count; i++) to[4 * i + 3] = sigmoid(opacities[i]);
-    },
-    quats: (to) => fill(to, of("quats"), count, 4),
-    scales: (to) => fill(to, scales.map(Math.exp), count, 2),
-    colors: (to) => fill(to, of("colors"), count, 3),
     material: (to) => material.forEach((factor, k) => {
       for (let i = 0; i < count; i++) to[4 * i + k] = factor[factor.length === 1 ? 0 : i];
     }),
@@ -80,21 +93,14 @@ function materialOf(of, optics) {
   return [ambient.map(sigmoid), diffuse.map(sigmoid), specular.map(sigmoid), bounded];
 }
 
-/** Texels [T, 3] in steps, from the planes of bytes of a compact file; one of 0 for a model without texture. */
+/** Texels [T, 3] in steps, from the codes of a compact file; one of 0 for a model without texture. */
 function texelsOf(codes) {
   if (!codes) return new Int16Array(3);
-  const [planes, , count] = codes.shape;
-  const texels = new Int16Array(3 * count);
-  const step = (channel, i) => {
-    let signed = 0;
-    for (let k = 0; k < planes; k++) signed |= codes.data[(3 * k + channel) * count + i] << (8 * k);
-    return (signed >>> 1) ^ -(signed & 1);
-  };
-  for (let i = 0; i < count; i++) {
-    const green = step(0, i);
-    texels[3 * i] = green + step(1, i);
-    texels[3 * i + 1] = green;
-    texels[3 * i + 2] = green + step(2, i);
+  const [green, red, blue] = wholeNumbers(codes), texels = new Int16Array(3 * green.length);
+  for (let i = 0, k = 0; i < green.length; i++) {
+    texels[k++] = green[i] + red[i];
+    texels[k++] = green[i];
+    texels[k++] = green[i] + blue[i];
   }
   return texels;
 }

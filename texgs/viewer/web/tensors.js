@@ -33,6 +33,19 @@ export function readTensors(buffer) {
   return { tensors, metadata };
 }
 
+/** Rows of whole numbers from their bytes [B, C, N], see codes_of in texgs/fields/surfels/compact.py. */
+export function wholeNumbers({ shape: [planes, rows, count], data }) {
+  return Array.from({ length: rows }, (_, row) => {
+    const numbers = new Int32Array(count);
+    for (let i = 0; i < count; i++) {
+      let signed = 0;
+      for (let k = 0; k < planes; k++) signed |= data[(rows * k + row) * count + i] << (8 * k);
+      numbers[i] = (signed >>> 1) ^ -(signed & 1);
+    }
+    return numbers;
+  });
+}
+
 /** The number that 16 bits of IEEE 754 half precision mean. */
 export function halfToFloat(bits) {
   const sign = bits & 0x8000 ? -1 : 1;

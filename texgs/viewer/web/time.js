@@ -1,30 +1,33 @@
 // The step of a series in time that is shown: a slider, and a button that plays the steps.
 
 import { element, gesture, newGesture } from "./inputs.js";
+import { timesOf } from "./state.js";
 
 const PACE = 200; // milliseconds from step to step, at least
 
 export class TimeSlider {
-  #state; #range; #name; #play; #timer = 0; #played = 0;
+  #state; #times; #range; #name; #play; #isBusy; #timer = 0; #played = 0;
 
   /**
-   * @param {SharedState} state
-   * @param {Element} root - for the inputs; hidden where the scene has no series
+   * @param {State} state
+   * @param {Element} root - for the inputs; hidden where there are no other steps
+   * @param {() => boolean} isBusy - whether a step that was asked for is not shown yet
    */
-  constructor(state, root) {
-    const { steps } = state.scene;
+  constructor(state, root, isBusy) {
+    const { steps } = state.scene, times = this.#times = timesOf(state.scene);
     this.#state = state;
-    root.hidden = steps.length < 2;
+    this.#isBusy = isBusy;
+    root.hidden = times.length < 2;
     this.#range = element("input", { type: "range", "aria-label": "Step in time" });
-    Object.assign(this.#range, { min: 0, max: Math.max(steps.length - 1, 0), step: 1 });
+    Object.assign(this.#range, { min: 0, max: Math.max(times.length - 1, 0), step: 1 });
     this.#name = element("output");
     this.#play = element("button", { type: "button", onclick: () => this.#timer ? this.stop() : this.play() }, "Play");
-    const use = gesture(this.#range, (step) => this.#show(Number(this.#range.value), step));
+    const use = gesture(this.#range, (step) => this.#show(this.#range.value, step));
     this.#range.addEventListener("pointerdown", () => this.stop());
     root.append(element("span", { className: "name" }, "Time"), this.#range, this.#name, this.#play);
     const show = () => {
       const { time } = state.scene;
-      if (!use.isBusy()) this.#range.value = time ?? 0;
+      if (!use.isBusy()) this.#range.value = times.indexOf(time);
       this.#name.textContent = time ?? "";
       this.#name.title = this.#range.ariaValueText = steps[time] ?? "";
     };
@@ -32,14 +35,19 @@ export class TimeSlider {
     show();
   }
 
-  /** Show one step after the other, as fast as the server makes them; all of it is one step of the history. */
+  /** Show one step after the other, as fast as they are drawn; all of it is one step of the history. */
   play() {
     this.#played = newGesture();
     this.#play.textContent = "Pause";
     this.#timer = setInterval(() => {
-      const { scene, isPending } = this.#state;
-      if (!isPending) this.#show((scene.time + 1) % scene.steps.length, this.#played);
+      const next = this.#times.indexOf(this.#state.scene.time) + 1;
+      if (!this.#isBusy()) this.#show(next % this.#times.length, this.#played);
     }, PACE);
+  }
+
+  /** Milliseconds in which another step may follow: there is no rest meanwhile. */
+  get pause() {
+    return this.#timer ? 2 * PACE : 0;
   }
 
   stop() {
@@ -48,7 +56,7 @@ export class TimeSlider {
     this.#play.textContent = "Play";
   }
 
-  #show(time, step) {
-    this.#state.edit("", "time", time, step);
+  #show(index, step) {
+    this.#state.edit("", "time", this.#times[index], step);
   }
 }

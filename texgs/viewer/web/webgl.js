@@ -7,8 +7,9 @@ import { samplesOf } from "./samples.js";
 import { MODES, PAIRS, PRESENT_FRAGMENT, PRESENT_VERTEX } from "./shaders.js";
 import { sizeOf } from "./size.js";
 import { DepthOrder } from "./sort.js";
+import { Steps } from "./steps.js";
 import { NEAR, SurfelPass, bind } from "./surfel_pass.js";
-import { joinSurfels } from "./surfels.js";
+import { joinSurfels, placeSurfels } from "./surfels.js";
 import { unpack } from "./tensors.js";
 import { withAlpha } from "./transparent.js";
 import { OF_TWIN, Twin, alone } from "./twin.js";
@@ -32,6 +33,7 @@ export class WebglRenderer {
     const gl = canvas.getContext("webgl2", CONTEXT);
     if (!gl) throw new Error(MISSING);
     this._gl = gl;
+    this._notice = notice;
     this._share = 1; // of the sides of a frame, while something moves
     this.took = 0; // milliseconds of the latest of these frames
     canvas.addEventListener("webglcontextlost", (event) => {
@@ -52,12 +54,16 @@ export class WebglRenderer {
    * @param {string} packed their tensors, see tensors.js.
    * @param {object} scene its description; models and segments may not change later, their edits may.
    * @param {string} volume its samples, where the page has them.
+   * @param {string[]} steps those of its series that the page holds, see steps.js.
    */
-  async open(packed, scene, volume = "") {
+  async open(packed, scene, volume = "", steps = []) {
     const { tensors, metadata } = await unpack(packed);
     this._original = scene;
     this._optics = JSON.parse(metadata.optics);
     this._surfels = joinSurfels(tensors, this._optics.models, firstRows(scene.models));
+    this._steps = new Steps(tensors, steps, scene.held ?? []);
+    this._time = scene.time; // where the surfels are
+    this._turn = Promise.resolve(); // of who needs them at a step
     this._order = new DepthOrder(this._surfels.lookups.length / 4);
     this._samples = volume ? samplesOf((await unpack(volume)).tensors) : null;
     if (volume) this.modes = MODES.toSpliced(1, 0, ...OF_TWIN);
@@ -82,6 +88,26 @@ export class WebglRenderer {
     this._ask();
   }
 
+  /** Whether the newest frame that is asked for has not begun. */
+  get isBusy() {
+    return this._isAsked;
+  }
+
+  /** Does something while the surfels are where they are at a step; who asks later waits. */
+  at(time, act) {
+    const done = this._turn.then(async () => {
+      if (time !== this._time) {
+        placeSurfels(this._surfels.surfels, await this._steps.at(time), this._optics.models.length);
+        this._pass.place(this._surfels.surfels);
+        this._time = time;
+        this._sorted = "";
+      }
+      return act();
+    });
+    this._turn = done.catch(() => {});
+    return done;
+  }
+
   /** Moves the line between two pictures. */
   wipe(part) {
     if (this._wanted) this._wanted.shown.wipe = part;
@@ -99,9 +125,13 @@ export class WebglRenderer {
   }
 
   /** The same picture as a canvas of its own; of another size, or without its background, if need be. */
-  still(camera, scene, { before, size = this.size(), transparent = false, ...how }) {
-    const [width, height] = size, view = { ...this._view(camera), width, height };
-    const shown = before ? this._original : scene, still = { ...how, moving: false };
+  async still(camera, scene, { before, ...how }) {
+    const view = this._view(camera), shown = before ? this._original : scene;
+    return this.at(shown.time, () => this._still(view, shown, how));
+  }
+
+  _still(onScreen, shown, { size = this.size(), transparent = false, ...how }) {
+    const [width, height] = size, view = { ...onScreen, width, height }, still = { ...how, moving: false };
     const over = (grey) => this.pixels(view, { ...shown, background: [grey, grey, grey] }, still);
     const pixels = transparent ? withAlpha(over(0), over(1)) : this.pixels(view, shown, still);
     if (this._wanted) this._frame(this._wanted.view, this._wanted.scene, this._wanted.shown); // on screen again
@@ -150,8 +180,19 @@ export class WebglRenderer {
     if (gl.isContextLost() || !this._wanted) return;
     const isDone = !this._begun || gl.getSyncParameter(this._begun.fence, gl.SYNC_STATUS) === gl.SIGNALED;
     if (isDone && this._begun) this._note(this._begun);
-    if (isDone && this._isAsked) this._begin(this._wanted);
+    if (isDone && this._isAsked && this._wanted.scene.time === this._time) this._begin(this._wanted);
+    else if (isDone && this._isAsked) this._going ??= this._go(this._wanted.scene.time);
     if (this._begun) this._request = requestAnimationFrame(() => this._tick());
+  }
+
+  /** Puts the surfels where they are at a step, for the newest frame. */
+  async _go(time) {
+    try {
+      await this.at(time, () => this._ask());
+    } catch (error) {
+      this._notice(error.message);
+    }
+    this._going = null;
   }
 
   _begin({ view, scene, shown }) {
@@ -198,7 +239,8 @@ export class WebglRenderer {
   /** The picture of a mode, or two and how they are shown. */
   _pictures(view, scene, mode, moving) {
     const look = lookOf(scene), draw = (slab) => this._blend(view, scene, look, mode, slab);
-    if (!this._twin || (mode !== "shaded" && !OF_TWIN.includes(mode))) return alone(draw());
+    const isThere = this._twin && scene.time === this._original.time; // of others, the page has no volume
+    if (!isThere || (mode !== "shaded" && !OF_TWIN.includes(mode))) return alone(draw());
     return this._twin.pictures(view, scene, look, { mode, moving }, { draw, target: this._pass.target });
   }
 

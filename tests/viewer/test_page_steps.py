@@ -1,0 +1,378 @@
+"""The steps of a series that a page carries: their numbers, and what a browser shows of them."""
+
+import io
+import json
+import re
+import shlex
+import zlib
+from base64 import b64decode
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+from safetensors.numpy import load
+from torch.nn.functional import normalize
+
+from tests.fields.surfels.test_composition import ball
+from tests.scene.test_twin import HIGH, LOOK, LOW
+from tests.viewer.drawing import drawn, open_renderer, unpacked
+from tests.viewer.in_browser import LINK, PLACE, WAIT, expect, shown, still
+from texgs.cli.main import main
+from texgs.core.camera import orbit
+from texgs.core.cuts import Cuts, Plane
+from texgs.core.errors import ArgumentError
+from texgs.core.light import Light
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.step_file import write_step
+from texgs.fields.surfels.variants import write_texture
+from texgs.scene.frame import frame
+from texgs.scene.scene import Scene, SceneModel, SceneSegment
+from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.segment_file import write_segment
+from texgs.scene.series_file import Series, write_series
+from texgs.scene.twin import SceneVolume
+from texgs.viewer import standalone
+from texgs.viewer.description import describe
+from texgs.viewer.page_steps import UNITS, page_steps
+from texgs.viewer.standalone import pack, scene_page
+from texgs.volume.generate import sphere
+from texgs.volume.prepare import prepare
+from texgs.volume.slabs import ArraySource
+
+COUNT, BEGIN = 5, 2  # steps, and the one that the scene shows
+CAMERA = orbit(20, 10, 3, 40, 96, 80)
+CLOSE = 50.0  # dB: the page rounds surfels and texels
+
+
+def at(model, time):
+    """A model that moves to the right, turns, shrinks, fades and changes its colours."""
+    p, g = dict(model.parameters), torch.Generator().manual_seed(time)
+    p["means"] = p["means"] + p["means"].new_tensor([0.12 * time, 0, 0])
+    p["quats"] = normalize(p["quats"], dim=1) + 0.2 * time * torch.randn(p["quats"].shape, generator=g)
+    p["scales"] = p["scales"] - 0.1 * time
+    p["opacities"] = p["opacities"] + 0.5 * time
+    p["colors"] = p["colors"] + 0.05 * time
+    return replace(model, parameters=p)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """Two models, of which one follows a series; a part of it has a look of its own, with its own colours."""
+    folder = tmp_path_factory.mktemp("series")
+    key, other = ball(1, n=300), ball(2, n=60, middle=0.3)
+    styled = replace(key, parameters={**key.parameters, "colors": 0.5 * key.parameters["colors"] + 0.3})
+    above = write_segment(folder / "above.segment", key, key.parameters["means"][:, 1] > 0.2, {})
+    look = write_texture(folder / "look.safetensors", styled)
+    series = Series(folder / "series.json", [f"{number}.nrrd" for number in range(COUNT)], ["A"])
+    for time in range(COUNT):
+        write_step(series.model("A", time), key, at(key, time), {})
+        prepare(ArraySource(sphere(24 + 2 * time), "made"), series.volume(time))
+    write_series(series)
+    models = {
+        "B": SceneModel(write_model(folder / "b.safetensors", other)),
+        "A": SceneModel(
+            write_model(folder / "a.safetensors", key), segments={"above": SceneSegment(above, texture=look)}
+        ),
+    }
+    volume = SceneVolume(series.volume(0), {"A": LOW, "B": HIGH}, LOOK)
+    whole = Scene(models, series=series, volume=volume).at(BEGIN)
+    return read_scene(write_scene(folder / "scene.yaml", whole))
+
+
+@pytest.fixture(scope="module")
+def page(chromium, scene):
+    """A browser that draws the scene at any step; nothing may go wrong in it."""
+    page, errors = chromium.new_page(), []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    steps = page_steps(scene).packed
+    description = describe("test", scene, scene.open()) | {"held": list(steps)}
+    open_renderer(page, pack(scene.open()), description, steps=steps.values())
+    yield page
+    page.close()
+    assert errors == []
+
+
+def closeness(one, other):
+    """PSNR of two pictures, dB."""
+    return -10 * np.log10(max(np.mean((one / 255.0 - other / 255.0) ** 2), 1e-9))
+
+
+def compared(page, seen, mode="shaded"):
+    """PSNR of what the page draws of a scene, and of the frame of it as it is."""
+    composed = seen.open()
+    rendered = frame(composed, CAMERA, seen, mode)
+    assert rendered.std() > 5, "something is seen"
+    return closeness(drawn(page, CAMERA, describe("test", seen, composed), mode), rendered)
+
+
+# ---- Numbers ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("time", range(COUNT))
+def test_sums_are_the_surfels_of_the_step(scene, time):
+    """Read without the code that wrote them; a look keeps its colours."""
+    base = unpacked(pack(scene.open()))[0][1].parameters
+    tensors = load(zlib.decompress(b64decode(page_steps(scene).packed[time])))
+    assert list(tensors) == ["1.codes"], "the other model does not follow the series"
+    whole = sum(plane.astype(np.int64) << 8 * k for k, plane in enumerate(tensors["1.codes"]))
+    rows = np.where(whole % 2, -(whole + 1) // 2, whole // 2)
+    true, row = scene.at(time).models["A"].open()[0].parameters, 0
+    for name, unit in UNITS.items():
+        values = normalize(base[name], dim=1) if name == "quats" else base[name]
+        sums = values.reshape(300, -1).double() + unit * torch.tensor(rows[row : row + values[0].numel()].T)
+        expected = normalize(true[name], dim=1) if name == "quats" else true[name].reshape(300, -1)
+        row += values[0].numel()
+        if name == "quats":
+            assert (normalize(sums, dim=1) * expected).sum(dim=1).abs().min() > 1 - 1e-5
+        else:
+            assert (sums - expected).abs().max() < 0.55 * unit, "half a unit, and half precision of the base"
+    assert row == len(rows)
+
+
+def test_steps_are_chosen_around_that_of_the_scene(scene):
+    assert list(page_steps(scene).packed) == [0, 1, 2, 3, 4]
+    assert list(page_steps(scene, "2").packed) == [0, 2, 4]
+    assert list(page_steps(scene.at(3), 2).packed) == [1, 3]
+    assert page_steps(scene, "one").packed == page_steps(scene, 3).packed | {BEGIN: ""} == {BEGIN: ""}
+    assert str(page_steps(scene, "one")) == "step 2 alone, of 5 in the series"
+    assert re.fullmatch(r"3 of 5 steps in 0\.0\d MB", str(page_steps(scene, 2)))
+
+
+@pytest.mark.parametrize("steps", ["0", "none", -1, 1.5, True])
+def test_steps_that_are_none_are_refused(scene, steps):
+    with pytest.raises(
+        ArgumentError, match=r"^steps: expected all, one or a number N for each N-th step, got"
+    ):
+        page_steps(scene, steps)
+
+
+def test_a_scene_without_a_series_has_none_of_it(scene):
+    alone = replace(scene, series=None, time=None)
+    assert page_steps(alone) is None
+    html = scene_page(alone, "x").text
+    assert '"held"' not in html
+    assert 'id="time"' not in html
+    assert 'class="step"' not in html
+
+
+def test_the_same_scene_gives_the_same_page(scene):
+    assert scene_page(scene, "x").text == scene_page(scene, "x").text
+
+
+# ---- Frames -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", ["shaded", "normal"])
+def test_each_step_is_that_of_the_rasterizer(page, scene, mode):
+    for time in (4, 0, 1, BEGIN):
+        assert compared(page, scene.at(time), mode) > CLOSE - 6 * (mode == "normal")
+    here, there = (drawn(page, CAMERA, describe("test", scene.at(t), scene.open())) for t in (BEGIN, 4))
+    assert closeness(here, there) < 30, "steps differ"
+
+
+def test_edits_hold_through_time(page, scene):
+    edited = replace(
+        scene,
+        light=Light("directional", 100, 30),
+        cuts=Cuts([Plane([0.0, 1.0, 0.2], 0.2)]),
+        background=(0.2, 0.3, 0.5),
+        volume=None,
+        models={
+            "B": replace(scene.models["B"], edit=PartEdit(opacity=0.4, specular=3.0)),
+            "A": replace(
+                scene.models["A"],
+                edit=PartEdit(palette=(0.9, 0.2, 0.1), opacity=2.0),
+                segments={"above": replace(scene.models["A"].segments["above"], edit=PartEdit(diffuse=1.5))},
+            ),
+        },
+    )
+    for time in (0, 4):
+        assert compared(page, edited.at(time)) > CLOSE - 12, "fragments on a plane but for rounding"
+
+
+def test_textures_stay_on_the_card(page, scene):
+    page.evaluate(
+        "() => { globalThis.made = 0; const gl = renderer._gl, make = gl.createTexture;"
+        " gl.createTexture = () => { made += 1; return make.call(gl); }; }"
+    )
+    for time in (1, 3):
+        drawn(page, CAMERA, describe("test", scene.at(time), scene.open()))
+    assert page.evaluate("made") == 0
+
+
+# ---- The page ---------------------------------------------------------------
+
+
+@pytest.fixture
+def opened(chromium, scene, tmp_path):
+    """Open the page of an export with some words; nothing may go wrong in it, and it may ask for nothing."""
+    wrong, asked, pages = [], [], []
+
+    def open_page(*words, link=LINK):
+        file = tmp_path / "page.html"
+        source = str(scene.series.file.with_name("scene.yaml"))
+        assert main(["export", source, "--to", str(file), *words]) == 0
+        page = chromium.new_page(viewport={"width": 800, "height": 500})
+        pages.append(page)
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(file.as_uri() + link)
+        page.wait_for_selector("#picture:not([hidden])", timeout=WAIT)
+        return page
+
+    yield open_page
+    for page in pages:
+        page.close()
+    assert wrong == []
+    assert [url for url in asked if not url.startswith(("data:", "file:", "blob:"))] == []
+
+
+def slider(page):
+    return page.get_by_label("Step in time")
+
+
+def saved(page):
+    """The picture that the page saves."""
+    return np.asarray(Image.open(io.BytesIO(still(page))).convert("RGB"))
+
+
+def expected(seen, picture):
+    """The frame of a scene for the page's camera."""
+    height, width = picture.shape[:2]
+    lens = PLACE["distance"], PLACE["fov_y"], width, height
+    return frame(seen.open(), orbit(PLACE["azimuth"], PLACE["polar"], *lens), seen)
+
+
+def test_the_slider_shows_steps_and_the_link_has_them(opened, scene, capsys):
+    page = opened()
+    assert re.search(r"Series in the page: 5 of 5 steps in 0\.\d\d MB", capsys.readouterr().err)
+    assert slider(page).input_value() == str(BEGIN)
+    picture = saved(page)
+    assert closeness(picture, expected(scene, picture)) > CLOSE
+    slider(page).fill("4")
+    picture = saved(page)  # which waits for the step
+    assert closeness(picture, expected(scene.at(4), picture)) > CLOSE
+    assert shlex.split(page.locator("#words textarea").input_value()) == ["time=4"]
+    page.wait_for_url(re.compile("time"))
+    page.get_by_role("button", name="Keep this view").click()
+    page.wait_for_url(re.compile("bookmarks=.*time"))
+    again = opened(link=page.url[page.url.index("#") :])
+    assert slider(again).input_value() == "4"
+    assert closeness(saved(again), picture) > 60
+    page.get_by_role("button", name="Undo").click()
+    assert slider(page).input_value() == str(BEGIN)
+
+
+def test_what_is_on_screen_follows(opened, scene):
+    page = opened()
+    for time in (0, 4):
+        slider(page).fill(str(time))
+        page.wait_for_timeout(300)
+        page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
+        size = page.locator("#picture").evaluate("picture => [picture.height, picture.width]")
+        rendered = expected(scene.at(time), np.empty(size))
+        assert closeness(shown(page), rendered[:-50]) > CLOSE - 10
+
+
+def test_the_button_plays_all_steps_in_turn_as_one_edit(opened):
+    page = opened()
+    page.get_by_label("Opacity of B", exact=True).fill("0.5")
+    page.evaluate(
+        "() => { const output = document.querySelector('#time output'); globalThis.seen = [];"
+        " const see = () => seen.push(Number(output.textContent));"
+        " new MutationObserver(see).observe(output, { childList: true }); }"
+    )
+    page.get_by_role("button", name="Play").click()
+    while page.evaluate("seen.length") < 6:
+        page.wait_for_timeout(100)
+    page.get_by_role("button", name="Pause").click()
+    seen = page.evaluate("seen")
+    assert seen[:6] == [3, 4, 0, 1, 2, 3]
+    names = page.get_by_role("list", name="Steps", exact=True).get_by_role("listitem").all_text_contents()
+    assert names == ["B opacity 0.5", f"time {seen[-1]}"]
+    page.wait_for_timeout(600)
+    assert page.evaluate("seen.length") == len(seen), "it has stopped"
+
+
+def test_each_nth_step(opened, scene):
+    page = opened("--steps", "2")
+    assert page.get_by_text("The page has 3 of 5 steps in 0.").is_visible()
+    assert slider(page).get_attribute("max") == "2"
+    slider(page).fill("2")
+    assert shlex.split(page.locator("#words textarea").input_value()) == ["time=4"]
+    picture = saved(page)
+    assert closeness(picture, expected(scene.at(4), picture)) > CLOSE
+    for time in (1, None):
+        edit = [{"part": "", "key": "time", "value": time}]
+        page.evaluate("words => { location.hash = new URLSearchParams(words); }", {"edits": json.dumps(edit)})
+        page.get_by_text("This page cannot use of the link: time.").wait_for()
+        page.get_by_label("Close").click()
+
+
+def test_one_step_alone(opened, scene):
+    page = opened("--steps", "one")
+    assert page.get_by_text("The page has step 2 alone, of 5 in the series.").is_visible()
+    assert slider(page).is_hidden()
+    picture = saved(page)
+    assert closeness(picture, expected(scene, picture)) > CLOSE
+
+
+def test_the_volume_is_that_of_one_step(opened, scene):
+    page = opened("--volume")
+    assert page.get_by_text("Its volume is that of step 2").is_visible()
+    page.get_by_label("Show", exact=True).select_option("wipe")
+    page.get_by_role("button", name="Add a plane").click()
+    slider(page).fill("3")
+    told = page.get_by_text("The volume in this page is that of step 2: go there to see it.")
+    expect(told).to_be_visible()
+    assert page.get_by_label("Show", exact=True).input_value() == "shaded"
+    off = page.locator("#mode option:disabled").evaluate_all("all => all.map((each) => each.value)")
+    assert off == ["volume", "difference", "wipe"]
+    picture = saved(page)
+    source = scene.series.file.with_name("scene.yaml")
+    words = shlex.split(page.locator("#words textarea").input_value())
+    cut = source.with_name("cut.yaml")
+    assert main(["edit", str(source), *words, "--output", str(cut)]) == 0
+    assert read_scene(cut).time == 3
+    assert closeness(picture, expected(read_scene(cut), picture)) > CLOSE - 10, "hollow"
+    slider(page).fill("2")
+    assert page.locator("#mode option:disabled").count() == 0
+    page.get_by_label("Show", exact=True).select_option("volume")
+    assert page.get_by_label("Show", exact=True).input_value() == "volume"
+
+
+def test_a_damaged_step_is_told_and_the_others_stay(opened, scene, tmp_path):
+    page = opened()
+    text = page_steps(scene).packed[4]
+    file = tmp_path / "page.html"
+    file.write_text(file.read_text().replace(text, text[: len(text) // 8 * 4]))
+    page.goto(file.as_uri())
+    page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
+    slider(page).fill("4")
+    told = page.get_by_text("The scene in this page cannot be unpacked")
+    expect(told).to_be_visible()
+    slider(page).fill("3")
+    picture = saved(page)
+    height, width = picture.shape[:2]
+    view = describe("x", scene, scene.open())["views"][0]
+    camera = orbit(view["azimuth"], view["polar"], view["distance"], 30, width, height, target=view["target"])
+    assert closeness(picture, frame(scene.at(3).open(), camera, scene.at(3))) > CLOSE
+
+
+def test_steps_are_of_pages_alone(scene, tmp_path, capsys):
+    source = str(scene.series.file.with_name("scene.yaml"))
+    assert main(["export", source, "--to", str(tmp_path / "x.ply"), "--steps", "one"]) == 2
+    assert "--steps: expected --to a page, .html, got" in capsys.readouterr().err
+    assert main(["export", source, "--to", str(tmp_path / "x.html"), "--steps", "half"]) == 2
+    assert "steps: expected all, one or a number N for each N-th step, got 'half'" in capsys.readouterr().err
+
+
+def test_series_that_are_too_large_are_refused(scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(standalone, "LARGEST", len(pack(scene.open())))
+    assert scene_page(scene, "x", steps="one").steps.total == COUNT
+    with pytest.raises(ArgumentError, match=r"of them; export fewer models or steps$"):
+        scene_page(scene, "x")
