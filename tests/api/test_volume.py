@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import texgs
+from tests.volume.zarr_files import axes_of, write_image
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import Light
@@ -123,6 +124,21 @@ def test_files_are_opened_and_turned_upright(tmp_path):
     again = texgs.Volume(first.file, up="+z")
     assert np.array_equal(again.grid.values, values.transpose(1, 0, 2)[::-1])
     assert np.array_equal(open_grid(again.file).values, again.grid.values)
+
+
+def test_a_channel_of_a_file_has_its_colour_and_window(tmp_path):
+    values = np.stack([field(4, 5, 6), 100 * field(4, 5, 6)])
+    window = {"window": {"start": 20, "end": 60}}
+    said = [{"label": name, "color": color, **window} for name, color in (("a", "FF0000"), ("b", "00FF00"))]
+    path = write_image(tmp_path / "v.zarr", [values], axes_of("czyx"), [(1, 3, 2, 1)], labels=said)
+    volume = texgs.Volume(path, channel="b")
+    assert volume.grid.spacing == (1, 2, 3)
+    (tf,) = volume.suggest().values()
+    assert tf.opacity[0] == (20, 0)
+    assert tf.color[0][1:] == (0, 1, 0)
+    assert len(volume.suggest(3)) == 3
+    with pytest.raises(ArgumentError, match=r"channel: expected one of 0 \(a\), 1 \(b\), got none"):
+        texgs.Volume(path)
 
 
 def test_a_picture_is_what_the_caster_sees_over_the_background():

@@ -58,8 +58,8 @@ def test_an_image_with_channels_and_time_says_what_is_taken_and_keeps_what_was_a
     path = write_image(
         conf.parent / "cells.ome.zarr", [values], axes_of("tczyx"), [(1, 1, 2, 1, 1)], labels=LABELS
     )
-    assert main(["new", str(path)]) == 2
-    assert "expected one of 0 (DAPI), 1 (GFP), 2 (RFP), got none" in capsys.readouterr().err
+    assert main(["new", str(path), "channel=CY5"]) == 2
+    assert "expected one of 0 (DAPI), 1 (GFP), 2 (RFP), got CY5" in capsys.readouterr().err
     assert main(["new", str(path), "channel=1"]) == 0
     told = capsys.readouterr().err
     assert "cells: step 0 of 3; dataset.volume.time chooses another\n" in told
@@ -70,6 +70,67 @@ def test_an_image_with_channels_and_time_says_what_is_taken_and_keeps_what_was_a
     assert grid.spacing == (1, 1, 2)
     text = (conf / "dataset" / "cells.yaml").read_text()
     assert yaml.safe_load(text)["volume"] == {"file": str(path), "channel": "RFP", "time": 2}
+
+
+def omero(label, color, start, end):
+    """What OMERO keeps of a channel."""
+    return {
+        "label": label,
+        "color": color,
+        "active": True,
+        "window": {"min": 0, "max": 999, "start": start, "end": end},
+    }
+
+
+def test_channels_become_data_sets_of_their_colour_and_window(conf, scan, capsys):
+    """All but the last, which has no window: its functions come from the histogram."""
+    shown = [
+        omero("DAPI", "0000FF", 50, 150),
+        omero("405 nm", "00FF80", -5, 9999),
+        {"label": "RFP", "color": "FF0000"},
+    ]
+    values = np.stack([np.load(scan) + 10 * channel for channel in range(3)])
+    path = write_image(conf.parent / "cells.zarr", [values], axes_of("czyx"), [(1, 1, 1, 1)], labels=shown)
+    assert main(["new", str(path), "reduce=2"]) == 0
+    assert (
+        "then: texgs run datasets=[cells_DAPI,cells_405_nm,cells_RFP] fit=quick\n" in capsys.readouterr().out
+    )
+    names = [f"cells_{label}" for label in ("DAPI", "405_nm", "RFP")]
+    assert [path.stem for path in sorted((conf / "dataset").iterdir())] == sorted(names)
+    dapi, nm, rfp = (compose((f"dataset={name}",)).dataset for name in names)
+    assert [each.volume.channel for each in (dapi, nm, rfp)] == ["DAPI", "405 nm", "RFP"]
+    assert [each.volume.reduce for each in (dapi, nm, rfp)] == [2, 2, 2]
+    (tf,) = dapi.basic_tfs.values()
+    high = open_grid("results/cells_DAPI/volume/volume.nrrd").values.max()
+    np.testing.assert_allclose(tf.opacity, [[50, 0], [150, 0.3], [high, 0.3]], rtol=1e-5)
+    np.testing.assert_allclose(tf.color, [[50, 0, 0, 1]])
+    (tf,) = nm.basic_tfs.values()
+    values = open_grid("results/cells_405_nm/volume/volume.nrrd").values
+    ends = np.array([values.min(), values.max()])
+    np.testing.assert_allclose(tf.opacity, np.stack([ends, 0.3 * (ends + 5) / 10004], axis=1), rtol=1e-5)
+    np.testing.assert_allclose(tf.color[0][1:], [0, 1, 128 / 255], atol=1e-6)
+    assert len(rfp.basic_tfs) > 1
+    assert main(["new", str(path)]) == 2
+    assert "cells_DAPI: is there already" in capsys.readouterr().err
+    assert main(["run", "datasets=[cells_DAPI,cells_RFP]", "fit=quick", "--dry-run"]) == 0
+
+
+@pytest.mark.parametrize("labels", [[], ["a b", "a_b"], ["a", ""]])
+def test_channels_whose_labels_are_no_names_have_numbers(conf, scan, labels):
+    values = np.stack([np.load(scan), np.load(scan) + 10])
+    path = write_image(conf.parent / "x.zarr", [values], axes_of("czyx"), [(1, 1, 1, 1)], labels=labels)
+    assert main(["new", str(path), "--name", "two"]) == 0
+    assert [compose((f"dataset=two_{k}",)).dataset.volume.channel for k in (0, 1)] == ["0", "1"]
+    np.testing.assert_array_equal(open_grid("results/two_1/volume/volume.nrrd").values, values[1])
+
+
+def test_a_channel_that_cannot_be_read_leaves_no_data_set_of_the_others(conf, scan, capsys):
+    values = np.stack([np.load(scan), np.full_like(np.load(scan), 3)])
+    path = write_image(
+        conf.parent / "x.zarr", [values], axes_of("czyx"), [(1, 1, 1, 1)], labels=["a", "empty"]
+    )
+    assert main(["new", str(path)]) == 2
+    assert not conf.exists()
 
 
 def test_a_data_set_is_only_replaced_where_that_is_asked_for_and_that_of_texgs_never(conf, scan, capsys):

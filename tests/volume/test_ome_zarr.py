@@ -12,6 +12,7 @@ from zarr.storage import LocalStore
 from tests.volume.volume_files import sample_values, whole
 from tests.volume.zarr_files import LABELS, add_image, all_axes, axes_of, write_image, zipped
 from texgs.core.errors import ArgumentError
+from texgs.volume.axes import Channel
 from texgs.volume.prepare import prepare
 from texgs.volume.sources import open_source
 
@@ -75,6 +76,24 @@ def test_channels_by_label_or_number(tmp_path):
             open_source(path, **keys)
     path = write_image(tmp_path / "one.zarr", [values[:1]], axes_of("czyx"), [(1, 1, 1, 1)], labels=["GFP"])
     np.testing.assert_array_equal(whole(path), VALUES)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"label": "x"},
+        {"label": "x", "color": "FF0000", "window": None},
+        {"label": "x", "color": "red", "window": {"start": 0, "end": 1}},
+        {"label": "x", "color": "FF0000", "window": {"start": 5, "end": 5}},
+        {"label": "x", "color": "FF0000", "window": {"start": "0", "end": 9}},
+    ],
+)
+def test_how_a_channel_is_shown_may_be_missing_or_senseless(tmp_path, said):
+    whole = {"label": "y", "color": "0080ff", "window": {"min": 0, "max": 65535, "start": 10, "end": 90.5}}
+    values = all_axes(VALUES, steps=1, channels=2)[0]
+    path = write_image(tmp_path / "v.zarr", [values], axes_of("czyx"), [(1, 1, 1, 1)], labels=[said, whole])
+    assert open_source(path, channel="0").channel == Channel("x")
+    assert open_source(path, channel="y").channel == Channel("y", (0, 128 / 255, 1), (10, 90.5))
 
 
 def test_a_step_of_time_is_chosen_and_the_first_one_is_taken_with_a_note(tmp_path):

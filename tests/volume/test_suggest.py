@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from tests.real_data import real_data
 from tests.volume.volume_files import whole
+from texgs.volume.axes import Channel
 from texgs.volume.suggest import suggest
 from texgs.volume.transfer import check_disjoint
 
@@ -130,3 +131,26 @@ def test_real_volumes():
     basic, _, _ = suggested(values)
     assert len(basic) == 3
     assert (values >= basic["TF01"].support[0]).mean() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("window", "opacity"),
+    [
+        ((20, 60), [(20, 0), (60, 0.3), (100, 0.3)]),
+        ((-100, 150), [(0, 0.12), (100, 0.24)]),
+        ((-20, 0), [(0, 0.3), (100, 0.3)]),
+        ((50, 100), [(50, 0), (100, 0.3)]),
+    ],
+)
+def test_a_channel_rises_over_its_window_within_the_data(window, opacity):
+    counts, channel = np.histogram(AIR, 256, (0, 100))[0], Channel("GFP", (0, 1, 0.5), window)
+    (tf,) = suggest(counts, 0, 100, channel=channel).values()
+    np.testing.assert_allclose(tf.opacity, opacity)
+    np.testing.assert_allclose(tf(window[1])[:3], (0, 1, 0.5))
+    assert suggest(counts, 0, 100, 2, channel) == suggest(counts, 0, 100, 2)
+
+
+def test_a_window_above_all_data_or_none_says_nothing():
+    counts = np.histogram(AIR, 256, (0, 100))[0]
+    for channel in (Channel("GFP", (0, 1, 0), (100, 200)), Channel("GFP")):
+        assert suggest(counts, 0, 100, channel=channel) == suggest(counts, 0, 100)

@@ -21,7 +21,7 @@ def write_image(
 ):
     """Write arrays as the levels of an image into a new folder of format 3, or 2 for version 0.4.
 
-    Options are those of Zarr's `create_array`.
+    Labels are those of channels, or all that OMERO keeps of them. Options are those of Zarr's `create_array`.
     """
     group = zarr.open_group(path, mode="w", zarr_format=2 if version == "0.4" else 3)
     add_image(group, levels, axes, scales, translations, version=version, labels=labels, more=more, **options)
@@ -44,7 +44,8 @@ def add_image(
         datasets.append({"path": f"s{k}", "coordinateTransformations": transforms})
     said = {"multiscales": [{"axes": axes, "datasets": datasets, "name": "image", **(more or {})}]}
     if labels:
-        said["omero"] = {"channels": [{"label": label, "color": "FFFFFF"} for label in labels]}
+        channels = [each if isinstance(each, dict) else {"label": each, "color": "FFFFFF"} for each in labels]
+        said["omero"] = {"channels": channels}
     if version == "0.4":
         said["multiscales"][0]["version"] = version
         group.attrs.update(said)

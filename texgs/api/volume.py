@@ -80,6 +80,7 @@ class Volume:
             source = open_source(data, spacing=steps, origin=first, **keys)
         else:
             source = ArraySource(grid_of(data, spacing, origin), name)
+        self._channel = source.channel
         self.summary = prepare(source, self.file, up=up, nan_value=nan_value)
         write_json(self.file.with_name("volume.json"), vars(self.summary))
 
@@ -99,10 +100,10 @@ class Volume:
         return open_grid(self.file)
 
     def suggest(self, count: int | None = None) -> Functions:
-        """Return basic transfer functions by name, from the histogram; `count` of them, or what shows."""
+        """Return basic transfer functions by name: `count` of the histogram, what shows, or a channel's."""
         known = self.summary
         low, high = known.minimum, known.maximum
-        suggested = suggest(known.histogram, low, high, count)
+        suggested = suggest(known.histogram, low, high, count, self._channel)
         return Functions({name: tf.rounded(low, high) for name, tf in suggested.items()}, known)
 
     def render(

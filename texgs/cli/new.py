@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING
 
 from texgs.config.compose import compose
 from texgs.config.dataset_text import as_yaml, require_read
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import is_there, read_json, write_bytes
 
 if TYPE_CHECKING:
+    from texgs.config.dataset import Dataset
     from texgs.config.schema import Config
+    from texgs.volume.axes import Channel
     from texgs.volume.transfer import TransferFunction
 
+NO_NAME = re.compile(r"[^A-Za-z0-9_]+")  # what a name of a data set cannot have
 PROJECT = Path(__file__).parent / "project"  # what a new one has; `gitignore` gets a dot in front
 
 
@@ -52,41 +55,75 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read the volume, choose TFs, write the file and the plot, and say what comes next."""
-    from texgs.config.dataset import BasicTF
+    """Make a data set of the volume, or one of each of its channels, and say what comes next."""
     from texgs.config.project import check_name, members, own_folder, shown
     from texgs.volume.tf_files import read_tf
-    from texgs.workflow.checks import check_basic_tfs
-    from texgs.workflow.execution import ensure
     from texgs.workflow.locate import series_files
-    from texgs.workflow.stage_table import STAGES
 
-    name = arguments.name or re.sub(r"[^A-Za-z0-9_]+", "_", arguments.file.name.split(".")[0])
-    check_name("--name", name)
-    target = own_folder() / "dataset" / f"{name}.yaml"
-    if name in members("dataset") and not arguments.force:
-        there, do = ("is there", "replace") if target.exists() else ("is a data set of texgs", "hide")
-        raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
     if arguments.count is not None and arguments.count < 1:
         raise ArgumentError(f"--count: expected at least 1, got {arguments.count}")
     for path in arguments.tf or ():
         read_tf(path)  # a mistake in it is told before the volume is read
-    config = configuration(name, arguments.file, arguments.overrides)
-    config = replace(config, dataset=replace(config.dataset, series=[*map(absolute, arguments.series)]))
-    series_files(config)
-    ensure(STAGES["volume"], config)
-    basic = basic_tfs(config, arguments.tf, arguments.count)
-    listed = {key: BasicTF(**tf.to_dict()) for key, tf in basic.items()}
-    config = replace(config, dataset=replace(config.dataset, basic_tfs=listed))
-    ensure(STAGES["transfer"], config)
-    text = document(config, ["file", *changed(arguments.overrides)])
-    check_basic_tfs(config.dataset)
-    require_read(text, config.dataset)
-    write_bytes(target, text.encode())
-    picture = Path(config.results, name, "transfer", "transfer.png")
-    print(f"{shown(target)}: {len(basic)} transfer functions to edit; {picture} shows them")
-    print(f"then: texgs run dataset={name} fit=quick")
+    name = arguments.name or NO_NAME.sub("_", arguments.file.name.split(".")[0])
+    given = configuration(name, arguments.file, arguments.overrides)
+    given = replace(given, dataset=replace(given.dataset, series=[*map(absolute, arguments.series)]))
+    series_files(given)
+    folder, of_each = own_folder() / "dataset", of_channels(given)
+    names = [config.dataset.name for config, _ in of_each]
+    for name in names:
+        check_name("--name", name)
+        if name in members("dataset") and not arguments.force:
+            is_own = (folder / f"{name}.yaml").exists()
+            there, do = ("is there", "replace") if is_own else ("is a data set of texgs", "hide")
+            raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
+    datasets = [with_tfs(config, channel, arguments) for config, channel in of_each]
+    for dataset in datasets:
+        text = document(dataset, ["file", *changed(arguments.overrides), "channel"])
+        require_read(text, dataset)
+        target = write_bytes(folder / f"{dataset.name}.yaml", text.encode())
+        count, picture = len(dataset.basic_tfs), Path(given.results, dataset.name, "transfer", "transfer.png")
+        print(f"{shown(target)}: {count} transfer functions to edit; {picture} shows them")
+    which = f"datasets=[{','.join(names)}]" if len(names) > 1 else f"dataset={names[0]}"
+    print(f"then: texgs run {which} fit=quick")
     return 0
+
+
+def of_channels(config: Config) -> list[tuple[Config, Channel | None]]:
+    """Return a configuration for each channel of the file, or the one it is, and what the file says of it."""
+    from texgs.workflow.stages.volume import source
+
+    dataset, volume = config.dataset, config.dataset.volume
+    try:
+        field = source(replace(volume, channel=volume.channel or "0"), Path(volume.file or ""))
+    except TexgsError:  # it has no channels; what else is wrong with it is told when it is read
+        return [(config, None)]
+    if volume.channel or len(field.channels) == 1:
+        return [(config, field.channel)]
+    keys = [channel.label for channel in field.channels]
+    if "" in keys or len({NO_NAME.sub("_", key) for key in keys}) < len(keys):
+        keys = [str(number) for number in range(len(keys))]
+    made: list[tuple[Config, Channel | None]] = []
+    for key, channel in zip(keys, field.channels, strict=True):
+        name = f"{dataset.name}_{NO_NAME.sub('_', key)}"
+        one = replace(dataset, name=name, title=name, volume=replace(volume, channel=key))
+        made.append((replace(config, dataset=one), channel))
+    return made
+
+
+def with_tfs(config: Config, channel: Channel | None, arguments: argparse.Namespace) -> Dataset:
+    """Read the volume, choose TFs, draw them, and return the data set."""
+    from texgs.config.dataset import BasicTF
+    from texgs.workflow.checks import check_basic_tfs
+    from texgs.workflow.execution import ensure
+    from texgs.workflow.stage_table import STAGES
+
+    ensure(STAGES["volume"], config)
+    basic = basic_tfs(config, channel, arguments.tf, arguments.count)
+    listed = {key: BasicTF(**tf.to_dict()) for key, tf in basic.items()}
+    dataset = replace(config.dataset, basic_tfs=listed)
+    ensure(STAGES["transfer"], replace(config, dataset=dataset))
+    check_basic_tfs(dataset)
+    return dataset
 
 
 def changed(overrides: list[str]) -> list[str]:
@@ -115,8 +152,10 @@ def absolute(file: str | Path) -> str:
     return path
 
 
-def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> dict[str, TransferFunction]:
-    """Return TFs from files, or suggested from the volume's histogram."""
+def basic_tfs(
+    config: Config, channel: Channel | None, files: list[Path] | None, count: int | None
+) -> dict[str, TransferFunction]:
+    """Return TFs from files, or suggested for a channel or from the volume's histogram."""
     import numpy as np
 
     from texgs.volume.suggest import looks_like_labels, suggest
@@ -127,7 +166,7 @@ def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> di
     low, high = summary["minimum"], summary["maximum"]
     if not files:
         histogram = np.array(summary["histogram"])
-        suggested = suggest(histogram, low, high, count)
+        suggested = suggest(histogram, low, high, count, channel)
         if looks_like_labels(histogram) and np.dtype(summary["dtype"]).kind == "f":
             sys.stderr.write(
                 f"{config.dataset.name}: values are in {np.count_nonzero(histogram)} of {len(histogram)} "
@@ -147,12 +186,12 @@ def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> di
     return basic
 
 
-def document(config: Config, keys: list[str]) -> str:
+def document(dataset: Dataset, keys: list[str]) -> str:
     """Return the YAML of a data set, with some keys of its volume; a line per list of points."""
-    dataset = asdict(config.dataset)
-    names = ("name", "title", "volume", *(["series"] if dataset["series"] else []), "basic_tfs")
-    written = {key: dataset[key] for key in names}
-    written["volume"] = {key: dataset["volume"][key] for key in keys}
+    values = asdict(dataset)
+    names = ("name", "title", "volume", *(["series"] if dataset.series else []), "basic_tfs")
+    written = {key: values[key] for key in names}
+    written["volume"] = {key: value for key in keys if (value := values["volume"][key]) is not None}
     note = "# Points are [value, opacity] and [value, r, g, b]; the ranges of basic TFs must not overlap.\n"
     return note + as_yaml(written)
 

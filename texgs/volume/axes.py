@@ -17,6 +17,15 @@ METRES |= {"um": 1e-6, "µm": 1e-6, "angstrom": 1e-10}
 
 
 @dataclass(frozen=True)
+class Channel:
+    """What a file says of a channel: its name, and how it is shown, if it says that at all."""
+
+    label: str = ""
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)  # red, green, blue
+    window: tuple[float, float] | None = None  # the values that are black and of the full colour
+
+
+@dataclass(frozen=True)
 class Axis:
     """A dimension of an array: sample i lies at start + i * step in its unit, as far as they are even."""
 
@@ -26,7 +35,7 @@ class Axis:
     start: float = 0.0
     step: float = 1.0  # below 0 where coordinates fall
     is_even: bool = True
-    labels: tuple[str, ...] = ()  # of channels
+    channels: tuple[Channel, ...] = ()  # one for each sample, or none
 
     @property
     def kind(self) -> str:
@@ -72,7 +81,7 @@ def _place(axis: Axis, wanted: str) -> int:
     """Return the index of a channel by its label or number, or of a step of time, by default the first."""
     numbers = [str(k) for k in range(axis.size)]
     wanted = wanted or ("0" if axis.size == 1 or axis.kind == "time" else "")
-    labels = axis.labels if axis.kind == "channel" and len(axis.labels) == axis.size else ()
+    labels = [channel.label for channel in axis.channels] if axis.kind == "channel" else []
     for names in (labels, numbers):
         if wanted in names:
             return names.index(wanted)

@@ -160,13 +160,10 @@ def image_of(
         from texgs.volume.vtk_image import read_vtk
 
         return read_vtk(path)
-    if path.is_dir():
-        from texgs.volume.dicom import read_dicom
-
-        return read_dicom(path, **keys)
+    from texgs.volume.dicom import read_dicom
     from texgs.volume.itk_image import read_itk
 
-    return read_itk(path, is_header_only)
+    return read_dicom(path, **keys) if path.is_dir() else read_itk(path, is_header_only)
 
 
 if __name__ == "__main__":

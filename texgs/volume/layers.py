@@ -10,7 +10,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
-from texgs.volume.axes import Axis, lattice, picked
+from texgs.volume.axes import Axis, Channel, lattice, picked
 from texgs.volume.grid import Triple, require_room
 from texgs.volume.slabs import SLAB_BYTES, Source, step_note
 
@@ -61,7 +61,12 @@ class LayerSource(Source):
         spacing, origin, remark = lattice((x, y, z), *given)
         dtype = np.dtype(np.float32) if self._coded else stored.dtype
         super().__init__(path.name, (x.size, y.size, z.size), dtype, spacing, origin)
-        self.n_steps = next((axis.size for axis in stored.axes if axis.kind == "time"), 1)
+        for axis, index in zip(stored.axes, self._index, strict=True):
+            if axis.kind == "time":
+                self.n_steps = axis.size
+            elif axis.kind == "channel" and isinstance(index, int):
+                self.channels = axis.channels or (Channel(),) * axis.size
+                self.channel = self.channels[index]
         self.note = "; ".join(filter(None, (stored.note, step_note(time or 0, self.n_steps), remark)))
         plane, chunk = x.size * y.size * stored.dtype.itemsize, stored.chunks[self._z]
         most = max(1, free_memory() // (SHARE * plane))

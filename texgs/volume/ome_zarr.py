@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import posixpath
+import re
 import warnings
 from base64 import b64decode
 from collections.abc import Mapping
@@ -16,7 +17,8 @@ import numpy as np
 
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
-from texgs.volume.axes import Axis, along, nameless
+from texgs.core.names import is_number
+from texgs.volume.axes import Axis, Channel, along, nameless
 from texgs.volume.grid import Triple
 from texgs.volume.layers import LayerSource, StoredArray, one_of
 
@@ -84,7 +86,7 @@ def _levels(name: str, nodes: Mapping[str, Any]) -> dict[str, list[Axis]]:
     if not said.get("multiscales"):
         return {}
     image, levels = said["multiscales"][0], {}
-    labels = tuple(str(channel.get("label", "")) for channel in said.get("omero", {}).get("channels", ()))
+    channels = tuple(map(_channel, said.get("omero", {}).get("channels", ())))
     # Versions before 0.4 only name their axes, or not even that, and have no transformations.
     axes: list[Any] = [
         {"name": each} if isinstance(each, str) else each for each in image.get("axes", "tczyx")
@@ -99,8 +101,18 @@ def _levels(name: str, nodes: Mapping[str, Any]) -> dict[str, list[Axis]]:
             steps, starts = steps * scale, starts * scale + shift
         path = posixpath.normpath(posixpath.join(name, level["path"]))
         lines = zip(names, nodes[path].shape, units, starts.tolist(), steps.tolist(), strict=True)
-        levels[path] = [Axis(*line, labels=labels) for line in lines]
+        levels[path] = [Axis(*line, channels=channels if line[1] == len(channels) else ()) for line in lines]
     return levels
+
+
+def _channel(said: Mapping[str, Any]) -> Channel:
+    """Return a channel as it is described for OMERO, whose viewers show it in its colour and window."""
+    window, color, label = said.get("window") or {}, str(said.get("color", "")), str(said.get("label", ""))
+    start, end = (window.get(key, "") for key in ("start", "end"))
+    if not (re.fullmatch("[0-9A-Fa-f]{6}", color) and is_number(start) and is_number(end) and start < end):
+        return Channel(label)
+    red, green, blue = (byte / 255 for byte in bytes.fromhex(color))
+    return Channel(label, (red, green, blue), (start, end))
 
 
 def _fitting(levels: list[str], nodes: Mapping[str, Any]) -> tuple[str, str]:

@@ -1,11 +1,13 @@
 """Volumes as sources, which hand out a slab of z slices at a time, so that any size fits into memory."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
+from texgs.volume.axes import Channel
 from texgs.volume.grid import ONES, ZEROS, Dims, Grid, Triple, byte_count, check_lattice
 
 SLAB_BYTES = 1 << 23  # reads of this size run at the disk's speed, and memory stays small
@@ -16,6 +18,8 @@ class Source(ABC):
 
     note = ""  # for the user: what was chosen of several, or taken for granted
     n_steps = 1  # of time, one of which this is
+    channels: Sequence[Channel] = ()  # of the file, one of which this is
+    channel: Channel | None = None
 
     def __init__(self, name: str, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> None:
         check_lattice(dims, dtype, spacing, origin)

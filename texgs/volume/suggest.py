@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from texgs.volume.axes import Channel
 from texgs.volume.transfer import TransferFunction
 
 Array = NDArray[np.float64]
@@ -22,6 +23,7 @@ COLORS = (
 )
 MOST = 5  # classes, where the user does not say
 SHELLS = 3  # classes of a histogram without peaks but the background
+ALONE = 0.3  # opacity of the only function
 FEW = 32  # a histogram with no more values than this holds labels
 SMOOTHING = 0.02  # standard deviation, as a fraction of the range
 RARE = 2e-4  # of the voxels outside the most frequent bin: a bin with fewer is empty ...
@@ -32,7 +34,11 @@ BELOW = 0.1  # of the foreground's voxels, that makes values below the backgroun
 
 
 def suggest(
-    histogram: ArrayLike, minimum: float, maximum: float, count: int | None = None
+    histogram: ArrayLike,
+    minimum: float,
+    maximum: float,
+    count: int | None = None,
+    channel: Channel | None = None,
 ) -> dict[str, TransferFunction]:
     """Propose basic transfer functions with disjoint supports: TF01, TF02, ... in ascending order of value.
 
@@ -42,8 +48,11 @@ def suggest(
     of the bins they are taken for labels, the lowest for background. Higher values are more opaque.
 
     The histogram counts voxels in equal bins over [minimum, maximum]; two of them are not 0. There are
-    `count` functions, fewer where there are fewer values; by default what shows, at most 5.
+    `count` functions, fewer where there are fewer values; by default what shows, at most 5. Of a channel with
+    a window it is one by default, see `windowed`.
     """
+    if count is None and channel and (shown := windowed(channel, minimum, maximum)):
+        return {"TF01": shown}
     counts = np.asarray(histogram, dtype=np.float64)
     values = minimum + (np.arange(len(counts)) + 0.5) * (maximum - minimum) / len(counts)
     present = counts > 0
@@ -54,11 +63,21 @@ def suggest(
     else:
         classes = _materials(counts, count)
     edges = np.concatenate([[minimum], (values[1:] + values[:-1]) / 2, [maximum]])
-    opacities = np.geomspace(0.08, 0.6, len(classes)) if len(classes) > 1 else [0.3]
+    opacities = np.geomspace(0.08, 0.6, len(classes)) if len(classes) > 1 else [ALONE]
     return {
         f"TF{i + 1:02d}": _trapezoid(edges[start], edges[stop], opacities[i], i, (minimum, maximum))
         for i, (start, stop) in enumerate(classes)
     }
+
+
+def windowed(channel: Channel, low: float, high: float) -> TransferFunction | None:
+    """Return a function in a channel's colour that rises over its window; None if it shows nothing."""
+    if channel.window is None or channel.window[0] >= high:
+        return None
+    values = np.clip([*channel.window, high], low, high)
+    opacity = np.interp(values, channel.window, (0, ALONE))
+    points = zip(values.tolist(), opacity.tolist(), strict=True)
+    return TransferFunction(tuple(points), ((values.tolist()[0], *channel.color),))
 
 
 def looks_like_labels(counts: Array) -> bool:
