@@ -23,6 +23,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import read_model
 from texgs.fields.surfels.step_file import at_step
 from texgs.volume.generate_series import SERIES
+from texgs.volume.generate_series import series as made
 from texgs.volume.grid import Grid
 
 RECIPE = "quick"
@@ -37,7 +38,7 @@ def main(output: str, folder: str, *names: str) -> None:
 
 def series(name: str, folder: Path) -> dict:
     """Return rows of the steps of one series that are compared, and their means."""
-    grids, key, rows = list(SERIES[name](SAMPLES, STEPS)), read_model(folder / "finer-0.safetensors"), {}
+    grids, key, rows = made(name, SAMPLES, STEPS), read_model(folder / "finer-0.safetensors"), {}
     for step in compared()[1:]:
         file = folder / f"step-{step}.safetensors"
         alone, surfels = fitted(grids[step], name, folder / f"{RECIPE}-{step}")
