@@ -177,9 +177,7 @@ class Scene(Editing):
         if size > largest:
             text = ""
             note = f"A picture: the page has {size:.1f} MB. scene.show(largest={size:.0f}) shows it."
-            note += (
-                ' scene.show(steps="one") has one step.' if page.steps and len(page.steps.packed) > 1 else ""
-            )
+            note += ' scene.show(steps="one") has one step.' if page.steps and page.steps.size else ""
         return Page(text, page.poster, note)
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
