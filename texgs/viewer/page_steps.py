@@ -1,7 +1,5 @@
 """The steps of a series in time as a page carries them: how surfels differ from those that it begins with."""
 
-from __future__ import annotations
-
 import json
 import zlib
 from base64 import b64encode
