@@ -33,7 +33,11 @@ onsuccess:
     made = finish("FINISHED")
     report = f"{RESULTS}/report.html"
     print("Done:", report if report in made else "what was asked for")
-    scenes = [Path(file).with_name("scene.yaml") for file in PLAN.done("steps") or PLAN.done("compose") if file in made]
+    scenes = [
+        Path(file).with_name("scene.yaml")
+        for file in PLAN.done("steps") or PLAN.done("compose")
+        if file in made
+    ]
     if scenes:
         program = Path(sys.executable).with_name("texgs")
         print("View:", shlex.join([str(program), "view", str(scenes[0])]))
