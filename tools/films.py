@@ -3,6 +3,9 @@
 `python -m tools.films SCENE` takes a scene.yaml of `engine` from the workflow, and enters the films in
 benchmarks/results/index.csv. A film is as fast as what it shows was on this machine, pictures of it included;
 that of the model is faster by `FASTER`.
+
+`python -m tools.films SERIES EDITED` makes that of docs/scenes.md: two scenes of `rings` side by side, as
+fitted and with a style, through all steps while the camera turns.
 """
 
 from __future__ import annotations
@@ -16,11 +19,15 @@ from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any
 
+import numpy as np
 from PIL import Image
 
 from benchmarks.browser import SOFTWARE, browser_path
 from benchmarks.command import call
 from benchmarks.results import add
+from texgs.scene.paths import shots_of
+from texgs.scene.scene_file import read_scene
+from texgs.scene.session import Session
 from tools.pictures import DOCS, PROGRAM
 
 WINDOW, SIZE = {"width": 1120, "height": 700}, (720, 450)  # of the browser, and of a film, pixels
@@ -28,6 +35,7 @@ FASTER = 8
 LAST = 2000  # milliseconds that the last frame stays
 WAIT = 240_000  # milliseconds at most, on a busy machine
 QUALITY = 55
+EACH, SHORT = 3, 80  # frames of a step of a series, and how long one is shown, milliseconds
 VIEW = "#azimuth=-60&polar=20"
 
 
@@ -48,10 +56,28 @@ class Film:
         """Write all pictures as an animation."""
         spans = [b - a for a, b in zip(self._times, self._times[1:], strict=False)]
         durations = [round(1000 * span / self._faster) for span in spans]
-        first, *others = self._frames
-        options = {"duration": [*durations, LAST], "loop": 0, "quality": QUALITY, "method": 6}
-        first.save(path, save_all=True, append_images=others, **options)
-        print(f"{path}: {path.stat().st_size / 1024:.0f} KiB, {sum(durations) / 1000:.0f} s")
+        animate(path, self._frames, [*durations, LAST])
+
+
+def animate(path: Path, frames: list[Image.Image], durations: list[int]) -> None:
+    """Write pictures that are shown for some milliseconds each."""
+    first, *others = frames
+    options = {"duration": durations, "loop": 0, "quality": QUALITY, "method": 6}
+    first.save(path, save_all=True, append_images=others, **options)
+    print(f"{path}: {path.stat().st_size / 1024:.0f} KiB, {sum(durations) / 1000:.0f} s")
+
+
+def through_time(path: Path, *files: str) -> None:
+    """Write a film of scenes of one series side by side: all steps, around which the camera turns."""
+    columns = []
+    for file in files:
+        scene = read_scene(file)
+        session, steps = Session(scene), len(scene.timeline.steps)
+        lens, count = scene.framed().lens().square(SIZE[1] * 4 // 5), EACH * steps
+        shots = shots_of(scene, session.composition, "orbit-time", count, lens, -60.0)
+        columns.append([session.frame(camera, scene=shown) for camera, shown in shots])
+    frames = [Image.fromarray(np.concatenate(pair, axis=1)) for pair in zip(*columns, strict=True)]
+    animate(path, frames, [SHORT] * len(frames))
 
 
 def drag(page: Any, film: Film, what: Any, *ways: tuple[float, float]) -> None:
@@ -129,8 +155,13 @@ def served(scene: Path) -> Iterator[str]:
         server.terminate()
 
 
-def main(source: str) -> None:
-    """Make all films."""
+def main(source: str, *edited: str) -> None:
+    """Make all films of a scene, or that of a series."""
+    if edited:
+        path = DOCS / "series.webp"
+        through_time(path, source, *edited)
+        add(path, "python -m tools.films SERIES EDITED", "steps image texgs.scene.paths")
+        return
     from playwright.sync_api import expect, sync_playwright
 
     with sync_playwright() as playwright, TemporaryDirectory() as folder:
