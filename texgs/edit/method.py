@@ -27,7 +27,7 @@ NO_METHOD = "none"  # of scenes as they are fitted
 class MethodKeys:
     """Keys of a method, `edit.NAME` in the configuration, and what follows from them alone."""
 
-    node = ""  # `edit.NAME`, for messages
+    node = ""  # `edit.NAME`, for messages; `Method` sets it
 
     def check(self) -> None:
         """Raise an ArgumentError for what is wrong with them."""
@@ -75,6 +75,9 @@ class Method(Generic[Settings]):
     fields: frozenset[str] = frozenset()  # kinds that it is made for; empty: all that can what it needs
     follows: str = ""  # which of its keys, "style" or "instruction", looks of a data set have a value of
     is_look: bool = True  # whether the scene looks different afterwards
+
+    def __post_init__(self) -> None:
+        self.settings.node = f"edit.{self.name}"
 
     @property
     def stage(self) -> str:

@@ -107,8 +107,9 @@ def ends_of_rays(caster: Caster, look: Appearance, tf: TransferFunction, images:
     """
     unlit = caster.with_appearance(replace(look, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
     generator = torch.Generator().manual_seed(seed)
-    parts = []
-    for camera, left in zip(images.cameras, shares_of_light(len(images.cameras), generator), strict=True):
+    count, parts = len(images.cameras), []
+    shares = (torch.randperm(count, generator=generator) + 0.5) / count  # spread evenly, in random order
+    for camera, left in zip(images.cameras, shares.tolist(), strict=True):
         thick = thickened(tf, math.log(0.5) / math.log(left))  # half of its light is left where `left` was
         parts.append(ends_of(unlit, thick, smaller(camera, 2), generator))
     points = Points(*map(torch.cat, zip(*parts, strict=True)))
@@ -119,11 +120,6 @@ def ends_of_rays(caster: Caster, look: Appearance, tf: TransferFunction, images:
     chosen = torch.randperm(len(points.places), generator=generator)[:SURFELS]
     ordered = chosen[z_order_of(points.places[chosen])]
     return Points(*(x[ordered] for x in points))
-
-
-def shares_of_light(count: int, generator: torch.Generator) -> list[float]:
-    """Return shares between 0 and 1 that are spread evenly, in random order."""
-    return ((torch.randperm(count, generator=generator) + 0.5) / count).tolist()
 
 
 def thickened(tf: TransferFunction, factor: float) -> TransferFunction:

@@ -15,7 +15,7 @@ from texgs.report.published import DATA, LABEL
 from texgs.report.table import SOURCES, Column, Table, data_frame
 
 if TYPE_CHECKING:
-    from pandas import DataFrame, Series
+    from pandas import DataFrame
 
 # Columns of measures of fits, with the digits that they are written with.
 OF_FITS = {"PSNR, training": 2, "PSNR": 2, "SSIM": 4, "minutes": 2, "memory GiB": 2, "primitives": 0}
@@ -101,21 +101,20 @@ def measured(runs: DataFrame) -> dict[str, int]:
 
 
 def variants(runs: DataFrame) -> DataFrame:
-    """Return a row for each variant: means over the seeds that are done, and their standard deviations."""
+    """Return a row for each variant: means over the seeds that are done, and their standard deviations.
+
+    They are None where a value is missing, or there are too few.
+    """
     rows = []
     for _, group in runs.groupby([*SERIES, "variant"], sort=False):
         done = group[group["is_done"].astype(bool)]
         row = {**group.iloc[0], "seeds": len(done), SOURCES: group[SOURCES].sum()}
         for title in measured(runs):
-            row[title], row[f"± {title}"] = spread_of(done[title])
+            known = [] if done[title].isna().any() else done[title].tolist()
+            row[title] = fmean(known) if known else None
+            row[f"± {title}"] = stdev(known) if len(known) > 1 else None
         rows.append(row)
     return data_frame(rows)
-
-
-def spread_of(values: Series) -> tuple[float | None, float | None]:
-    """Return mean and standard deviation; None where a value is missing, or there are too few."""
-    known = [] if values.isna().any() else values.tolist()
-    return fmean(known) if known else None, stdev(known) if len(known) > 1 else None
 
 
 def natural(name: str) -> tuple[float, str]:

@@ -133,7 +133,8 @@ def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:
     cuts = scene.cuts
     planes, numbers = list(cuts.planes), [str(number + 1) for number in range(len(cuts.planes))]
     if key == "box":
-        return replace(cuts, box=_box(scene, text) if text else None)
+        corners = _places(scene, text.split(","), [0, 1, 2] * 2, BOX) if text else []
+        return replace(cuts, box=Box(corners[:3], corners[3:]) if text else None)
     if key == "faces":
         return cuts_of(plain_cuts(cuts) | {"faces": text or NO_CUTS.faces})
     if key and key not in numbers:
@@ -155,12 +156,6 @@ def _plane(scene: Scene, text: str) -> Plane:
         return Plane(along(number, sign), sign * _places(scene, [words[1]], [number], PLANE)[0])
     numbers = _places(scene, words, [None] * 4, PLANE)
     return Plane(numbers[:3], numbers[3])
-
-
-def _box(scene: Scene, text: str) -> Box:
-    """Return the box between two corners."""
-    numbers = _places(scene, text.split(","), [0, 1, 2] * 2, BOX)
-    return Box(numbers[:3], numbers[3:])
 
 
 def _places(scene: Scene, words: Sequence[str], axes: Sequence[int | None], form: str) -> list[float]:

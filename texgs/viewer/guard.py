@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, TexgsError
 
 HOST = re.compile(r"[A-Za-z0-9._:\[\]-]+")
 POLICY = (  # not every browser takes the socket for a part of 'self'
@@ -37,6 +37,8 @@ PAGE = '<!doctype html><meta http-equiv="refresh" content="0; url={0}"><a href="
 def guard(token: str, host: str) -> Middleware:
     """Return a middleware that answers 403 to all without this token, a host of ours, and our own origin.
 
+    What a handler refuses gets 400 and the sentence that says why.
+
     The token is the first part of every path, and the host what the server listens on. A site that makes its
     name point to this machine has neither the host nor the origin; a page of another site that opens a socket
     has not the origin.
@@ -55,7 +57,10 @@ def guard(token: str, host: str) -> Middleware:
         needs_origin = is_socket or request.method != "GET"
         if not is_own_origin(request.headers.get("Origin"), name, needs_origin):
             raise web.HTTPForbidden(text="Wrong origin: open the address that texgs view printed.")
-        return await handler(request)
+        try:
+            return await handler(request)
+        except TexgsError as error:
+            raise web.HTTPBadRequest(text=str(error)) from error
 
     return middleware
 

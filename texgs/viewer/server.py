@@ -10,7 +10,7 @@ from typing import Any
 import torch
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError
 from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
@@ -19,7 +19,19 @@ from texgs.viewer.description import bounds, describe, presets
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Beside, Frames
 from texgs.viewer.guard import guard, headers
-from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Pick, Save, Segment, View, parse
+from texgs.viewer.messages import (
+    Cancel,
+    Export,
+    Fit,
+    Look,
+    Mask,
+    Message,
+    Pick,
+    Save,
+    Segment,
+    View,
+    parse,
+)
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
@@ -126,32 +138,23 @@ class Server:
 
     async def still(self, request: web.Request) -> web.StreamResponse:
         """Return a PNG file of the view in the query on its page, as `texgs render` writes it."""
-        try:
-            view = parse(request.query.get("view", ""), messages.VIEWS)
-            scene = self._shown(view, request.query.get("page", ""))
-            words = await asyncio.to_thread(self.edits.checked, scene)
-            png = await self.frames.still(view, scene, words)
-        except TexgsError as error:
-            raise web.HTTPBadRequest(text=str(error)) from error
+        view = parse(request.query.get("view", ""), messages.VIEWS)
+        scene = self._shown(view, request.query.get("page", ""))
+        words = await asyncio.to_thread(self.edits.checked, scene)
+        png = await self.frames.still(view, scene, words)
         saved = {"Content-Disposition": "attachment"}  # the page gives it a name
         return web.Response(body=png, content_type="image/png", headers=saved)
 
     async def thumbnail(self, request: web.Request) -> web.StreamResponse:
         """Return a small view of the scene with a picture laid on."""
-        try:
-            asked = parse(request.query.get("look", ""), messages.LOOKS)
-            picture = await self.work.thumbnail(replace(asked, preview=True))  # never by a full recipe
-        except TexgsError as error:
-            raise web.HTTPBadRequest(text=str(error)) from error
+        asked = parse(request.query.get("look", ""), messages.LOOKS)
+        picture = await self.work.thumbnail(replace(asked, preview=True))  # never by a full recipe
         return web.Response(body=picture, content_type="image/jpeg")
 
     async def new_style(self, request: web.Request) -> web.StreamResponse:
         """Take in a picture of the page's user; return the name that it has from then on."""
         content = await request.read()
-        try:
-            name = await asyncio.to_thread(self.work.styles.add, request.query.get("name", ""), content)
-        except TexgsError as error:
-            raise web.HTTPBadRequest(text=str(error)) from error
+        name = await asyncio.to_thread(self.work.styles.add, request.query.get("name", ""), content)
         return web.Response(text=name)
 
     async def file(self, request: web.Request) -> web.StreamResponse:
@@ -180,16 +183,8 @@ class Server:
             await page.pick(message)
         elif isinstance(message, Mask) or (isinstance(message, Look) and message.preview):
             page.find(message)
-        elif isinstance(message, Segment):
-            self.work.begin_segment(message, page)
-        elif isinstance(message, Look):
-            await self.work.begin_look(message, page)
-        elif isinstance(message, Fit):
-            self.work.begin_fit(message, page)
-        elif isinstance(message, messages.Keep):
-            self.work.begin_keep(message, page)
-        elif isinstance(message, Export):
-            self.work.begin_export(message, page)
+        elif isinstance(message, Segment | Look | Fit | messages.Keep | Export):
+            await self.work.begin(message, page)
         elif isinstance(message, Cancel):
             if not message.preview:
                 self.work.stop(page)

@@ -118,40 +118,31 @@ class Work:
         """Return a small picture of the scene with a look, after those that were asked for before."""
         return await self._thumbnails.run(partial(self._looks.thumbnail, self._edits.scene, asked), Watch())
 
-    def begin_segment(self, asked: Segment, page: Page) -> None:
-        """Begin to make a segment."""
-        require_new(self._edits.scene, asked.part)
-        name = split(self._edits.scene, asked.part)[1]
-        require_name(name, "segment")
-        part_file("segment", str(name))
-        self._begin(page, partial(self._segment, asked, page))
-
-    async def begin_look(self, asked: Look, page: Page) -> None:
-        """Begin to make a new look; its picture and the weights are looked at first."""
-        for part in asked.parts:
-            entry_of(self._edits.scene, part)
-        edit = await asyncio.to_thread(self._looks.edit_of, asked)
-        self._begin(page, partial(self._look, asked, edit, page))
-
-    def begin_fit(self, asked: Fit, page: Page) -> None:
-        """Begin to fit a model of a function."""
-        tried(self._edits.scene, asked.function)
-        require_name(asked.function, "function")
-        self._begin(page, partial(self._fit, asked, page))
-
-    def begin_keep(self, asked: Keep, page: Page) -> None:
-        """Begin to write a function into the file of its data set."""
-
-        async def write(watch: Watch) -> None:
-            kept = partial(keep, self._edits.scene, asked.function)
-            page.tell(await self._jobs.run(kept, watch), level="info")
-
-        self._begin(page, write)
-
-    def begin_export(self, asked: Export, page: Page) -> None:
-        """Begin to write a file."""
-        require_kind(self._edits.scene, asked.kind)
-        self._begin(page, partial(self._export, asked, page))
+    async def begin(self, asked: Segment | Look | Fit | Keep | Export, page: Page) -> None:
+        """Begin to make or write something; what is wrong with it is told first."""
+        scene = self._edits.scene
+        match asked:
+            case Segment():
+                require_new(scene, asked.part)
+                name = split(scene, asked.part)[1]
+                require_name(name, "segment")
+                part_file("segment", str(name))
+                job = partial(self._segment, asked, page)
+            case Look():
+                for part in asked.parts:
+                    entry_of(scene, part)
+                edit = await asyncio.to_thread(self._looks.edit_of, asked)  # reads its picture
+                job = partial(self._look, asked, edit, page)
+            case Fit():
+                tried(scene, asked.function)
+                require_name(asked.function, "function")
+                job = partial(self._fit, asked, page)
+            case Keep():
+                job = partial(self._keep, asked, page)
+            case Export():
+                require_kind(scene, asked.kind)
+                job = partial(self._export, asked, page)
+        self._begin(page, job)
 
     @property
     def is_at_work(self) -> bool:
@@ -247,6 +238,11 @@ class Work:
                     break
 
         await self._jobs.run(work, watch, is_urgent=True)
+
+    async def _keep(self, asked: Keep, page: Page, watch: Watch) -> None:
+        """Write a function into the file of its data set, and tell its page what that means."""
+        kept = partial(keep, self._edits.scene, asked.function)
+        page.tell(await self._jobs.run(kept, watch), level="info")
 
     async def _export(self, asked: Export, page: Page, watch: Watch) -> None:
         """Write a file, and tell its page where it is."""

@@ -27,7 +27,7 @@ def overlay(functions: Mapping[str, TransferFunction]) -> TransferFunction:
         return combine(functions)
     each = list(functions.values())
     values = places(each)
-    sides = mixed(each, values, left_of), mixed(each, values, right_of)
+    sides = mixed(each, values, left_of), mixed(each, values, TransferFunction.__call__)
     points = []
     for value, left, right in zip(values.tolist(), *sides, strict=True):
         points += [(value, *row) for row in ([left, right] if not np.allclose(left, right) else [right])]
@@ -56,11 +56,6 @@ def mixed(
     weights = extinction + 1e-12 * (np.stack(near) + 1e-12)  # where nothing is seen, colours go on
     color = (weights[..., None] * limits[..., :3]).sum(axis=0) / weights.sum(axis=0)[:, None]
     return np.column_stack([color, -np.expm1(-extinction.sum(axis=0))]).clip(0, 1)
-
-
-def right_of(tf: TransferFunction, values: Array) -> Array:
-    """Return r, g, b and opacity [N, 4] at values and right above them."""
-    return tf(values)
 
 
 def left_of(tf: TransferFunction, values: Array) -> Array:

@@ -103,10 +103,9 @@ def _materials(counts: Array, count: int | None) -> list[Class]:
 
 def _smooth_log(counts: Array) -> Array:
     """Return the logarithm of the counts after a Gaussian filter; a floor below the rare keeps noise flat."""
-    sigma = SMOOTHING * len(counts)
-    radius = round(4 * sigma)
-    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    smooth = np.convolve(np.pad(counts, radius, mode="symmetric"), kernel / kernel.sum(), mode="valid")
+    from scipy.ndimage import gaussian_filter1d
+
+    smooth = gaussian_filter1d(counts, SMOOTHING * len(counts))
     return np.log(smooth + RARE * (counts.sum() - counts.max()) + NOISE)
 
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 class ArfKeys(FeatureKeys):
     """How colours of voxels take on a style."""
 
-    node = "edit.arf"
-
     epochs: float = key(10.0, "rounds through the training views, for the style", least=0)
     ray_epochs: float = key(1.0, "rounds through the rays of recoloured views before that", least=0)
     content: float = key(5e-3, "weight of the features that views have as recoloured", least=0)

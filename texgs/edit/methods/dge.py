@@ -14,7 +14,6 @@ from texgs.fitting.settings import CommonRates
 class DgeKeys(UpdateKeys):
     """How Gaussians follow: rounds, in each of which some views are edited together and learned from."""
 
-    node = "edit.dge"
     keeps_renders = True
 
     l1: float = key(10.0, "weight of the absolute difference to edited views", least=0)

@@ -17,8 +17,6 @@ def rates(zeroth: float, means_final: float) -> CommonRates:
 class Igs2gsKeys(UpdateKeys):
     """How Gaussians follow: all views are edited one after the other, then learned from for a while."""
 
-    node = "edit.igs2gs"
-
     passes: int = key(3, "times that each view is edited", least=1)
     every: int = key(2500, "iterations from pass to pass", least=1)
     noise: list[float] = key([0.7, 0.98], "level of noise of an edit, from and to, as a share")

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 class ImageKeys(OpacityKeys, StyleKeys):
     """How texels take on a style."""
 
-    node = "edit.image"
-
     recipe: str = key(
         "default",
         "default; patches, which needs no weights; preview, the picture laid onto the surface; paper, NNFM "

@@ -11,8 +11,6 @@ from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, 
 class In2nKeys(UpdateKeys):
     """How a grid follows: one view is edited at a time, and patches of all views are learned from."""
 
-    node = "edit.in2n"
-
     l1: float = key(1.0, "weight of the absolute difference to edited views", least=0)
     dssim: float = key(0.0, "weight of D-SSIM, which patches have not", least=0, most=0)
     lpips: float = key(1.0, "weight of LPIPS on VGG-16; 0 needs no weights", least=0)

@@ -25,8 +25,6 @@ STYLES = "edit.stylerf.styles"
 class StyleRfKeys(FeatureKeys):
     """How palette colours take on styles."""
 
-    node = "edit.stylerf"
-
     styles: list[str] = key(
         [], "a picture for each palette colour of the fit, whatever looks say; default: `style` for all"
     )

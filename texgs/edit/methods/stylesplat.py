@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 class StyleSplatKeys(FeatureKeys):
     """How colours of 3D Gaussians take on a style."""
 
-    node = "edit.stylesplat"
-
     iterations: int = key(2000, "steps of the style, of one view each", least=0)
     rate: float = key(0.005, "learning rate of zeroth harmonics; the others have a twentieth", above=0)
 

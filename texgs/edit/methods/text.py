@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 class TextKeys(OpacityKeys, InstructionKeys):
     """What to do, what edits the views, and how texels follow."""
 
-    node = "edit.text"
-
     recipe: str = key(
         "default",
         "how texels follow: solved for the colours of edited views, quickly at one opacity; or as in the "
