@@ -199,16 +199,15 @@ def random_ranges(n=300):
     return 1.5 * torch.rand(2, n, generator=torch.Generator().manual_seed(1))
 
 
-@pytest.mark.parametrize("keep", [True, False])
 @pytest.mark.parametrize("degree", [0, 2])
-def test_voxels_within_a_range_are_those_of_the_definition(device, degree, keep):
+def test_voxels_within_a_range_are_those_of_the_definition(device, degree):
     scene = voxels_within(random_ranges(), degree=degree)
     density, sh = (x.double().requires_grad_() for x in (scene.density, scene.sh))
     expected = scene.definition(density, sh)
     moved = scene.to(device)
     rows = moved.grid.rows.requires_grad_()
     march = replace(scene.march, depth_range=scene.march.depth_range.to(device))
-    result = render_rays(moved.grid, moved.rays, march, keep=keep)
+    result = render_rays(moved.grid, moved.rays, march)
     for own, true in zip(result, expected, strict=True):
         assert float((own.cpu() - true).detach().abs().gt(2e-3).double().mean()) < 0.02  # samples at an end
     result.color.sum().backward()

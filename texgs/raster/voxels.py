@@ -2,7 +2,6 @@
 
 from ctypes import byref, c_int64
 from dataclasses import dataclass, replace
-from itertools import repeat
 from typing import Any, NamedTuple
 
 import torch
@@ -13,9 +12,9 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.raster import native
 from texgs.raster.arguments import require
+from texgs.raster.types import Render
 from texgs.raster.voxel_grid import NativeGrid, VoxelGrid
 
-PIECE = 16_384  # rays at a time, where memory is to be saved
 NativeMarch = native.struct(
     "texgs_march", "n n, p rays, 3f background, f step transmittance_min, p depth_range"
 )
@@ -118,9 +117,6 @@ def render_rays(
     grid: VoxelGrid,
     rays: Tensor,
     march: March | None = None,
-    *,
-    into: RowGradient | None = None,
-    keep: bool = True,
 ) -> Rays:
     """Blend a grid's samples along rays, front to back.
 
@@ -133,23 +129,10 @@ def render_rays(
         rays: [N, 6] origin and direction, world units, directions of a length from 1e-15 to 1e15; neighbours
             one after the other are faster.
         march: how rays are sampled.
-        into: where the backward pass adds its gradient, in place of `grid.rows.grad`.
-        keep: the samples, 36 bytes each, for the backward pass; False: it marches piece by piece again
-            (deferred back-propagation, Zhang et al. 2022), for views that memory does not suffice for.
     """
     check.constant(rays=rays)
-    if into:
-        into.check(grid)
-    keep = keep and grid.rows.requires_grad and torch.is_grad_enabled()
-    return Rays(*_Render.apply(grid, march or March(), rays.contiguous(), into, keep, grid.rows))
-
-
-class GridView(NamedTuple):
-    """What a camera sees of a grid."""
-
-    color: Tensor  # [H, W, 3] over the background
-    alpha: Tensor  # [H, W]
-    depth: Tensor  # [H, W] expected depth along the camera's axis, world units; 0 where alpha is 0
+    keep = grid.rows.requires_grad and torch.is_grad_enabled()
+    return Rays(*_Render.apply(grid, march or March(), rays.contiguous(), keep, grid.rows))
 
 
 def render_view(
@@ -158,18 +141,16 @@ def render_view(
     march: March | None = None,
     *,
     depth_range: Tensor | None = None,  # [2, H, W] camera z
-    into: RowGradient | None = None,
-    keep: bool = True,
-) -> GridView:
-    """Render all pixels of a camera, differentiable in the grid's rows; see `render_rays`."""
+) -> Render:
+    """Render all pixels of a camera, with depth; differentiable in the grid's rows, see `render_rays`."""
     size = (camera.height, camera.width)
     rays = camera_rays(camera).flatten(0, 1)
     if depth_range is not None:
         check.shape("depth_range", depth_range, f"2 {camera.height} {camera.width}")
         march = replace(march or March(), depth_range=depth_range.flatten(1))
-    color, alpha, distance = render_rays(grid, rays, march, into=into, keep=keep)
+    color, alpha, distance = render_rays(grid, rays, march)
     depth = distance / rays[:, 3:].norm(dim=1)
-    return GridView(color.reshape(*size, 3), alpha.reshape(size), depth.reshape(size))
+    return Render(color.reshape(*size, 3), alpha.reshape(size), depth.reshape(size))
 
 
 def camera_rays(camera: Camera) -> Tensor:
@@ -185,14 +166,11 @@ class _Render(torch.autograd.Function):
         grid: VoxelGrid,
         march: March,
         rays: Tensor,
-        into: RowGradient | None,
         keep: bool,
         rows: Tensor,
     ) -> tuple[Tensor, Tensor, Tensor]:
         out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
-        samples = Samples(grid, march, rays, out, keep)
-        ctx.samples = samples if keep else None
-        ctx.grid, ctx.march, ctx.rays, ctx.into = grid, march, rays, into
+        ctx.samples = Samples(grid, march, rays, out, keep)
         ctx.save_for_backward(rows)  # autograd refuses a backward pass after they were changed
         ctx.mark_non_differentiable(out.distance)
         ctx.set_materialize_grads(False)
@@ -202,16 +180,9 @@ class _Render(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, color: Tensor | None, alpha: Tensor | None, _: Any) -> tuple[Tensor | None, ...]:
         (_rows,) = ctx.saved_tensors
-        into = ctx.into or RowGradient(ctx.grid)
-        if ctx.samples:
-            ctx.samples.add_gradient(color, alpha, into)
-        else:
-            ranges = None if ctx.march.depth_range is None else ctx.march.depth_range.mT
-            pieces = (repeat(None) if x is None else x.split(PIECE) for x in (ctx.rays, ranges, color, alpha))
-            for rays, part, color_part, alpha_part in zip(*pieces, strict=False):
-                march = replace(ctx.march, depth_range=None if part is None else part.mT)
-                Samples(ctx.grid, march, rays).add_gradient(color_part, alpha_part, into)
-        return None, None, None, None, None, None if ctx.into else into.rows
+        gradient = RowGradient(ctx.samples.grid)
+        ctx.samples.add_gradient(color, alpha, gradient)
+        return None, None, None, None, gradient.rows
 
 
 class RayPoints(NamedTuple):

@@ -60,7 +60,7 @@ class Voxels(UnlitField):
         red, green, blue = (1.0, 1.0, 1.0) if background is None else background.tolist()
         march = replace(self.march, background=(red, green, blue))
         view = render_view(self.grid, camera, march, depth_range=depth_range)
-        return Render(view.color, view.alpha, depth=view.depth if outputs else None)
+        return view if outputs else replace(view, depth=None)
 
     def sizes(self) -> dict[str, float]:
         """Return sizes in MiB.
