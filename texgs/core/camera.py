@@ -1,10 +1,9 @@
 """Pinhole cameras: OpenCV axes (x right, y down, z forward), world +y up, pixel centres at +0.5."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, isfinite, radians, sin, tan
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -66,18 +65,18 @@ class Camera:
         right, down = (x + 0.5 - K[0, 2]) / K[0, 0], (y + 0.5 - K[1, 2]) / K[1, 1]
         return torch.stack([right, down, torch.ones_like(right)], dim=-1)
 
-    def to(self, device: torch.device | str) -> Camera:
+    def to(self, device: torch.device | str) -> Self:
         """Return the same camera with its matrices on another device."""
         return replace(self, viewmat=self.viewmat.to(device), K=self.K.to(device))
 
-    def crop(self, left: int, top: int, right: int, bottom: int) -> Camera:
+    def crop(self, left: int, top: int, right: int, bottom: int) -> Self:
         """Return the camera of the pixels left <= x < right, top <= y < bottom of this one's image."""
         K = self.K.clone()
         K[0, 2] -= left
         K[1, 2] -= top
         return replace(self, K=K, width=right - left, height=bottom - top)
 
-    def resized(self, longer: int) -> Camera:
+    def resized(self, longer: int) -> Self:
         """Return the camera of the same view at another resolution, the longer side having so many pixels."""
         scale = longer / max(self.width, self.height)
         width, height = (max(1, round(side * scale)) for side in (self.width, self.height))

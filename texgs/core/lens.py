@@ -1,11 +1,9 @@
 """What cameras around a target have in common, and how far away they show all that is visible."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isqrt, radians, sqrt, tan
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from texgs.core.cuts import FAR
 from texgs.core.errors import ArgumentError
@@ -24,7 +22,7 @@ class Lens(NamedTuple):
     height: int = 800  # pixels
     target: Sequence[float] = ORIGIN  # [3], that cameras look at, world units
 
-    def square(self, size: int) -> Lens:
+    def square(self, size: int) -> Self:
         """Return the same for square images."""
         return self._replace(width=size, height=size)
 

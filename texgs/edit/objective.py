@@ -1,9 +1,8 @@
 """How far a view is from a style: NNFM and distribution of VGG features, a CLIP term, patches."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -60,7 +59,7 @@ class Objective:
     @classmethod
     def of(
         cls, recipe: Recipe, style: StylePicture, reduce: int, vgg: Vgg | None, clip: FeatureTerm | None
-    ) -> Objective:
+    ) -> Self:
         """Compute once what the losses need to know about a style, which has the size at which it is to show.
 
         Features see `reduce` pixels each way as one. NNFM needs a VGG, and a lambda_s below 1 a CLIP term.
@@ -86,9 +85,7 @@ class Objective:
         return cls(recipe, reduce, vgg, features, distributions, patches, clip)
 
     @classmethod
-    def of_views(
-        cls, recipe: Recipe, style: StylePicture, size: tuple[int, int], vgg: Vgg | None
-    ) -> Objective:
+    def of_views(cls, recipe: Recipe, style: StylePicture, size: tuple[int, int], vgg: Vgg | None) -> Self:
         """Compute the same for a picture behind views of a width and height, without a CLIP term."""
         scaled = style.scaled(recipe.pattern * max(size))
         return cls.of(recipe, scaled, recipe.reduction(*size), vgg, None)

@@ -1,9 +1,7 @@
 """How to stylise: the numbers of one image-driven edit, and the sets of them that have names."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 Start = Literal["projected", "sphere", "mean", "random", "transfer"]
 OPAQUE = 0.8  # mean alpha from which on a scene is taken for opaque
@@ -57,7 +55,7 @@ class Recipe:
         """Return how many pixels each way features see as one, for views of this size."""
         return self.reduce or max(1, round(max(width, height) / FULL_RESOLUTION))
 
-    def adapted(self, alpha: float) -> Recipe:
+    def adapted(self, alpha: float) -> Self:
         """Return the recipe for a scene of which pixels have this alpha, see `canvas.mean_alpha`.
 
         Layers are averaged in a pixel of a translucent scene. Each learns as if it were opaque. A pixel shows

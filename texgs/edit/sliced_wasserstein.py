@@ -6,9 +6,8 @@ colour or pattern of the style can be left out, while NNFM is content when each 
 it. The distance of patches needs no pretrained weights.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -34,7 +33,7 @@ class PatchStatistics:
     quantiles: tuple[Tensor, ...]  # of each level [BANKS, FILTERS, QUANTILES]
 
     @classmethod
-    def of(cls, picture: Tensor, region: Tensor | None = None, seed: int = 0) -> PatchStatistics:
+    def of(cls, picture: Tensor, region: Tensor | None = None, seed: int = 0) -> Self:
         """Project the patches of a picture [3, h, w], centred in a region [h, w] bool, by default anywhere.
 
         It has at least 7 pixels each way; levels that would be smaller are left out.
@@ -79,7 +78,7 @@ class FeatureDistribution:
     variance: Tensor  # [] along a direction, mean over them
 
     @classmethod
-    def of(cls, features: Tensor, region: Tensor | None = None, seed: int = 0) -> FeatureDistribution:
+    def of(cls, features: Tensor, region: Tensor | None = None, seed: int = 0) -> Self:
         """Project the features [C, h, w] of a picture, those of a region [h, w] bool, by default all.
 
         The seed is of the directions, and of the draw of 16,384 features where there are more.

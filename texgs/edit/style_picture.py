@@ -1,11 +1,10 @@
 """The picture that a style is taken from: read at a useful size, with the part of it that counts."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import torch
@@ -40,7 +39,7 @@ class StylePicture:
             )
 
     @classmethod
-    def of(cls, image: Tensor, region: Tensor | None = None) -> StylePicture:
+    def of(cls, image: Tensor, region: Tensor | None = None) -> Self:
         """Return the style of an image [3, h, w], cut to the box around the region [h, w]; by default all."""
         size = check.shape("image", image, "3 h w")
         if min(size["h"], size["w"]) < SMALLEST:
@@ -66,7 +65,7 @@ class StylePicture:
         """Return the colours [n, 3] of the region."""
         return self.image.permute(1, 2, 0)[self.region]
 
-    def scaled(self, long_side: float) -> StylePicture:
+    def scaled(self, long_side: float) -> "StylePicture":
         """Return the style with its longer side at so many pixels, its aspect kept; smaller by averaging."""
         height, width = self.region.shape
         factor = long_side / max(height, width)
@@ -79,12 +78,12 @@ class StylePicture:
         region = F.interpolate(self.region[None, None].float(), size, mode="area")[0, 0] > 0.5
         return StylePicture(image, region if bool(region.any()) else torch.ones_like(region))
 
-    def vivid(self, gain: float) -> StylePicture:
+    def vivid(self, gain: float) -> Self:
         """Return the style with its colours' differences from grey times a gain, as far as they can be."""
         grey = self.image.mean(0)
         return replace(self, image=(grey + gain * (self.image - grey)).clamp(0, 1))
 
-    def to(self, device: torch.device | str) -> StylePicture:
+    def to(self, device: torch.device | str) -> "StylePicture":
         """Return the same on another device."""
         return StylePicture(self.image.to(device), self.region.to(device))
 

@@ -1,7 +1,5 @@
 """The texture phase: geometry and material stay, surfels get colours that vary."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import torch
@@ -75,7 +73,7 @@ def mean_color(images: Images) -> Tensor:
     return (premultiplied / alpha.clamp_min(1)).clamp(0, 1).float()
 
 
-def mean_unlit_color(model: Surfels, sight: Sight) -> Tensor:
+def mean_unlit_color(model: Surfels, sight: "Sight") -> Tensor:
     """Return the mean colour [3] of a model without light, each surfel as much as views show of it."""
     shown = sight.shown[:, None]
     return ((shown * model.parameters["colors"]).sum(dim=0) / shown.sum().clamp_min(1e-12)).clamp(0, 1)

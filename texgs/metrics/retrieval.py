@@ -3,11 +3,10 @@
 Only the object counts. Views are compared with colours, and by the pattern alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Self
 
 import torch
 from safetensors.torch import load
@@ -41,17 +40,17 @@ class Likeness:
     histogram: Tensor  # [..., B] shares of colours
 
     @classmethod
-    def stacked(cls, several: Iterable[Likeness]) -> Likeness:
+    def stacked(cls, several: "Iterable[Likeness]") -> Self:
         """Return many as one, along a new first dimension."""
         listed = list(several)
         return cls(*(torch.stack([vars(each)[name] for each in listed]) for name in vars(listed[0])))
 
     @property
-    def mean(self) -> Likeness:
+    def mean(self) -> "Likeness":
         """Return the mean along the first dimension."""
         return Likeness(*(each.mean(0) for each in vars(self).values()))
 
-    def distances(self, pictures: Likeness) -> dict[str, Tensor]:
+    def distances(self, pictures: "Likeness") -> dict[str, Tensor]:
         """Return how far pictures [P, S] are, at the scale of each at which it is nearest: by kind [P].
 
         A layer counts by the cosine, and with colours the Hellinger distance of histograms counts too.

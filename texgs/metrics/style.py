@@ -1,9 +1,8 @@
 """How much of a style a view shows that was not learned from: NNFM and Gram matrices."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -22,7 +21,7 @@ class StyleTarget:
     gram: Tensor  # [C, C]
 
     @classmethod
-    def of(cls, rows: Tensor) -> StyleTarget:
+    def of(cls, rows: Tensor) -> Self:
         """Prepare the features [n, C] of a picture."""
         return cls(StyleFeatures.of(rows.T[:, None]), gram(rows.T))
 

@@ -1,7 +1,5 @@
 """How far a mesh is from a surface that is known: Chamfer distance, F-score and angle between normals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,7 +22,7 @@ class Points:
     places: Tensor  # [N, 3] float64, world units
     normals: Tensor  # [N, 3] unit length, outwards
 
-    def __getitem__(self, kept: Tensor) -> Points:
+    def __getitem__(self, kept: Tensor) -> "Points":
         """Return some of them, by a mask [N] or indices."""
         return Points(self.places[kept], self.normals[kept])
 

@@ -1,11 +1,9 @@
 """Features of images and texts by CLIP (Radford et al. 2021), and how well an edit fits its caption."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import torch
 from torch import Tensor
@@ -29,7 +27,7 @@ class Clip:
     tokenizer: Any
 
     @classmethod
-    def load(cls, weights: str | Path, device: torch.device | str = "cpu") -> Clip:
+    def load(cls, weights: str | Path, device: torch.device | str = "cpu") -> Self:
         """Read a model in float32, by a name of the catalogue or from a folder with its tokenizer."""
         folder = Path(weights) if Path(weights).is_dir() else locate(str(weights))
         network, tokenizer = read_folder(folder, "clip", ("CLIPModel", "AutoTokenizer"))

@@ -1,13 +1,11 @@
 """Newer editors, each view alone: image-to-image pipelines of diffusers, and servers at an address."""
 
-from __future__ import annotations
-
 import inspect
 import json
 from base64 import b64decode, b64encode
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 from urllib.request import Request, urlopen
 
 import numpy as np
@@ -70,7 +68,7 @@ class ImagePipeline(EachAlone):
         self.pipeline, self.size = pipeline, size
 
     @classmethod
-    def open(cls, folder: Path, name: str, device: torch.device, **options: Any) -> ImagePipeline:
+    def open(cls, folder: Path, name: str, device: torch.device, **options: Any) -> Self:
         """Read a pipeline from its folder; nothing is downloaded, and nothing in the files is executed.
 
         In single precision on a CPU, in bfloat16 on a GPU: in float16 the large ones overflow.

@@ -1,10 +1,8 @@
 """InstructPix2Pix (Brooks et al. 2023): views edited by a diffusion model, with a short loop of our own."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import torch
 from torch import Tensor
@@ -68,7 +66,7 @@ class InstructPix2Pix:
         self.consistency = Consistency(self.unet) if epipolar else None
 
     @classmethod
-    def open(cls, folder: str | Path, device: torch.device | str = "cpu", **options: Any) -> InstructPix2Pix:
+    def open(cls, folder: str | Path, device: torch.device | str = "cpu", **options: Any) -> Self:
         """Read the model from a folder in its published format, with a folder for each of its parts.
 
         Half precision on a GPU, single on a CPU. Nothing is downloaded, nothing in the files is executed. The

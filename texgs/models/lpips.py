@@ -1,10 +1,9 @@
 """Learned perceptual image patch similarity with a VGG backbone."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -32,7 +31,7 @@ class Lpips:
         heads: str | Path | None = None,
         device: torch.device | str = "cpu",
         dtype: torch.dtype = torch.float32,
-    ) -> Lpips:
+    ) -> Self:
         """Read both files of weights, by default where they are found; a VGG with `LAYERS` may be given."""
         heads = locate("lpips_vgg") if heads is None else heads
         names = [f"lin{index}.model.1.weight" for index in range(len(LAYERS))]

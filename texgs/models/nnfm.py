@@ -4,9 +4,8 @@ The loss of ARF (Zhang et al. 2022, eq. 3), which the paper takes over: the mean
 distance to the nearest feature of the style.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -34,7 +33,7 @@ class StyleFeatures:
         positions: int | None = None,
         dimensions: int | None = None,
         seed: int = 0,
-    ) -> StyleFeatures:
+    ) -> Self:
         """Gather the features [C, h, w] of a picture, or of its region [h, w] bool.
 
         Of more positions so many are kept, drawn at random. The search is in so many principal directions of

@@ -1,11 +1,10 @@
 """VGG-16 as far as its features are wanted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import EllipsisType
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -39,7 +38,7 @@ class Vgg:
         device: torch.device | str = "cpu",
         layers: Sequence[str] = STYLE_LAYERS,
         dtype: torch.dtype | None = None,
-    ) -> Vgg:
+    ) -> Self:
         """Read the weights that the layers need, `relu1_1` to `relu5_3` in order.
 
         They have torchvision's names, `features.N.weight`. The dtype to compute in is by default the fastest:

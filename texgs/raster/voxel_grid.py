@@ -1,11 +1,9 @@
 """A sparse grid of voxels with density and spherical harmonics: its layout in memory and its rows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite
-from typing import Any
+from typing import Any, Self
 
 import torch
 from torch import Tensor
@@ -81,7 +79,7 @@ class VoxelGrid:
             "texgs_grid_occupy", self.structure(), self.occupied, self.distance, device=self.rows.device
         )
 
-    def with_rows(self, rows: Tensor) -> VoxelGrid:
+    def with_rows(self, rows: Tensor) -> Self:
         """Return the same voxels with other rows, [n, 4, 16 or 32]."""
         require({"rows": (rows, f"{len(self.rows)} K")})
         check.same_device(masks=self.masks, rows=rows)
@@ -97,7 +95,7 @@ class VoxelGrid:
         grid.refresh()
         return grid
 
-    def to(self, device: torch.device | str) -> VoxelGrid:
+    def to(self, device: torch.device | str) -> Self:
         """Return the same grid on another device."""
         tensors: dict[str, Any] = {
             name: x.to(device) for name, x in vars(self).items() if isinstance(x, Tensor)

@@ -4,11 +4,9 @@ What was not measured is None, and is left out of the file. Units are in the nam
 reads is in the module of its stage.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from texgs.core.keys import typed
 
@@ -275,7 +273,7 @@ class EditMeasures(Result):
     values: dict[str, Any] = field(default_factory=dict)  # of texgs/metrics/edits, by name
 
     @classmethod
-    def of(cls, numbers: Mapping[str, Any]) -> EditMeasures:
+    def of(cls, numbers: Mapping[str, Any]) -> Self:
         """Return the measures that `plain` made these numbers of; who knows the metrics checks `values`."""
         own = {each.name for each in fields(cls)} - {"values"}
         known = {name: value for name, value in numbers.items() if name in own}

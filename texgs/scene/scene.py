@@ -1,11 +1,9 @@
 """A scene: fields by name with what is edited about each, a light, a background; opening trains nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import torch
 from torch import Tensor
@@ -131,7 +129,7 @@ class Scene:
         return self.frame or bounds_of(models_of(self.open() if composed is None else composed))
 
     @property
-    def as_fitted(self) -> Scene:
+    def as_fitted(self) -> Self:
         """Return the scene without what is edited about its models; light, background and cuts stay."""
         models = {name: SceneModel(model.file, step=model.step) for name, model in self.models.items()}
         return replace(self, models=models)
@@ -143,7 +141,7 @@ class Scene:
             raise ArgumentError("time: expected a scene of a series, got one without; texgs series makes one")
         return self.series
 
-    def at(self, time: Any) -> Scene:
+    def at(self, time: Any) -> Self:
         """Return the scene at a step of its series: models and volume are those of it, edits stay."""
         series, last = self.timeline, len(self.timeline.steps) - 1
         if not is_number(time) or time not in range(last + 1):

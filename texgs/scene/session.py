@@ -1,13 +1,11 @@
 """A scene that is being edited: each change makes a new scene, and all of them can be undone."""
 
-from __future__ import annotations
-
 import sys
 from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -61,7 +59,7 @@ class Session:
         self._twin: tuple[object, Twin] | None = None
 
     @classmethod
-    def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Session:
+    def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Self:
         """Return a session that begins with a scene file; its models are read when a frame needs them."""
         return cls(read_scene(path), device)
 

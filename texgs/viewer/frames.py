@@ -3,8 +3,6 @@
 A scene can be beside its volume, or where it names none, beside the training view nearest to the camera.
 """
 
-from __future__ import annotations
-
 import asyncio
 import io
 import json
@@ -65,7 +63,7 @@ class Pace:
 class Frames:
     """Renders scenes of a session, or their views, in one thread, in the order they are asked for."""
 
-    def __init__(self, session: Session, beside: Beside) -> None:
+    def __init__(self, session: Session, beside: "Beside") -> None:
         self._session, self._beside = session, beside
         threads = torch.get_num_threads()
         self._thread = ThreadPoolExecutor(1, "render", torch.set_num_threads, (threads,))

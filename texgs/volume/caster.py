@@ -8,15 +8,13 @@ CPU: bricks of 4 x 4 x 4 cells are known by their extremes, and rays leap over t
 The result has the same bits for any number of threads.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Collection
 from copy import copy
 from ctypes import c_int32, c_int64
 from dataclasses import dataclass
 from math import hypot, inf
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -93,7 +91,7 @@ class Caster:
         self._call("texgs_volume_extremes", self._extremes, missing)
         self._prepared = list[tuple[TransferFunction, native.Struct, Tensor]]()  # the last, of all copies
 
-    def with_appearance(self, appearance: Appearance) -> Caster:
+    def with_appearance(self, appearance: Appearance) -> Self:
         """Return a caster of the same volume with another shading and sampling; nothing is read again."""
         other = copy(self)
         other._appearance = appearance

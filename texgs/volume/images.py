@@ -1,7 +1,5 @@
 """The views of a split in memory over white, 8 bits per value, and one of them at a time as floats."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -36,12 +34,12 @@ class Box(NamedTuple):
     right: int
     bottom: int
 
-    def union(self, other: Box) -> Box:
+    def union(self, other: "Box") -> "Box":
         """Return the smallest box around both."""
         low, high = map(min, self[:2], other[:2]), map(max, self[2:], other[2:])
         return Box(*low, *high)
 
-    def within(self, width: int, height: int) -> Box:
+    def within(self, width: int, height: int) -> "Box":
         """Return the box and a margin, as far as they are in the image; one pixel of it at least."""
         left = min(max(self.left - MARGIN, 0), width - 1)
         top = min(max(self.top - MARGIN, 0), height - 1)

@@ -1,12 +1,10 @@
 """Volume rendering behind one interface, and the views of a volume as files that are made only once."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 import torch
@@ -47,7 +45,7 @@ class VolumeRenderer(Protocol):
 
     local_viewer: bool  # whether directions to viewer and headlight differ from point to point
 
-    def with_appearance(self, appearance: Appearance) -> VolumeRenderer:
+    def with_appearance(self, appearance: Appearance) -> Self:
         """Return a renderer of the same volume with another shading; nothing is read again."""
 
     def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:

@@ -3,13 +3,11 @@
 Its shading is Phong's, with a viewer nearby: highlights differ from those of `texgs.volume.caster`.
 """
 
-from __future__ import annotations
-
 import os
 from copy import copy
 from dataclasses import replace
 from math import atan, degrees
-from typing import Any, cast
+from typing import Any, Self, cast
 
 import numpy as np
 import pyvista
@@ -59,7 +57,7 @@ class VtkRenderer:
         self._plotter.renderer.AddLight(self._light)
         self._plotter.renderer.AddVolume(self._volume)
 
-    def with_appearance(self, appearance: Appearance) -> VtkRenderer:
+    def with_appearance(self, appearance: Appearance) -> Self:
         """Return a renderer of the same volume and window with another shading; `step` stays."""
         other = copy(self)
         other._appearance = replace(appearance, step=self._appearance.step)

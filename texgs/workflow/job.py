@@ -1,11 +1,9 @@
 """A job: a stage with its settings, the files it reads and the folder of its result."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import yaml
 
@@ -30,7 +28,7 @@ class Job:
     swept: Mapping[str, str] = field(default_factory=dict, compare=False)  # see workflow/sweep.py
 
     @classmethod
-    def of(cls, stage: Stage, config: Config, checksums: Checksums) -> Job:
+    def of(cls, stage: Stage, config: Config, checksums: Checksums) -> Self:
         """Return the job that a configuration describes; its settings name the weights that it works with."""
         settings, weights = stage.settings(config), weights_of(stage, config, checksums)
         named = {} if weights is None else {"weights": weights}

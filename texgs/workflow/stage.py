@@ -4,8 +4,6 @@ A stage is one module of texgs/workflow/stages, see `stage_table`. Its settings 
 say by `read` which values of the configuration they have.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from operator import attrgetter
@@ -21,7 +19,7 @@ from texgs.report.results import Result
 from texgs.workflow.code import code_digest
 from texgs.workflow.sweep import edit_variant, fit_variant
 
-RULES: dict[str, Rule] = {}  # those of all stages, by name; texgs.workflow.stage_table fills it
+RULES: dict[str, "Rule"] = {}  # those of all stages, by name; texgs.workflow.stage_table fills it
 EVERY = 1024  # threads, of which a job gets as many as there are
 
 

@@ -4,12 +4,10 @@ Unlike the authors' (Tang et al. 2024), it fills the box around the object inste
 of the palette mix where theirs keep the largest alone, and weights are as fitted, without a running mean.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import torch
 from torch import Tensor
@@ -51,7 +49,7 @@ class PaletteField(UnlitField):
         """The palette, [P, 3]."""
         return self.parameters["palette.colors"]
 
-    def to(self, device: torch.device | str) -> PaletteField:
+    def to(self, device: torch.device | str) -> Self:
         """Return the same field, which is rendered on the CPU alone."""
         if torch.device(device).type != "cpu":
             raise DeviceError(f"device: expected cpu, got {device}; palette fields are rendered on the CPU")

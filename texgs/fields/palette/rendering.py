@@ -1,7 +1,5 @@
 """Rays through fields of networks: where they are dense, what of that shows, and its blended colours."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -49,7 +47,7 @@ class Points(NamedTuple):
     depth: Tensor  # [n] optical: density times length
     features: Tensor  # [n, 15] of the density network
 
-    def take(self, chosen: Tensor) -> Points:
+    def take(self, chosen: Tensor) -> "Points":
         """Return some of them."""
         return Points(*(x[chosen] for x in self))
 

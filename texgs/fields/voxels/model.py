@@ -1,11 +1,9 @@
 """Sparse grids with density and view-dependent colour (Fridovich-Keil et al. 2022), and scenes of several."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import torch
 from torch import Tensor
@@ -39,7 +37,7 @@ class Voxels(UnlitField):
         """Where its rows are."""
         return self.grid.rows.device
 
-    def to(self, device: torch.device | str) -> Voxels:
+    def to(self, device: torch.device | str) -> Self:
         """Return the same field on another device."""
         return replace(self, grid=self.grid.to(device))
 
