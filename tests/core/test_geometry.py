@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from texgs.core.errors import ShapeError
-from texgs.core.geometry import quats_to_matrices, z_order, z_order_of
+from texgs.core.geometry import facing, quats_to_matrices, z_order, z_order_of
 
 
 def random_quats(n, seed=0):
@@ -61,3 +61,10 @@ def test_places_in_a_plane_and_in_one_point_have_an_order():
     assert z_order_of(places).tolist() == [1, 2, 0]
     assert z_order_of(places[:1].expand(3, 3)).tolist() == [0, 1, 2]
     assert z_order_of(places[:0]).tolist() == []
+
+
+def test_quaternions_that_face_along_normals():
+    generator = torch.Generator().manual_seed(0)
+    normals = torch.nn.functional.normalize(torch.randn(200, 3, generator=generator), dim=1)
+    normals = torch.cat([normals, torch.tensor([[0.0, 0, 1], [0, 0, -1], [1e-5, 0, -1]])])
+    torch.testing.assert_close(quats_to_matrices(facing(normals))[:, :, 2], normals, atol=2e-4, rtol=0)

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from tests.scene.test_twin import HIGH, LOOK, LOW
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
-from texgs.core.geometry import quats_to_matrices
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT
 from texgs.fitting import now
@@ -36,13 +35,6 @@ def grid():
 
 def of_range(tf, grid):
     return tf.scaled(float(grid.values.min()), float(grid.values.max()))
-
-
-def test_surfels_face_along_their_normals():
-    generator = torch.Generator().manual_seed(0)
-    normals = torch.nn.functional.normalize(torch.randn(200, 3, generator=generator), dim=1)
-    normals = torch.cat([normals, torch.tensor([[0.0, 0, 1], [0, 0, -1], [1e-5, 0, -1]])])
-    torch.testing.assert_close(quats_to_matrices(now.facing(normals))[:, :, 2], normals, atol=2e-4, rtol=0)
 
 
 def test_places_of_pixels_are_seen_in_these_pixels():

@@ -5,10 +5,9 @@ import torch
 from PIL import Image
 
 from texgs.core.camera import orbit
-from texgs.core.geometry import quats_to_matrices
 from texgs.core.lens import Lens
 from texgs.metrics.surface import sample
-from texgs.report.mesh_figure import CLAY, drawn, facing, lit, write_mesh_figure
+from texgs.report.mesh_figure import CLAY, drawn, lit, write_mesh_figure
 from texgs.volume.isosurface import isosurface
 
 RADIUS, DISTANCE, FOV, SIZE = 0.3, 2.0, 30.0, 160
@@ -19,14 +18,6 @@ def ball(radius=RADIUS):
     axis = np.linspace(-0.5, 0.5, 41)
     distance = np.sqrt(sum(x**2 for x in np.meshgrid(axis, axis, axis, indexing="ij")))
     return isosurface(radius - distance, 0.0, (0.025,) * 3, (-0.5,) * 3)
-
-
-def test_discs_face_along_their_normals():
-    normals = torch.nn.functional.normalize(torch.randn(50, 3, generator=torch.Generator().manual_seed(0)))
-    normals[:2] = torch.tensor([[0.0, 0, 1], [0, 0, -1]])
-    quats = facing(normals)
-    axes = quats_to_matrices(quats / quats.norm(dim=1, keepdim=True))[:, :, 2]
-    torch.testing.assert_close((axes * normals).sum(1).abs(), torch.ones(50))
 
 
 def test_a_ball_is_a_disc_without_holes_that_is_brightest_in_its_middle():

@@ -2,6 +2,7 @@
 
 import torch
 from torch import Tensor
+from torch.nn.functional import normalize
 
 from texgs.core.errors import ShapeError
 
@@ -19,6 +20,14 @@ def quats_to_matrices(quats: Tensor) -> Tensor:
         raise ShapeError(f"quats: expected [..., 4], got {list(quats.shape)}")
     matrices: Tensor = quaternion_to_rotation_matrix(quats)
     return matrices
+
+
+def facing(normals: Tensor) -> Tensor:
+    """Return quaternions [N, 4] wxyz that turn the z axis to normals [N, 3], on the shortest way."""
+    x, y, z = normalize(normals, dim=1).unbind(dim=1)
+    turned = torch.stack([1 + z, -y, x, torch.zeros_like(z)], dim=1)
+    around_x = normals.new_tensor([0.0, 1.0, 0.0, 0.0])  # half a turn, as all ways to -z are equally short
+    return normalize(torch.where((1 + z < 1e-6)[:, None], around_x, turned), dim=1)
 
 
 def z_order(cells: Tensor) -> Tensor:

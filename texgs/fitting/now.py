@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
-from torch.nn.functional import normalize
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.geometry import z_order_of
+from texgs.core.geometry import facing, z_order_of
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, random_lights
 from texgs.core.progress import progress
@@ -154,11 +153,3 @@ def surfels_on(points: Points, seed: int) -> dict[str, Tensor]:
     """Return raw parameters of surfels at points that face along their normals."""
     parameters = surfels_at(points.places, OPACITY, torch.Generator().manual_seed(seed))
     return {**parameters, "quats": facing(points.normals), "colors": points.colors}
-
-
-def facing(normals: Tensor) -> Tensor:
-    """Return quaternions [N, 4] wxyz that turn the z axis to normals [N, 3], on the shortest way."""
-    x, y, z = normalize(normals, dim=1).unbind(dim=1)
-    turned = torch.stack([1 + z, -y, x, torch.zeros_like(z)], dim=1)
-    around_x = normals.new_tensor([0.0, 1.0, 0.0, 0.0])  # half a turn, as all ways to -z are equally short
-    return normalize(torch.where((1 + z < 1e-6)[:, None], around_x, turned), dim=1)

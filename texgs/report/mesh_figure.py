@@ -7,6 +7,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.figures import Cell, Row, Scale
+from texgs.core.geometry import facing
 from texgs.core.lens import Lens
 from texgs.metrics.surface import Points, distances, sample
 from texgs.raster import Render, rasterize
@@ -68,10 +69,3 @@ def drawn(points: Points, mesh: Mesh, colors: Tensor, camera: Camera) -> Render:
         features=colors.float().contiguous(),
         background=torch.ones(3),
     )
-
-
-def facing(normals: Tensor) -> Tensor:
-    """Return the rotations [N, 4] wxyz of discs whose normal is +- the given one [N, 3]."""
-    up = torch.where(normals[:, 2:] < 0, -normals, normals)
-    x, y, z = up.unbind(1)
-    return torch.stack([1 + z, -y, x, torch.zeros_like(z)], dim=1)
