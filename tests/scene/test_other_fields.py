@@ -1,5 +1,7 @@
 """Scenes of fields that are no surfels: what goes, and what is refused in one sentence."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -44,9 +46,9 @@ def test_fields_of_two_kinds_make_no_scene(grid, tmp_path):
 
 def test_what_only_surfels_can(grid):
     session = Session(Scene({"TF01": SceneModel(grid)}))
-    for change, part in ((session.set_texture, "TF01"), (session.add_segment, "TF01/part")):
+    for change in (partial(session.set_file, "TF01", "texture"), partial(session.add_segment, "TF01/part")):
         with pytest.raises(ArgumentError, match=r"models\.TF01: .*expected surfels, got voxels"):
-            change(part, grid)
+            change(grid)
     assert not session.undo()
 
 

@@ -52,7 +52,7 @@ def test_numbers_read_no_file_again_and_files_do(session, tmp_path):
     before = session.composition
     session.set("left", "diffuse", 0.5)
     assert session.composition is before
-    session.set_texture("left", write_texture(tmp_path / "a", ball(1)))
+    session.set_file("left", "texture", write_texture(tmp_path / "a", ball(1)))
     assert session.composition is not before
 
 
@@ -115,7 +115,10 @@ def test_a_new_segment_looks_as_its_model_does_and_an_earlier_scene_as_it_was(se
         (lambda s: s.set_of_scene("light", "up"), "light: expected headlight, or azimuth and polar"),
         (lambda s: s.set_of_scene("cuts", {"plane": []}), "cuts.plane: no such key, did you mean planes"),
         (lambda s: s.set_of_scene("models", 1), "the scene: no such key 'models'"),
-        (lambda s: s.set_texture("left", s.scene.models["left"].file), "models.left: .*texgs-texture"),
+        (
+            lambda s: s.set_file("left", "texture", s.scene.models["left"].file),
+            "models.left: .*texgs-texture",
+        ),
         (lambda s: s.add_segment("left/a.b", s.scene.models["left"].file), "expected a name without"),
         (lambda s: s.remove_segment("left"), "expected a segment to remove, got the model left"),
     ],

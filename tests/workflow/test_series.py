@@ -128,7 +128,7 @@ def test_segments_textures_and_edits_of_one_step_hold_for_all(folder, fitted):
     session.make_segment("ball/top", mask, folder / "top.safetensors", {})
     p = fitted.parameters
     look = replace(fitted, parameters={**p, "texels": 0 * p["texels"], "colors": 0 * p["colors"] + 0.1})
-    session.set_texture("ball/top", write_texture(folder / "look.safetensors", look))
+    session.set_file("ball/top", "texture", write_texture(folder / "look.safetensors", look))
     session.save(folder / "s" / "edited.yaml")
     edited = read_scene(folder / "s" / "edited.yaml")
     for time in range(3):

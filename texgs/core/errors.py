@@ -49,12 +49,12 @@ class FitError(TexgsError, ArithmeticError):
 
 
 @contextmanager
-def located(where: object) -> Iterator[None]:
+def located(where: object, between: str = ": ") -> Iterator[None]:
     """Put where it happened, such as a path, before the message of an error of texgs."""
     try:
         yield
     except TexgsError as error:
-        raise type(error)(f"{where}: {error}") from error
+        raise type(error)(f"{where}{between}{error}") from error
 
 
 def printable(text: str) -> str:

@@ -86,10 +86,8 @@ def _change_part(session: Session, part: str, key: str, text: str) -> None:
     """Change one value of a part; an empty text takes it back."""
     entry_of(session.scene, part)
     known({key: text}, SEGMENT_KEYS, key_path(part))
-    if key == "texture":
-        session.set_texture(part, _file(text) if text else None)
-    elif key == "file":
-        session.set_file(part, _file(text))
+    if key in ("file", "texture"):
+        session.set_file(part, key, _file(text) if text or key == "file" else None)
     elif text:
         session.set(part, key, _plain(text))
     else:

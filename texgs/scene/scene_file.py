@@ -131,10 +131,8 @@ def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, Part
     file, texture = named_file(f"{where}.file", folder, values.get("file"), kind), values.get("texture")
     if texture is not None:
         texture = named_file(f"{where}.texture", folder, texture, "a texture variant")
-    try:
+    with located(where, "."):
         edit = PartEdit(**{key: value for key, value in values.items() if key in EDITS})
-    except ArgumentError as error:
-        raise ArgumentError(f"{where}.{error}") from error
     return file, edit, texture
 
 
@@ -143,10 +141,8 @@ def volume_of(values: Any, folder: Path) -> SceneVolume:
     known(values, VOLUME_KEYS, "volume")
     file = named_file("volume.file", folder, values.get("file"), "a volume")
     functions = functions_of(values.get("tfs"), "volume.tfs")
-    try:
+    with located("volume", "."):
         look = Appearance(**{key: value for key, value in values.items() if key in LOOK})
-    except ArgumentError as error:
-        raise ArgumentError(f"volume.{error}") from error
     return SceneVolume(file, functions, look)
 
 

@@ -27,7 +27,6 @@ from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, cuts_of, functions_of, known, light_of, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.twin import Twin, needs_twin
-from texgs.volume.transfer import TransferFunction
 
 SCENE_KEYS: dict[str, Any] = {
     "light": "headlight",
@@ -85,31 +84,25 @@ class Session:
         entry = entry_of(self.scene, part)
         known({key: value}, EDITS, key_path(part))
         kind = kind_of(self.scene.models[split(self.scene, part)[0]].file)
-        try:
+        with located(key_path(part), "."):
             require_possible(PartEdit(**{key: value}), kind.name)
             edit = replace(entry.edit, **{key: value})
-        except ArgumentError as error:
-            raise ArgumentError(f"{key_path(part)}.{error}") from error
         self._push(replaced(self.scene, part, replace(entry, edit=edit)))
 
     def reset(self, part: str, key: str) -> None:
         """Take a value of a part's edit back."""
         self.set(part, key, getattr(PartEdit(), key, None))
 
-    def set_texture(self, part: str, file: Path | None) -> None:
-        """Give a part the texels of a texture file; None: those that it was fitted with."""
-        scene = replaced(self.scene, part, replace(entry_of(self.scene, part), texture=file))
+    def set_file(self, part: str, key: str, file: Path | None) -> None:
+        """Give a part another `file` or `texture`; None: the texels that it was fitted with."""
+        changed: dict[str, Any] = {key: file}
+        scene = replaced(self.scene, part, replace(entry_of(self.scene, part), **changed))
         self._push_read(scene, {split(self.scene, part)[0]})
 
     def set_looks(self, looks: Mapping[str, NewLook]) -> None:
         """Give several parts new looks in one step; see `with_looks` for palettes."""
         models = {split(self.scene, part)[0] for part in looks}
         self._push_read(with_looks(self.scene, looks), models)
-
-    def set_file(self, part: str, file: Path) -> None:
-        """Put another file in the place of a model or a segment."""
-        scene = replaced(self.scene, part, replace(entry_of(self.scene, part), file=file))
-        self._push_read(scene, {split(self.scene, part)[0]})
 
     def set_light(self, light: Light = HEADLIGHT) -> None:
         """Let another light shine on the scene."""
@@ -122,10 +115,6 @@ class Session:
     def set_cuts(self, cuts: Cuts) -> None:
         """Cut the scene; cuts of before are gone."""
         self._push(replace(self.scene, cuts=cuts))
-
-    def set_functions(self, functions: Mapping[str, TransferFunction]) -> None:
-        """Try transfer functions on the volume; those of before are gone."""
-        self._push(replace(self.scene, functions=functions))
 
     def set_scene(self, scene: Scene) -> None:
         """Go on with another scene, whose models are read first."""
@@ -141,7 +130,7 @@ class Session:
             case "cuts":
                 self.set_cuts(cuts_of(value))
             case "functions":
-                self.set_functions(functions_of(value, key))
+                self._push(replace(self.scene, functions=functions_of(value, key)))
             case "time":
                 self.set_scene(self.scene.at(value))
             case _:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.config.compose import compose
 from texgs.config.project import Words, members
-from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
+from texgs.core.errors import ConfigError, MissingDataError, located
 from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import kinds, require
 from texgs.fields.surfels.material import require_material
@@ -47,16 +47,12 @@ def check_basic_tfs(dataset: Any) -> None:
     """Check the points of all basic TFs of a data set, and that their ranges do not overlap."""
     from texgs.volume.transfer import TransferFunction, check_disjoint
 
-    where = dataset.name
-    try:
-        basic = {}
-        for name, points in dataset.basic_tfs.items():
-            where = f"{dataset.name}: basic TF {name}:"
+    basic = {}
+    for name, points in dataset.basic_tfs.items():
+        with located(f"{dataset.name}: basic TF {name}"):
             basic[name] = TransferFunction(points.opacity, points.color)
-        where = f"{dataset.name}: basic TFs"
+    with located(f"{dataset.name}: basic TFs", " "):
         check_disjoint(basic)
-    except ArgumentError as error:
-        raise ArgumentError(f"{where} {error}") from error
 
 
 def require_fit(stage: Stage, config: Config) -> None:
