@@ -9,13 +9,16 @@ import shlex
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import nibabel
 import numpy as np
 import pytest
 import pyvista
 
+import texgs
 from tests.one_thread import one_thread  # noqa: F401
 from texgs.cli.main import STAGE_VERBS, main, parse
 from texgs.config.compose import compose
@@ -91,13 +94,18 @@ def commands():
 COMMANDS = commands()
 
 
+def ball(size):
+    """Values [Z, Y, X] that fall with the distance from the centre of a cube."""
+    axes = np.meshgrid(*[np.linspace(-1, 1, size)] * 3, indexing="ij")
+    return (255 * np.clip(1.2 - np.linalg.norm(axes, axis=0), 0, 1)).astype(np.uint8)
+
+
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
     """A project folder, with small volumes under the names that the pages have."""
     folder = tmp_path_factory.mktemp("readme") / "project"
     assert main(["init", str(folder)]) == 0
-    axes = np.meshgrid(*[np.linspace(-1, 1, 24)] * 3, indexing="ij")
-    values = (255 * np.clip(1.2 - np.linalg.norm(axes, axis=0), 0, 1)).astype(np.uint8)
+    values = ball(24)
     grid = pyvista.ImageData(dimensions=values.shape)
     grid.point_data["ImageScalars"] = values.ravel(order="F")
     grid.save(folder / "engine.vti")
@@ -242,6 +250,17 @@ def test_python_examples_run(project, monkeypatch):
         assert done.returncode == 0, done.stderr
     assert (project / "surfels.png").stat().st_size > 10_000
     assert "opacity: 0.4" in (project / "blob" / "scene.yaml").read_text()
+
+
+@pytest.mark.docs
+def test_python_of_the_readme_runs():
+    """Of an array, with small views and a short fit."""
+    few = ("views.train.frequency=1", "fit.shading.iterations=30", "views.step=1")
+    small = SimpleNamespace(Volume=texgs.Volume, fit=partial(texgs.fit, size=32, overrides=few))
+    (example,) = blocks("README.md", "python")
+    names = {"texgs": small, "array": ball(20)}
+    exec(example, names)
+    assert names["scene"].psnr(views=2, width=24) > 15
 
 
 def test_what_a_user_writes_is_shown_as_it_is_tested():

@@ -3,8 +3,6 @@
 Which series, which of its steps in time, and whether their slices are a lattice.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
