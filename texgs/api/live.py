@@ -1,21 +1,16 @@
 """The viewer of a scene that Python edits as well, for a notebook on the same machine."""
 
-from __future__ import annotations
-
 import asyncio
 import secrets
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from aiohttp import web
 
 from texgs.core.errors import ArgumentError
+from texgs.scene.session import Session
 from texgs.viewer.server import Server
 from texgs.viewer.shared_edits import SCENE, Opened
-
-if TYPE_CHECKING:
-    from texgs.scene.session import Session
 
 HOST = "127.0.0.1"
 PATIENCE = 60.0  # seconds for the server to start

@@ -1,11 +1,10 @@
 """Mistakes in the choice of a fit or an edit, told before any job runs and any earlier result goes."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from texgs.config.compose import compose
 from texgs.config.project import Words, members
+from texgs.config.schema import Config
 from texgs.core.errors import ConfigError, MissingDataError, located
 from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import kinds, require
@@ -14,9 +13,6 @@ from texgs.fitting.kinds import fit_specs
 from texgs.workflow.edits import lineage, looks_of
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.stage import Stage
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
 
 
 def check_fit(config: Config) -> None:

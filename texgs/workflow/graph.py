@@ -1,14 +1,13 @@
 """The jobs of a run by their folders: what it goes through, what it replaces, and what it lacks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from texgs.config.project import Words
+from texgs.config.schema import Config
+from texgs.core.checksum import Checksums
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.io import read_json
 from texgs.report.metrics_files import below
@@ -19,10 +18,6 @@ from texgs.workflow.missing import lacking, missing_weights
 from texgs.workflow.result import METRICS, fingerprint, is_complete, stamped
 from texgs.workflow.stage_table import STAGES, SWEPT
 from texgs.workflow.stage_table import jobs as jobs_of
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
-    from texgs.core.checksum import Checksums
 
 
 @dataclass

@@ -1,20 +1,15 @@
 """What a run needs and this machine may not have: data, and weights, which are part of a job's identity."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
+from texgs.config.schema import Config
 from texgs.core.checksum import Checksums
 from texgs.core.errors import MissingDataError
+from texgs.edit.keys import EditKeys
 from texgs.edit.method import NO_METHOD, method_of
 from texgs.models import weights
+from texgs.workflow.stage import Stage
 from texgs.workflow.stage_table import jobs
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
-    from texgs.edit.keys import EditKeys
-    from texgs.workflow.stage import Stage
 
 SHOWN = 12  # digits of checksums in settings
 

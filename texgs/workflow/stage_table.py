@@ -3,20 +3,15 @@
 A module defines one `STAGE`, or several alike as `STAGES`; modules without either are helpers of others.
 """
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib import import_module
-from typing import TYPE_CHECKING
 
+from texgs.config.schema import Config
 from texgs.workflow.inputs import is_fit
 from texgs.workflow.locate import tf_names
 from texgs.workflow.stage import RULES, Stage
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
 
 PACKAGE = "texgs.workflow.stages"
 SWEPT = ("volume", "views", "phase", "edit", "edit_metrics", "gallery")  # places shown of a sweep
