@@ -65,7 +65,9 @@ def test_what_cannot_be_fitted(scene_file, capsys, words, message):
 
 def test_a_scene_without_a_volume_has_no_function_to_fit(scene_file):
     bare = replace(read_scene(scene_file), volume=None)
-    with pytest.raises(ArgumentError, match="volume: expected the volume that the function is of, got none"):
+    with pytest.raises(
+        ArgumentError, match="volume: expected the volume that the scene was made from, got none"
+    ):
         next(function_model.models_of(bare, "new"))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.parts import entry_of
@@ -19,15 +19,9 @@ class Value(Generic[T]):
     def __set_name__(self, owner: type, name: str) -> None:
         self._key = name
 
-    @overload
-    def __get__(self, part: None, owner: type) -> Value[T]: ...
-
-    @overload
-    def __get__(self, part: Part, owner: type) -> T: ...
-
-    def __get__(self, part: Part | None, owner: type) -> Value[T] | T:
+    def __get__(self, part: Part | None, owner: type) -> T:
         if part is None:
-            return self
+            return cast(T, self)
         return cast(T, getattr(entry_of(part.scene.session.scene, part.name).edit, self._key))
 
     def __set__(self, part: Part, value: Any) -> None:

@@ -11,6 +11,7 @@ from texgs.fields.files import kind_of
 from texgs.fields.surfels.model import Surfels
 from texgs.fitting.now import fit_now
 from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.twin import volume_of
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.nrrd_file import open_grid
@@ -30,9 +31,7 @@ def models_of(
         ArgumentError: if the scene tries no such function, names no volume or has other fields than surfels,
             or nothing is to be seen.
     """
-    volume, tf = scene.volume, tried(scene, name)
-    if volume is None:
-        raise ArgumentError("volume: expected the volume that the function is of, got none")
+    volume, tf = volume_of(scene), tried(scene, name)
     for other, entry in scene.models.items():
         if (kind := kind_of(entry.file).name) != "surfels":
             raise ArgumentError(f"models.{other}: expected surfels, which a new model can join, got {kind}")
@@ -54,10 +53,9 @@ def with_model(scene: Scene, name: str, file: Path, tf: TransferFunction) -> Sce
 
     A model of the name that is there gets the file, and keeps what is edited by numbers.
     """
-    if scene.volume is None:
-        raise ArgumentError("volume: expected the volume that the function is of, got none")
     edit = scene.models[name].edit if name in scene.models else SceneModel(file).edit
-    volume = replace(scene.volume, tfs={**scene.volume.tfs, name: tf})
+    volume = volume_of(scene)
+    volume = replace(volume, tfs={**volume.tfs, name: tf})
     functions = {other: each for other, each in scene.functions.items() if other != name}
     models = {**scene.models, name: SceneModel(file, edit)}
     return replace(scene, models=models, volume=volume, functions=functions)

@@ -22,6 +22,7 @@ from texgs.fields.palette.networks import free_color, light, new_networks, palet
 from texgs.fields.palette.rendering import RAYS, Shown, points_on, shown, view_harmonics
 from texgs.fields.voxels.rays import training_rays
 from texgs.fitting.palette import cluster_colors
+from texgs.metrics.retrieval import LUMINANCE
 from texgs.models.vgg import Vgg
 from texgs.raster.voxels import camera_rays
 from texgs.volume.images import Images
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from texgs.edit.methods.stylerf import StyleRfKeys
 
 CLUSTERS = 4  # of the colours of a style, the largest of which is its dominant one
-LUMINANCE = (0.299, 0.587, 0.114)
 DRAWN, RUN = 4096, 2  # rays a step of the distillation, and neighbours among them
 RATE, LAST_RATE = 1e-2, 7e-5  # of Adam in the distillation
 BETAS = (0.9, 0.99)
