@@ -1,7 +1,7 @@
 """Text-driven editing: a guidance edits a few views of a model once, and its texels follow them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import atan, degrees
 from typing import Literal, NamedTuple
 
@@ -149,13 +149,8 @@ def axis_cameras(like: Camera, points: Tensor) -> list[Camera]:
     radius = float((like.position.cpu().double() - center).norm())
     tangent = _widest(points.detach().cpu().double() - center, radius, like.width / like.height)
     fov = degrees(2 * atan(BORDER * tangent))
-    cameras = []
-    for azimuth, polar in AXES:
-        camera = orbit(azimuth, polar, radius, fov, like.width, like.height)
-        viewmat = camera.viewmat.clone()
-        viewmat[:3, 3] -= viewmat[:3, :3] @ center.to(viewmat)
-        cameras.append(replace(camera, viewmat=viewmat).to(like.viewmat.device))
-    return cameras
+    lens, target = (radius, fov, like.width, like.height), center.tolist()
+    return [orbit(*angles, *lens, target).to(like.viewmat.device) for angles in AXES]
 
 
 def nearest_to_axes(cameras: Sequence[Camera], points: Tensor) -> list[Camera]:

@@ -6,6 +6,8 @@ from math import prod
 from typing import Any
 
 import numpy as np
+import torch
+from torch.nn import functional as F
 
 from texgs.core.errors import ArgumentError, located
 from texgs.scene.scene import Scene
@@ -154,19 +156,8 @@ def plane_at(values: np.ndarray, place: float, sides: list[int]) -> np.ndarray:
     plane = values[first].astype(np.float32)
     if t:
         plane += t * (values[first + 1].astype(np.float32) - plane)
-    return stretched(stretched(plane, sides[0], 0), sides[1], 1)
-
-
-def stretched(plane: np.ndarray, size: int, axis: int) -> np.ndarray:
-    """Return a plane with another size along an axis, by linear interpolation between the same ends."""
-    most = plane.shape[axis] - 1
-    if size == most + 1:
-        return plane
-    places = np.linspace(0, most, size)
-    first = places.astype(int).clip(max=most - 1)
-    t = np.expand_dims((places - first).astype(np.float32), 1 - axis)
-    one, other = (plane.take(each, axis) for each in (first, first + 1))
-    return one + t * (other - one)
+    planes = torch.from_numpy(plane)[None, None]
+    return F.interpolate(planes, tuple(sides), mode="bilinear", align_corners=True)[0, 0].numpy()
 
 
 def pack(codes: np.ndarray) -> bytes:
