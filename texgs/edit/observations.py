@@ -17,7 +17,7 @@ from texgs.fields.surfels.shading import light_direction, material, viewer
 from texgs.fields.surfels.texels import bare_colors
 from texgs.models.guidance import EditViews
 from texgs.raster import Render, Texture
-from texgs.raster.losses import depth_to_normal
+from texgs.raster.losses import depth_to_normal, planar
 from texgs.raster.shading import blinn_phong_texture
 
 MARGIN = 11  # pixels around content: a window of SSIM
@@ -175,14 +175,9 @@ def _observation(
         rest = rasterized(model, camera, opacity, texture=others, background=white).color
         wanted = goal - rest
     left, top, right, bottom = content(cover[..., 0])
-    rest, wanted = (planar(x[top:bottom, left:right]) for x in (rest, wanted))
+    rest, wanted = (planar(x[top:bottom, left:right]).permute(1, 2, 0) for x in (rest, wanted))
     crop = camera.crop(left, top, right, bottom)
     return LinearObservation(model, opacity, texture, crop, rest, wanted)
-
-
-def planar(image: Tensor) -> Tensor:
-    """Return an image [H, W, C] in planar memory, as the rasterizer returns and takes images."""
-    return image.permute(2, 0, 1).contiguous().permute(1, 2, 0)
 
 
 def content(cover: Tensor) -> tuple[int, int, int, int]:

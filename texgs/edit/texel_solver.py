@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.progress import progress
-from texgs.edit.observations import LinearObservation, planar
+from texgs.edit.observations import LinearObservation
 from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors, owners
@@ -141,8 +141,7 @@ def image_loss(observation: LinearObservation, colors: Tensor) -> Tensor:
     shows less of do not count more.
     """
     image = observation.image(colors) + observation.rest
-    wanted = planar(observation.wanted + observation.rest)
-    return l1_dssim(image, wanted, DSSIM) * image[..., 0].numel()
+    return l1_dssim(image, observation.wanted + observation.rest, DSSIM) * image[..., 0].numel()
 
 
 def learn(

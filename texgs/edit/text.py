@@ -149,8 +149,9 @@ def axis_cameras(like: Camera, points: Tensor) -> list[Camera]:
     radius = float((like.position.cpu().double() - center).norm())
     tangent = _widest(points.detach().cpu().double() - center, radius, like.width / like.height)
     fov = degrees(2 * atan(BORDER * tangent))
-    lens, target = (radius, fov, like.width, like.height), center.tolist()
-    return [orbit(*angles, *lens, target).to(like.viewmat.device) for angles in AXES]
+    size, target = (like.width, like.height), center.tolist()
+    placed = (orbit(azimuth, polar, radius, fov, *size, target) for azimuth, polar in AXES)
+    return [camera.to(like.viewmat.device) for camera in placed]
 
 
 def nearest_to_axes(cameras: Sequence[Camera], points: Tensor) -> list[Camera]:
