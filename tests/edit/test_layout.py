@@ -9,7 +9,6 @@ from tests.edit.scenes import ball
 from tests.fitting.scenes import RADIUS
 from texgs.core.camera import orbit
 from texgs.core.errors import ShapeError
-from texgs.edit.canvas import rasterized
 from texgs.edit.style_start import RIM, laid_out
 from texgs.fields.surfels.texels import owners, recolored
 from texgs.raster import Texture
@@ -141,7 +140,7 @@ def front(model):
     p = model.parameters
     colors, gain = p["colors"] + p["palette"], torch.ones_like(p["opacities"])
     texture = Texture(colors, gain, p["texels"], p["sizes"], p["offsets"])
-    return rasterized(model, camera, texture=texture).color.permute(2, 0, 1)
+    return model.rasterized(camera, texture=texture).color.permute(2, 0, 1)
 
 
 @pytest.mark.parametrize("sphere", [False, True])

@@ -16,7 +16,6 @@ from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
-from texgs.edit.canvas import rasterized
 from texgs.edit.observations import observe, render_views
 from texgs.edit.texel_solver import image_loss
 from texgs.edit.text import RECIPES, TextRecipe, axis_cameras, edit_by_text, nearest_to_axes
@@ -189,7 +188,7 @@ def shares(model, camera, opacity):
     texels = torch.ones_like(p["texels"]).requires_grad_()
     plain = torch.zeros_like(p["means"]), torch.ones_like(p["opacities"])
     texture = Texture(*plain, texels, p["sizes"], p["offsets"])
-    image = rasterized(model, camera, opacity, texture=texture).color
+    image = model.rasterized(camera, opacity, texture=texture).color
     return torch.autograd.grad(image.sum(), texels)[0].sum(dim=1)
 
 

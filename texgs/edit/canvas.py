@@ -1,7 +1,6 @@
 """What the losses of a style see of a view: the part that shows the model, with something behind it."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -11,9 +10,9 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.edit.recipe import Recipe
-from texgs.fields.splats import geometry, screen_box
+from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
-from texgs.raster import Render, Texture, rasterize
+from texgs.raster import Texture
 
 VIEWS = 6  # that tell how translucent a scene is
 SEEN = 0.02  # of alpha: less is not looked at
@@ -34,17 +33,6 @@ def require_editable(model: Surfels, surfels: Tensor | None) -> None:
         )
 
 
-def rasterized(model: Surfels, camera: Camera, opacity: float = 1.0, **options: Any) -> Render:
-    """Rasterize a model with a factor on its opacities, which stay at most 1; see `rasterize`."""
-    means, quats, scales, opacities = geometry(model.parameters)
-    return rasterize(
-        *(means, quats, scales, (opacity * opacities).clamp_max(1)),
-        *(camera.viewmat, camera.K, camera.width, camera.height),
-        options=model.shading.options,
-        **options,
-    )
-
-
 def paint(
     model: Surfels, texels: Tensor, camera: Camera, light: Light, recipe: Recipe, chosen: Tensor | None = None
 ) -> tuple[Tensor, Tensor, Tensor]:
@@ -63,7 +51,7 @@ def paint(
         gain = torch.ones_like(p["opacities"])
         texture = Texture(p["colors"] + p["palette"], gain, texels, p["sizes"], p["offsets"])
     features = None if chosen is None else chosen.to(texels)[:, None]  # blended, they are the share
-    render = rasterized(model, part, recipe.opacity, texture=texture, features=features)
+    render = model.rasterized(part, recipe.opacity, texture=texture, features=features)
     planes, alpha = render.color.permute(2, 0, 1), render.alpha
     rows, columns = visible_part(alpha) if recipe.cropped else (slice(None), slice(None))
     planes, alpha = planes[:, rows, columns], alpha[rows, columns]
@@ -100,7 +88,7 @@ def mean_alpha(model: Surfels, cameras: Sequence[Camera], opacity: float = 1.0) 
     """Return the mean alpha of a few views of a model with a factor on its opacities, see `weighted_mean`."""
     parts = (around(model, camera.to(model.device)) for camera in cameras[:: -(-len(cameras) // VIEWS)])
     nothing = model.parameters["means"][:, :1]
-    return weighted_mean(rasterized(model, part, opacity, features=nothing).alpha for part in parts)
+    return weighted_mean(model.rasterized(part, opacity, features=nothing).alpha for part in parts)
 
 
 def weighted_mean(alphas: Iterable[Tensor]) -> float:

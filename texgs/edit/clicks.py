@@ -9,7 +9,6 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
-from texgs.edit.canvas import rasterized
 from texgs.fields.splats import REACH, geometry
 from texgs.fields.surfels.model import Surfels
 
@@ -86,7 +85,7 @@ def weights_at(model: Surfels, camera: Camera, column: int, row: int) -> Tensor:
     """Return how much of a pixel each surfel makes up, [N]."""
     pixel = camera.crop(column, row, column + 1, row + 1)
     nothing = torch.zeros_like(model.parameters["opacities"])[:, None]
-    seen = rasterized(model, pixel, features=nothing, outputs=("statistics",)).statistics
+    seen = model.rasterized(pixel, features=nothing, outputs=("statistics",)).statistics
     assert seen is not None
     return seen.weight_sum
 

@@ -11,7 +11,6 @@ from torch.nn.functional import pad
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.edit.canvas import rasterized
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import light_direction, material, viewer
 from texgs.fields.surfels.texels import bare_colors
@@ -65,8 +64,8 @@ def render_views(
     p, colors = model.parameters, bare_colors(model)
     white = torch.ones_like(colors[0])
     renders = (
-        rasterized(
-            *(model, camera, opacity),
+        model.rasterized(
+            *(camera, opacity),
             texture=Texture(*light_on(model, camera, light), colors, p["sizes"], p["offsets"]),
             background=white,
             outputs=("depth", "normal"),
@@ -116,7 +115,7 @@ class LinearObservation:
         texture = replace(self.texture, texels=colors)
         if plain:
             texture = replace(texture, base=torch.zeros_like(texture.base))
-        return rasterized(self.model, self.camera, self.opacity, texture=texture).color
+        return self.model.rasterized(self.camera, self.opacity, texture=texture).color
 
 
 def observe(
@@ -166,13 +165,13 @@ def _observation(
     highlight, gain = light_on(model, camera, light)
     lit = highlight * changing[:, None], gain * changing
     texture = Texture(*lit, p["texels"], p["sizes"], p["offsets"])
-    cover = rasterized(model, camera, opacity, features=changing[:, None]).color
+    cover = model.rasterized(camera, opacity, features=changing[:, None]).color
     if bare is None:
         rest, wanted = 1 - cover, goal * cover
     else:
         stay, white = 1 - changing, torch.ones_like(goal[0, 0])
         others = replace(texture, base=highlight * stay[:, None], gain=gain * stay, texels=bare)
-        rest = rasterized(model, camera, opacity, texture=others, background=white).color
+        rest = model.rasterized(camera, opacity, texture=others, background=white).color
         wanted = goal - rest
     left, top, right, bottom = content(cover[..., 0])
     rest, wanted = (planar(x[top:bottom, left:right]).permute(1, 2, 0) for x in (rest, wanted))

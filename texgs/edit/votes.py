@@ -7,7 +7,6 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.edit.canvas import rasterized
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.raster import Render, splat
@@ -87,7 +86,7 @@ class ContributionVotes:
 
     def shown(self, camera: Camera, values: Tensor, outputs: Collection[str] = ()) -> Render:
         """Render values [N, C] of surfels over 0."""
-        return rasterized(self.model, camera, features=values, outputs=outputs)
+        return self.model.rasterized(camera, features=values, outputs=outputs)
 
     def _splat(self, camera: Camera, image: Tensor) -> tuple[Tensor, Tensor]:
         """Return sums [N] of weight * image [H, W], and sums [N] of weights."""

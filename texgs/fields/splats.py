@@ -69,19 +69,25 @@ class Splats:
 
         `opacity` [N] are factors on opacities, which stay at most 1.
         """
-        place = geometry(self.parameters)
-        if opacity is not None:
-            place = (*place[:3], (place[3] * opacity).clamp_max(1))
         colored = self.shading.colors(self.parameters, camera, light)
         kind = "texture" if isinstance(colored, Texture) else "features"
+        background = torch.ones_like(camera.viewmat[0, :3]) if background is None else background
+        shown = {kind: colored, "background": background, "depth_range": depth_range, "outputs": outputs}
+        return self.rasterized(camera, opacity, **shown)
+
+    def rasterized(self, camera: Camera, opacity: float | Tensor | None = None, **shown: Any) -> Render:
+        """Rasterize features or a texture of the splats; see `rasterize`.
+
+        `opacity` is a factor on the opacities of all, or of each [N]; these stay at most 1.
+        """
+        means, quats, scales, opacities = geometry(self.parameters)
+        if opacity is not None:
+            opacities = (opacities * opacity).clamp_max(1)
         return rasterize(
-            *place,
+            *(means, quats, scales, opacities),
             *(camera.viewmat, camera.K, camera.width, camera.height),
-            background=torch.ones_like(camera.viewmat[0, :3]) if background is None else background,
-            depth_range=depth_range,
-            outputs=outputs,
             options=self.shading.options,
-            **{kind: colored},  # type: ignore[arg-type]
+            **shown,
         )
 
 

@@ -7,10 +7,10 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.fields.splats import Shading, geometry
+from texgs.fields.splats import Shading, Splats
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fitting.settings import Losses
-from texgs.raster import Render, rasterize
+from texgs.raster import Render
 from texgs.raster.losses import bilateral_smoothness, l1_dssim, normal_consistency, ssim
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Target
@@ -72,14 +72,7 @@ def draw(
     """Render features [N, C] over white behind colours, and over 0 behind material."""
     background = features.new_zeros(features.shape[1])
     background[:3] = 1
-    return rasterize(
-        *geometry(parameters),
-        *(camera.viewmat, camera.K, camera.width, camera.height),
-        features=features,
-        background=background,
-        options=shading.options,
-        **more,
-    )
+    return Splats(parameters, shading).rasterized(camera, features=features, background=background, **more)
 
 
 def material_maps(parameters: Mapping[str, Tensor], shading: Shading) -> Tensor | None:

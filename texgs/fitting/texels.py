@@ -7,12 +7,12 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
-from texgs.fields.splats import geometry, visible_part
+from texgs.fields.splats import visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import EXTENT, offsets_of
 from texgs.fitting.settings import TextureKeys
 from texgs.fitting.texture_solve import refine, solve
-from texgs.raster import Texture, rasterize
+from texgs.raster import Texture
 from texgs.raster.arguments import MOST_TEXELS
 from texgs.volume.images import Images
 
@@ -115,13 +115,8 @@ def look(model: Surfels, images: Images, title: str) -> Sight:
         texture = model.shading.colors(model.parameters, camera, target.light)
         if not isinstance(texture, Texture):
             raise ArgumentError(f"model: expected a texture, got stage {model.stage}; lay one out first")
-        seen = rasterize(
-            *geometry(model.parameters),
-            *(camera.viewmat, camera.K, camera.width, camera.height),
-            features=texture.gain[:, None],  # any: only the statistics count
-            outputs=("statistics",),
-            options=model.shading.options,
-        ).statistics
+        any_features = texture.gain[:, None]  # only the statistics count
+        seen = model.rasterized(camera, features=any_features, outputs=("statistics",)).statistics
         curvature = seen.weight_sum * texture.gain.square()  # type: ignore[union-attr]
         shown += seen.weight_sum  # type: ignore[union-attr]
         total += curvature

@@ -8,12 +8,12 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.progress import progress
 from texgs.fields.optimizer import Optimizer, Rate
-from texgs.fields.splats import geometry, visible_part
+from texgs.fields.splats import visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import footprint
 from texgs.fitting.checkpoint import require_finite
 from texgs.fitting.settings import TextureKeys
-from texgs.raster import Texture, rasterize
+from texgs.raster import Texture
 from texgs.raster.losses import l1_dssim
 from texgs.volume.images import Images, Target
 
@@ -123,10 +123,5 @@ def texel_map(model: Surfels, camera: Camera) -> Tensor:
     """
     p = model.parameters
     black = torch.zeros_like(p["means"])
-    seen = rasterize(
-        *geometry(p),
-        *(camera.viewmat, camera.K, camera.width, camera.height),
-        texture=Texture(black, torch.ones_like(p["opacities"]), p["texels"], p["sizes"], p["offsets"]),
-        options=model.shading.options,
-    )
-    return seen.color
+    texture = Texture(black, torch.ones_like(p["opacities"]), p["texels"], p["sizes"], p["offsets"])
+    return model.rasterized(camera, texture=texture).color

@@ -12,12 +12,10 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.core.figures import COLUMNS, Cell, Row, Scale, draw
 from texgs.fields.field import Field
-from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
 from texgs.fitting.losses import material_maps
 from texgs.metrics.quality import psnr
-from texgs.raster import rasterize
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import over_white, smaller
 from texgs.volume.view_set import View
@@ -139,12 +137,7 @@ def maps(model: Field, view: View, reduce: int) -> list[Cell]:
         factors = material(model.parameters, model.shading.material)
         lines = [f"{name:9} {value.item():6.3f}" for name, value in factors.items()]
         return [*cells, Cell("material of all surfels", words="\n".join(lines))]
-    blended = rasterize(
-        *geometry(model.parameters),
-        *(camera.viewmat, camera.K, camera.width, camera.height),
-        features=features,
-        options=model.shading.options,
-    ).color.cpu()
+    blended = model.rasterized(camera, features=features).color.cpu()
     means = (blended / cover.clamp_min(1e-6)).unbind(dim=2)  # of the surfels that a pixel shows
     return [*cells, *(map_cell(name, mean, alpha) for name, mean in zip(MATERIAL, means, strict=True))]
 
