@@ -39,7 +39,7 @@ def test_log_file_gets_a_line_every_five_seconds_and_a_last_one(clock, log):
 
 
 def test_a_notebook_gets_a_bar_that_goes_when_it_is_done(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "ipykernel", sys)
+    monkeypatch.setitem(sys.modules, "ipykernel.kernelapp", sys)
     monkeypatch.setattr(module, "find_spec", lambda name: None)
     assert list(progress(range(3), title="views", unit="view")) == [0, 1, 2]
     said = capsys.readouterr().err

@@ -13,6 +13,7 @@ import torch
 from texgs.api.display import as_light, camera_of, picture_of
 from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
+from texgs.core.interrupts import interrupts_between_items
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.light import Light
 from texgs.core.names import part_file
@@ -148,6 +149,7 @@ class Editing:
         """
         return self._look("text", {"instruction": instruction, **settings}, parts)
 
+    @interrupts_between_items()
     def segment(
         self,
         name: str,
@@ -196,6 +198,7 @@ class Editing:
         self.changed(f"{part} new")
         return self[part]
 
+    @interrupts_between_items()
     def _look(self, method: str, values: dict[str, Any], parts: Sequence[str]) -> Self:
         """Give parts a new look by a method of editing with values of its settings."""
         from texgs.config.recipes import Edit

@@ -15,6 +15,7 @@ from texgs.api.functions import AnyFunctions, named
 from texgs.api.scene import Scene
 from texgs.api.volume import Volume
 from texgs.core.errors import ArgumentError
+from texgs.core.interrupts import interrupts_between_items
 from texgs.core.io import write_atomic
 from texgs.core.names import file_name
 from texgs.scene.session import Session
@@ -28,6 +29,7 @@ TEST_VIEWS = 12  # for the numbers of a fit; `Scene.psnr` measures more
 LEAST = 16  # pixels
 
 
+@interrupts_between_items()
 def fit(
     volume: Volume,
     functions: AnyFunctions | None = None,

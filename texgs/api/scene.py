@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.api.display import MB, LivePage, Page, camera_of, picture_of
 from texgs.api.editing import Editing
 from texgs.core.errors import ArgumentError
+from texgs.core.interrupts import interrupts_between_items
 from texgs.core.names import EXPORTS
 from texgs.scene.copied import write_copy
 from texgs.scene.frame import Mode
@@ -62,6 +63,7 @@ class Scene(Editing):
         camera = camera_of(framed, azimuth, polar, width, height, fov_y, radius, target)
         return picture_of(self.session.frame(camera, mode, transparent=transparent))
 
+    @interrupts_between_items()
     def film(
         self,
         path: str | Path,

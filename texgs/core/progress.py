@@ -80,7 +80,7 @@ def progress(iterable: Iterable[T], total: int | None = None, *, title: str, uni
 
 def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterable[T]:
     """Return the items, in a bar or with plain lines."""
-    is_notebook = "ipykernel" in sys.modules
+    is_notebook = "ipykernel.kernelapp" in sys.modules  # others talk to kernels
     if not (is_notebook or sys.stderr.isatty()):
         return _lines(iterable, total, title, unit)
     if is_notebook and find_spec("ipywidgets"):
