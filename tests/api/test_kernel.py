@@ -23,7 +23,8 @@ few = ("views.train.frequency=1", "fit.shading.iterations=400", "views.step=1")
 
 class InImport:
     def find_spec(self, name, path=None, target=None):
-        if name == "sympy.series":  # of what optimizers of torch import when they are made; sympy.core is there by then
+        # Optimizers of torch import it when they are made; sympy.core is there by then.
+        if name == "sympy.series":
             sys.meta_path.remove(self)
             signal.raise_signal(signal.SIGINT)
 
