@@ -92,9 +92,8 @@ def test_channels_become_data_sets_of_their_colour_and_window(conf, scan, capsys
     values = np.stack([np.load(scan) + 10 * channel for channel in range(3)])
     path = write_image(conf.parent / "cells.zarr", [values], axes_of("czyx"), [(1, 1, 1, 1)], labels=shown)
     assert main(["new", str(path), "reduce=2"]) == 0
-    assert (
-        "then: texgs run datasets=[cells_DAPI,cells_405_nm,cells_RFP] fit=quick\n" in capsys.readouterr().out
-    )
+    told = 'then: texgs run "datasets=[cells_DAPI,cells_405_nm,cells_RFP]" fit=quick\n'
+    assert told in capsys.readouterr().out
     names = [f"cells_{label}" for label in ("DAPI", "405_nm", "RFP")]
     assert [path.stem for path in sorted((conf / "dataset").iterdir())] == sorted(names)
     dapi, nm, rfp = (compose((f"dataset={name}",)).dataset for name in names)

@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
         target = write_bytes(folder / f"{dataset.name}.yaml", text.encode())
         count, picture = len(dataset.basic_tfs), Path(given.results, dataset.name, "transfer", "transfer.png")
         print(f"{shown(target)}: {count} transfer functions to edit; {picture} shows them")
-    which = f"datasets=[{','.join(names)}]" if len(names) > 1 else f"dataset={names[0]}"
+    which = f'"datasets=[{",".join(names)}]"' if len(names) > 1 else f"dataset={names[0]}"
     print(f"then: texgs run {which} fit=quick")
     return 0
 
