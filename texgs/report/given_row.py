@@ -1,20 +1,15 @@
 """What the looks of a comparison were given, for a row beside their views."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image, ImageOps
 
 from texgs.core.figures import Cell, Row, as_picture
 from texgs.core.io import read_json
-
-if TYPE_CHECKING:
-    from texgs.volume.transfer import TransferFunction
+from texgs.volume.transfer import TransferFunction
 
 SIDE, INCHES = 512, 3.2  # of a picture; letters are as large as for so many inches
 LETTERS = 18  # of a line of words

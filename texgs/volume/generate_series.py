@@ -4,8 +4,6 @@ Cubes as those of `texgs.volume.generate`, the same for the same arguments up to
 formulas: a moment costs no more than its samples. Time goes from 0 to 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import cos, pi, sin
 

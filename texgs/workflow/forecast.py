@@ -1,7 +1,5 @@
 """What a run would find on this machine, what it would do, and about how long that takes."""
 
-from __future__ import annotations
-
 import csv
 import statistics
 import time
@@ -10,14 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from texgs.config.schema import Config
+from texgs.workflow.experiments import Selection
+from texgs.workflow.job import Job
 from texgs.workflow.sweep import as_sweep
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
-    from texgs.workflow.experiments import Selection
-    from texgs.workflow.job import Job
 
 PROBE = "probe"  # the row of speeds.csv with the seconds of `probe` on the same machine
 START_SECONDS = 8  # of a run before its first job, on that machine

@@ -1,20 +1,15 @@
 """Where the data of a data set are on this machine, and its basic TFs."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from texgs.config.dataset import BasicTF, Volume
 from texgs.config.project import check_name
+from texgs.config.schema import Config
 from texgs.core.cache import cache_folder
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError, located
 from texgs.core.io import is_there
 from texgs.core.names import file_name
 from texgs.workflow.moments import in_time, matching
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
 
 
 def source_file(config: Config) -> Path | None:

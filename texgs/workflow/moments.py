@@ -1,7 +1,5 @@
 """The steps of a series in time: which files they come from, and in which order."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from glob import glob
