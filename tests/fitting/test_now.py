@@ -37,17 +37,6 @@ def of_range(tf, grid):
     return tf.scaled(float(grid.values.min()), float(grid.values.max()))
 
 
-def test_places_of_pixels_are_seen_in_these_pixels():
-    camera, depth = orbit(20, 10, 3.0, 40.0, 48, 32), torch.rand(32, 48) + 2
-    rows, columns = torch.tensor([0, 5, 31]), torch.tensor([47, 20, 0])
-    places = now.places_of(camera, depth, rows, columns)
-    seen = places @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]
-    pixels = seen @ camera.K.T
-    torch.testing.assert_close(seen[:, 2], depth[rows, columns])
-    torch.testing.assert_close(pixels[:, 0] / pixels[:, 2], columns + 0.5, atol=1e-3, rtol=0)
-    torch.testing.assert_close(pixels[:, 1] / pixels[:, 2], rows + 0.5, atol=1e-3, rtol=0)
-
-
 @pytest.mark.parametrize(("tf", "least"), [(HIGH, 30.0), (LOW, 27.0)])
 def test_the_finer_model_is_closer_to_the_volume_in_a_view_between_others(small, grid, tf, least):
     tf, caster = of_range(tf, grid), Caster(grid, LOOK)

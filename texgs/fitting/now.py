@@ -72,16 +72,23 @@ def fit_now(
     parameters = surfels_on(points, seed)
     factors = (look.ambient, look.diffuse, look.specular, look.shininess)
     parameters |= raw_material(*factors, kind=shading.material)
-    some = slice(None, None, HEADLIGHTS)
-    lit_alike = Images(images.planes[some], images.cameras[some], images.lights[some])
+    lit_alike = images[::HEADLIGHTS]
     for number, iterations in enumerate(PASSES, start=1):
-        phase = Phase(iterations, rates=RATES, losses=Losses(alpha=0.0), densify=Densify(stop=0))
-        fit = Fit(parameters, shading, images, phase, seed)
-        for _ in progress(fit.run(), iterations, title=f"{title}, pass {number}", unit="view"):
-            pass
-        parameters = {key: x.detach() for key, x in fit.parameters.items()}
+        named = f"{title}, pass {number}"
+        parameters = refined(Surfels(parameters, shading), images, iterations, RATES, seed, named)
         model = Surfels(in_full_light(parameters, shading.material), shading)
         yield texturize(model, lit_alike, TEXTURE, seed, f"{title}, texture")
+
+
+def refined(
+    model: Surfels, images: Images, iterations: int, rates: Rates, seed: int, title: str
+) -> dict[str, Tensor]:
+    """Return the parameters of surfels that were fitted to views, as many as before."""
+    phase = Phase(iterations, rates=rates, losses=Losses(alpha=0.0), densify=Densify(stop=0))
+    fit = Fit(model.parameters, model.shading, images, phase, seed)
+    for _ in progress(fit.run(), iterations, title=title, unit="view"):
+        pass
+    return {name: x.detach() for name, x in fit.parameters.items()}
 
 
 def cast_views(caster: Caster, tf: TransferFunction, lens: Lens, title: str, seed: int) -> Images:
@@ -138,15 +145,7 @@ def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: tor
     ends = z[rows, columns] > 0
     at = rows[ends], columns[ends]
     rgba = seen.rgba[at]
-    return Points(places_of(camera, z, *at), normals[at], (rgba[:, :3] / rgba[:, 3:]).clamp(0, 1))
-
-
-def places_of(camera: Camera, depth: Tensor, rows: Tensor, columns: Tensor) -> Tensor:
-    """Return the points [N, 3], world units, that pixels show at their depths [H, W]."""
-    z = depth[rows, columns][:, None]
-    pixels = torch.stack([columns + 0.5, rows + 0.5, torch.ones(len(rows))], dim=1)
-    in_camera = z * (pixels @ torch.linalg.inv(camera.K).T)
-    return (in_camera - camera.viewmat[:3, 3]) @ camera.viewmat[:3, :3]
+    return Points(camera.unproject(z)[at], normals[at], (rgba[:, :3] / rgba[:, 3:]).clamp(0, 1))
 
 
 def surfels_on(points: Points, seed: int) -> dict[str, Tensor]:

@@ -10,19 +10,16 @@ from torch.nn.functional import normalize
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.lens import Lens
-from texgs.core.progress import progress
 from texgs.fields.surfels.model import TEXTURE, Surfels
 from texgs.fields.surfels.step_file import UNITS
 from texgs.fields.surfels.texels import untextured
-from texgs.fitting.loop import Fit
-from texgs.fitting.now import HEADLIGHTS, Points, cast_views, ends_of_rays, surfels_on
+from texgs.fitting.now import HEADLIGHTS, Points, cast_views, ends_of_rays, refined, surfels_on
 from texgs.fitting.now import RATES as RATES_OF_SEEDS
 from texgs.fitting.seeds import shown
-from texgs.fitting.settings import Densify, Losses, Phase, Rates
+from texgs.fitting.settings import Rates
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
-from texgs.volume.images import Images
 from texgs.volume.motion import Motion, motion
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
@@ -89,14 +86,9 @@ class Follower:
         """Plant surfels without texels, and fit all to views of a volume."""
         images = cast_views(caster, self._tf, lens, title, seed)
         points = ends_of_rays(caster, self._look, self._tf, images, seed)
-        some = slice(None, None, HEADLIGHTS)
-        few = Images(images.planes[some], images.cameras[some], images.lights[some])
-        plain = planted(plain, points, shown(Surfels(plain, self._shading), few), seed)
-        phase = Phase(ITERATIONS, rates=RATES, losses=Losses(alpha=0.0), densify=Densify(stop=0))
-        fit = Fit(plain, self._shading, images, phase, seed)
-        for _ in progress(fit.run(), ITERATIONS, title=title, unit="view"):
-            pass
-        return {name: x.detach() for name, x in fit.parameters.items()}
+        weights = shown(Surfels(plain, self._shading), images[::HEADLIGHTS])
+        model = Surfels(planted(plain, points, weights, seed), self._shading)
+        return refined(model, images, ITERATIONS, RATES, seed, title)
 
 
 def lens_of(grid: Grid, tf: TransferFunction) -> Lens | None:

@@ -104,13 +104,13 @@ class VoxelGrid:
 
     def links(self) -> Tensor:
         """Return [X, Y, Z] int32: the row of each voxel, 0 where it has none."""
-        bits = _unpacked(self.masks)  # [X / 4, Y / 4, Z / 4, 64]
+        bits = unpacked(self.masks)  # [X / 4, Y / 4, Z / 4, 64]
         rows = self.first[..., None] + bits.cumsum(-1, dtype=torch.int32) - 1
-        return _lattice((rows * bits).int())
+        return lattice_of((rows * bits).int())
 
     def points(self) -> Tensor:
         """Return the world positions [n - 1, 3] of the voxels that have a row, in their order."""
-        block, bit = _unpacked(self.masks).flatten(0, 2).nonzero().unbind(1)
+        block, bit = unpacked(self.masks).flatten(0, 2).nonzero().unbind(1)
         _, columns, depth = self.masks.shape
         corner = torch.stack([block // (columns * depth), block // depth % columns, block % depth], dim=1)
         inside = torch.stack([bit // 16, bit // 4 % 4, bit % 4], dim=1)
@@ -228,12 +228,12 @@ def _blocks(lattice: Tensor) -> Tensor:
     return lattice.reshape(x, 4, y, 4, z, 4).permute(0, 2, 4, 1, 3, 5).reshape(x, y, z, 64)
 
 
-def _lattice(blocks: Tensor) -> Tensor:
+def lattice_of(blocks: Tensor) -> Tensor:
     """Return [X / 4, Y / 4, Z / 4, 64] as [X, Y, Z]."""
     x, y, z = blocks.shape[:3]
     return blocks.reshape(x, y, z, 4, 4, 4).permute(0, 3, 1, 4, 2, 5).reshape(4 * x, 4 * y, 4 * z)
 
 
-def _unpacked(masks: Tensor) -> Tensor:
+def unpacked(masks: Tensor) -> Tensor:
     """Return the bits of int64 masks [...], [..., 64] bool."""
     return (masks[..., None] >> torch.arange(64, device=masks.device) & 1).bool()

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import cv2
 import numpy as np
@@ -68,6 +68,9 @@ class Images:
 
     def __len__(self) -> int:
         return len(self.planes)
+
+    def __getitem__(self, some: slice) -> Self:
+        return replace(self, planes=self.planes[some], cameras=self.cameras[some], lights=self.lights[some])
 
     @cached_property
     def boxes(self) -> list[Box]:

@@ -12,12 +12,11 @@ from texgs.core.errors import ShapeError, located
 from texgs.core.io import reading_as
 from texgs.core.tensor_file import read_tensor_file, write_tensor_file
 from texgs.fields.voxels.model import Voxels
-from texgs.raster.voxel_grid import VoxelGrid, pack_rows, unpack_rows, voxel_grid
+from texgs.raster.voxel_grid import VoxelGrid, lattice_of, pack_rows, unpack_rows, unpacked, voxel_grid
 from texgs.raster.voxels import March
 
 FORMAT = "texgs-voxels"
 VERSION = 1
-BITS = torch.arange(64)
 COEFFICIENTS = {1: 0, 4: 1, 9: 2}  # degrees by number of coefficients
 
 
@@ -58,11 +57,9 @@ def grid_of(tensors: Mapping[str, Tensor], description: Mapping[str, Any]) -> Vo
         raise ShapeError(f"sh: expected 1, 4 or 9 coefficients, [N, K, 3], got {count}")
     if masks.dtype != torch.int64 or density.dtype != torch.float32 or sh.dtype != torch.float32:
         raise ShapeError("masks, density, sh: expected int64 and float32, got other types")
-    x, y, z = masks.shape
-    bits = (masks[..., None] >> BITS & 1).bool()
+    bits = unpacked(masks)
     if int(bits.sum()) + 1 != n:  # the first row is that of all other voxels
         raise ShapeError(f"masks: expected the bits of {n - 1} voxels, got {int(bits.sum())}")
-    filled = bits.reshape(x, y, z, 4, 4, 4).permute(0, 3, 1, 4, 2, 5).reshape(4 * x, 4 * y, 4 * z)
     spacing = float(description["spacing"])
-    grid = voxel_grid(filled, description["lower"], spacing, COEFFICIENTS[count])
+    grid = voxel_grid(lattice_of(bits), description["lower"], spacing, COEFFICIENTS[count])
     return grid.with_rows(pack_rows(density, sh))
