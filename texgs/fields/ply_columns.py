@@ -30,14 +30,26 @@ def numbered(name: str, values: Tensor) -> dict[str, Tensor]:
     return {f"{name}_{k}": column for k, column in enumerate(values.T)}
 
 
-def write_columns(path: str | Path, columns: Mapping[str, Tensor]) -> Path:
-    """Create or replace a binary PLY file of float32 vertices in one step."""
+def colored(places: Tensor, colors: Tensor) -> dict[str, Tensor]:
+    """Name the columns of places [N, 3] and colours [N, 3] from 0 to 255."""
+    values = (*places.cpu().float().T, *colors.cpu().byte().T)
+    return dict(zip(("x", "y", "z", "red", "green", "blue"), values, strict=True))
+
+
+def write_columns(path: str | Path, columns: Mapping[str, Tensor], faces: np.ndarray | None = None) -> Path:
+    """Create or replace a binary PLY file of vertices, and of faces [F] if there are any, in one step.
+
+    Properties are float32, or bytes where columns are.
+    """
     from plyfile import PlyData, PlyElement
 
-    vertices = np.empty(len(columns["x"]), [(name, "<f4") for name in columns])
+    types = [(name, "u1" if column.dtype == torch.uint8 else "<f4") for name, column in columns.items()]
+    vertices = np.empty(len(columns["x"]), types)
     for name, column in columns.items():
-        vertices[name] = column.numpy()
-    return write_atomic(path, PlyData([PlyElement.describe(vertices, "vertex")], byte_order="<").write)
+        vertices[name] = column.detach().numpy()
+    elements = {"vertex": vertices} | ({} if faces is None else {"face": faces})
+    described = [PlyElement.describe(array, name) for name, array in elements.items()]
+    return write_atomic(path, PlyData(described, byte_order="<").write)
 
 
 def take(vertices: np.ndarray, *names: str) -> Tensor:

@@ -113,11 +113,7 @@ class Samples:
         return self.grid.structure(), self.march.structure(self.rays)
 
 
-def render_rays(
-    grid: VoxelGrid,
-    rays: Tensor,
-    march: March | None = None,
-) -> Rays:
+def render_rays(grid: VoxelGrid, rays: Tensor, march: March | None = None) -> Rays:
     """Blend a grid's samples along rays, front to back.
 
     Density and coefficients are interpolated trilinearly every `march.step`, from half a step after the ray

@@ -6,12 +6,10 @@ from functools import partial
 from pathlib import Path
 from typing import cast
 
-import numpy as np
 import torch
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_atomic
 from texgs.core.lens import Frame
 from texgs.fields import files
 from texgs.fields.field import Field, Look
@@ -19,6 +17,7 @@ from texgs.fields.gaussians.files import write_ply as write_gaussians
 from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
 from texgs.fields.kinds import Kind, kinds
 from texgs.fields.part_edit import PartEdit
+from texgs.fields.ply_columns import colored, write_columns
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.compact import seen_surfels, write_compact
 from texgs.fields.surfels.composition import Composition, Part
@@ -30,7 +29,7 @@ from texgs.scene.bounds import bounds_of
 from texgs.scene.clouds import clouds_of
 from texgs.scene.gltf import write_gltf
 from texgs.scene.joined import joined, write_vtp
-from texgs.scene.mesh import VERTEX, fill, fuse, write_mesh
+from texgs.scene.mesh import fuse, write_mesh
 from texgs.scene.scene import Scene
 from texgs.scene.spz import write_spz
 from texgs.scene.usd import write_usd
@@ -135,8 +134,6 @@ def write_points(path: str | Path, model: Surfels, least_opacity: float = 0.5) -
 
     Surfels need an opacity to become a point. Before shading, colours are those of the constant harmonic.
     """
-    from plyfile import PlyData, PlyElement
-
     if model.stage != "surfels":
         model = joined([Part(model)], [PartEdit()])
     means, _, _, opacities = geometry(model.parameters)
@@ -148,6 +145,4 @@ def write_points(path: str | Path, model: Surfels, least_opacity: float = 0.5) -
             "at most; lower the limit"
         )
     color = (0.5 + Y00 * model.parameters["sh"][:, 0])[opaque]
-    vertices = np.empty(len(color), VERTEX)
-    fill(vertices, means[opaque], color.clamp(0, 1).mul(255).round())
-    return write_atomic(path, PlyData([PlyElement.describe(vertices, "vertex")], byte_order="<").write)
+    return write_columns(path, colored(means[opaque], color.clamp(0, 1).mul(255).round()))

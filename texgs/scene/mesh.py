@@ -11,9 +11,9 @@ from torch.nn import functional as F
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_atomic
 from texgs.core.memory import require_memory
 from texgs.core.progress import progress
+from texgs.fields.ply_columns import colored, write_columns
 from texgs.raster import Render
 from texgs.raster.fusion import BLOCK, DepthView, Lattice
 from texgs.volume.isosurface import Mesh, isosurface
@@ -21,7 +21,6 @@ from texgs.volume.isosurface import Mesh, isosurface
 TRUNCATION = 5.0  # voxels beside a surface that know their distance from it, as in 2DGS; at most BLOCK
 LEAST_VIEWS = 1  # more views than this must have seen a voxel
 LEAST_VOXEL = 1e-6  # world units; the longest side of a volume is 1
-VERTEX = [*((axis, "<f4") for axis in "xyz"), *((channel, "u1") for channel in ("red", "green", "blue"))]
 CLUSTERS, LEAST_TRIANGLES = 50, 50  # the largest connected parts that stay, and how small they may be
 
 
@@ -130,19 +129,7 @@ def with_triangles(mesh: Mesh, kept: np.ndarray) -> Mesh:
 
 def write_mesh(path: str | Path, mesh: Mesh) -> Path:
     """Create or replace a binary PLY file in one step; a mesh without colours is grey."""
-    from plyfile import PlyData, PlyElement
-
     colors = np.full_like(mesh.vertices, 200, dtype=np.uint8) if mesh.colors is None else mesh.colors
-    vertices = np.empty(len(mesh.vertices), VERTEX)
-    fill(vertices, torch.from_numpy(mesh.vertices), torch.from_numpy(colors))
     faces = np.empty(len(mesh.triangles), [("vertex_indices", "<i4", (3,))])
     faces["vertex_indices"] = mesh.triangles
-    elements = [PlyElement.describe(vertices, "vertex"), PlyElement.describe(faces, "face")]
-    return write_atomic(path, PlyData(elements, byte_order="<").write)
-
-
-def fill(vertices: np.ndarray, places: Tensor, colors: Tensor) -> None:
-    """Set places [V, 3] and colours [V, 3] from 0 to 255 of vertices."""
-    for names, values in ((("x", "y", "z"), places), (("red", "green", "blue"), colors)):
-        for name, column in zip(names, values.detach().cpu().numpy().T, strict=True):
-            vertices[name] = column
+    return write_columns(path, colored(torch.from_numpy(mesh.vertices), torch.from_numpy(colors)), faces)

@@ -54,6 +54,7 @@ def test_colour_without_light_is_the_constant_harmonic(tmp_path, flavour):
     model = sample("shading", material="paper")
     columns = vertices(write_ply(tmp_path / "m.ply", model, flavour))
     expected = (model.parameters["colors"].numpy() - 0.5) / 0.28209479177387814
+    assert columns.dtype["f_dc_0"] == np.float32
     for k in range(3):
         np.testing.assert_allclose(columns[f"f_dc_{k}"], expected[:, k], rtol=1e-6, atol=1e-7)
 
