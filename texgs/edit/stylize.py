@@ -15,7 +15,7 @@ from texgs.edit.objective import FeatureTerm, Objective
 from texgs.edit.recipe import DEFAULT, Recipe
 from texgs.edit.style_loop import Painting, Stopwatch, learn_style
 from texgs.edit.style_picture import StylePicture, mirrored_crop
-from texgs.edit.style_start import pixel_side, start_colors
+from texgs.edit.style_start import pixel_side, placed, start_colors, where_shown
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import owners, recolored, spread, untextured
 from texgs.models.vgg import Vgg
@@ -41,6 +41,7 @@ def stylize(
     vgg: Vgg | None = None,
     clip: FeatureTerm | None = None,
     surfels: Tensor | None = None,
+    steps: Sequence[Surfels] = (),
     title: str = "style",
     show: Callable[[Callable[[], Surfels]], None] = lambda result: None,
 ) -> Stylized:
@@ -59,6 +60,7 @@ def stylize(
         vgg: for NNFM; needed unless the recipe's `features` or `lambda_s` is 0.
         clip: a differentiable loss [] of an image [H, W, 3] in [0, 1], for a `lambda_s` below 1.
         surfels: [N] bool, the ones to change; by default all. Texels and colours of others stay, bit for bit.
+        steps: the model at other steps of a series, with the same texels: views show all in turn.
         title: of the progress bar.
         show: is called after each iteration with a function that makes the model as it is then.
     """
@@ -69,7 +71,7 @@ def stylize(
         )
     watch = Stopwatch(model.device)
     with watch.part("start"):
-        run = SurfelPainting(model, cameras, lights, style, recipe, vgg, clip, surfels)
+        run = SurfelPainting(model, cameras, lights, style, recipe, vgg, clip, surfels, steps)
     offer = partial(show, run.result)
     losses = learn_style(run, len(cameras), recipe, title, watch=watch, show=offer)
     return Stylized(run.result(), run.recipe, losses, dict(watch.seconds))
@@ -88,6 +90,7 @@ class SurfelPainting:
         vgg: Vgg | None,
         clip: FeatureTerm | None,
         surfels: Tensor | None,
+        steps: Sequence[Surfels] = (),
     ) -> None:
         self.whole = model
         if recipe.adapts:
@@ -105,7 +108,8 @@ class SurfelPainting:
         owner = torch.empty_like(surfel).index_copy_(0, places, surfel)  # [T] surfel of each texel
         moving = None if surfels is None else surfels[owner]
         pixel = pixel_side(model, cameras)
-        texels = start_colors(recipe.start, model, self.style, pixel, recipe.seed, moving)
+        laid = where_shown(model, steps, cameras) if steps else model
+        texels = start_colors(recipe.start, laid, self.style, pixel, recipe.seed, moving)
         self.fixed: Tensor | None = None  # [F] indices of texels that stay
         if surfels is not None:
             colors = torch.where(surfels[:, None], colors, p["colors"])
@@ -113,6 +117,7 @@ class SurfelPainting:
             texels[self.fixed] = p["texels"][self.fixed]
         # The colours of surfels are taken out where they change: texels [T, 3] have all of the colour.
         self.model = Surfels({**p, "colors": colors.contiguous()}, model.shading, model.metadata)
+        self.steps, self.turn = [self.model, *(placed(self.model, step) for step in steps)], 0
         self.texels = texels.requires_grad_()
         self.generator = torch.Generator().manual_seed(recipe.seed)
 
@@ -122,9 +127,11 @@ class SurfelPainting:
         return torch.optim.Adam([self.texels], eps=1e-15, fused=True)
 
     def render(self, view: int) -> list[Painting]:
-        """Show a view over the style or white."""
+        """Show a view over the style or white; of a series, the next step."""
+        model = self.steps[self.turn % len(self.steps)]
+        self.turn += 1
         camera, light = self.cameras[view].to(self.model.device), self.lights[view]
-        color, alpha, share = paint(self.model, self.texels, camera, light, self.recipe, self.surfels)
+        color, alpha, share = paint(model, self.texels, camera, light, self.recipe, self.surfels)
         image = (color.detach() + (1 - alpha) * self.behind(alpha)).clamp(0, 1).requires_grad_()
         return [Painting(image, share, self.objective, color.backward)]
 

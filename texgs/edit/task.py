@@ -25,6 +25,7 @@ from texgs.volume.cameras import icosphere_of
 from texgs.volume.view_set import View, read_views
 
 Settings = TypeVar("Settings")
+STEPS = 6  # of a series at most, that a look is learned from beside that of the scene
 VIEWS, SIZE = 92, 400  # of an `OrbitTask`, and pixels of their sides
 
 
@@ -111,6 +112,15 @@ class Task(Generic[Settings]):
                 f"got {model}"
             )
         return read_views(self.views[model].parent).train
+
+    def other_steps(self, part: str) -> list[Surfels]:
+        """Return the model of a part at some more steps of its series, so that a look is learned for all."""
+        name, _ = split(self.scene, part)
+        if self.scene.series is None or name not in self.scene.series.models:
+            return []
+        last = len(self.scene.series.steps) - 1
+        spread = {round(last * i / (STEPS - 1)) for i in range(STEPS)} - {self.scene.time}
+        return [self.scene.at(step).models[name].surfels()[0].to(self.device) for step in sorted(spread)]
 
     def each_part(
         self,

@@ -88,8 +88,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     dtype = torch.float32 if recipe.single_precision else None
     look = Look(task, Vgg.load(device=task.device, dtype=dtype) if recipe.needs_vgg else None)
     network = Clip.load(keys.clip, task.device) if recipe.needs_clip else None
-    seconds: dict[str, dict[str, float]] = {}
-    adapted: list[Recipe] = []
+    seconds, adapted = dict[str, dict[str, float]](), list["Recipe"]()
 
     def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
         picture = look.picture(name)
@@ -102,6 +101,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
             vgg=look.vgg,
             clip=ClipLoss(network, picture.image.permute(1, 2, 0).to(task.device)) if network else None,
             surfels=surfels,
+            steps=task.other_steps(name),
             title=task.title_of(name),
             show=partial(task.show, name),
         )
