@@ -50,15 +50,16 @@ def views(
 ) -> list[Case]:
     """A view, and a step of an edit: the view, its gradient from a given one of the image, the optimiser."""
     seen = camera(size).to(device)
-    upstream = torch.full((size, size, 3), 1e-6, device=device)
+    rays = camera_rays(seen).flatten(0, 1)
+    out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
+    upstream = torch.full_like(out.color, 1e-6)
 
     def view() -> None:
         with torch.no_grad():
             render_view(grid, seen)
 
     def edit() -> None:
-        grid.rows.requires_grad_()
-        render_view(grid, seen, into=optimizer.gradient).color.backward(upstream)
+        Samples(grid, March(), rays, out).add_gradient(upstream, None, optimizer.gradient)
         optimizer.step(RATES)
 
     return [Case("view", where, {"view": view}), Case("step of an edit", where, {"step of an edit": edit})]

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture(autouse=True, scope="module")
 def one_thread():
     """Images of a thousand pixels are not worth a second thread; results are the same with any number."""
     before = torch.get_num_threads()
