@@ -85,9 +85,10 @@ def surfels(settings: Settings) -> Iterator[Comparison]:
     generator = torch.Generator().manual_seed(4)
     material = list(torch.rand(4, n, generator=generator).mul(0.5).to(device))
     material[3] = 20 * material[3]
-    pair = {"texgs": shading.blinn_phong, "torch": shading_definition.blinn_phong}
+    modules = {"texgs": shading, "torch": shading_definition}
+    pair = {who: lambda *x, by=module: by.blinn_phong(*x)[0] for who, module in modules.items()}
     learned = [made["features"], *material, made["means"], made["quats"]]
     yield Comparison("blinn_phong", pair, learned, (position,))
     sh = 0.2 * torch.randn(n, 16, 3, generator=generator).to(device)
-    pair = {"texgs": shading.spherical_harmonics, "torch": shading_definition.spherical_harmonics}
+    pair = {who: module.spherical_harmonics for who, module in modules.items()}
     yield Comparison("spherical_harmonics, degree 3", pair, [sh, made["means"]], (position,))

@@ -17,7 +17,7 @@ from texgs.fields.surfels.texels import bare_colors, owners, recolored
 from texgs.raster import Texture, reference
 from texgs.raster.losses import l1_dssim
 from texgs.raster.reference.losses import l1_dssim as l1_dssim_by_definition
-from texgs.raster.reference.shading import blinn_phong_texture
+from texgs.raster.reference.shading import blinn_phong
 
 STRIPES = 9.0  # for each world unit
 
@@ -160,7 +160,7 @@ def by_definition(model, camera, colors, opacity):
     p = {name: x.double() if x.is_floating_point() else x for name, x in model.parameters.items()}
     *splats, opacities = geometry(p)
     factors = material(p, model.shading.material).values()
-    lit = blinn_phong_texture(
+    lit = blinn_phong(
         torch.zeros_like(p["means"]), *factors, p["means"], p["quats"], camera.position.double(), facing=True
     )
     return reference.rasterize(

@@ -209,7 +209,7 @@ def test_gradients_of_palette_and_texels_are_those_of_the_definition(bare, image
     exact = {name: p[name].clone().requires_grad_() for name in leaves}
     (changed(bare, **leaves).render(camera).color - target.color).square().sum().backward()
     a, d, s, b = material(p, bare.shading.material).values()
-    base, gain = shading.blinn_phong_texture(
+    base, gain = shading.blinn_phong(
         *(exact["palette"].expand(len(bare), 3), a, d, s, b, p["means"], p["quats"]),
         camera.position.double(),
         facing=bare.shading.facing,

@@ -107,9 +107,7 @@ def of_losses(name, inputs, leaves, constants, sizes, small, large, tolerances, 
 
 def of_shading(light, facing):
     """Return Blinn-Phong shading of textured surfels."""
-    functions = (
-        partial(module.blinn_phong_texture, facing=facing) for module in (shading, shading_definition)
-    )
+    functions = (partial(module.blinn_phong, facing=facing) for module in (shading, shading_definition))
     constants = ("camera_position",) if light == "headlight" else ("camera_position", "light")
     sizes = tuple((n, shared) for n in (1, 17, 3001) for shared in ((), ("shininess", "specular"), MATERIAL))
     inputs, leaves = partial(surfels, light=light), ("color", *MATERIAL, "means", "quats")

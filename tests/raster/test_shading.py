@@ -13,7 +13,7 @@ from tests.volume.march import shade
 from texgs.core.errors import ShapeError
 from texgs.core.geometry import quats_to_matrices
 from texgs.raster.reference import shading as definition
-from texgs.raster.shading import MATERIAL, blinn_phong, blinn_phong_texture, spherical_harmonics
+from texgs.raster.shading import MATERIAL, blinn_phong, spherical_harmonics
 from texgs.volume.render import Appearance
 
 LEAVES = ("color", *MATERIAL, "means", "quats")
@@ -26,7 +26,7 @@ def placed(device, *size, **settings):
 
 def gradients(given, **settings):
     """Return base and gain, and the gradients of all leaves."""
-    return evaluate(partial(blinn_phong_texture, **settings), given, LEAVES)
+    return evaluate(partial(blinn_phong, **settings), given, LEAVES)
 
 
 def assert_close(values, expected, tolerance):
@@ -47,7 +47,7 @@ def test_facing_is_the_light_of_volume_renderers(light, device):
     given = placed(device, 500, light=light)
     given |= {name: torch.full((1,), getattr(look, name), device=device) for name in MATERIAL}
     given["means"] = torch.zeros_like(given["color"])  # in one place: a distant viewer is in one direction
-    shaded = blinn_phong(**given, facing=True)
+    shaded, _ = blinn_phong(**given, facing=True)
     to_viewer = normalize(CAMERA.double(), dim=0)
     to_light = to_viewer if LIGHTS[light] is None else normalize(LIGHTS[light].double(), dim=0)
     normal = quats_to_matrices(given["quats"].cpu().double())[:, :, 2]
@@ -101,21 +101,20 @@ def one_surfel(device):
 
 def test_a_surfel_that_faces_the_headlight(facing, device):
     given = one_surfel(device)
-    shaded, gain = blinn_phong_texture(**given, facing=facing)
+    shaded, gain = blinn_phong(**given, facing=facing)
     torch.testing.assert_close(gain.cpu(), torch.tensor([0.8]))
     torch.testing.assert_close(shaded, 0.8 * given["color"] + 0.1)
     # The light 60 degrees off the normal: n.l = cos 60, n.h = cos 30.
     light = torch.tensor([math.sqrt(3), 0.0, 1.0], device=device)
-    shaded = blinn_phong(**given, light=light, facing=facing)
+    shaded, _ = blinn_phong(**given, light=light, facing=facing)
     torch.testing.assert_close(shaded, 0.55 * given["color"] + 0.1 * 0.75**10)
 
 
 def test_textured_fragment_is_affine_in_the_texel(facing, device):
     given = placed(device, 50, light="directional")
-    base, gain = blinn_phong_texture(**given, facing=facing)
-    assert torch.equal(blinn_phong(**given, facing=facing), base)
+    base, gain = blinn_phong(**given, facing=facing)
     texel = torch.rand(50, 3, device=device)
-    expected = blinn_phong(**given | {"color": given["color"] + texel}, facing=facing)
+    expected, _ = blinn_phong(**given | {"color": given["color"] + texel}, facing=facing)
     torch.testing.assert_close(base + gain[:, None] * texel, expected)
 
 
@@ -151,7 +150,7 @@ def test_clamped_colours_have_no_gradient(device):
 
 def test_a_shininess_that_is_not_finite_is_seen(device):
     shininess = torch.tensor([5.0, float("nan"), 5.0], device=device)
-    lit = blinn_phong(**placed(device, 3) | {"shininess": shininess})
+    lit, _ = blinn_phong(**placed(device, 3) | {"shininess": shininess})
     assert lit.isnan().any(1).tolist() == [False, True, False]
 
 

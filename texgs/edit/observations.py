@@ -12,12 +12,11 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.shading import light_direction, material, viewer
+from texgs.fields.surfels.shading import material
 from texgs.fields.surfels.texels import bare_colors
 from texgs.models.guidance import EditViews
 from texgs.raster import Render, Texture
 from texgs.raster.losses import depth_to_normal, planar
-from texgs.raster.shading import blinn_phong_texture
 
 MARGIN = 11  # pixels around content: a window of SSIM
 SOFT = 0.05  # alpha below which colours are rather those of the neighbourhood
@@ -84,11 +83,7 @@ def light_on(model: Surfels, camera: Camera, light: Light | None) -> tuple[Tenso
     black = torch.zeros_like(p["means"])
     if light is None:
         return black, torch.ones_like(p["opacities"])
-    a, d, s, b = material(p, shading.material).values()
-    place, toward = viewer(camera, shading), light_direction(light, camera)
-    return blinn_phong_texture(
-        black, a, d, s, b, p["means"], p["quats"], place, toward, facing=shading.facing
-    )
+    return shading.lit(black, material(p, shading.material).values(), p, camera, light)
 
 
 @dataclass(frozen=True, eq=False)

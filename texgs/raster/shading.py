@@ -32,7 +32,7 @@ def blinn_phong(
     light: Tensor | None = None,  # [3]
     *,
     facing: bool = False,
-) -> Tensor:
+) -> tuple[Tensor, Tensor]:
     """Shade surfels: color * (ambient + diffuse |n.l|) + specular |n.h|^shininess.
 
     n is the surfel's normal, l the direction to the light, h halfway between l and the direction v to the
@@ -40,6 +40,9 @@ def blinn_phong(
     nothing is clamped. With `facing` only the face that the camera sees is, as renderers of volumes do: for n
     turned towards the camera, color * (ambient + diffuse max(n.l, 0)) + specular max(n.h, 0)^shininess, and
     the last term is there only where n.l > 0. For a light at the camera this is the same.
+
+    Light is constant over a surfel, and shading affine in colour: a fragment with a texel, of color + texel,
+    looks like base + gain * texel, see `Texture`.
 
     Differentiable in every surfel tensor, through n and v in quats and means too, but not in the side that
     faces the camera; not in the camera or the light.
@@ -57,33 +60,7 @@ def blinn_phong(
         facing: whether the light must be in front of the face that the camera sees.
 
     Returns:
-        [N, 3] shaded colours.
-    """
-    material = (ambient, diffuse, specular, shininess)
-    return blinn_phong_texture(color, *material, means, quats, camera_position, light, facing=facing)[0]
-
-
-def blinn_phong_texture(
-    color: Tensor,
-    ambient: Tensor,
-    diffuse: Tensor,
-    specular: Tensor,
-    shininess: Tensor,
-    means: Tensor,
-    quats: Tensor,
-    camera_position: Tensor,
-    light: Tensor | None = None,
-    *,
-    facing: bool = False,
-) -> tuple[Tensor, Tensor]:
-    """Shade textured surfels, whose colour is color + texel(u, v): the base and gain of `Texture`.
-
-    Light is constant over a surfel and Blinn-Phong affine in colour, so that the shaded fragment is
-    base + gain * texel with gain = ambient + diffuse |n.l|, or ambient + diffuse max(n.l, 0) with `facing`,
-    and base = blinn_phong(color). Arguments, gradients and errors are those of `blinn_phong`.
-
-    Returns:
-        base [N, 3] and gain [N].
+        base [N, 3], the shaded colours, and gain [N], ambient + diffuse |n.l| or what `facing` makes of it.
     """
     factors = zip(MATERIAL, (ambient, diffuse, specular, shininess), strict=True)
     material = {name: (x, name) for name, x in factors}  # each of a length of its own

@@ -106,7 +106,7 @@ def test_highlights_have_the_tint_of_their_part():
     light = SIDE.direction(CAMERA).double()
     rest = (p["means"], p["quats"], place, light)
     colors = p["colors"] + p["palette"]
-    shade = partial(reference.blinn_phong_texture, facing=True)
+    shade = partial(reference.blinn_phong, facing=True)
     matt, gains = shade(colors, zero + 0.4, zero + 0.5, zero, zero, *rest)
     shine, _ = shade(0 * colors, zero, zero, k_s, beta, *rest)
     tint = torch.where(first[:, None], torch.tensor(blue), torch.tensor(gold))

@@ -16,10 +16,10 @@ from texgs.fields.field import Look
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.shading import light_direction, material, viewer
+from texgs.fields.surfels.shading import material
 from texgs.fields.surfels.variants import labels_of
 from texgs.raster import Render, Texture, rasterize
-from texgs.raster.shading import MATERIAL, blinn_phong_texture
+from texgs.raster.shading import MATERIAL
 
 DISC = 1e6  # opacity that makes a surfel a disc with a sharp rim
 NARROW = 1 / sqrt(2 * log(DISC / 0.5))  # scale at which this disc has a radius of one standard deviation
@@ -84,19 +84,15 @@ class Part:
 
     def look(self, edited: Edited, camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
         """Return base [N, 3] and gain [N]: the colour of a fragment is base + gain * texel."""
-        p, shading, n = self.model.parameters, self.model.shading, len(self.model)
-        colors, (a, d, s, b) = edited.colors, edited.material
+        colors, n = edited.colors, len(self.model)
         if look == "unshaded":
             return colors, torch.ones_like(self.opacities)
         if look == "texture":
             return torch.full_like(colors, 0.5), torch.ones_like(self.opacities)
         if look in MATERIAL:
-            value = (a, d, s, b)[MATERIAL.index(look)].expand(n)
+            value = edited.material[MATERIAL.index(look)].expand(n)
             return value[:, None].expand(n, 3), torch.zeros_like(self.opacities)
-        seen_from, direction = viewer(camera, shading), light_direction(light, camera)
-        base, gain = blinn_phong_texture(
-            colors, a, d, s, b, p["means"], p["quats"], seen_from, direction, facing=shading.facing
-        )
+        base, gain = self.model.shading.lit(colors, edited.material, self.model.parameters, camera, light)
         if edited.tint is not None:
             matt = gain[:, None] * colors
             base = matt + edited.tint * (base - matt)

@@ -1,6 +1,6 @@
 """How surfels get their colours in a view: the shading model, its material, lights and the viewer."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +11,7 @@ from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.fields.surfels.material import RANGES, require_material
 from texgs.raster import Options, Texture
-from texgs.raster.shading import MATERIAL, blinn_phong, blinn_phong_texture, spherical_harmonics
+from texgs.raster.shading import MATERIAL, blinn_phong, spherical_harmonics
 
 FAR = 1e4  # world units: a viewer so far away sees all surfels from one direction
 LEAST = 1e-6  # share of ambient or of diffuse light, so that its logit is finite
@@ -36,12 +36,22 @@ class ShadingModel:
         p = parameters
         if "ambient" not in p:
             return spherical_harmonics(p["sh"], p["means"], camera.position)
-        a, d, s, b = material(p, self.material).values()
-        rest = (a, d, s, b, p["means"], p["quats"], viewer(camera, self), light_direction(light, camera))
-        if "texels" not in p:  # clamped as renderers of volumes do
-            return blinn_phong(p["colors"], *rest, facing=self.facing).clamp(0, 1)
-        base, gain = blinn_phong_texture(p["colors"] + p["palette"], *rest, facing=self.facing)
-        return Texture(base.clamp(0, 1), gain, p["texels"], p["sizes"], p["offsets"])
+        colors = p["colors"] + p["palette"] if "texels" in p else p["colors"]
+        base, gain = self.lit(colors, material(p, self.material).values(), p, camera, light)
+        base = base.clamp(0, 1)  # as renderers of volumes do
+        return Texture(base, gain, p["texels"], p["sizes"], p["offsets"]) if "texels" in p else base
+
+    def lit(
+        self, colors: Tensor, factors: Iterable[Tensor], p: Mapping[str, Tensor], camera: Camera, light: Light
+    ) -> tuple[Tensor, Tensor]:
+        """Return base [N, 3] and gain [N] of surfels with parameters `p`; factors are those of `material`.
+
+        A viewer who is not local is far behind the camera.
+        """
+        viewer = camera.position if self.local_viewer else -FAR * camera.viewmat[2, :3]
+        toward = None if light.kind == "headlight" else light.direction(camera).to(camera.viewmat)
+        a, d, s, b = factors
+        return blinn_phong(colors, a, d, s, b, p["means"], p["quats"], viewer, toward, facing=self.facing)
 
 
 def material(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
@@ -87,17 +97,3 @@ def in_full_light(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tens
     light = factors["ambient"] + factors["diffuse"]  # [N] or [1]
     scaled = {name: (factors[name] / light).logit(eps=LEAST) for name in ("ambient", "diffuse")}
     return {**parameters, **scaled, "colors": parameters["colors"] * light[:, None]}
-
-
-def viewer(camera: Camera, shading: ShadingModel) -> Tensor:
-    """Return the place [3] that directions to the viewer lead to: the camera, or far behind it."""
-    if shading.local_viewer:
-        return camera.position
-    return -FAR * camera.viewmat[2, :3]
-
-
-def light_direction(light: Light, camera: Camera) -> Tensor | None:
-    """Return the direction to the light [3]; None for one at the viewer."""
-    if light.kind == "headlight":
-        return None
-    return light.direction(camera).to(camera.viewmat)

@@ -1,7 +1,6 @@
 """The definitions of per-surfel shading in plain torch: any floating-point type, gradients by autograd."""
 
 import math
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -10,7 +9,7 @@ from torch.nn.functional import normalize
 from texgs.core.geometry import quats_to_matrices
 
 
-def blinn_phong_texture(
+def blinn_phong(
     color: Tensor,
     ambient: Tensor,
     diffuse: Tensor,
@@ -37,11 +36,6 @@ def blinn_phong_texture(
         n_l, lobe = n_l.abs(), n_h.abs() ** shininess
     gain = ambient + diffuse * n_l
     return gain[:, None] * color + (specular * lobe)[:, None], gain
-
-
-def blinn_phong(*arguments: Any, facing: bool = False) -> Tensor:
-    """Return the shaded colours [N, 3]; the arguments are those of `blinn_phong_texture`."""
-    return blinn_phong_texture(*arguments, facing=facing)[0]
 
 
 def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:
