@@ -75,6 +75,24 @@ def test_nifti_scale_and_single_fourth_axis(tmp_path):
     np.testing.assert_allclose(source.slices(0, 11), sample_values() * 0.5 - 3)
 
 
+@pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
+@pytest.mark.parametrize("slope", [None, 0.5])
+def test_a_step_of_nifti_with_an_axis_of_time(tmp_path, suffix, slope):
+    first = sample_values("int16")
+    steps = [first, first + 1, first[::-1] + 2]
+    image = nibabel.Nifti1Image(np.stack([each.T for each in steps], axis=3), np.diag([-2, 3, 4, 1]))
+    image.header.set_slope_inter(slope, None if slope is None else -3)
+    nibabel.save(image, tmp_path / f"v{suffix}")
+    for time, values in enumerate(steps):
+        source = open_source(tmp_path / f"v{suffix}", time=time)
+        assert (source.n_steps, source.spacing) == (3, (2, 3, 4))
+        expected = values[:, :, ::-1] * (slope or 1) - (3 if slope else 0)
+        np.testing.assert_allclose(source.slices(0, 11), expected)
+    assert "step 2 of 3" in source.note
+    with pytest.raises(ArgumentError, match=r"v\.nii.*: dataset.volume.time: expected one of 0 to 2, got 3"):
+        open_source(tmp_path / f"v{suffix}", time=3)
+
+
 def test_nrrd_space_directions_and_byte_skip(tmp_path):
     values = sample_values("uint8")
     header = "NRRD0005\ntype: uchar\ndimension: 3\nspace dimension: 3\nsizes: 13 12 11\nencoding: raw\n"
@@ -206,7 +224,8 @@ def test_more_than_one_component_is_refused(tmp_path):
 def test_other_than_three_axes_is_refused(tmp_path, shape):
     values = np.zeros(shape, np.uint8)
     nrrd.write(str(tmp_path / "v.nrrd"), values, index_order="C")
-    nibabel.save(nibabel.Nifti1Image(values.T, np.eye(4)), tmp_path / "v.nii")
+    five = np.stack([values.T] * 2, axis=-1) if len(shape) > 3 else values.T  # a fourth one is time
+    nibabel.save(nibabel.Nifti1Image(five, np.eye(4)), tmp_path / "v.nii")
     tifffile.imwrite(tmp_path / "v.tif", values, photometric="minisblack")
     np.save(tmp_path / "v.npy", values)
     (tmp_path / "v.mha").write_text(

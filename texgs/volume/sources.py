@@ -24,7 +24,7 @@ from texgs.volume.grid import (
 )
 from texgs.volume.netcdf import open_netcdf
 from texgs.volume.ome_zarr import is_zarr, open_zarr
-from texgs.volume.slabs import ArraySource, RawSource, Source, size_text
+from texgs.volume.slabs import ArraySource, RawSource, Source, size_text, step_note
 from texgs.volume.text_columns import ColumnSource
 from texgs.volume.tiff import open_tiff, tiffs_in
 
@@ -58,8 +58,8 @@ def open_source(
         keys: what only some formats take, see `KEYS`: `dims`, samples along x, y, z; `dtype`, numpy's name of
             the sample type, such as "uint16"; `endian`, "little" or "big"; `skip`, bytes before the first
             sample; `series`, number or UID of one of several; `variable`, the path of an array in the file;
-            `channel`, its label or number, from 0; `time`, a step, from 0 (the default), of arrays and of
-            DICOM; `column`, from 1.
+            `channel`, its label or number, from 0; `time`, a step, from 0 (the default), of arrays, of
+            NIfTI and of DICOM; `column`, from 1.
 
     Raises:
         ArgumentError, ShapeError: if the file is missing, cannot be read, is unknown, damaged or no scalar
@@ -151,10 +151,11 @@ def _open_npy(path: Path, spacing: Triple | None, origin: Triple | None) -> Sour
     return ArraySource(Grid(values, *lattice), path.name)
 
 
-def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
+def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: int = 0) -> Source:
     """Open a NIfTI image, its axes permuted and flipped to the closest R, A, S; mapped if uncompressed.
 
-    By nibabel: ITK knows neither NIfTI-2 nor axes that are not at right angles.
+    Of several along a fourth axis one step is read. By nibabel: ITK knows neither NIfTI-2 nor axes that are
+    not at right angles.
     """
     import nibabel
     from nibabel.imageglobals import LoggingOutputSuppressor
@@ -166,7 +167,10 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None) -> So
         stored = image.get_data_dtype()
         if stored.fields:
             raise ArgumentError(f"expected a scalar volume, got {len(stored.fields)} components per sample")
-        shape = image.shape[:3] + tuple(size for size in image.shape[3:] if size != 1)
+        n_steps, *rest = image.shape[3:] or (1,)
+        if time not in range(n_steps):
+            raise ArgumentError(f"dataset.volume.time: expected one of 0 to {n_steps - 1}, got {time}")
+        shape = image.shape[:3] + tuple(size for size in rest if size != 1)
         x, y, z = dims_of(shape)[::-1]
         check_lattice((x, y, z), stored)
         turn = nibabel.io_orientation(image.affine)
@@ -174,13 +178,16 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None) -> So
             raise ArgumentError("expected three independent axes, got a singular affine matrix")
         proxy: Any = image.dataobj
         is_scaled = (proxy.slope, proxy.inter) != (1, 0)
+        proxy = proxy[..., time, *[0] * len(rest)] if n_steps > 1 else proxy  # reads no other step
         require_room((x, y, z), np.dtype(np.float32) if is_scaled else stored)
         samples = np.asarray(proxy, np.float32) if is_scaled else np.asanyarray(proxy)
         values = nibabel.apply_orientation(samples.reshape(shape, order="F"), turn)  # [X, Y, Z]
         affine = image.affine @ nibabel.orientations.inv_ornt_aff(turn, shape)
     dx, dy, dz = (float(step) for step in nibabel.affines.voxel_sizes(affine))
     first = (float(affine[0, 3]), float(affine[1, 3]), float(affine[2, 3]))
-    return ArraySource(Grid(values.T, spacing or (dx, dy, dz), origin or first), path.name)
+    source = ArraySource(Grid(values.T, spacing or (dx, dy, dz), origin or first), path.name)
+    source.n_steps, source.note = n_steps, step_note(time, n_steps)
+    return source
 
 
 # Suffix: function of the path, of spacing and origin where they replace the file's, and of further keys.
@@ -199,4 +206,5 @@ KEYS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((".raw", ".bin", ".dat"), ("dims", "dtype", "endian", "skip")),
     **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5", ".zip", ".ozx"), IN_FILES),
     **dict.fromkeys((".txt", ".txt.gz"), ("dims", "column")),
+    **dict.fromkeys((".nii", ".nii.gz"), ("time",)),
 }
