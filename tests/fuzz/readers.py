@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import nibabel
 import numpy as np
 import torch
 from PIL import Image
@@ -23,6 +24,7 @@ from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_release_texture import release_run
 from tests.study.test_ballots import STUDY, ballot
+from tests.volume.test_dicom import write_series as write_slices
 from tests.volume.test_netcdf import FIELD, write_netcdf
 from tests.volume.test_text_columns import LINES, write_lines
 from tests.volume.test_tf_files import RAMP, TENT, preset
@@ -86,6 +88,20 @@ def volume(name: str, folder: Path) -> Path:
 def read_volume(path: Path, **keys: Any) -> None:
     """All of it, as `texgs volume` does."""
     prepare(open_source(path, **keys), path.parent / "out.nrrd", nan_value=0.0)
+
+
+def dicom(folder: Path) -> Path:
+    """Two steps of four slices."""
+    (folder / "slices").mkdir()
+    for step in range(2):
+        write_slices(folder / "slices", sample_values()[:4] + step, number=step, AcquisitionNumber=step)
+    return folder / "slices"
+
+
+def nifti_in_time(folder: Path) -> Path:
+    steps = np.stack([sample_values("int16").T] * 3, axis=3)
+    nibabel.save(nibabel.Nifti1Image(steps, np.diag([2, 3, 4, 1])), folder / "v.nii.gz")
+    return folder / "v.nii.gz"
 
 
 def slc(compression: int, folder: Path) -> Path:
@@ -233,6 +249,10 @@ READERS: dict[str, Reader] = {
     "nii.gz inside": Reader(
         partial(volume, "packed.nii.gz"), read_volume, None, gzip.decompress, gzip.compress
     ),
+    "nii time inside": Reader(
+        nifti_in_time, partial(read_volume, time=1), None, gzip.decompress, gzip.compress
+    ),
+    "dicom samples": Reader(dicom, partial(read_volume, time=1), "slices/07-1.ima"),
     "plain.slc": Reader(partial(slc, 0), read_volume),
     "packed.slc": Reader(partial(slc, 1), read_volume),
     "netcdf": Reader(lambda folder: write_netcdf(folder / "v.nc", {"t": FIELD}), read_volume),
