@@ -154,7 +154,8 @@ def test_a_changed_value_runs_what_reads_it(project):
 
 
 def test_a_changed_line_runs_the_stages_that_import_it(project, sources):
-    sources("texgs/report/fit_figure.py", "import annotations\n", "import annotations\n\nCHANGED = True\n")
+    old = "from math import ceil\n"
+    sources("texgs/report/fit_figure.py", old, f"{old}\nCHANGED = True\n")
     pictures = {"figure", "comparison", "gallery", "mesh", "pse", "tables", "report"}
     assert changed(project) == pictures
     sources("texgs/config/recipes.py", '"seed of random numbers', '"seed of all random numbers')
