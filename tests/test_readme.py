@@ -20,7 +20,7 @@ import pyvista
 
 import texgs
 from tests.one_thread import one_thread  # noqa: F401
-from texgs.cli.main import STAGE_VERBS, main, parse
+from texgs.cli.main import STAGE_VERBS, VERBS, main, parse
 from texgs.config.compose import compose
 
 ROOT = Path(__file__).parents[1]
@@ -282,3 +282,8 @@ def test_the_script_without_parameters_runs_the_workflow(project, monkeypatch):
     paths = listing.removeprefix("ls -l ").split()
     code, said = run([*shlex.split(words.removeprefix(".venv/bin/")), *paths, "--dry-run"])
     assert code == 0, said
+
+
+def test_the_page_of_commands_names_every_verb():
+    page = (ROOT / "docs" / "usage.md").read_text(encoding="utf-8")
+    assert [verb for verb in VERBS if f"`{verb}`" not in page] == []
