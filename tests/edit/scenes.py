@@ -61,6 +61,15 @@ def views(count=6, size=64):
     return cameras(count, size), [HEADLIGHT] * count
 
 
+def two_steps():
+    """The ball with its upper half hidden, and the step at which all of it is there, farther to the right."""
+    p = ball().parameters
+    upper = p["means"][:, 1] > 0.05
+    key = {**p, "opacities": torch.where(upper, -12.0, p["opacities"])}
+    step = {**p, "means": p["means"] + torch.tensor([0.1, 0.0, 0.0])}
+    return Surfels(key, ball().shading), Surfels(step, ball().shading), upper
+
+
 def shell(count=160, texels=5, opacity=3.0, seed=0):
     """Surfels that are opaque together, in one colour and some noise: few enough for brute force."""
     p = {

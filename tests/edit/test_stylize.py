@@ -3,26 +3,24 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.edit.scenes import ball, plain_style, task, views
+from tests.edit.scenes import ball, plain_style, task, two_steps, views
 from tests.models.networks import random_weights
 from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.methods.image import ImageKeys, run
 from texgs.edit.recipe import PRESETS, preset
 from texgs.edit.style_picture import StylePicture
-from texgs.edit.style_start import pixel_side, start_colors, weights_of, where_shown
+from texgs.edit.style_start import pixel_side, start_colors
 from texgs.edit.stylize import Stylized, stylize
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.splats import GEOMETRY
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.step_file import write_step
 from texgs.fields.surfels.texels import lean, owners
 from texgs.models.pictures import picture
 from texgs.models.vgg import Vgg
 from texgs.raster.shading import MATERIAL
 from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.series_file import Series, read_series, write_series
 
 CHANGED = {"texels", "colors"}
 
@@ -291,27 +289,6 @@ def test_half_precision_learns_what_single_precision_does(tmp_path, style, dtype
     assert torch.cosine_similarity(moves[0].flatten(), moves[1].flatten(), dim=0) > 0.8
 
 
-def two_steps():
-    """The ball with its upper half hidden, and the step at which all of it is there, farther to the right."""
-    p = ball().parameters
-    upper = p["means"][:, 1] > 0.05
-    key = {**p, "opacities": torch.where(upper, -12.0, p["opacities"])}
-    step = {**p, "means": p["means"] + torch.tensor([0.1, 0.0, 0.0])}
-    return Surfels(key, ball().shading), Surfels(step, ball().shading), upper
-
-
-def test_a_picture_is_laid_onto_surfels_where_they_show_most_of_all_steps():
-    key, step, upper = two_steps()
-    laid = where_shown(key, [step], views()[0])
-    weights = torch.stack([weights_of(each, views()[0]) for each in (key, step)])
-    moved = (laid.parameters["means"] == step.parameters["means"]).all(dim=1)
-    seen = weights.max(dim=0).values > 0
-    assert torch.equal(moved[seen], (weights[1] > 4 * weights[0])[seen])
-    assert moved[upper & seen].all()
-    assert moved[~upper & seen].float().mean() < 0.2
-    assert torch.equal(laid.parameters["opacities"], key.parameters["opacities"])
-
-
 def test_what_only_another_step_shows_learns_from_it(style):
     key, step, upper = two_steps()
     start, done, alone = (
@@ -323,15 +300,3 @@ def test_what_only_another_step_shows_learns_from_it(style):
     hidden = upper[surfel]
     assert torch.equal(alone[places][hidden], unmoved[places][hidden]), "no view shows them"
     assert (done != start)[places][hidden].float().mean() > 0.3
-
-
-def test_a_look_of_a_series_is_learned_from_its_steps(tmp_path, style):
-    key, step, _ = two_steps()
-    file = write_model(tmp_path / "ball.safetensors", key)
-    series = write_series(Series(tmp_path / "series.json", ["a", "b"], ["ball"]))
-    for number, each in enumerate((key, step)):
-        write_step(read_series(series).model("ball", number), key, each, {})
-    scene = replace(Scene({"ball": SceneModel(file)}), series=read_series(series)).at(0)
-    (other,) = task(scene, tmp_path).other_steps("ball")
-    torch.testing.assert_close(other.parameters["means"], step.parameters["means"], atol=1e-4, rtol=0)
-    assert task(Scene({"ball": SceneModel(file)}), tmp_path).other_steps("ball") == []

@@ -74,6 +74,18 @@ def render_views(
     return edit_views(renders, cameras, None, None)
 
 
+def joined(parts: Sequence[EditViews]) -> EditViews:
+    """Return views of several models as if they were of one scene."""
+    if len(parts) == 1:
+        return parts[0]
+    shown, conditions, alphas, points, normals = (
+        torch.cat([getattr(each, name) for each in parts])
+        for name in ("images", "conditions", "alphas", "points", "normals")
+    )
+    cameras = [camera for each in parts for camera in each.cameras]
+    return EditViews(shown, conditions, alphas, points, normals, cameras)
+
+
 def light_on(model: Surfels, camera: Camera, light: Light | None) -> tuple[Tensor, Tensor]:
     """Return highlight [N, 3] and gain [N]: a fragment of bare colour c looks like highlight + gain * c.
 

@@ -4,7 +4,6 @@ Pictures are laid onto surfaces by place and normal, in chunks whose strokes sta
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -13,7 +12,6 @@ from torch.nn import functional as F
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.geometry import quats_to_matrices
-from texgs.edit.canvas import around
 from texgs.edit.recipe import Start
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.surfels.model import Surfels
@@ -26,10 +24,6 @@ DRIFT = 0.125  # longer sides of the picture between where a chunk and where the
 RIM = 0.98  # part of a sphere's radius that is read: the last pixels have some of the background
 MOST = 1 << 16  # cells along an axis
 TEXELS = 1 << 18  # at a time
-PLACE = ("means", "quats", "scales")
-MOVED = (*PLACE, "opacities")  # of surfels, in a series
-SHOWN_IN = 6  # views that tell how much surfels show
-BETTER = 4.0  # times as much as in the model: from then on, a surfel is laid out at another step
 # What the picture shows to the right and down, where a surface faces x, y or z: (z, -y), (x, z), (x, -y).
 RIGHT, DOWN = ((0.0, 0, 1), (1, 0, 0), (1, 0, 0)), ((0.0, -1, 0), (0, 0, 1), (0, -1, 0))
 
@@ -65,35 +59,6 @@ def pixel_side(model: Surfels, cameras: Sequence[Camera]) -> float:
         viewmat, K = (x.to(middle) for x in (camera.viewmat, camera.K))
         sides.append((viewmat[2, :3] @ middle + viewmat[2, 3]).abs() / K[1, 1])
     return float(torch.stack(sides).mean())
-
-
-@torch.no_grad()
-def where_shown(model: Surfels, steps: Sequence[Surfels], cameras: Sequence[Camera]) -> Surfels:
-    """Return a model of a series whose surfels are where views show them most, at one step or another.
-
-    They stay where they are unless another step shows them much better: a picture that is laid onto them is
-    then whole on surfaces of the model, and on those that appear later.
-    """
-    few = [around(model, camera.to(model.device)) for camera in cameras[:: -(-len(cameras) // SHOWN_IN)]]
-    shown = torch.stack([weights_of(placed(model, step), few) for step in (model, *steps)])
-    shown[0] *= BETTER
-    best = shown.argmax(dim=0)
-    rows = torch.arange(len(model), device=best.device)
-    every = [model, *steps]
-    chosen = {name: torch.stack([step.parameters[name] for step in every])[best, rows] for name in PLACE}
-    return replace(model, parameters={**model.parameters, **chosen})
-
-
-def weights_of(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
-    """Return how much each surfel [N] shows in some views: the sum of its blending weights."""
-    nothing = model.parameters["means"][:, :1]
-    renders = (model.rasterized(each, features=nothing, outputs=("statistics",)) for each in cameras)
-    return torch.stack([each.statistics.weight_sum for each in renders if each.statistics]).sum(0)
-
-
-def placed(model: Surfels, step: Surfels) -> Surfels:
-    """Return a model with its surfels where they are at a step of its series."""
-    return replace(model, parameters={**model.parameters, **{name: step.parameters[name] for name in MOVED}})
 
 
 def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:

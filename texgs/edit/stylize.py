@@ -13,9 +13,10 @@ from texgs.core.light import Light
 from texgs.edit.canvas import mean_alpha, paint, require_editable
 from texgs.edit.objective import FeatureTerm, Objective
 from texgs.edit.recipe import DEFAULT, Recipe
+from texgs.edit.steps import placed, where_shown
 from texgs.edit.style_loop import Painting, Stopwatch, learn_style
 from texgs.edit.style_picture import StylePicture, mirrored_crop
-from texgs.edit.style_start import pixel_side, placed, start_colors, where_shown
+from texgs.edit.style_start import pixel_side, start_colors
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import owners, recolored, spread, untextured
 from texgs.models.vgg import Vgg

@@ -13,7 +13,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.memory import require_memory
 from texgs.edit.canvas import require_editable
-from texgs.edit.observations import LinearObservation, Target, observe, render_views
+from texgs.edit.observations import LinearObservation, Target, joined, observe, render_views
+from texgs.edit.steps import Shot, placed, shots_of
 from texgs.edit.texel_solver import back_project, fill_unseen, learn, seen_texels, solve
 from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
@@ -84,6 +85,7 @@ def edit_by_text(
     light: Light = HEADLIGHT,
     opacity: float = 1.0,
     surfels: Tensor | None = None,
+    steps: Sequence[Surfels] = (),
     size: int = SIZE,
     seed: int = 0,
     title: str = "text",
@@ -104,6 +106,8 @@ def edit_by_text(
         light: that shines on the scene while it is edited.
         opacity: factor on the model's opacities, with which it is shown before and after the edit.
         surfels: [N] bool, which may change; all by default. Others keep their colours bit for bit.
+        steps: the model at other steps of a series, with the same texels: half as many views again show what
+            the model hides.
         size: pixels along the longer side of the six views; all training views are edited as they are.
         seed: of all random numbers; with the same one, machine and versions, results are the same.
         title: of progress bars.
@@ -113,19 +117,32 @@ def edit_by_text(
     changing = torch.ones(len(model), dtype=torch.bool) if surfels is None else surfels
     changing, shine = changing.to(model.device), light if guidance.lit else None
     generator = torch.Generator().manual_seed(seed)
-    cameras = edited_cameras(recipe, cameras, model.parameters["means"], size)
-    pixels, opacities = cameras[0].width * cameras[0].height, [opacity * x for x in recipe.opacities]
-    needed = len(cameras) * (PIXEL * pixels + len(opacities) * (FOLLOWED * pixels + SURFEL * len(model)))
-    require_memory(needed, f"{len(cameras)} views that are edited", "edit fewer views, or smaller ones")
-    views = render_views(model, cameras, shine, opacity)
+    means = torch.cat([each.parameters["means"] for each in (model, *steps)])
+    shots = shots_of(model, steps, edited_cameras(recipe, cameras, means, size), changing)
+    _require_memory(shots, recipe)
+    shown = [render_views(each.model, each.cameras, shine, opacity) for each in shots]
+    views = joined(shown)
     edited = require_edited(guidance(views, instruction, generator), views, guidance.name)
     own = model if recipe.is_textured else untextured(model, changing)
-    rows = observe(own, views, edited, shine, opacities, changing, target=recipe.target)
+    opacities = [opacity * x for x in recipe.opacities]
+    rows: list[list[LinearObservation]] = [[] for _ in opacities]
+    for shot, part, images in zip(shots, shown, edited.split([*map(len, shown)]), strict=True):
+        at, learning = placed(own, shot.model), shot.surfels if recipe.target == "colors" else changing
+        observed = observe(at, part, images, shine, opacities, learning, target=recipe.target)
+        rows = [[*row, *more] for row, more in zip(rows, observed, strict=True)]
     colors, weights = _follow(rows, own, recipe, generator, title)
     share = _seen_share(weights, own, changing)
     colors = colors if recipe.is_textured else spread(colors, own, model)
     changing = changing if recipe.fills else changing & _shown(weights, own)
     return Edited(recolored(model, colors, changing), views, edited, share)
+
+
+def _require_memory(shots: Sequence[Shot], recipe: TextRecipe) -> None:
+    """Require memory for views, and for what texels follow at each opacity."""
+    model, (camera, *_), _ = shots[0]
+    count, pixels = sum(len(each.cameras) for each in shots), camera.width * camera.height
+    needed = count * (PIXEL * pixels + len(recipe.opacities) * (FOLLOWED * pixels + SURFEL * len(model)))
+    require_memory(needed, f"{count} views that are edited", "edit fewer views, or smaller ones")
 
 
 def edited_cameras(

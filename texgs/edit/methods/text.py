@@ -77,6 +77,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
             light=task.scene.light,
             opacity=task.opacity_of(name),
             surfels=surfels,
+            steps=task.other_steps(name),
             size=settings.size,
             seed=task.edit.seed,
             title=task.title_of(name),
