@@ -488,6 +488,8 @@ def test_an_export_is_saved(chromium, scene_file):
     with served(scene_file) as (_, address), opened(chromium, address) as page:
         with page.expect_download(timeout=WAIT) as download:
             page.get_by_role("button", name="Export").click()
+            page.get_by_role("dialog").get_by_label("As").select_option("Web page")
+            expect(page.get_by_text("Steps in time")).to_be_hidden()  # this is no series
             page.get_by_role("dialog").get_by_label("As").select_option("3D Gaussians, PLY")
             page.get_by_role("dialog").get_by_role("button", name="Export").click()
         assert download.value.suggested_filename == "scene-3dgs.ply"

@@ -18,7 +18,8 @@ from torch.nn.functional import normalize
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOOK, LOW
 from tests.viewer.drawing import drawn, open_renderer, unpacked
-from tests.viewer.in_browser import LINK, PLACE, WAIT, expect, shown, still
+from tests.viewer.in_browser import LINK, PLACE, WAIT, expect, served, shown, still
+from tests.viewer.in_browser import opened as opened_viewer
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.cuts import Cuts, Plane
@@ -369,6 +370,35 @@ def test_steps_are_of_pages_alone(scene, tmp_path, capsys):
     assert "--steps: expected --to a page, .html, got" in capsys.readouterr().err
     assert main(["export", source, "--to", str(tmp_path / "x.html"), "--steps", "half"]) == 2
     assert "steps: expected all, one or a number N for each N-th step, got 'half'" in capsys.readouterr().err
+
+
+def exported_by(viewer, which=None, each=None):
+    """The steps that a page has which a viewer exports, with some of the series in it."""
+    with viewer.expect_download(timeout=WAIT) as download:
+        viewer.get_by_role("button", name="Export").click()
+        dialog = viewer.get_by_role("dialog")
+        dialog.get_by_label("As").select_option("Web page")
+        if which:
+            dialog.get_by_role("combobox", name="Steps in time").select_option(which)
+        if each:
+            dialog.get_by_role("spinbutton", name="N", exact=True).fill(each)
+        dialog.get_by_role("button", name="Export").click()
+    return download.value.path().read_text().count('class="step"')
+
+
+def test_the_viewer_asks_which_steps_a_page_holds(chromium, scene):
+    file = scene.series.file.with_name("scene.yaml")
+    with served(file) as (_, address), opened_viewer(chromium, address) as viewer:
+        viewer.get_by_role("button", name="Export").click()
+        dialog, asked = viewer.get_by_role("dialog"), viewer.get_by_role("combobox", name="Steps in time")
+        expect(asked).to_be_hidden()  # a film first
+        dialog.get_by_label("As").select_option("Web page")
+        expect(asked).to_be_visible()
+        expect(dialog.get_by_role("spinbutton", name="N", exact=True)).to_be_hidden()
+        dialog.get_by_role("button", name="Cancel").click()
+        assert exported_by(viewer) == COUNT
+        assert exported_by(viewer, "Each N-th", "2") == 3
+        assert exported_by(viewer, "The one that is shown") == 1
 
 
 def test_series_that_are_too_large_are_refused(scene, tmp_path, monkeypatch):

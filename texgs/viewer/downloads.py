@@ -43,7 +43,7 @@ class Downloads:
             return write_frames(path, self._film(scene, asked), asked.fps, comment=words)
         if asked.kind in PAGES:
             volume = page_volume(scene) if asked.kind == "volume" else None
-            write_page(path, scene, name, self._edits.checked(scene), volume)
+            write_page(path, scene, name, self._edits.checked(scene), volume, asked.steps)
             return path
         return export.export_scene(path, scene, export.Export(asked.kind))
 

@@ -181,6 +181,7 @@ class Export:
     stops: Annotated[tuple[Orbit, ...], Field(max_length=20)] = ()  # of a film; of fewer than 2, a turntable
     seconds: Annotated[float, Field(ge=0.1, le=600)] = 2.88  # of a film
     fps: Annotated[float, Field(ge=1, le=240)] = 25.0  # frames per second
+    steps: Annotated[str, Field(max_length=9)] = "all"  # of a series, in a page; see `page_steps`
     type: Literal["export"] = tag("export")
 
 

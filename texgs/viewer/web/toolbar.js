@@ -3,6 +3,7 @@
 import { EditHistory } from "./history.js";
 import { FilmInputs } from "./film.js";
 import { ask, download } from "./inputs.js";
+import { PageInputs } from "./page_inputs.js";
 import { PictureDialog } from "./size_inputs.js";
 
 const EXPORTS = {
@@ -13,7 +14,7 @@ const EXPORTS = {
 const get = (id) => document.getElementById(id);
 
 export class Toolbar {
-  #page; #film;
+  #page; #film; #pageInputs;
 
   /**
    * @param {object} page - with camera, job, notices, renderer, shown and state
@@ -26,6 +27,7 @@ export class Toolbar {
     new PictureDialog(page, (how) => this.#still(how));
     get("export-kind").append(...exports.map((kind) => new Option(EXPORTS[kind] ?? kind, kind)));
     this.#film = new FilmInputs(page);
+    this.#pageInputs = new PageInputs(page.state.scene);
     get("export").onclick = () => this.#export();
     get("save").onclick = () => this.#askForName();
     window.addEventListener("beforeunload", (event) => {
@@ -62,10 +64,11 @@ export class Toolbar {
 
   async #export() {
     this.#film.show();
+    this.#pageInputs.show();
     const kind = await ask(get("export-dialog"), get("export-kind").value);
     if (kind === null || !this.#page.mayBegin()) return;
     const { size, ...film } = this.#film.values;
-    this.#page.job.begin({ type: "export", kind, view: this.#view(size), ...film });
+    this.#page.job.begin({ type: "export", kind, view: this.#view(size), ...film, ...this.#pageInputs.values });
   }
 
   /** What is shown, as the server has it. */
