@@ -74,12 +74,7 @@ def fit(
 
 
 def fit_now_into(
-    volume: Volume,
-    functions: Mapping[str, TransferFunction],
-    size: int,
-    seed: int,
-    device: str,
-    folder: Path,
+    volume: Volume, functions: Mapping[str, TransferFunction], size: int, seed: int, device: str, folder: Path
 ) -> Path:
     """Fit models in memory, and write them and a scene into a folder; return the scene's file."""
     from texgs.fields.surfels.model_file import write_model

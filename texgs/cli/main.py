@@ -56,8 +56,7 @@ VERBS = {
 def overview() -> argparse.ArgumentParser:
     """Return the parser that lists the verbs."""
     top = Parser(
-        prog="texgs",
-        description="Editable 3D scenes of textured 2D Gaussians from scientific volumes.",
+        prog="texgs", description="Editable 3D scenes of textured 2D Gaussians from scientific volumes."
     )
     top.add_argument("--version", action="version", version=f"texgs {__version__}")
     verbs = top.add_subparsers(metavar="VERB", required=True)

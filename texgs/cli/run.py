@@ -5,8 +5,6 @@ options and targets of snakemake, such as --dry-run or results/report.html.
 `texgs views --help` lists all keys.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import shlex

@@ -58,8 +58,7 @@ class GalleryKeys:
     """What a data set's scenes are shown in; by default all new looks of the experiment."""
 
     name: str = key(
-        "looks",
-        "name of its folder, and that of fits side by side; as its file in conf/experiment",
+        "looks", "name of its folder, and that of fits side by side; as its file in conf/experiment"
     )
     section: str = key("more", "section of the report in which it stands", choices=SECTIONS)
     note: str = key("", "words behind the captions of all pictures, such as what stands in for what")

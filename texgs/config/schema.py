@@ -32,9 +32,7 @@ class Device:
 
     name: str = key("cpu", "device that the work runs on", choices=("cpu", "cuda"))
     renderer: str = key(
-        "cpu",
-        "what renders volumes: the caster, on the CPU or a GPU; or VTK",
-        choices=("cpu", "gpu", "vtk"),
+        "cpu", "what renders volumes: the caster, on the CPU or a GPU; or VTK", choices=("cpu", "gpu", "vtk")
     )
 
 
@@ -71,8 +69,7 @@ class Sweep:
     edit_seeds: list[int] = key([0], "seeds of edits; each edit is made once with each")
     variants: dict[str, list[str]] = key(dict, "overrides by the name of the variant")
     over: list[str] = key(
-        [],
-        "keys with several values, such as fit.low_pass=2,6; each combination is a variant",
+        [], "keys with several values, such as fit.low_pass=2,6; each combination is a variant"
     )
     edits: list[str] = key([], "edits that are made of each variant; default those of the experiment")
 

@@ -101,9 +101,7 @@ CATALOGUE: dict[str, Single | Snapshot] = {
     ),
     "sam_vit_h": Single(
         File(
-            "sam_vit_h_4b8939.pth",
-            2564.6,
-            "a7bf3b02f3ebf1267aba913ff637d9a2d5c33d3173bb679e46d9f338c26f262e",
+            "sam_vit_h_4b8939.pth", 2564.6, "a7bf3b02f3ebf1267aba913ff637d9a2d5c33d3173bb679e46d9f338c26f262e"
         ),
         "https://dl.fbaipublicfiles.com/segment_anything/sam_vit_h_4b8939.pth",
     ),

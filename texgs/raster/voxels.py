@@ -158,12 +158,7 @@ def camera_rays(camera: Camera) -> Tensor:
 class _Render(torch.autograd.Function):
     @staticmethod
     def forward(
-        ctx: Any,
-        grid: VoxelGrid,
-        march: March,
-        rays: Tensor,
-        keep: bool,
-        rows: Tensor,
+        ctx: Any, grid: VoxelGrid, march: March, rays: Tensor, keep: bool, rows: Tensor
     ) -> tuple[Tensor, Tensor, Tensor]:
         out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
         ctx.samples = Samples(grid, march, rays, out, keep)

@@ -58,11 +58,7 @@ def write_fit_figure(
 
 @torch.no_grad()
 def write_comparison(
-    path: str | Path,
-    models: Mapping[str, Field],
-    views: Mapping[str, View],
-    reduce: int = 1,
-    title: str = "",
+    path: str | Path, models: Mapping[str, Field], views: Mapping[str, View], reduce: int = 1, title: str = ""
 ) -> Path:
     """Draw fits by recipe side by side as PNG, in one step; arguments are those of `write_fit_figure`.
 

@@ -107,11 +107,7 @@ def mean(values: Iterable[Any]) -> float | None:
 
 
 def beside_paper(
-    rows: Rows,
-    name: str,
-    keys: Mapping[str, str],
-    columns: Mapping[str, Column],
-    is_sum: bool = False,
+    rows: Rows, name: str, keys: Mapping[str, str], columns: Mapping[str, Column], is_sum: bool = False
 ) -> Table:
     """Return a table of fits: means over the basic scenes of a data set, beside the paper's numbers.
 

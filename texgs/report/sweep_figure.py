@@ -65,11 +65,7 @@ def different(runs: DataFrame) -> dict[str, int]:
 
 
 def draw_panels(
-    figure: Figure,
-    titles: Mapping[str, int],
-    series: Mapping[str, DataFrame],
-    name: str,
-    bars: Sequence[str],
+    figure: Figure, titles: Mapping[str, int], series: Mapping[str, DataFrame], name: str, bars: Sequence[str]
 ) -> None:
     """Draw a panel for each measure, with a line or a bar for each of `bars` for each of the series."""
     rows, thick = -(-len(titles) // ACROSS), 0.8 / len(series)

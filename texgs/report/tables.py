@@ -1,7 +1,5 @@
 """The tables of a report in their order: first the paper's, then ours."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -35,10 +33,7 @@ class TableSpec:
         return f"Table {self.number}. {self.title}" if self.number else self.title
 
     def table(
-        self,
-        records: Sequence[Record[Any]],
-        left_out: Sequence[LeftOut] = (),
-        given: Table | None = None,
+        self, records: Sequence[Record[Any]], left_out: Sequence[LeftOut] = (), given: Table | None = None
     ) -> Table:
         """Return the table of some jobs, or the given one; its caption says what it shows and lacks."""
         made = self.make(records) if self.make else given or Table("", [], [])
@@ -187,9 +182,7 @@ def sweeps_of(records: Iterable[Record[Any]]) -> list[str]:
 
 
 def tables_of(
-    records: Sequence[Record[Any]],
-    left_out: Sequence[LeftOut] = (),
-    given: Mapping[str, Table] | None = None,
+    records: Sequence[Record[Any]], left_out: Sequence[LeftOut] = (), given: Mapping[str, Table] | None = None
 ) -> dict[str, Table]:
     """Return all tables of some jobs by their names, also empty ones; `given` need more than records."""
     own, listed = given or {}, specs(sweeps_of(records))

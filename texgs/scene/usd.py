@@ -13,13 +13,7 @@ from texgs.fields.splats import REACH
 from texgs.raster.shading import DEGREES
 from texgs.scene.clouds import Cloud
 
-ATTRIBUTES = (
-    "Position",
-    "Orientation",
-    "Scale",
-    "Opacity",
-    "SphericalHarmonics",
-)  # in schemas of their own
+ATTRIBUTES = ("Position", "Orientation", "Scale", "Opacity", "SphericalHarmonics")  # in schemas of their own
 
 
 def write_usd(path: str | Path, clouds: Sequence[Cloud]) -> Path:

@@ -19,19 +19,7 @@ from texgs.viewer.description import bounds, describe, presets
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Beside, Frames
 from texgs.viewer.guard import guard, headers
-from texgs.viewer.messages import (
-    Cancel,
-    Export,
-    Fit,
-    Look,
-    Mask,
-    Message,
-    Pick,
-    Save,
-    Segment,
-    View,
-    parse,
-)
+from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Pick, Save, Segment, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import Opened, SharedEdits, title_of

@@ -1,7 +1,5 @@
 """A scene as one HTML file that needs no server and no network."""
 
-from __future__ import annotations
-
 import json
 import re
 import zlib
@@ -65,11 +63,7 @@ def write_page(
 
 
 def scene_page(
-    scene: Scene,
-    name: str,
-    checked: str = "",
-    volume: PageVolume | None = None,
-    steps: str | int = "all",
+    scene: Scene, name: str, checked: str = "", volume: PageVolume | None = None, steps: str | int = "all"
 ) -> ScenePage:
     """Return the page of a scene of surfels; the same scene gives the same text.
 

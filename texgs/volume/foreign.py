@@ -3,8 +3,6 @@
 Damaged files crash libraries that are written in C++, and make them print instead of raising.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

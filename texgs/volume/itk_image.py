@@ -1,7 +1,5 @@
 """Images that SimpleITK reads, as lattice and samples."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

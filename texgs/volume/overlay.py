@@ -4,14 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from texgs.volume.transfer import (
-    Array,
-    TransferFunction,
-    combine,
-    just_above,
-    left_limit,
-    overlapping,
-)
+from texgs.volume.transfer import Array, TransferFunction, combine, just_above, left_limit, overlapping
 
 PARTS = 8  # straight pieces between two points: products of transparencies are curves
 DENSEST = 1 - 1e-9  # opacity whose extinction is still finite

@@ -4,8 +4,6 @@ Snakemake reads the Snakefile again in each job on a cluster. There the plan com
 wrote before it submitted the job, so that nothing is composed, digested or looked up again.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shlex

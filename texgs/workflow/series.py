@@ -1,7 +1,5 @@
 """Make a scene of a series in time: the models of a scene of one step, followed through the files of all."""
 
-from __future__ import annotations
-
 import filecmp
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Compact files of basic models: texels in fixed steps, the rest in half precision, packed by xz."""
 
-from __future__ import annotations
-
 import json
 import lzma
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Files of steps of a series: how the surfels of one step differ from those of the key model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from hashlib import sha256

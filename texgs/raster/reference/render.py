@@ -115,11 +115,7 @@ def composite(alpha: Tensor, transmittance_min: float) -> tuple[Tensor, Tensor]:
 
 
 def blend(
-    weights: Tensor,
-    fragments: Fragments,
-    index: Tensor,
-    features: Tensor | None,
-    texture: Texture | None,
+    weights: Tensor, fragments: Fragments, index: Tensor, features: Tensor | None, texture: Texture | None
 ) -> Tensor:
     """Return the sum over fragments [P, C] of weight times colour, without the background."""
     if features is None and texture is None:

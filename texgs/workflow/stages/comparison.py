@@ -1,7 +1,5 @@
 """Stage `comparison`: show the fits of several recipes side by side."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Stage `page`: a scene as one HTML file that shows and edits it in a browser, without a server."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Stage `shading`: from surfels to relightable ones, with Blinn-Phong shading fitted to the views."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from pathlib import Path
 

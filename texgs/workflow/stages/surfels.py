@@ -1,7 +1,5 @@
 """Stage `surfels`: seed surfels in the views, and fit them with spherical harmonics."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Stage `texture`: give the surfels of a relightable model textures; geometry and material stay."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Stage `timing`: how long a frame of the scene takes, beside one of the volume in the same minute."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from pathlib import Path

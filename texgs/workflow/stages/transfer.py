@@ -1,7 +1,5 @@
 """Stage `transfer`: compare a data set's basic TFs with its values, plot them, and export them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
