@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from tests.report.written import lines, metrics, records, rows, sources
-from texgs.report.fit_tables import PHASES, RUNS, SIZES, ablation, fits, fitting, model_size
+from texgs.report.fit_tables import ablation, fits, fitting, model_size
 from texgs.report.results import FitResult
-from texgs.report.table import UNLIKE
+from texgs.report.table import UNLIKE, columns
 
 DATASETS = {line["dataset"]: line for line in lines("datasets")}
 ENGINE = next(line for line in lines("fitting") if line["dataset"] == "engine")
@@ -58,7 +58,7 @@ def test_means_of_the_papers_basic_scenes_are_the_papers_rows(tmp_path):
             metrics(tmp_path, line["phase"], phase_of(line, factor), dataset, f"TF{index}", **facts)
     for row, line in zip(rows(fitting(records(tmp_path))), lines("fitting"), strict=True):
         assert (row["data set"], row["phase"]) == (line["dataset"], line["phase"])
-        check_row(row, line, PHASES, DATASETS[line["dataset"]]["basic_scenes"])
+        check_row(row, line, columns("fitting"), DATASETS[line["dataset"]]["basic_scenes"])
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_stand_in_has_a_row_of_its_own_without_the_papers_numbers(tmp_path):
     entries = rows(fitting(records(tmp_path)))
     assert [row["data set"] for row in entries[:4]] == ["five_jets"] * 3 + ["jets, stand-in for five jets"]
     assert [row["recipe"] for row in entries[:4]] == ["the paper"] * 3 + ["paper"]
-    assert {entries[3][f"{column.title} (paper)"] for column in PHASES.values()} == {None}
+    assert {entries[3][f"{column.title} (paper)"] for column in columns("fitting").values()} == {None}
 
 
 def test_a_measure_that_a_basic_scene_lacks_has_no_mean(tmp_path):
@@ -155,7 +155,7 @@ def test_means_of_the_papers_basic_scenes_and_seeds_are_the_papers_rows(tmp_path
             for seed, more in ((0, 0.05), (1, -0.05)):
                 write_fit(tmp_path, line, sweep, factor + more, tf, seed=seed)
     for row, line in zip(rows(ablation(records(tmp_path), sweep)), lines(sweep), strict=True):
-        check_row(row, line, RUNS, 2)
+        check_row(row, line, columns("views"), 2)
 
 
 @pytest.mark.parametrize("changed", [{"recipe": "quick"}, {"dataset": "engine"}, {"stand_in": "ionization"}])
@@ -172,7 +172,7 @@ def test_a_fit_with_a_missing_phase_is_not_measured(tmp_path):
         write_fit(tmp_path, lines("views")[0], tf=tf)
     max(tmp_path.iterdir()).unlink()
     own = rows(ablation(records(tmp_path), "views"))[0]
-    assert {own[column.title] for column in RUNS.values()} == {None}
+    assert {own[column.title] for column in columns("views").values()} == {None}
     assert own["PSNR (paper)"] == UNLIKE
 
 
@@ -186,14 +186,14 @@ def test_other_sweeps_do_not_count_but_for_their_like(tmp_path):
 def test_sums_over_the_papers_basic_scenes_are_the_papers_sizes(tmp_path):
     for line in lines("model_size"):
         scenes = int(line["basic_scenes"])
-        sizes = {group: line[group] / scenes for group in SIZES if group != "primitives"}
+        sizes = {group: line[group] / scenes for group in columns("model_size") if group != "primitives"}
         result = FitResult(60.0, round(line["primitives"] / scenes), sizes=sizes, **seen(line["dataset"]))
         for index in range(scenes):
             metrics(tmp_path, "texture", result, line["dataset"], f"TF{index}", "paper")
     by_dataset = {row["data set"]: row for row in rows(model_size(records(tmp_path)))}
     assert len(by_dataset) == len(model_size(records(tmp_path)).rows) == 4
     for line in lines("model_size"):
-        check_row(by_dataset[line["dataset"]], line, SIZES, line["basic_scenes"], rel=1e-6)
+        check_row(by_dataset[line["dataset"]], line, columns("model_size"), line["basic_scenes"], rel=1e-6)
 
 
 def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):

@@ -96,7 +96,7 @@ def add_votes_arguments(parser: argparse.ArgumentParser) -> None:
 def run_votes(arguments: argparse.Namespace) -> int:
     """Count the ballots of a user study: write the table and its figure, and print the table."""
     from texgs.report.table import write_table
-    from texgs.report.tables import STUDY
+    from texgs.report.tables import spec_of
     from texgs.study.ballots import read_votes
     from texgs.study.questions import read_key
     from texgs.study.votes import user_study, write_votes
@@ -106,8 +106,9 @@ def run_votes(arguments: argparse.Namespace) -> int:
     if not ballots:
         raise ArgumentError(f"votes: no ballots in {folder}; put the files there that voters send")
     votes = read_votes(study, ballots)
-    table = STUDY.table([], given=user_study(votes))
-    write_table(arguments.output, STUDY.name, table)
-    write_votes(arguments.output / f"{STUDY.name}.png", votes)
+    spec = spec_of("user_study")
+    table = spec.table([], given=user_study(votes))
+    write_table(arguments.output, spec.name, table)
+    write_votes(arguments.output / f"{spec.name}.png", votes)
     print(table.markdown())
     return 0

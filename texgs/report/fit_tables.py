@@ -7,46 +7,14 @@ from texgs.fitting.kinds import fit_specs
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import DATA, LABEL, beside_paper, cells, in_order, is_alike, rank
 from texgs.report.results import FitResult, MeshResult
-from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table
+from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table, columns
 
 Run = dict[str, Record[FitResult]]  # a fit by its phases
-PHASES = {  # columns of the table of phases, by the headings of the paper's file
-    "psnr": Column("PSNR", 2),
-    "ssim": Column("SSIM", 4),
-    "minutes": Column("minutes", 2),
-    "cpu_gb": Column("CPU GiB", 2),
-    "gpu_gb": Column("GPU GiB", 2, UNPUBLISHED),
-    "primitives": Column("primitives", 0),
-}
 ON_OBJECT = Column("PSNR on the object", 2)
 RELIT = Column("PSNR under unseen lights", 2, UNPUBLISHED)  # of the last phase
-RUNS = {  # the same for the tables of ablations
-    "train_psnr": Column("PSNR, training", 2),
-    "train_ssim": Column("SSIM, training", 4),
-    "test_psnr": Column("PSNR", 2),
-    "test_ssim": Column("SSIM", 4),
-    "fitting_min": Column("minutes", 2),
-    "primitives": Column("primitives", 0),
-}
-SIZES = {
-    "geometry_mib": Column("geometry MiB", 1),
-    "shading_mib": Column("shading MiB", 1),
-    "texture_mib": Column("texture MiB", 1),
-    "primitives": Column("primitives", 0),
-}
 VARIANTS = {  # by the sweep: the heading of its variants, and that of the paper's file
     "views": ("training views", "views"),
     "resolution": ("pixels", "image_px"),
-}
-MESHES = {
-    "chamfer": Column("Chamfer", 5),
-    "accuracy": Column("mesh to surface", 5),
-    "completeness": Column("surface to mesh", 5),
-    "f_score": Column("F-score", 3),
-    "tolerance": Column("tolerance", 3),
-    "normal_angle": Column("normals, degrees", 1),
-    "triangles": Column("triangles", 0),
-    "mesh_seconds": Column("seconds", 1),
 }
 
 
@@ -75,14 +43,14 @@ def phase_rows(records: Iterable[Record[Any]]) -> list[dict[str, Any]]:
 
 def fitting(records: Iterable[Record[Any]]) -> Table:
     """Return the table of all phases of fits: means over the basic scenes of a data set."""
-    return beside_paper(phase_rows(records), "fitting", {"phase": "phase"}, PHASES)
+    return beside_paper(phase_rows(records), "fitting", {"phase": "phase"}, columns("fitting"))
 
 
 def fits(records: Iterable[Record[Any]]) -> Table:
     """Return the table of all phases of fits, each basic TF by itself."""
     rows = sorted(phase_rows(records), key=lambda row: (row["rank"], row["TF"] or ""))
     labels = [Column(title) for title in (DATA, "TF", LABEL, "phase")]
-    psnr, *others = PHASES.values()
+    psnr, *others = columns("fitting").values()
     caption = "Test views, on the object where view or model show something; minutes of the phase itself."
     return Table(caption, [*labels, psnr, ON_OBJECT, RELIT, *others], rows)
 
@@ -130,7 +98,7 @@ def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
         row |= {LABEL: first.recipe, variant: first.variant, SOURCES: [part.path for part in run.values()]}
         rows.append(row)
     rows.sort(key=lambda row: (len(row[variant]), row[variant]))  # numbers, as words
-    return beside_paper(rows, sweep, {heading: variant}, RUNS)
+    return beside_paper(rows, sweep, {heading: variant}, columns("views"))
 
 
 def model_size(records: Iterable[Record[Any]]) -> Table:
@@ -139,9 +107,9 @@ def model_size(records: Iterable[Record[Any]]) -> Table:
     for record in in_order(of(FitResult, records)):
         if record.result.sizes and not record.is_swept:
             numbers = {**record.result.sizes, "primitives": record.result.primitives}
-            sizes = {column.title: numbers[key] for key, column in SIZES.items()}
+            sizes = {column.title: numbers[key] for key, column in columns("model_size").items()}
             rows.append(cells(record, alike=is_alike(record), **sizes))
-    return beside_paper(rows, "model_size", {}, SIZES, is_sum=True)
+    return beside_paper(rows, "model_size", {}, columns("model_size"), is_sum=True)
 
 
 def meshes(records: Iterable[Record[Any]]) -> Table:
@@ -150,8 +118,9 @@ def meshes(records: Iterable[Record[Any]]) -> Table:
         "Meshes fused from depth, against what training views see of the isosurface. Lengths in world units: "
         "the longest side of a volume is 1. The paper shows this comparison as a picture only."
     )
+    measured = columns("meshes")
     rows = [
-        cells(record, **{column.title: getattr(record.result, key) for key, column in MESHES.items()})
+        cells(record, **{column.title: getattr(record.result, key) for key, column in measured.items()})
         for record in in_order(of(MeshResult, records))
     ]
-    return Table(caption, [*map(Column, (DATA, "TF", LABEL)), *MESHES.values()], rows)
+    return Table(caption, [*map(Column, (DATA, "TF", LABEL)), *measured.values()], rows)

@@ -1,7 +1,6 @@
 """One HTML file with all that a run has to show: tables, pictures, curves, and where each came from."""
 
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from texgs.report.published import THEIRS, in_order
 from texgs.report.results import FitResult
 from texgs.report.sections import SECTIONS, Figure, data_uri, figures
 from texgs.report.sweep_figure import sweep_figure
-from texgs.report.table import SOURCES, Table
+from texgs.report.table import SOURCES, Table, report_file
 from texgs.report.tables import specs, sweeps_of, tables_of
 
 JOB = ("stage", "dataset", "tf", "recipe", "edit", "variant", "seed", "seconds", "peak_memory_mib", "device")
@@ -36,7 +35,7 @@ def write_report(
     """
     from jinja2 import Environment
 
-    template = files("texgs.report").joinpath("report.html.j2").read_text(encoding="utf-8")
+    template = report_file("report.html.j2")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     pictures = figures(records, Path(path).resolve().parent)
     pictures["fitting"] += loss_figures(records)

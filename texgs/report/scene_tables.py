@@ -28,35 +28,8 @@ from texgs.report.results import (
     ViewsResult,
     VolumeResult,
 )
-from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Column, Table
+from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Table, columns
 
-DATASETS = (
-    Column(DATA),
-    Column("volume, samples"),
-    Column("image, pixels"),
-    SCENES,
-    Column("volume MiB", 1),
-    Column("ms / frame", 1),
-    Column("VTK, ms / frame", 1),
-    Column("device", None, UNPUBLISHED),
-    Column("samples (paper)", None, UNPUBLISHED),
-    Column("basic scenes (paper)", 0, UNPUBLISHED),
-    Column("MiB (paper)", 1, UNPUBLISHED),
-    Column("ms / frame (paper)", 1, UNPUBLISHED),
-)
-RENDERING = (
-    Column(DATA),
-    Column(LABEL),
-    Column("pixels"),
-    Column("device"),
-    Column("threads", 0, UNPUBLISHED),
-    Column("primitives", 0),
-    Column("mean ms", 2),
-    Column("max ms", 2),
-    Column("volume, mean ms", 1),
-    Column("volume / scene", 1),
-    Column("volume, ms (paper)", 1, UNPUBLISHED),
-)
 WAYS = {
     "uncut": "not cut",
     "dropped": "surfels dropped by their centres",
@@ -64,26 +37,6 @@ WAYS = {
     "slab": "slab of the volume over clipped surfels",
     "volume": "the volume, cut",
 }
-CUTS = (
-    *map(Column, (DATA, LABEL, "cut by", "way")),
-    *(Column(title, 2) for title in ("whole", "face", "face, tenth", "band", "band, tenth")),
-    Column("ms", 2),
-    Column("ms / not cut", 2),
-)
-CLOSENESS = {
-    "psnr": Column("PSNR", 2),
-    "ssim": Column("SSIM", 4),
-    "object_psnr": Column("PSNR on the object", 2),
-    "object_ssim": Column("SSIM on the object", 4),
-}
-STEPS = (
-    *map(Column, (DATA, LABEL)),
-    *(Column(title, 0) for title in ("steps", "compared", "views")),
-    Column("s / step", 1),
-    Column("MiB / step", 2),
-    *(Column(title, 2) for title in ("PSNR", "PSNR of the worst step", "PSNR on the object")),
-)
-EDITS = (*map(Column, (DATA, LABEL, "edit")), Column("views", 0), *CLOSENESS.values())
 
 
 def datasets(records: Iterable[Record[Any]]) -> Table:
@@ -103,7 +56,7 @@ def datasets(records: Iterable[Record[Any]]) -> Table:
         device = str(record.facts["device"]) if isinstance(record.result, ViewsResult) else ""
         groups[record.dataset, record.result.width, record.result.height, device].append(record)
     rows = [dataset_row(own.get(key[0]), group, key[3]) for key, group in groups.items()]
-    return Table(caption, DATASETS, rows)
+    return Table(caption, [*columns("datasets").values()], rows)
 
 
 def dataset_row(
@@ -140,11 +93,11 @@ def rendering(records: Iterable[Record[Any]]) -> Table:
     """Return the time of frames of whole scenes, and of their volumes in the same job."""
     timings = [record for record in in_order(of(TimingResult, records)) if not record.is_swept]
     rows = [timing_row(record) for record in timings]
-    titles = [column.title for column in RENDERING[5:]]
+    titles = [*columns("rendering")][5:]
     means = mean_rows(rows, (LABEL, "pixels", "device", "threads"), titles)
     if any(intended_dataset(record) in volumes() for record in timings):
         means += [published_time("image", "800x800"), published_time("text", "512x512")]
-    return Table("", RENDERING, [*rows, *means])
+    return Table("", [*columns("rendering").values()], [*rows, *means])
 
 
 def timing_row(record: Record[TimingResult]) -> dict[str, Any]:
@@ -172,20 +125,22 @@ def published_time(driven: str, pixels: str) -> dict[str, Any]:
     numbers = {"primitives": "primitives", "render_mean_ms": "mean ms", "render_max_ms": "max ms"}
     lines = paper(f"{driven}_npse", {"method": "method"}, numbers).set_index("method")
     labels = {DATA: "mean of 4", LABEL: f"{THEIRS}, {driven}-driven", "pixels": pixels, "device": "RTX 4090"}
-    others = dict.fromkeys([column.title for column in RENDERING[8:]], UNPUBLISHED)
+    others = dict.fromkeys([*columns("rendering")][8:], UNPUBLISHED)
     return {**labels, **lines.loc["TexGS-VolVis"], **others}
 
 
 def edits(records: Iterable[Record[Any]]) -> Table:
     """Return edited scenes against the volume with the same edits."""
+    shown = columns("edits")
+    closeness = [*shown.items()][4:]
     rows = [
         cells(record, edit=step.title, views=record.result.views)
-        | {column.title: getattr(step, key) for key, column in CLOSENESS.items()}
+        | {column.title: getattr(step, key) for key, column in closeness}
         for record in in_order(of(PseResult, records))
         if not record.is_swept
         for step in (*record.result.pse, *record.result.relight)
     ]
-    return Table("", EDITS, rows)
+    return Table("", [*shown.values()], rows)
 
 
 def steps(records: Iterable[Record[Any]]) -> Table:
@@ -203,7 +158,7 @@ def steps(records: Iterable[Record[Any]]) -> Table:
         }
         counts = {"steps": result.steps, "compared": len(result.compared), "views": result.views}
         rows.append(cells(record, **counts, **quality))
-    return Table("", STEPS, rows)
+    return Table("", [*columns("steps").values()], rows)
 
 
 def cuts(records: Iterable[Record[Any]]) -> Table:
@@ -216,4 +171,4 @@ def cuts(records: Iterable[Record[Any]]) -> Table:
             scores = {"whole": each.whole, "face": each.face, "band": each.band, **tenths}
             ms = {"ms": each.ms, "ms / not cut": each.ms / uncut[each.case]}
             rows.append(cells(record, **{"cut by": each.case, "way": WAYS[each.way]}, **scores, **ms))
-    return Table("", CUTS, rows)
+    return Table("", [*columns("cuts").values()], rows)

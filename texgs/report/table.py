@@ -6,11 +6,13 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.io import write_bytes
+from texgs.core.plain_yaml import parse_yaml
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -30,19 +32,6 @@ SPECIAL = {  # letters that LaTeX takes for something else, or has other names f
     **{"[": "{[}", "]": "{]}"},  # after the end of a row they would hold an argument
     **{"–": "--", "—": "---", "‘": "`", "’": "'", "“": "``", "”": "''"},
 }
-HEAD = r"""% All tables of a report: pdflatex tables.tex
-\documentclass{article}
-\usepackage[a3paper,margin=15mm]{geometry}
-\usepackage[T1]{fontenc}
-\usepackage[utf8]{inputenc}
-\usepackage{booktabs}
-\usepackage{graphicx}
-\newsavebox{\tablebox}
-% A table at its own size, or as wide as the page.
-\newcommand{\fitted}[1]{\sbox{\tablebox}{\input{#1}\unskip}%
-  \ifdim\wd\tablebox>\linewidth\resizebox{\linewidth}{!}{\usebox{\tablebox}}\else\usebox{\tablebox}\fi}
-\begin{document}
-"""
 FLOAT = r"""\begin{table}[p]
 \centering
 \textbf{%s}
@@ -75,6 +64,24 @@ class Column:
         if cell is None:
             return self.missing
         return str(cell) if isinstance(cell, str) or self.digits is None else f"{cell:,.{self.digits}f}"
+
+
+@cache
+def tables_file() -> dict[str, dict[str, Any]]:
+    """Return what tables.yaml tells of each table, by name."""
+    tables: dict[str, dict[str, Any]] = parse_yaml(report_file("tables.yaml"))
+    return tables
+
+
+def report_file(name: str) -> str:
+    """Return the text of a file beside this module."""
+    return files("texgs.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def columns(name: str) -> dict[str, Column]:
+    """Return the columns of a table by their keys in tables.yaml."""
+    told = tables_file()[name]["columns"]
+    return {key: Column(**{"title": key, **facts}) for key, facts in told.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +159,7 @@ def write_tables(folder: str | Path, tables: Mapping[str, Table]) -> None:
         write_table(folder, name, table)
         if not table.is_empty:
             floats.append(FLOAT % (escape(table.heading or name), escape(table.caption), name))
-    text = "".join([HEAD, *floats, "\\end{document}\n"])
+    text = "".join([report_file(DOCUMENT), *floats, "\\end{document}\n"])
     write_bytes(Path(folder, DOCUMENT), text.encode())
 
 

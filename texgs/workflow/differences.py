@@ -4,7 +4,6 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 from texgs.config.compose import compose
@@ -15,7 +14,7 @@ from texgs.core.plain_yaml import parse_yaml
 from texgs.edit.method import NO_METHOD, method_of
 from texgs.report.metrics_files import Record, of
 from texgs.report.results import EditResult, FitResult, SheetResult
-from texgs.report.table import Column, Table
+from texgs.report.table import Column, Table, report_file
 
 COLUMNS = tuple(map(Column, ("what", "the paper", "here", "in", "where the paper says it")))
 ALL = "all"  # of what no key expresses
@@ -66,8 +65,7 @@ class Published:
 @cache
 def published() -> Published:
     """Read what the paper says from recipe.yaml."""
-    file = files("texgs.report").joinpath("paper", "recipe.yaml")
-    return typed(Published, parse_yaml(file.read_text(encoding="utf-8")))
+    return typed(Published, parse_yaml(report_file("paper/recipe.yaml")))
 
 
 def differences(
