@@ -15,7 +15,7 @@ class ProjectionResult(Result, section="data"):
     mean: float  # of the picture, 0 to 1
 
 
-def work(settings, inputs, output):
+def work(settings: OfDataset, inputs, output):
     """Write projection.png, the largest sample along z."""
     import torch
 
@@ -33,7 +33,6 @@ STAGE = Stage(
     order=25,
     help="project a volume by its largest samples",
     rule=Rule("projection", "{dataset}/projection", ("projection.png",), target="volumes", threads=1),
-    schema=OfDataset,
     inputs=prepared_volume,
     work=work,
     applies=has_volume,

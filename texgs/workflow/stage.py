@@ -6,6 +6,8 @@ say by `read` which values of the configuration they have.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cached_property
+from inspect import signature
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal, cast, get_type_hints
@@ -55,7 +57,6 @@ class Stage:
     order: int  # among the stages: behind those whose files it reads
     help: str  # what it does, in `texgs --help`
     rule: Rule
-    schema: type[Any]  # dataclass of its settings, whose fields say what they `read`
     inputs: Callable[[Config], dict[str, Path]]  # the files it reads, by name
     work: Callable[[Any, dict[str, Path], Path], Outcome]  # its job: from settings and inputs to a folder
     applies: Callable[[Config], bool] = lambda config: True  # whether a data set or edit goes through it
@@ -65,6 +66,12 @@ class Stage:
     def module(self) -> str:
         """What the job runs."""
         return self.work.__module__
+
+    @cached_property
+    def schema(self) -> type[Any]:
+        """Dataclass of its settings, whose fields say what they `read`: the first that `work` takes."""
+        first = next(iter(signature(self.work).parameters))
+        return cast(type[Any], get_type_hints(self.work)[first])
 
     @property
     def place(self) -> str:

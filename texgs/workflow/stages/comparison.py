@@ -57,7 +57,6 @@ STAGE = Stage(
         target="comparisons",
         shown={"comparison.png": "Test views, the fit of each recipe with its PSNR, and below it its error."},
     ),
-    schema=Settings,
     inputs=inputs,
     work=work,
     applies=applies,

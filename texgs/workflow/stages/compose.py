@@ -81,7 +81,6 @@ STAGE = Stage(
         gpu=("fit",),
         shown={"scene.png": "The basic models as one scene, rendered from their primitives."},
     ),
-    schema=Settings,
     inputs=models_and_volume,
     work=work,
     applies=has_scene,

@@ -202,7 +202,6 @@ STAGE = Stage(
             "their centres, as other viewers of splats do."
         },
     ),
-    schema=Settings,
     inputs=scene_and_volume,
     work=work,
     applies=applies,

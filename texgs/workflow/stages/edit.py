@@ -139,7 +139,6 @@ def stage_of(method: Method[Any]) -> Stage:
         order=150,
         help=method.summary,
         rule=RULE,
-        schema=Settings,
         inputs=edited_scene,
         work=work,
         applies=lambda config: config.tf is None and config.edit.method == method.name,

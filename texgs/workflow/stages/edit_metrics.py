@@ -105,7 +105,6 @@ STAGE = Stage(
         threads=EVERY,  # it measures frames, too
         gpu=("fit",),
     ),
-    schema=Settings,
     inputs=inputs,
     work=work,
     applies=applies,

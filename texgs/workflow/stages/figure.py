@@ -86,7 +86,6 @@ STAGE = Stage(
         target="figures",
         shown={"figure.png": "Test views, the phases of the fit, errors, normals, depth and material."},
     ),
-    schema=Settings,
     inputs=inputs,
     work=work,
     applies=is_fit,

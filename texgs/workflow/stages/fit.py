@@ -155,7 +155,6 @@ def stage_of(kind: FitSpec[Any]) -> Stage:
         order=80,
         help=kind.summary,
         rule=PHASE,
-        schema=Settings,
         inputs=view_set,
         work=work,
         applies=is_fit_of(kind.name),

@@ -245,7 +245,6 @@ STAGE = Stage(
     order=170,
     help="show all looks of a data set side by side",
     rule=Rule("gallery", "{dataset}/gallery/{gallery}", target="galleries", gpu=("fit",)),
-    schema=Settings,
     inputs=gallery_inputs,
     work=work,
     applies=applies,

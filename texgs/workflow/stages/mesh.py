@@ -118,7 +118,6 @@ STAGE = Stage(
         gpu=("fit",),
         shown={"mesh.png": "The isosurface of the volume, the mesh of the fit, and its distance from it."},
     ),
-    schema=Settings,
     inputs=lambda config: {**model_of(last_phase(config))(config), **prepared_volume(config)},
     work=work,
     applies=applies,

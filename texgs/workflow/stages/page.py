@@ -68,7 +68,6 @@ STAGE = Stage(
         threads=2,
         shown={"scene.html": SHOWN},
     ),
-    schema=Settings,
     inputs=inputs,
     work=work,
     applies=applies,

@@ -158,7 +158,6 @@ STAGE = Stage(
         gpu=("fit",),
         shown={name: f"{words}." for name, words in PICTURES.items()},
     ),
-    schema=OfScene,
     inputs=scene_and_volume,
     work=work,
     applies=has_scene,

@@ -62,7 +62,6 @@ STAGE = Stage(
     order=60,
     help="fit relightable surfels with Blinn-Phong shading",
     rule=PHASE,
-    schema=Settings,
     inputs=model_of("surfels"),
     work=work,
     applies=is_fit_of("surfels"),

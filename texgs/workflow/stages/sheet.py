@@ -62,7 +62,6 @@ STAGE = Stage(
         threads=1,
         shown={"sheet.png": "Views that the model was fitted to, and test views."},
     ),
-    schema=OfTF,
     inputs=view_set,
     work=work,
     applies=applies,

@@ -120,7 +120,6 @@ STAGE = Stage(
         gpu=("fit",),
         shown={"steps.png": SHOWN + BELOW},
     ),
-    schema=Settings,
     inputs=inputs,
     work=work,
     applies=lambda config: has_scene(config) and is_series(config),

@@ -72,7 +72,6 @@ STAGE = Stage(
     order=50,
     help="seed surfels and fit them with spherical harmonics",
     rule=PHASE,
-    schema=Settings,
     inputs=inputs,
     work=work,
     applies=is_fit_of("surfels"),

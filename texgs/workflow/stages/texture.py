@@ -40,7 +40,6 @@ STAGE = Stage(
     order=70,
     help="give relightable surfels textures",
     rule=PHASE,
-    schema=Settings,
     inputs=model_of("shading"),
     work=work,
     applies=is_fit_of("surfels"),

@@ -57,7 +57,6 @@ STAGE = Stage(
         threads=EVERY,  # other jobs would be measured with it
         gpu=("fit",),
     ),
-    schema=OfScene,
     inputs=scene_and_volume,
     work=work,
     applies=has_scene,

@@ -61,7 +61,6 @@ STAGE = Stage(
         threads=1,
         shown={"transfer.png": "Histogram of the volume with the basic transfer functions."},
     ),
-    schema=Settings,
     inputs=prepared_volume,
     work=work,
     applies=has_volume,

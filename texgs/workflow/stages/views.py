@@ -269,7 +269,6 @@ STAGE = Stage(
         ("transforms_train.json", "transforms_test.json", "turntable.png"),
         gpu=("views",),
     ),
-    schema=Settings,
     inputs=prepared_volume,
     work=work,
     applies=has_volume,

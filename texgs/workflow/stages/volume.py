@@ -114,7 +114,6 @@ STAGE = Stage(
     order=10,
     help="make or read the volume of a data set, and check it",
     rule=Rule("volume", "{dataset}/volume", ("volume.nrrd", "volume.json"), threads=1),
-    schema=Settings,
     inputs=inputs,
     work=work,
     applies=has_volume,
