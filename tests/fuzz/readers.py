@@ -16,6 +16,7 @@ import nibabel
 import numpy as np
 import torch
 from PIL import Image
+from pydicom.uid import generate_uid
 from zarr.codecs import BloscCodec
 
 from tests.config.kept import project
@@ -95,6 +96,15 @@ def dicom(folder: Path) -> Path:
     (folder / "slices").mkdir()
     for step in range(2):
         write_slices(folder / "slices", sample_values()[:4] + step, number=step, AcquisitionNumber=step)
+    return folder / "slices"
+
+
+def dicom_phases(folder: Path) -> Path:
+    """Two series of four slices."""
+    (folder / "slices").mkdir()
+    for step in range(2):
+        uid = generate_uid(entropy_srcs=[str(step)])
+        write_slices(folder / "slices", sample_values()[:4] + step, number=step, uid=uid)
     return folder / "slices"
 
 
@@ -253,6 +263,9 @@ READERS: dict[str, Reader] = {
         nifti_in_time, partial(read_volume, time=1), None, gzip.decompress, gzip.compress
     ),
     "dicom samples": Reader(dicom, partial(read_volume, time=1), "slices/07-1.ima"),
+    "dicom phases samples": Reader(
+        dicom_phases, partial(read_volume, series="all", time=1), "slices/00-1.ima"
+    ),
     "plain.slc": Reader(partial(slc, 0), read_volume),
     "packed.slc": Reader(partial(slc, 1), read_volume),
     "netcdf": Reader(lambda folder: write_netcdf(folder / "v.nc", {"t": FIELD}), read_volume),

@@ -201,3 +201,105 @@ def test_a_slice_that_is_cut_off_is_refused(tmp_path, which):
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(ArgumentError, match=f"{path.name}: cut off or damaged"):
         open_source(tmp_path)
+
+
+def write_phases(folder, tags, n_steps=3, first=4):
+    """A series for each phase; tags are functions of its step. Their numbers begin with the last step."""
+    for step in range(n_steps):
+        values, number = sample_values()[:5] + 100 * step, first + n_steps - step
+        said = {name: value(step) for name, value in tags.items()}
+        write_series(folder, values, uid=generate_uid(), **{"number": number, **said})
+
+
+def no_position(step):
+    return 1
+
+
+@pytest.mark.parametrize(
+    ("tags", "name"),
+    [
+        (
+            {"TemporalPositionIdentifier": lambda t: 9 + t, "SeriesDescription": lambda t: f"{50 - t} %"},
+            "7 to 5, ordered by temporal position",
+        ),
+        (
+            {
+                "SeriesDescription": lambda t: f"CT 1.5 T={2 * t}0.0% ex",
+                "TemporalPositionIdentifier": no_position,
+            },
+            "7 to 5, ordered by percentage",
+        ),
+        (
+            {"number": lambda t: 9 + t, "SeriesDescription": lambda t: "50%"},
+            "9 to 11, ordered by series number",
+        ),
+    ],
+    ids=["position", "percentage", "number"],
+)
+def test_series_on_one_lattice_are_steps_in_time(tmp_path, tags, name):
+    """The first number that is not the same in all of them counts."""
+    write_phases(tmp_path, tags)
+    scout = {"number": 2, "uid": generate_uid(), "orientation": (1, 0, 0, 0, 0, -1)}
+    write_series(tmp_path, sample_values()[:1], SeriesDescription="Scout", **scout)
+    for step in range(3):
+        source = open_source(tmp_path, series="all", time=step)
+        assert (source.n_steps, source.spacing) == (3, (0.5, 2, 2.5))
+        np.testing.assert_array_equal(source.slices(0, 5), sample_values()[:5] + 100 * step)
+    left = f"left out, on other lattices: 2 (Scout, 1 files, UID {scout['uid']})"
+    assert open_source(tmp_path, series="all").note.endswith(f"; steps are the 3 series {name}; {left}")
+    with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 2, got 3$"):
+        open_source(tmp_path, series="all", time=3)
+    with pytest.raises(ArgumentError, match="or series=all for those alike, as steps in time, of "):
+        open_source(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("tags", "message"),
+    [
+        (
+            {"TemporalPositionIdentifier": lambda t: t or ""},
+            "expected a temporal position in each series, all",
+        ),
+        (
+            {"SeriesDescription": lambda t: f"{t // 2}0%"},
+            "expected a percentage in each series, all different",
+        ),
+        ({"SeriesDescription": lambda t: f"{t}0%" if t else "mean"}, "expected a percentage in each series"),
+        (
+            {"SeriesNumber": lambda t: 7},
+            "expected a series number in each series, all different, got 7 .Bone, 5 files",
+        ),
+    ],
+)
+def test_an_order_that_is_not_told_is_refused(tmp_path, tags, message):
+    write_phases(tmp_path, {"SeriesDescription": lambda t: "Bone", **tags})
+    with pytest.raises(ArgumentError, match=message):
+        open_source(tmp_path, series="all")
+
+
+def test_series_of_which_none_are_most_are_refused(tmp_path):
+    write_series(tmp_path, sample_values()[:4], number=1)
+    write_series(tmp_path, sample_values()[:5, :7], number=2, uid=generate_uid())
+    message = "expected series on one lattice, and fewer on any other, got "
+    with pytest.raises(ArgumentError, match=message):
+        open_source(tmp_path, series="all")
+    for number, rows in ((3, 12), (4, 7)):
+        values = sample_values()[: 4 if rows == 12 else 5, :rows]
+        write_series(tmp_path, values, number=number, uid=generate_uid())
+    with pytest.raises(ArgumentError, match=message):
+        open_source(tmp_path, series="all")
+
+
+def test_a_series_that_lacks_slices_is_refused(tmp_path):
+    write_phases(tmp_path, {"TemporalPositionIdentifier": lambda t: t})
+    (tmp_path / "28-6.ima").unlink()
+    message = (
+        r"expected series as long as \d \(Bone, 5 files, .*\), got 6 \(Bone, 4 files, .*; complete them$"
+    )
+    with pytest.raises(ArgumentError, match=message):
+        open_source(tmp_path, series="all")
+
+
+def test_one_series_alone_has_its_own_steps(tmp_path):
+    write_steps(tmp_path, {"TemporalPositionIdentifier": lambda step, z: step})
+    assert open_source(tmp_path, series="all", time=2).n_steps == 3

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 import torch
 import yaml
+from pydicom.uid import generate_uid
 
 import texgs
 from tests.volume.test_dicom import write_series as write_slices
 from tests.volume.test_motion import TF, blob
 from tests.volume.zarr_files import axes_of, write_image
 from texgs.cli.main import main
+from texgs.config.dataset import Volume
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.image import read_rgba
@@ -317,6 +319,18 @@ def test_one_folder_of_slices_has_all_steps(folder):
         write_dicom(folder / "heart", place, number=step, TriggerTime=40 * step + 20)
     prepare(open_source(folder / "heart", time=1), folder / "volume.nrrd")
     assert followed(folder, "heart") == [f"heart, step {time}" for time in range(3)]
+
+
+def test_one_folder_has_a_series_for_each_phase(folder):
+    for step, place in enumerate(PLACES):
+        tags = {"uid": generate_uid(), "SeriesDescription": f"{50 * step}%"}
+        write_dicom(folder / "lung", place, number=9 - step, **tags)
+    prepare(open_source(folder / "lung", series="all", time=1), folder / "volume.nrrd")
+    file = make_series(read_scene("scene.yaml"), [folder / "lung"], folder / "s", CPU, Volume(series="all"))
+    scene = read_scene(file)
+    assert (scene.time, [*scene.series.steps]) == (1, [f"lung, step {time}" for time in range(3)])
+    for time, place in enumerate(PLACES):
+        assert centre(scene.at(time)) == pytest.approx(place, abs=0.02)
 
 
 def test_one_folder_of_files_has_all_steps(folder):

@@ -23,7 +23,8 @@ class Volume:
         None, "file, or folder of TIFF or DICOM slices, or of Zarr; relative to data_folder"
     )
     series: str | None = key(
-        None, "number or UID of the series to read, where a folder of DICOM slices has several"
+        None,
+        "number or UID of the series to read of a folder of DICOM slices; all: those alike are steps in time",
     )
     variable: str | None = key(
         None, "array to read, by its path in the file, where Zarr, HDF5 or NetCDF has several"

@@ -3,6 +3,7 @@
 Which series, which of its steps in time, and whether their slices are a lattice.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,10 +12,12 @@ import numpy as np
 import SimpleITK as sitk
 
 from texgs.core.errors import ArgumentError
+from texgs.volume.dicom_phases import ALL, FileSeries, phases_of
 from texgs.volume.grid import require_room
 from texgs.volume.itk_image import require_volume, sentence
 
-NUMBER, DESCRIPTION, PLACE, ORIENTATION = "0020|0011", "0008|103e", "0020|0032", "0020|0037"  # tags
+OF_SERIES = "0020|0011", "0008|103e", "0020|0100"  # tags: number, description and position in time
+PLACE, ORIENTATION = "0020|0032", "0020|0037"  # and of a slice
 # Tags that order slices at one place in time: the first does whose values differ at each place.
 TIMES = {"0020|0100": "temporal position", "0018|1060": "trigger time", "0020|0012": "acquisition number"}
 UNEVEN = 0.05  # of the distance of slices: how much one may differ, as places are rounded in files
@@ -45,11 +48,7 @@ def read_dicom(folder: Path, series: str | None, time: int) -> tuple[dict[str, A
     """Read lattice and samples [Z, Y, X], rescaled by slope and intercept, of a step of a series."""
     sitk.ProcessObject.GlobalWarningDisplayOff()
     try:
-        files = chosen_files(folder, series)
-        steps = steps_of(sorted((slice_of(Path(file)) for file in files), key=lambda each: each.height))
-        if not 0 <= time < len(steps):
-            raise ArgumentError(f"dataset.volume.time: expected one of 0 to {len(steps) - 1}, got {time}")
-        slices = steps[time]
+        slices, n_steps, note = step_at(folder, series, time)
         step, first = slice_distance(slices), slices[0]
         pixel_ids = {each.pixel_id for each in slices}
         pixel_id = sitk.sitkFloat64 if len(pixel_ids) > 1 else pixel_ids.pop()
@@ -67,34 +66,67 @@ def read_dicom(folder: Path, series: str | None, time: int) -> tuple[dict[str, A
         "spacing": (*first.spacing[:2], step),
         "origin": first.place.tolist(),
         "directions": first.directions.tolist(),
-        "n_steps": len(steps),
+        "n_steps": n_steps,
+        "note": note,
     }
     return lattice, values
 
 
-def chosen_files(folder: Path, series: str | None) -> list[str]:
-    """Return the files of the only series, or of the one whose number or UID is asked for."""
-    chosen, titles, listed = [], [], set[str]()
-    for uid in sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder)):
-        files = list(sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid))
-        reader = header(Path(files[0]))
-        number = tag(reader, NUMBER)
-        titles.append(f"{number} ({tag(reader, DESCRIPTION)}, {len(files)} files, UID {uid})")
-        if series is None or series in (uid, number):
-            chosen.append(files)
-        listed.update(Path(file).name for file in files)
-    unlisted = (path for path in sorted(folder.iterdir()) if path.name not in listed)
+def step_at(folder: Path, series: str | None, time: int) -> tuple[list[Slice], int, str]:
+    """Return the slices of a step, how many steps there are, and what there is to say about them."""
+    every, note = series_in(folder), ""
+    steps: Any
+    if series == ALL and len(every) > 1:
+        steps, note = phases_of(every)
+    else:
+        steps = steps_of(slices_of(chosen(every, series)))
+    if not 0 <= time < len(steps):
+        raise ArgumentError(f"dataset.volume.time: expected one of 0 to {len(steps) - 1}, got {time}")
+    return slices_of(steps[time]) if note else steps[time], len(steps), note
+
+
+def series_in(folder: Path) -> list[FileSeries]:
+    """Return all series of a folder, one at least; no slice may be damaged."""
+    found, reader = [], sitk.ImageSeriesReader
+    for uid in reader.GetGDCMSeriesIDs(str(folder)):
+        files = reader.GetGDCMSeriesFileNames(str(folder), uid)
+        first, lattice = header(Path(files[0])), lattice_of(Path(files[0]), len(files))
+        number, description, position = (tag(first, each) for each in OF_SERIES)
+        found.append(FileSeries(number, description, position, uid, files, lattice))
+    names = {Path(file).name for each in found for file in each.files}
+    unlisted = (path for path in sorted(folder.iterdir()) if path.name not in names)
     if damaged := next((path.name for path in unlisted if is_slice(path)), None):
         raise ArgumentError(f"{damaged}: cut off or damaged; put the whole slice there, or take it away")
-    if not titles:
+    if not found:
         raise ArgumentError("expected a folder of DICOM slices or TIFFs (.tif, .tiff), found none in it")
-    if len(chosen) != 1:
-        what = "several series" if series is None else f"{len(chosen)} series for {series!r}"
+    return found
+
+
+def lattice_of(file: Path, count: int) -> tuple[float, ...]:
+    """Return that of a series as `FileSeries` has it, rounded to 0.001 mm."""
+    try:
+        first = slice_of(file)
+    except ArgumentError:  # a report, say, that has no place
+        return ()
+    numbers = count, *first.sizes[:2], *first.spacing[:2], *first.place, *first.directions.flat
+    return tuple(round(float(each), 3) for each in numbers)
+
+
+def chosen(every: Sequence[FileSeries], series: str | None) -> FileSeries:
+    """Return the only series, or the one whose number or UID is asked for."""
+    found = [each for each in every if series in (None, ALL, each.uid, each.number)]
+    if len(found) != 1:
+        what = "several series" if series is None else f"{len(found)} series for {series!r}"
         raise ArgumentError(
             f"expected one series of DICOM slices, got {what}; choose one by dataset.volume.series=NUMBER "
-            f"or UID, of {'; '.join(titles)}"
+            f"or UID, or series={ALL} for those alike, as steps in time, of {'; '.join(map(str, every))}"
         )
-    return chosen[0]
+    return found[0]
+
+
+def slices_of(series: FileSeries) -> list[Slice]:
+    """Return the slices of a series, sorted by height."""
+    return sorted((slice_of(Path(file)) for file in series.files), key=lambda each: each.height)
 
 
 def is_slice(path: Path) -> bool:

@@ -65,7 +65,7 @@ def open_foreign(
                 values = RawSource(stored.path, dims, dtype, offset).mapped()
         source = ArraySource(Grid(permuted_values(values, axes), (dx, dy, dz), (x, y, z)), path.name)
         source.n_steps = reply.get("n_steps", 1)
-        source.note = step_note(time, source.n_steps)
+        source.note = "; ".join(filter(None, (step_note(time, source.n_steps), reply.get("note"))))
         return source
 
 
