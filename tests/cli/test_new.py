@@ -7,10 +7,11 @@ import yaml
 from tests.volume.zarr_files import LABELS, all_axes, axes_of, write_image
 from texgs.cli import new
 from texgs.cli.main import main
-from texgs.config.compose import compose
+from texgs.config.compose import compose, recompose
 from texgs.config.project import ROOT, groups, members
 from texgs.core.io import write_json
 from texgs.volume.nrrd_file import open_grid
+from texgs.volume.suggest import COLORS
 from texgs.volume.transfer import TransferFunction
 
 # no text to YAML, or no name of a file
@@ -82,45 +83,109 @@ def omero(label, color, start, end):
     }
 
 
-def test_channels_become_data_sets_of_their_colour_and_window(conf, scan, capsys):
-    """All but the last, which has no window: its functions come from the histogram."""
+def cells(folder, scan, shown, *, other=lambda values: values + 10):
+    """An image of as many channels as are described, each 10 above the one before."""
+    channels = [np.load(scan)]
+    while len(channels) < len(shown or range(2)):
+        channels.append(other(channels[-1]))
+    return write_image(
+        folder / "cells.zarr", [np.stack(channels)], axes_of("czyx"), [(1, 1, 1, 1)], labels=shown
+    )
+
+
+def test_channels_become_functions_of_their_colour_and_window(conf, scan, capsys):
+    """All but the last, which has no window: its function comes from the histogram, its colour from texgs."""
     shown = [
         omero("DAPI", "0000FF", 50, 150),
         omero("405 nm", "00FF80", -5, 9999),
         {"label": "RFP", "color": "FF0000"},
     ]
-    values = np.stack([np.load(scan) + 10 * channel for channel in range(3)])
-    path = write_image(conf.parent / "cells.zarr", [values], axes_of("czyx"), [(1, 1, 1, 1)], labels=shown)
+    path = cells(conf.parent, scan, shown)
     assert main(["new", str(path), "reduce=2"]) == 0
-    told = 'then: texgs run "datasets=[cells_DAPI,cells_405_nm,cells_RFP]" fit=quick\n'
-    assert told in capsys.readouterr().out
-    names = [f"cells_{label}" for label in ("DAPI", "405_nm", "RFP")]
-    assert [path.stem for path in sorted((conf / "dataset").iterdir())] == sorted(names)
-    dapi, nm, rfp = (compose((f"dataset={name}",)).dataset for name in names)
-    assert [each.volume.channel for each in (dapi, nm, rfp)] == ["DAPI", "405 nm", "RFP"]
-    assert [each.volume.reduce for each in (dapi, nm, rfp)] == [2, 2, 2]
-    (tf,) = dapi.basic_tfs.values()
-    high = open_grid("results/cells_DAPI/volume/volume.nrrd").values.max()
-    np.testing.assert_allclose(tf.opacity, [[50, 0], [150, 0.3], [high, 0.3]], rtol=1e-5)
-    np.testing.assert_allclose(tf.color, [[50, 0, 0, 1]])
-    (tf,) = nm.basic_tfs.values()
-    values = open_grid("results/cells_405_nm/volume/volume.nrrd").values
-    ends = np.array([values.min(), values.max()])
-    np.testing.assert_allclose(tf.opacity, np.stack([ends, 0.3 * (ends + 5) / 10004], axis=1), rtol=1e-5)
-    np.testing.assert_allclose(tf.color[0][1:], [0, 1, 128 / 255], atol=1e-6)
-    assert len(rfp.basic_tfs) > 1
+    out = capsys.readouterr().out
+    assert "cells.yaml: 3 transfer functions of the channels DAPI, 405 nm, RFP to edit; " in out
+    assert "then: texgs run dataset=cells fit=quick\n" in out
+    assert [path.name for path in (conf / "dataset").iterdir()] == ["cells.yaml"]
+    document = yaml.safe_load((conf / "dataset" / "cells.yaml").read_text())
+    assert document["volume"] == {"file": str(path), "reduce": 2}
+    assert [tf["channel"] for tf in document["basic_tfs"].values()] == ["DAPI", "405 nm", "RFP"]
+    tfs = compose(("dataset=cells",)).dataset.basic_tfs
+    assert list(tfs) == ["DAPI", "channel_405_nm", "RFP"]
+    dapi, nm, rfp = tfs.values()
+    grid = open_grid("results/cells/volume/volume.nrrd")
+    np.testing.assert_allclose(dapi.opacity, [[50, 0], [150, 0.3], [grid.values.max(), 0.3]], rtol=1e-5)
+    np.testing.assert_allclose(dapi.color, [[50, 0, 0, 1]])
+    ends = np.array([grid.others[0].min(), grid.others[0].max()])
+    np.testing.assert_allclose(nm.opacity, np.stack([ends, 0.3 * (ends + 5) / 10004], axis=1), rtol=1e-5)
+    np.testing.assert_allclose(nm.color[0][1:], [0, 1, 128 / 255], atol=1e-6)
+    assert rfp.color[0][1:] == list(COLORS[2])
     assert main(["new", str(path)]) == 2
-    assert "cells_DAPI: is there already" in capsys.readouterr().err
-    assert main(["run", "datasets=[cells_DAPI,cells_RFP]", "fit=quick", "--dry-run"]) == 0
+    assert "cells: is there already" in capsys.readouterr().err
+    assert main(["run", "dataset=cells", "fit=quick", "--dry-run"]) == 0
+
+
+def test_one_channel_of_several_is_a_data_set_as_ever(conf, scan):
+    path = cells(conf.parent, scan, ["a", "b"])
+    assert main(["new", str(path), "channel=b", "--name", "second"]) == 0
+    dataset = compose(("dataset=second",)).dataset
+    assert (dataset.volume.channel, dataset.channels, list(dataset.basic_tfs)) == ("b", [], ["TF01", "TF02"])
+    grid = open_grid("results/second/volume/volume.nrrd")
+    np.testing.assert_array_equal(grid.values, np.load(scan) + 10)
+    assert not grid.others
 
 
 @pytest.mark.parametrize("labels", [[], ["a b", "a_b"], ["a", ""]])
 def test_channels_whose_labels_are_no_names_have_numbers(conf, scan, labels):
-    values = np.stack([np.load(scan), np.load(scan) + 10])
-    path = write_image(conf.parent / "x.zarr", [values], axes_of("czyx"), [(1, 1, 1, 1)], labels=labels)
+    path = cells(conf.parent, scan, labels)
     assert main(["new", str(path), "--name", "two"]) == 0
-    assert [compose((f"dataset=two_{k}",)).dataset.volume.channel for k in (0, 1)] == ["0", "1"]
-    np.testing.assert_array_equal(open_grid("results/two_1/volume/volume.nrrd").values, values[1])
+    tfs = compose(("dataset=two",)).dataset.basic_tfs
+    assert {name: tf.channel for name, tf in tfs.items()} == {"channel_0": "0", "channel_1": "1"}
+    (second,) = open_grid("results/two/volume/volume.nrrd").others
+    np.testing.assert_array_equal(second, np.load(scan) + 10)
+
+
+@pytest.mark.parametrize(
+    ("labels", "names"),
+    [
+        (["DAPI", "scene"], ["channel_0", "channel_1"]),  # a folder of texgs
+        (["no", "yes"], ["channel_0", "channel_1"]),
+        (["405", "channel_405"], ["channel_0", "channel_1"]),
+        (["405", "_x"], ["channel_405", "channel__x"]),
+        (["l" * 300, "a"], ["channel_0", "channel_1"]),
+        (["GFP", "gamma/2"], ["GFP", "gamma_2"]),
+    ],
+)
+def test_functions_have_the_names_of_channels_as_far_as_these_are_names(labels, names):
+    assert new.tf_names(labels) == names
+
+
+def test_a_count_and_files_are_for_each_channel(conf, scan, capsys):
+    path = cells(conf.parent, scan, ["a", "b"])
+    assert main(["new", str(path), "--count", "2"]) == 0
+    tfs = compose(("dataset=cells",)).dataset.basic_tfs
+    assert {name: tf.channel for name, tf in tfs.items()} == {
+        f"{channel}_{tf}": channel for channel in "ab" for tf in ("TF01", "TF02")
+    }
+    functions = [TransferFunction(((x, 0), (x + 9, 1)), ((x, 1, 0, 0),)).to_dict() for x in (90, 91)]
+    files = [
+        write_json(conf.parent / f"{k}.json", {"format": "texgs-tf", "version": 1, **points})
+        for k, points in enumerate(functions)
+    ]
+    assert main(["new", str(path), "--force", "--tf", *map(str, files)]) == 0
+    tfs = recompose(("dataset=cells",)).dataset.basic_tfs
+    assert [(tf.channel, tf.opacity[0][0]) for tf in tfs.values()] == [("a", 90), ("b", 91)]
+    assert main(["new", str(path), "--force", "--tf", str(files[0])]) == 2
+    assert "--tf: expected a file for each of the channels a, b, got 1\n" in capsys.readouterr().err
+
+
+def test_channels_have_no_steps_in_time(conf, scan, capsys):
+    path = cells(conf.parent, scan, ["a", "b"])
+    assert main(["new", str(path), "--series", str(path)]) == 2
+    assert (
+        "dataset.series of cells: expected one channel, got a, b; leave out the others or the series\n"
+        in capsys.readouterr().err
+    )
+    assert not (conf / "dataset").exists()
 
 
 def test_a_channel_that_cannot_be_read_leaves_no_data_set_of_the_others(conf, scan, capsys):

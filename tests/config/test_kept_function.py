@@ -13,11 +13,18 @@ from tests.config.kept import DATA_SET, TRIED, project
 from tests.viewer.pages import on_page
 from texgs.cli.main import main
 from texgs.config.compose import recompose
+from texgs.config.dataset_text import as_yaml
 from texgs.config.kept_function import keep
 from texgs.config.project import ROOT
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.edit.function_model import with_model
 from texgs.scene.scene_file import write_scene
+from texgs.volume.generate import sphere
+from texgs.volume.grid import Grid
+from texgs.volume.prepare import prepare_channels
+from texgs.volume.slabs import ArraySource
+from texgs.volume.summaries import write_summaries
+from texgs.volume.transfer import TransferFunction
 from texgs.workflow.checks import check_basic_tfs
 from texgs.workflow.stages.settings import basic_tfs_of
 
@@ -35,6 +42,40 @@ def here(tmp_path, monkeypatch):
 @pytest.fixture
 def scene_file(here):
     return write_scene(here / "scene.yaml", project(here))
+
+
+def channels_of(folder, is_scaled):
+    """A project whose volume has a second channel, ten times as large, with a scene that tries a function."""
+    scene = project(folder)
+    sources = [ArraySource(Grid(sphere(16).values * factor)) for factor in (1, 10)]
+    first, second = prepare_channels(sources, scene.volume.file)
+    write_summaries(scene.volume.file, [first, second], ["DAPI", "GFP"])
+    document = yaml.safe_load(DATA_SET)
+    for tf, channel in zip(document["basic_tfs"].values(), ("DAPI", "GFP"), strict=True):
+        tf["channel"] = channel
+    if not is_scaled:
+        del document["tf_values"]
+        for tf, known in zip(document["basic_tfs"].values(), (first, second), strict=True):
+            for points in (tf["opacity"], tf["color"]):
+                for point in points:
+                    point[0] = known.minimum + point[0] * (known.maximum - known.minimum)
+    file_of(folder).write_text(as_yaml(document))
+    points = [
+        (second.minimum + share * (second.maximum - second.minimum), alpha) for share, alpha in TRIED["TF03"]
+    ]
+    return replace(scene, functions={"TF03": TransferFunction(points, ((0, 1, 0, 0),), 1)})
+
+
+@pytest.mark.parametrize("is_scaled", [True, False])
+def test_a_function_of_a_channel_names_it(here, is_scaled):
+    scene = channels_of(here, is_scaled)
+    assert "TF03 is a basic transfer function" in keep(scene, "TF03")
+    dataset = recompose(("dataset=mine",)).dataset
+    check_basic_tfs(dataset)
+    assert [tf.channel for tf in dataset.basic_tfs.values()] == ["DAPI", "GFP", "GFP"]
+    made = basic_tfs_of(scene.volume.file, {"TF03": dataset.basic_tfs["TF03"]}, dataset.tf_values)["TF03"]
+    assert made.channel == 1
+    np.testing.assert_allclose(made.opacity, scene.functions["TF03"].opacity, rtol=1e-5)
 
 
 def file_of(folder):

@@ -6,7 +6,7 @@ import gzip
 import lzma
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -56,7 +56,7 @@ from texgs.scene.twin import SceneVolume, Twin
 from texgs.study.ballots import read_ballot
 from texgs.study.questions import read_key, write_key
 from texgs.volume.generate import sphere
-from texgs.volume.prepare import prepare
+from texgs.volume.prepare import prepare, prepare_channels
 from texgs.volume.slabs import ArraySource
 from texgs.volume.sources import open_source
 from texgs.volume.tf_files import read_tf
@@ -200,13 +200,14 @@ def ply(flavour: str, text: bool, folder: Path) -> Path:
     return folder / "text.ply"
 
 
-def scene(folder: Path) -> Path:
+def scene(folder: Path, channel: int = 0) -> Path:
     file = write_model(folder / "model.safetensors", sample())
     mask = write_segment(folder / "s.safetensors", sample(), torch.arange(7) < 3)
     texture = write_texture(folder / "t.safetensors", sample())
     entry = SceneModel(file, texture=texture, segments={"part": SceneSegment(mask)})
-    prepare(ArraySource(sphere(8), "sphere"), folder / "volume.nrrd")
-    volume = SceneVolume(folder / "volume.nrrd", {"TF01": RISE, "TF02": FALL})
+    source = ArraySource(sphere(8), "sphere")
+    prepare_channels([source] * (1 + channel), folder / "volume.nrrd")
+    volume = SceneVolume(folder / "volume.nrrd", {"TF01": RISE, "TF02": replace(FALL, channel=channel)})
     frame = Frame([0.1, 0.0, -0.2], 0.5)
     models = {"TF01": entry, "TF02": SceneModel(file)}
     whole = Scene(models, volume=volume, frame=frame, functions={"TF02": RISE, "TF03": FALL})
@@ -312,6 +313,8 @@ READERS: dict[str, Reader] = {
         lambda path: read_segment(path, sample()),
     ),
     "scene": Reader(scene, read_whole_scene),
+    "scene of channels": Reader(partial(scene, channel=1), read_whole_scene),
+    "volume of channels": Reader(partial(scene, channel=1), read_whole_scene, victim="volume.nrrd"),
     "data set": Reader(data_set, keep_function),
     "data set's metrics": Reader(data_set, keep_function, "results/mine/volume/metrics.json"),
     "2dgs.ply": Reader(partial(ply, "2dgs", False), read_ply),

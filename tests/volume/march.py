@@ -25,12 +25,21 @@ class March(NamedTuple):
     normal: Tensor  # [H, W, 3] expected normal, world axes, towards the camera; length at most 1
 
 
-def march(grid: Grid, tf: TransferFunction, camera: Camera, look: Appearance, light: Light) -> March:
+def march(
+    grid: Grid,
+    tf: TransferFunction | list[TransferFunction],  # one, or one for each of some channels
+    camera: Camera,
+    look: Appearance,
+    light: Light,
+) -> March:
     """March the rays of a camera through a volume, front to back.
 
-    A sample has opacity 1 - (1 - a)^(step / opacity unit) and the colour of `shade`.
+    A sample has opacity 1 - (1 - a)^(step / opacity unit) and the colour of `shade`. Of several channels it
+    has the product of what is let through, and colours and normals by their shares of the logarithm of that.
     """
-    values, half, cells = Tensor(grid.values), torch.tensor(grid.aabb[1]), torch.tensor(grid.dims) - 1
+    tfs = [tf] if isinstance(tf, TransferFunction) else tf
+    channels = [Tensor(grid.channel(each.channel).values) for each in tfs]
+    half, cells = torch.tensor(grid.aabb[1]), torch.tensor(grid.dims) - 1
     step = look.step * float((2 * half / cells).min())
     rays = camera.rays().reshape(-1, 3)  # [n, 3], camera z is 1
     # In units in which the box is [-1, 1]^3; no ray is parallel to a side of it.
@@ -41,20 +50,31 @@ def march(grid: Grid, tf: TransferFunction, camera: Camera, look: Appearance, li
     count = int(((far - near) / stretch).max().clamp_min(0).ceil())
     z = near[:, None] + (torch.arange(count) + 0.5) * stretch[:, None]  # [n, k]
     points = origin + z[..., None] * direction[:, None]  # [n, k, 3]
-    rgba = torch.from_numpy(tf(sample(values, points))).float()
-    alpha = 1 - (1 - rgba[..., 3]) ** (step / look.opacity_unit)
-    alpha = torch.where(z < far[:, None], alpha, 0)
+    seen = [each(sample(values, points)) for each, values in zip(tfs, channels, strict=True)]
+    rgba = torch.from_numpy(np.stack(seen)).float()  # [C, n, k, 4]
+    own = 1 - (1 - rgba[..., 3]) ** (step / look.opacity_unit)
+    own = torch.where(z < far[:, None], own, 0)
+    alpha = 1 - (1 - own).prod(dim=0) if len(tfs) > 1 else own[0]
+    extinction = -torch.log1p(-own.double().clamp_max(1 - 1e-9))
+    shares = (extinction / extinction.sum(dim=0).clamp_min(1e-30)).float() if len(tfs) > 1 else own / own
     through = torch.cumprod(1 - alpha, dim=1)
     weights = (torch.cat([torch.ones(len(z), 1), through[:, :-1]], dim=1) * alpha)[..., None]  # [n, k, 1]
     ray, k = alpha.nonzero().T
     around = points[ray, k][:, None] + torch.stack([torch.diag(2 / cells), -torch.diag(2 / cells)])[:, None]
-    ahead, behind = sample(values, around)
-    normal = normalize((ahead - behind) * (cells / half), dim=-1, eps=1e-30)  # central differences, [m, 3]
     to_viewer, to_light = (torch.from_numpy(vector).float() for vector in directions(camera, light))
     color, facing = torch.zeros(*z.shape, 3), torch.zeros(*z.shape, 3)
-    color[ray, k] = shade(rgba[ray, k, :3], normal, to_viewer, to_light, look)
-    away = (normal * rays[ray]).sum(dim=1, keepdim=True) > 0
-    facing[ray, k] = torch.where(away, -normal, normal)
+    for values, (red_green_blue, share) in zip(
+        channels, zip(rgba[..., :3], shares, strict=True), strict=True
+    ):
+        ahead, behind = sample(values, around)
+        normal = normalize(
+            (ahead - behind) * (cells / half), dim=-1, eps=1e-30
+        )  # central differences, [m, 3]
+        color[ray, k] += share[ray, k, None] * shade(
+            red_green_blue[ray, k], normal, to_viewer, to_light, look
+        )
+        away = (normal * rays[ray]).sum(dim=1, keepdim=True) > 0
+        facing[ray, k] += share[ray, k, None] * torch.where(away, -normal, normal)
     weight = weights.sum(dim=1)  # [n, 1]
     sums = [(weights * x).sum(dim=1) for x in (color, z[..., None], facing)]
     depth, normal = (torch.where(weight > 0, x / weight.clamp_min(1e-12), 0) for x in sums[1:])

@@ -181,7 +181,7 @@ def test_progress_sees_every_slab_and_an_interrupt_leaves_nothing(tmp_path, monk
 
     source = source_of(np.arange(60).reshape(3, 4, 5))
     prepare(source, tmp_path / "v.nrrd", progress=progress)
-    assert seen == [((0, 1), 3), ((1, 2), 3), ((2, 3), 3)]
+    assert seen == [((0, 0, 1), 3), ((0, 1, 2), 3), ((0, 2, 3), 3)]
 
     def interrupt(steps, total):
         yield steps[0]

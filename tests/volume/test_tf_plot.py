@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -12,9 +14,10 @@ RED = TransferFunction(((0, 0), (1, 0.5), (2, 0.5), (3, 0)), ((0, 1, 0, 0),))
 BLUE = TransferFunction(((4, 1), (6, 1)), ((0, 0, 0, 1),))
 
 
-def written(path, *values):
-    """Write the figure of some values; returns its path."""
-    return write_figure(path, plot(*values))
+def written(path, histogram, minimum, maximum, *values):
+    """Write the figure of one channel; returns its path."""
+    summary = {"histogram": histogram, "minimum": minimum, "maximum": maximum}
+    return write_figure(path, plot({"": summary}, *values))
 
 
 def area(path, color, tolerance=60):
@@ -39,6 +42,23 @@ def test_the_histogram_is_grey_and_logarithmic(tmp_path):
 def test_functions_beyond_the_data_are_in_the_picture_and_titles_are_no_mathematics(tmp_path):
     path = written(tmp_path / "plot.png", [1, 2, 3], 0, 1, {"$x_{$": BLUE}, "$\\frac{$ 5 $")
     assert area(path, (38, 38, 255)) > 5000
+
+
+def test_each_channel_has_its_histogram_and_its_functions(tmp_path):
+    """The lower half has twice as many values, of which the function covers half as much."""
+    ends = {"a": 10, "b": 20}
+    known = {label: {"histogram": [1, 9], "minimum": 0, "maximum": high} for label, high in ends.items()}
+    path = write_figure(
+        tmp_path / "plot.png", plot(known, {"red": RED, "blue": replace(BLUE, channel=1)}, "x")
+    )
+    picture = Image.open(path)
+    assert picture.size == (1000, 900)
+    for part, (top, bottom) in {"upper": (0, 450), "lower": (450, 900)}.items():
+        picture.crop((0, top, 1000, bottom)).save(tmp_path / f"{part}.png")
+    red, blue = (255, 38, 38), (38, 38, 255)
+    assert area(tmp_path / "upper.png", blue) == area(tmp_path / "lower.png", red) == 0
+    ratio = area(tmp_path / "lower.png", blue) / area(tmp_path / "upper.png", red)
+    assert ratio == pytest.approx(2 / 2, rel=0.05)
 
 
 def test_pyplot_is_left_alone(tmp_path):

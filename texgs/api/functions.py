@@ -33,8 +33,7 @@ class Functions(dict[str, TransferFunction]):
         """Return a figure of matplotlib: opacities and colours over the number of voxels, on a log axis."""
         from texgs.volume.tf_plot import plot
 
-        known = self._summary
-        return plot(known.histogram, known.minimum, known.maximum, self)
+        return plot({"": vars(self._summary)}, self)
 
     def _repr_png_(self) -> bytes:
         """Return the plot, for notebooks."""

@@ -21,7 +21,7 @@ from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.overlay import overlay
+from texgs.volume.overlay import overlays
 from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import ArraySource
@@ -134,7 +134,7 @@ class Volume:
         shown = named(self.suggest() if functions is None else functions)
         caster = Caster(self.grid, replace(Appearance(), step=step))
         view = camera_of(frame_of(self.grid, shown.values()), azimuth, polar, width, height)
-        rgba = caster.cast(overlay(shown), view, as_light(light)).rgba
+        rgba = caster.cast(overlays(shown), view, as_light(light)).rgba
         behind = rgba.new_tensor(color("background", background))
         return picture_of(quantized(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import argparse
 import re
 import sys
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from texgs.config.compose import compose
-from texgs.config.dataset_text import as_yaml, require_read
-from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.io import is_there, read_json, write_bytes
+from texgs.config.dataset_text import as_yaml, plain_tf, require_read
+from texgs.config.project import check_name
+from texgs.core.errors import ArgumentError, ConfigError, TexgsError
+from texgs.core.io import is_there, write_bytes
 
 if TYPE_CHECKING:
-    from texgs.config.dataset import Dataset
+    from texgs.config.dataset import BasicTF, Dataset
     from texgs.config.schema import Config
     from texgs.volume.axes import Channel
     from texgs.volume.transfer import TransferFunction
@@ -55,8 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Make a data set of the volume, or one of each of its channels, and say what comes next."""
-    from texgs.config.project import check_name, members, own_folder, shown
+    """Make a data set of the volume, with all its channels, and say what comes next."""
+    from texgs.config.project import members, own_folder, shown
     from texgs.volume.tf_files import read_tf
     from texgs.workflow.locate import series_files
 
@@ -68,62 +70,101 @@ def run(arguments: argparse.Namespace) -> int:
     given = configuration(name, arguments.file, arguments.overrides)
     given = replace(given, dataset=replace(given.dataset, series=[*map(absolute, arguments.series)]))
     series_files(given)
-    folder, of_each = own_folder() / "dataset", of_channels(given)
-    names = [config.dataset.name for config, _ in of_each]
-    for name in names:
-        check_name("--name", name)
-        if name in members("dataset") and not arguments.force:
-            is_own = (folder / f"{name}.yaml").exists()
-            there, do = ("is there", "replace") if is_own else ("is a data set of texgs", "hide")
-            raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
-    datasets = [with_tfs(config, channel, arguments) for config, channel in of_each]
-    for dataset in datasets:
-        text = document(dataset, ["file", *changed(arguments.overrides), "channel"])
-        require_read(text, dataset)
-        target = write_bytes(folder / f"{dataset.name}.yaml", text.encode())
-        count, picture = len(dataset.basic_tfs), Path(given.results, dataset.name, "transfer", "transfer.png")
-        print(f"{shown(target)}: {count} transfer functions to edit; {picture} shows them")
-    which = f'"datasets=[{",".join(names)}]"' if len(names) > 1 else f"dataset={names[0]}"
-    print(f"then: texgs run {which} fit=quick")
+    folder = own_folder() / "dataset"
+    check_name("--name", name)
+    if name in members("dataset") and not arguments.force:
+        is_own = (folder / f"{name}.yaml").exists()
+        there, do = ("is there", "replace") if is_own else ("is a data set of texgs", "hide")
+        raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
+    channels = channels_of(given)
+    dataset = with_tfs(given, channels, arguments)
+    text = document(dataset, ["file", *changed(arguments.overrides)])
+    require_read(text, dataset)
+    target = write_bytes(folder / f"{name}.yaml", text.encode())
+    count, picture = len(dataset.basic_tfs), Path(given.results, name, "transfer", "transfer.png")
+    of = f" of the channels {', '.join(channels)}" if dataset.channels else ""
+    print(f"{shown(target)}: {count} transfer functions{of} to edit; {picture} shows them")
+    print(f"then: texgs run dataset={name} fit=quick")
     return 0
 
 
-def of_channels(config: Config) -> list[tuple[Config, Channel | None]]:
-    """Return a configuration for each channel of the file, or the one it is, and what the file says of it."""
+def channels_of(config: Config) -> dict[str, Channel | None]:
+    """Return what the file says of channels by their labels or numbers; of the one to read, by ""."""
     from texgs.workflow.stages.volume import source
 
-    dataset, volume = config.dataset, config.dataset.volume
+    volume = config.dataset.volume
     try:
         field = source(replace(volume, channel=volume.channel or "0"), Path(volume.file or ""))
     except TexgsError:  # it has no channels; what else is wrong with it is told when it is read
-        return [(config, None)]
+        return {"": None}
     if volume.channel or len(field.channels) == 1:
-        return [(config, field.channel)]
+        return {"": field.channel}
     keys = [channel.label for channel in field.channels]
     if "" in keys or len({NO_NAME.sub("_", key) for key in keys}) < len(keys):
         keys = [str(number) for number in range(len(keys))]
-    made: list[tuple[Config, Channel | None]] = []
-    for key, channel in zip(keys, field.channels, strict=True):
-        name = f"{dataset.name}_{NO_NAME.sub('_', key)}"
-        one = replace(dataset, name=name, title=name, volume=replace(volume, channel=key))
-        made.append((replace(config, dataset=one), channel))
-    return made
+    return dict(zip(keys, field.channels, strict=True))
 
 
-def with_tfs(config: Config, channel: Channel | None, arguments: argparse.Namespace) -> Dataset:
-    """Read the volume, choose TFs, draw them, and return the data set."""
+def with_tfs(config: Config, channels: dict[str, Channel | None], arguments: argparse.Namespace) -> Dataset:
+    """Read the volume, choose TFs of its channels, draw them, and return the data set."""
     from texgs.config.dataset import BasicTF
-    from texgs.workflow.checks import check_basic_tfs
+    from texgs.volume.summaries import read_summaries
+    from texgs.workflow.checks import check_basic_tfs, check_channels
     from texgs.workflow.execution import ensure
     from texgs.workflow.stage_table import STAGES
 
-    ensure(STAGES["volume"], config)
-    basic = basic_tfs(config, channel, arguments.tf, arguments.count)
-    listed = {key: BasicTF(**tf.to_dict()) for key, tf in basic.items()}
-    dataset = replace(config.dataset, basic_tfs=listed)
+    dataset = config.dataset
+    if len(channels) > 1:
+        dataset = replace(dataset, basic_tfs={key: BasicTF(channel=key) for key in channels})
+        check_channels(dataset)
+    ensure(STAGES["volume"], replace(config, dataset=dataset))
+    known = read_summaries(Path(config.results, dataset.name, "volume", "volume.nrrd"))
+    if len(channels) > 1:
+        listed = of_each(known, channels, arguments)
+    else:
+        basic = basic_tfs(dataset.name, known[""], channels[""], arguments.tf, arguments.count)
+        listed = {key: BasicTF(**tf.to_dict()) for key, tf in basic.items()}
+    dataset = replace(dataset, basic_tfs=listed)
     ensure(STAGES["transfer"], replace(config, dataset=dataset))
     check_basic_tfs(dataset)
     return dataset
+
+
+def of_each(
+    known: Mapping[str, Any], channels: Mapping[str, Channel | None], arguments: argparse.Namespace
+) -> dict[str, BasicTF]:
+    """Return TFs of all channels, named by their labels: one of each, unless a count says otherwise."""
+    from texgs.config.dataset import BasicTF
+    from texgs.volume.suggest import COLORS, windowed
+
+    files = arguments.tf
+    if files and len(files) != len(channels):
+        raise ArgumentError(
+            f"--tf: expected a file for each of the channels {', '.join(channels)}, got {len(files)}"
+        )
+    listed, names = {}, tf_names(list(channels))
+    for number, (key, channel) in enumerate(channels.items()):
+        has_look = channel and windowed(channel, known[key]["minimum"], known[key]["maximum"])
+        count = arguments.count or (None if has_look else 1)
+        basic = basic_tfs(key, known[key], channel, files and files[number : number + 1], count)
+        for name, tf in basic.items():
+            if len(basic) == 1 and count and not files:
+                tf = tf.with_points(tf.opacity, [(tf.support[0], *COLORS[number % len(COLORS)])])
+            whole = names[number] if len(basic) == 1 else f"{names[number]}_{name}"
+            listed[whole] = BasicTF(**tf.to_dict(), channel=key)
+    return listed
+
+
+def tf_names(labels: list[str]) -> list[str]:
+    """Return names of TFs like the labels of channels, or with their numbers where these cannot be names."""
+    names = [NO_NAME.sub("_", label) for label in labels]
+    names = [name if name[:1].isalpha() else f"channel_{name}" for name in names]
+    try:
+        for name in names:
+            check_name("dataset.basic_tfs", name)
+    except ConfigError:
+        names = []
+    return names if len(set(names)) == len(labels) else [f"channel_{k}" for k in range(len(labels))]
 
 
 def changed(overrides: list[str]) -> list[str]:
@@ -153,23 +194,22 @@ def absolute(file: str | Path) -> str:
 
 
 def basic_tfs(
-    config: Config, channel: Channel | None, files: list[Path] | None, count: int | None
+    of: str, summary: Mapping[str, Any], channel: Channel | None, files: list[Path] | None, count: int | None
 ) -> dict[str, TransferFunction]:
-    """Return TFs from files, or suggested for a channel or from the volume's histogram."""
+    """Return TFs from files, or suggested for a channel or from the histogram in a summary."""
     import numpy as np
 
     from texgs.volume.suggest import looks_like_labels, suggest
     from texgs.volume.tf_files import read_tf
     from texgs.volume.transfer import check_disjoint
 
-    summary = read_json(Path(config.results, config.dataset.name, "volume", "volume.json"))
     low, high = summary["minimum"], summary["maximum"]
     if not files:
         histogram = np.array(summary["histogram"])
         suggested = suggest(histogram, low, high, count, channel)
         if looks_like_labels(histogram) and np.dtype(summary["dtype"]).kind == "f":
             sys.stderr.write(
-                f"{config.dataset.name}: values are in {np.count_nonzero(histogram)} of {len(histogram)} "
+                f"{of}: values are in {np.count_nonzero(histogram)} of {len(histogram)} "
                 f"parts of [{low:g}, {high:g}], and are taken for labels; if one of them stands for missing "
                 "samples, write NaN in its place and add nan_value=...\n"
             )
@@ -190,9 +230,11 @@ def document(dataset: Dataset, keys: list[str]) -> str:
     """Return the YAML of a data set, with some keys of its volume; a line per list of points."""
     values = asdict(dataset)
     names = ("name", "title", "volume", *(["series"] if dataset.series else []), "basic_tfs")
+    values["basic_tfs"] = {name: plain_tf(tf) for name, tf in dataset.basic_tfs.items()}
     written = {key: values[key] for key in names}
     written["volume"] = {key: value for key in keys if (value := values["volume"][key]) is not None}
-    note = "# Points are [value, opacity] and [value, r, g, b]; the ranges of basic TFs must not overlap.\n"
+    which = "basic TFs of one channel" if dataset.channels else "basic TFs"
+    note = f"# Points are [value, opacity] and [value, r, g, b]; the ranges of {which} must not overlap.\n"
     return note + as_yaml(written)
 
 

@@ -56,6 +56,9 @@ class BasicTF:
     # OmegaConf takes no integers for list[list[float]]; the points are checked where the TF is made.
     opacity: list[Any] = key([], "points [value, opacity]; opacity is 0 outside")
     color: list[Any] = key([], "points [value, r, g, b], linear, 0 to 1")
+    channel: str | None = key(
+        None, "label or number of the channel of these values, from 0, where the data set shows several"
+    )
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,16 @@ class Dataset:
     def framing(self) -> list[str]:
         """Return the names of the basic TFs that frame the views of all."""
         return self.framed_by or list(self.basic_tfs)
+
+    @property
+    def channels(self) -> list[str]:
+        """Return the channels that basic TFs name, in their order; none where `volume.channel` says which."""
+        named = dict.fromkeys(tf.channel for tf in self.basic_tfs.values())
+        return [channel for channel in named if channel is not None]
+
+    def number_of(self, tf: BasicTF) -> int:
+        """Return the number of a basic TF's channel among those that are prepared."""
+        return 0 if tf.channel is None else self.channels.index(tf.channel)
 
 
 @dataclass(frozen=True)

@@ -25,12 +25,19 @@ def with_basic_tf(text: str, name: str, points: BasicTF, framed_by: list[str]) -
             "basic_tfs: expected a line for the name of each and lines below for its points, got other YAML "
             "or none in this file; write them so"
         )
-    more = indent(as_yaml({name: vars(points)}), " " * value.start_mark.column)
+    more = indent(as_yaml({name: plain_tf(points)}), " " * value.start_mark.column)
     more += as_yaml({"framed_by": framed_by}) if framed_by else ""
     start = key.start_mark.index
     block = re.findall(r"[^\n]*\n(?:(?:[#\r][^\n]*\n|\n)*[ \t][^\n]*\n)*", text[start:])[0]
     end = text.index("\n", start + len(block.rstrip())) + 1
     return text[:end] + (more.replace("\n", "\r\n") if "\r\n" in text else more) + text[end:]
+
+
+def plain_tf(points: BasicTF) -> dict[str, Any]:
+    """Return a basic TF as files have it: with its channel, if it names one."""
+    return {
+        key: value for key in ("channel", "opacity", "color") if (value := getattr(points, key)) is not None
+    }
 
 
 def as_yaml(values: Mapping[str, Any]) -> str:

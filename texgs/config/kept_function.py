@@ -14,6 +14,7 @@ from texgs.core.io import read_json, write_bytes
 from texgs.scene.scene import Scene
 from texgs.volume.framing import frame_of, out_of_frame
 from texgs.volume.nrrd_file import open_grid
+from texgs.volume.summaries import read_summaries
 from texgs.volume.transfer import TransferFunction, overlapping, row_text
 
 
@@ -29,16 +30,22 @@ def keep(scene: Scene, name: str) -> str:
     check_name("function", name)
     file = file_of(volume.file)
     dataset, text = recompose((f"dataset={file.stem}",)).dataset, file.read_bytes().decode()
-    low, high = map(read_json(volume.file.with_name("volume.json")).get, ("minimum", "maximum"))
+    ends = [(each["minimum"], each["maximum"]) for each in read_summaries(volume.file).values()]
+    channel, channels = known[name].channel, dataset.channels
+    low, high = ends[channel]
     with located(shown(file)):
         if name in dataset.basic_tfs:
             raise ArgumentError(f"basic_tfs: {name} is there already; copy the function, or edit the file")
         tf = known[name].rounded(low, high)
         if is_scaled := dataset.tf_values == "fraction":
             tf = known[name].with_values(lambda value: (value - low) / (high - low)).rounded(0, 1)
-        basic_tfs = {**dataset.basic_tfs, name: BasicTF(**tf.to_dict())}
-        tfs = {key: TransferFunction.from_dict(vars(points)) for key, points in basic_tfs.items()}
-        tfs = {key: tf.scaled(low, high) for key, tf in tfs.items()} if is_scaled else tfs
+        added = BasicTF(**{**tf.to_dict(), "channel": channels[channel] if channels else None})
+        basic_tfs = {**dataset.basic_tfs, name: added}
+        tfs = {
+            key: TransferFunction(tuple(points.opacity), tuple(points.color), dataset.number_of(points))
+            for key, points in basic_tfs.items()
+        }
+        tfs = {key: tf.scaled(*ends[tf.channel]) for key, tf in tfs.items()} if is_scaled else tfs
         require_composable(tfs)
         framing, grid = dataset.framing, open_grid(volume.file)
         far = out_of_frame(grid, tfs[name], frame_of(grid, [tfs[key] for key in framing]))

@@ -131,7 +131,7 @@ def ends_of_rays(caster: Caster, look: Appearance, tf: TransferFunction, images:
 def thickened(tf: TransferFunction, factor: float) -> TransferFunction:
     """Return a function of a factor's extinction."""
     through = [(value, math.log1p(-min(alpha, DENSEST))) for value, alpha in tf.opacity]
-    return TransferFunction(tuple((value, -math.expm1(factor * x)) for value, x in through), tf.color)
+    return tf.with_points([(value, -math.expm1(factor * x)) for value, x in through], tf.color)
 
 
 def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: torch.Generator) -> Points:

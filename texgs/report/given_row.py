@@ -8,7 +8,6 @@ import numpy as np
 from PIL import Image, ImageOps
 
 from texgs.core.figures import Cell, Row, as_picture
-from texgs.core.io import read_json
 from texgs.volume.transfer import TransferFunction
 
 SIDE, INCHES = 512, 3.2  # of a picture; letters are as large as for so many inches
@@ -35,10 +34,11 @@ def given_row(
 
 def plotted(volume: Path, basic: Mapping[str, TransferFunction]) -> np.ndarray:
     """Return a square plot [S, S, 3] of transfer functions over the histogram of volume.nrrd."""
+    from texgs.volume.summaries import read_summaries
     from texgs.volume.tf_plot import plot
 
-    summary = read_json(volume.with_name("volume.json"))
-    bounds = summary["minimum"], summary["maximum"]
-    figure = plot(summary["histogram"], *bounds, basic, size=(INCHES, INCHES), dpi=SIDE / INCHES)
-    figure.axes[1].set_axis_off()  # the number of voxels
+    known = read_summaries(volume)
+    figure = plot(known, basic, size=(INCHES, INCHES / len(known)), dpi=SIDE / INCHES)
+    for voxels in figure.axes[1::2]:
+        voxels.set_axis_off()  # the number of voxels
     return np.asarray(as_picture(figure).convert("RGB"))

@@ -21,7 +21,7 @@ from texgs.raster.cuts import CutRange, cut_range
 from texgs.raster.shading import MATERIAL
 from texgs.volume.caster import Caster
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.overlay import overlay
+from texgs.volume.overlay import overlays
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
@@ -36,6 +36,11 @@ class SceneVolume:
     file: Path  # volume.nrrd, prepared
     tfs: Mapping[str, TransferFunction]  # basic ones, by the names of models
     appearance: Appearance = field(default_factory=Appearance)
+
+    @property
+    def has_channels(self) -> bool:
+        """Return whether functions show more than the first channel."""
+        return any(tf.channel for tf in self.tfs.values())
 
 
 class Twin:
@@ -110,7 +115,7 @@ class Twin:
         for share in dict.fromkeys(edit.tint):  # all channels are lit alike but for that
             self._caster = self._caster.with_appearance(replace(look, specular=share * look.specular))
             casts[share] = self._caster.cast(
-                *(overlay(shown), camera, scene.light, outputs),
+                *(overlays(shown), camera, scene.light, outputs),
                 depth_range=None if cut is None else cut.depth_range,
                 faces=cut,
                 lit_faces=scene.cuts.faces == "shaded",
@@ -162,9 +167,9 @@ def edited(tf: TransferFunction, edit: PartEdit, palette: Sequence[float]) -> Tr
     """Return a basic TF with an edit's colour and opacity, cut off at 0 and 1 at every value."""
     opacity = clipped([(value, alpha * edit.opacity) for value, alpha in tf.opacity])
     if edit.palette is None:
-        return TransferFunction(opacity, tf.color)
+        return tf.with_points(opacity, tf.color)
     moved = np.subtract(edit.palette, palette)
-    return TransferFunction(opacity, clipped([(value, *np.add(rgb, moved)) for value, *rgb in tf.color]))
+    return tf.with_points(opacity, clipped([(value, *np.add(rgb, moved)) for value, *rgb in tf.color]))
 
 
 def clipped(points: Sequence[tuple[float, ...]]) -> Any:

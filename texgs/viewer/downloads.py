@@ -83,7 +83,8 @@ def exports_of(scene: Scene) -> list[str]:
     """Return what a scene can be written as."""
     kind = kind_of(next(iter(scene.models.values())).file)
     able = [*FILMS, *(each for each in kind.exports if each not in export.OF_MODELS)]
-    return [*able, "volume"] if "html" in able and scene.volume is not None else able
+    has_volume = scene.volume is not None and not scene.volume.has_channels
+    return [*able, "volume"] if "html" in able and has_volume else able
 
 
 def require_kind(scene: Scene, kind: str) -> None:

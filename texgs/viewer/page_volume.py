@@ -56,11 +56,17 @@ def page_volume(scene: Scene, budget: float = PAGE_VOLUME) -> PageVolume:
     """Return the volume that a scene names, with as many samples as a budget in MB holds.
 
     Raises:
-        ArgumentError: if the scene names no volume, it cannot be read, or the budget is none.
+        ArgumentError: if the scene names no volume, it cannot be read or has several channels, or the budget
+            is none.
     """
     if not 0 < budget < np.inf:
         raise ArgumentError(f"volume: expected a size in MB above 0, got {budget:g}")
     source = volume_of(scene)
+    if source.has_channels:
+        raise ArgumentError(
+            "volume: the scene shows several channels, and a page carries one; leave the volume out of the "
+            "page, or make a data set of one channel"
+        )
     with located("volume"):
         return within(open_grid(source.file), budget * MEGABYTE)
 

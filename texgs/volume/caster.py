@@ -9,7 +9,7 @@ The result has the same bits for any number of threads.
 """
 
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from copy import copy
 from ctypes import c_int32, c_int64
 from dataclasses import dataclass
@@ -38,6 +38,7 @@ OUTPUTS = ("depth", "median", "normal")
 BYTES = 64  # of memory for a pixel
 LEAST_WIDTH = torch.finfo(torch.float32).tiny  # of a transfer function, in data values
 MOST_SAMPLES = 2**24  # along a ray; their numbers are floats
+Prepared = tuple[list[TransferFunction], Any, Any]  # arguments of the library for them, and what these need
 PADDING = 3  # bytes behind the distances of bricks, which are loaded as words
 NativeVolume = native.struct("texgs_volume", "p values, i type, 3i size, 3f half")
 NativeTransfer = native.struct("texgs_transfer", "i n, p points")
@@ -50,7 +51,7 @@ NativeView = native.struct(
 native.declare("texgs_volume_bricks", NativeVolume, "p", result=c_int64, stream=False)
 native.declare("texgs_volume_extremes", NativeVolume, "pp")
 native.declare("texgs_volume_distance", NativeVolume, "p", NativeTransfer, "p")
-native.declare("texgs_cast", NativeVolume, NativeTransfer, "p", NativeView)
+native.declare("texgs_cast", NativeVolume, NativeTransfer, "ip", NativeView)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ class Cast:
 
 
 class Caster:
-    """Renders one volume from any camera; the samples go to the device that casts rays.
+    """Renders one volume from any camera; samples of what is shown go to the device that casts rays.
 
     Samples in C order and native bytes are not copied on a CPU. NaN is transparent, with the cells around it.
     """
@@ -72,24 +73,16 @@ class Caster:
     local_viewer = False
 
     def __init__(self, grid: Grid, appearance: Appearance, device: torch.device | str = "cpu") -> None:
-        self._appearance, self._device = appearance, torch.device(device)
-        values = np.require(grid.values, grid.values.dtype.newbyteorder("="), ["C", "ALIGNED"])
-        kind = "uint8" if values.dtype == bool else values.dtype.name
-        if kind not in TYPES:
-            raise ArgumentError(f"volume: expected samples of {', '.join(TYPES)} or bool, got {kind}")
-        half = [float(side) for side in grid.aabb[1]]
-        self._diagonal = 2 * hypot(*half)
-        self._voxel = min(2 * side / (size - 1) for side, size in zip(half, grid.dims, strict=True))
-        samples = bytes_of(values).to(self._device)
-        self._device = samples.device  # with the number of the GPU, whichever is the current one later
-        self._volume = NativeVolume(samples, TYPES.index(kind), grid.dims, tuple(half))
-        count_bricks = native.function(native.library(self._device.type), "texgs_volume_bricks")
-        bricks = count_bricks(self._volume, (c_int32 * 3)())
-        require_memory(8 * bricks, "a volume's bricks", "crop it, or reduce it by dataset.volume.reduce")
-        self._extremes = torch.empty(bricks, 2, device=self._device)
-        missing = torch.zeros(1, dtype=torch.int64, device=self._device)
-        self._call("texgs_volume_extremes", self._extremes, missing)
-        self._prepared = list[tuple[TransferFunction, native.Struct, Tensor]]()  # the last, of all copies
+        self._appearance, self._grid = appearance, grid
+        self._half = [float(side) for side in grid.aabb[1]]
+        self._diagonal = 2 * hypot(*self._half)
+        self._voxel = min(2 * side / (size - 1) for side, size in zip(self._half, grid.dims, strict=True))
+        # With the number of the GPU, whichever is the current one later.
+        self._device = torch.empty(0, device=device).device
+        self._channels = dict[int, tuple[native.Struct, Tensor]]()  # that were shown, of all copies
+        self._prepared = list[Prepared]()  # the last, of all copies
+        if not grid.others:
+            self._channel(0)
 
     def with_appearance(self, appearance: Appearance) -> Self:
         """Return a caster of the same volume with another shading and sampling; nothing is read again."""
@@ -103,7 +96,7 @@ class Caster:
 
     def cast(
         self,
-        tf: TransferFunction,
+        tf: TransferFunction | Sequence[TransferFunction],
         camera: Camera,
         light: Light,
         outputs: Collection[str] = (),
@@ -114,6 +107,9 @@ class Caster:
     ) -> Cast:
         """Cast a view, with what else is wanted of OUTPUTS, in one pass; without gradients and skew.
 
+        Of several functions each has a channel of its own: extinctions add up, and colours are means that
+        these weigh.
+
         Samples stay where they are without a depth range, and count for what of their step lies in it: two
         parts of a ray join. Over an opacity unit behind the faces of a cut, normals are those of its planes,
         as even matter has none; or, where faces are not to be lit, colours are those of the function.
@@ -121,7 +117,7 @@ class Caster:
         height, width = camera.height, camera.width
         require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
         self._check(camera)
-        transfer, distance = self._prepare(tf)
+        _, prepared, _kept = self._prepare([tf] if isinstance(tf, TransferFunction) else [*tf])
         matrices = [x.float().to(self._device).contiguous() for x in (camera.viewmat, camera.K)]
         shapes = {"rgba": (height, width, 4), "normal": (height, width, 3)}
         seen = {
@@ -137,7 +133,7 @@ class Caster:
             **self._cut(camera, depth_range, faces),
             unlit_faces=not lit_faces,
         )
-        self._call("texgs_cast", transfer, distance, view)
+        native.call("texgs_cast", *prepared, view, device=self._device)
         return Cast(**seen)
 
     def _cut(self, camera: Camera, depth_range: Tensor | None, faces: CutRange | None) -> dict[str, Any]:
@@ -161,21 +157,44 @@ class Caster:
                 f"step: expected at most {MOST_SAMPLES} samples on a ray, got {samples:.3g}; raise it"
             )
 
-    def _prepare(self, tf: TransferFunction) -> tuple[native.Struct, Tensor]:
-        """Return a function for the library, and how far each brick is from one in which something shows."""
+    def _prepare(self, tfs: list[TransferFunction]) -> Prepared:
+        """Return channels with their functions for the library, and how far bricks are from what shows."""
         prepared = self._prepared[0] if self._prepared else None  # another thread may prepare another one
-        if prepared is None or prepared[0] != tf:
-            points = points_of(tf).to(self._device)
-            transfer = NativeTransfer(len(points), points)
-            distance = torch.zeros(len(self._extremes) + PADDING, dtype=torch.uint8, device=self._device)
-            self._call("texgs_volume_distance", self._extremes, transfer, distance)
-            prepared = tf, transfer, distance
+        if prepared is None or prepared[0] != tfs:
+            count, kept = len(tfs), [*map(self._shown, tfs)]  # arrays of the library do not keep tensors
+            volumes, transfers, distances = zip(*kept, strict=True)
+            arrays = (NativeVolume * count)(*volumes), (NativeTransfer * count)(*transfers)
+            prepared = tfs, (*arrays, count, torch.stack(distances).amin(dim=0)), kept
             self._prepared[:] = [prepared]
-        return prepared[1:]
+        return prepared
 
-    def _call(self, name: str, *arguments: Any) -> None:
-        """Call the native library on the volume."""
-        native.call(name, self._volume, *arguments, device=self._device)
+    def _shown(self, tf: TransferFunction) -> tuple[native.Struct, native.Struct, Tensor]:
+        """Return a function's channel, the function, and how far bricks are from one that it shows."""
+        volume, extremes = self._channel(tf.channel)
+        points = points_of(tf).to(self._device)
+        transfer = NativeTransfer(len(points), points)
+        distance = torch.zeros(len(extremes) + PADDING, dtype=torch.uint8, device=self._device)
+        native.call("texgs_volume_distance", volume, extremes, transfer, distance, device=self._device)
+        return volume, transfer, distance
+
+    def _channel(self, number: int) -> tuple[native.Struct, Tensor]:
+        """Return a channel for the library, and the extremes of its bricks [bricks, 2]."""
+        if number not in self._channels:
+            grid = self._grid.channel(number)
+            values = np.require(grid.values, grid.values.dtype.newbyteorder("="), ["C", "ALIGNED"])
+            kind = "uint8" if values.dtype == bool else values.dtype.name
+            if kind not in TYPES:
+                raise ArgumentError(f"volume: expected samples of {', '.join(TYPES)} or bool, got {kind}")
+            samples = bytes_of(values).to(self._device)
+            volume = NativeVolume(samples, TYPES.index(kind), grid.dims, tuple(self._half))
+            count_bricks = native.function(native.library(self._device.type), "texgs_volume_bricks")
+            bricks = count_bricks(volume, (c_int32 * 3)())
+            require_memory(8 * bricks, "a volume's bricks", "crop it, or reduce it by dataset.volume.reduce")
+            extremes = torch.empty(bricks, 2, device=self._device)
+            missing = torch.zeros(1, dtype=torch.int64, device=self._device)
+            native.call("texgs_volume_extremes", volume, extremes, missing, device=self._device)
+            self._channels[number] = volume, extremes
+        return self._channels[number]
 
 
 def bytes_of(values: NDArray[Any]) -> Tensor:

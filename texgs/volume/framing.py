@@ -36,10 +36,14 @@ def out_of_frame(grid: Grid, tf: TransferFunction, frame: Frame) -> str:
 
 def shown_corners(grid: Grid, tfs: Iterable[TransferFunction]) -> np.ndarray:
     """Return the outermost corners [N, 3], world units, of rows of cells with values that functions show."""
-    seen = [each for tf in tfs for each in shown_values(tf)]
-    corners = []
-    for start, stop in slab_bounds(ArraySource(grid), 0, grid.dims[2] - 1):
-        corners.append(outermost(shown_cells(grid.values[start : stop + 1], seen), start))
+    seen: dict[int, list[tuple[np.float64, np.float64]]] = {}
+    for tf in tfs:
+        seen.setdefault(tf.channel, []).extend(shown_values(tf))
+    corners = [np.empty((0, 3), int)]
+    for channel, ranges in seen.items():
+        values = grid.channel(channel).values
+        for start, stop in slab_bounds(ArraySource(grid), 0, grid.dims[2] - 1):
+            corners.append(outermost(shown_cells(values[start : stop + 1], ranges), start))
     indices = np.concatenate(corners)
     if not len(indices):
         raise ArgumentError("transfer functions: expected some of the volume to be visible, got nothing")

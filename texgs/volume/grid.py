@@ -1,6 +1,6 @@
 """A scalar field on a regular lattice: where it lies in the world, and its turns by right angles."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from math import isfinite, prod
 
@@ -37,6 +37,7 @@ class Grid:
     values: np.ndarray  # [Z, Y, X], real numbers, every axis at least 2; x is the fastest axis, as in VTK
     spacing: Triple = ONES  # x, y, z; physical units, above 0
     origin: Triple = ZEROS  # centre of the first sample, x, y, z; physical units
+    others: tuple[np.ndarray, ...] = ()  # samples of further channels, of the same shape and type
 
     def __post_init__(self) -> None:
         check_lattice(dims_of(self.values.shape), self.values.dtype, self.spacing, self.origin)
@@ -45,6 +46,13 @@ class Grid:
     def dims(self) -> Dims:
         """Number of samples along x, y, z."""
         return dims_of(self.values.shape)
+
+    def channel(self, number: int) -> "Grid":
+        """Return the grid of one channel, by its number from 0."""
+        channels = (self.values, *self.others)
+        if number >= len(channels):
+            raise ArgumentError(f"channel: expected one of 0 to {len(channels) - 1}, got {number}")
+        return replace(self, values=channels[number], others=())
 
     @property
     def sides(self) -> list[float]:

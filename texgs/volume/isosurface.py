@@ -51,6 +51,7 @@ def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
     Where an opaque middle of its range has two sides, both are surfaces; and so are the faces of the volume's
     box, where what is opaque ends there.
     """
+    grid = grid.channel(tf.channel)
     least, most = float(grid.values.min()), float(grid.values.max())
     span = max(most - least, 1e-30)
     require_memory(BYTES * grid.values.size, "the surface of the volume", "prepare it with reduce=2")
@@ -91,7 +92,7 @@ def visible_voxels(grid: Grid, tf: TransferFunction, count: int, seed: int) -> t
     Return points [N, 3] in world units, fewer if fewer samples are visible, and colours [N, 3]. One slice is
     in memory at a time (weighted reservoir sampling: Efraimidis and Spirakis 2006).
     """
-    random = np.random.default_rng(seed)
+    random, grid = np.random.default_rng(seed), grid.channel(tf.channel)
     stride = ceil((grid.values.size / MOST) ** (1 / 3)) if grid.values.size > MOST else 1
     keys, places, colors = np.empty(0), np.empty((0, 3)), np.empty((0, 3))
     for z in range(0, grid.values.shape[0], stride):

@@ -11,7 +11,7 @@ DENSEST = 1 - 1e-9  # opacity whose extinction is still finite
 
 
 def overlay(functions: Mapping[str, TransferFunction]) -> TransferFunction:
-    """Return one function that shows what several show together; ranges of values may overlap.
+    """Return one function that shows what several of a channel show together; ranges of values may overlap.
 
     Where they do, matter of all of them is at one place: extinctions add up, and colours are means that these
     weigh. Elsewhere, and without an overlap, it is what `combine` returns.
@@ -24,10 +24,16 @@ def overlay(functions: Mapping[str, TransferFunction]) -> TransferFunction:
     points = []
     for value, left, right in zip(values.tolist(), *sides, strict=True):
         points += [(value, *row) for row in ([left, right] if not np.allclose(left, right) else [right])]
-    return TransferFunction(
-        tuple((value, alpha) for value, *_, alpha in points),
-        tuple((value, red, green, blue) for value, red, green, blue, _ in points),
-    )
+    opacity = [(value, alpha) for value, *_, alpha in points]
+    return each[0].with_points(opacity, [(value, *rgb) for value, *rgb, _ in points])
+
+
+def overlays(functions: Mapping[str, TransferFunction]) -> list[TransferFunction]:
+    """Return for each channel the function that shows what those of the channel show together."""
+    channels = dict.fromkeys(tf.channel for tf in functions.values())
+    return [
+        overlay({name: tf for name, tf in functions.items() if tf.channel == channel}) for channel in channels
+    ]
 
 
 def places(functions: list[TransferFunction]) -> Array:

@@ -1,11 +1,11 @@
 """Stream any source into the one canonical file that everything else reads."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import inf, prod
 from pathlib import Path
 from shutil import disk_usage
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from texgs.volume.nrrd_file import WORDS, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
 
 Bounds = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
-Progress = Callable[[Iterable[tuple[int, int]], int], Iterable[tuple[int, int]]]
+Step = tuple[int, int, int]  # channel, and a slab: slices [start, stop)
+Progress = Callable[[Iterable[Step], int], Iterable[Step]]
 BINS = 256
 
 
@@ -39,8 +40,14 @@ class Summary:
         return prod(self.dims)
 
 
-def prepare(
-    source: Source,
+def prepare(source: Source, target: Path, **keys: Any) -> Summary:
+    """Write the canonical file of a volume of one channel, see `prepare_channels`."""
+    (summary,) = prepare_channels([source], target, **keys)
+    return summary
+
+
+def prepare_channels(
+    sources: Sequence[Source],
     target: Path,
     *,
     crop: tuple[int, int, int, int, int, int] | None = None,
@@ -49,14 +56,14 @@ def prepare(
     up: str = "+y",
     nan_value: float | None = None,
     progress: Progress | None = None,
-) -> Summary:
+) -> list[Summary]:
     """Write the canonical file of a volume: a .nrrd with raw, little-endian samples that can be mapped.
 
     Samples stay uint8, int8, uint16, int16 or float32; bool becomes uint8, everything else float32. The
     volume is read slab by slab and never held as a whole.
 
     Args:
-        source: the volume.
+        sources: the channels of the volume, most often one.
         target: file to write, .nrrd.
         crop: (x0, x1, y0, y1, z0, z1) in samples of the source, half open; default all.
         reduce: one sample for every block of reduce^3; incomplete blocks at the end count as they are.
@@ -68,37 +75,54 @@ def prepare(
         progress: called with the slabs and their number, yields the slabs again; for a progress bar.
 
     Raises:
-        ArgumentError: if an argument is out of range, samples are not finite or do not fit float32, the
-            volume is constant, fewer than two samples are left along an axis, or there is too little space
-            on the disk. Nothing is written then.
+        ArgumentError: if an argument is out of range, samples are not finite or do not fit float32, a
+            channel is constant or unlike the first in lattice or type, fewer than two samples are left along
+            an axis, or there is too little space on the disk. Nothing is written then.
     """
     if nan_value is not None and not abs(nan_value) <= np.finfo(np.float32).max:
         raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
     if up not in UPRIGHT:
         raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up}")
+    source, tallies = _first_of(sources), [_Tally(each.name) for each in sources]
     bounds, axes = _bounds(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
     kept = "uint8" if source.dtype.kind == "b" else source.dtype.name
     dtype = np.dtype(kept if kept in WORDS else "float32")
-    tally, ((x0, x1), (y0, y1), (z0, z1)) = _Tally(source.name), bounds
+    ((x0, x1), (y0, y1), (z0, z1)), size = bounds, prod(dims) * dtype.itemsize
 
     def write(file: BinaryIO) -> None:
-        if (needed := prod(dims) * dtype.itemsize) > (free := disk_usage(target.parent).free):
-            sizes = f"{needed / GIB:.3g} GiB of disk, but {free / GIB:.3g} GiB are free"
-            raise ArgumentError(f"{source.name}: needs {sizes}; crop or reduce it")
-        offset = write_header(file, dims, dtype, spacing, origin)
-        steps = slab_bounds(source, z0, z1, multiple=reduce)
-        for start, stop in steps if progress is None else progress(steps, len(steps)):
-            slab = source.slices(start, stop)[:, y0:y1, x0:x1]
-            block = tally.finite(slab, (x0, y0, start), nan_value)
+        _require_disk(source.name, target, len(sources) * size)
+        offset = write_header(file, dims, dtype, spacing, origin, len(sources))
+        slabs = slab_bounds(source, z0, z1, multiple=reduce)
+        steps = [(number, *slab) for number in range(len(sources)) for slab in slabs]
+        for number, start, stop in steps if progress is None else progress(steps, len(steps)):
+            slab = sources[number].slices(start, stop)[:, y0:y1, x0:x1]
+            block = tallies[number].finite(slab, (x0, y0, start), nan_value)
             if reduce > 1:
                 block = REDUCERS[method](block, reduce)
-            block = tally.extend(_convert(block, dtype, source.name))
-            _write_permuted(file, offset, dims, axes, block, (start - z0) // reduce)
-        tally.check()
+            block = tallies[number].extend(_convert(block, dtype, source.name))
+            _write_permuted(file, offset + number * size, dims, axes, block, (start - z0) // reduce)
+        for tally in tallies:
+            tally.check()
 
     write_atomic(target, write)
-    return summarize(open_prepared(target), tally.minimum, tally.maximum)
+    pairs = zip(open_prepared(target), tallies, strict=True)
+    return [summarize(each, tally.minimum, tally.maximum) for each, tally in pairs]
+
+
+def _first_of(sources: Sequence[Source]) -> Source:
+    """Return the first of some channels, and require of the others that they are like it."""
+    first, *others = sources
+    if any((x.dims, x.dtype, x.spacing) != (first.dims, first.dtype, first.spacing) for x in others):
+        raise ArgumentError(f"{first.name}: expected channels of one lattice and type; choose some of them")
+    return first
+
+
+def _require_disk(name: str, target: Path, needed: int) -> None:
+    """Refuse a file of more bytes than the disk has room for."""
+    if needed > (free := disk_usage(target.parent).free):
+        sizes = f"{needed / GIB:.3g} GiB of disk, but {free / GIB:.3g} GiB are free"
+        raise ArgumentError(f"{name}: needs {sizes}; crop or reduce it")
 
 
 class _Tally:

@@ -63,6 +63,8 @@ def _from_ours(data: dict[str, Any]) -> TransferFunction:
     """Return the function of a file of ours."""
     if data.get("version") != VERSION:
         raise ArgumentError(f"version: expected {VERSION}, got {data.get('version')!r}; update texgs")
+    if "channel" in data:
+        raise ArgumentError("channel: expected a function for any channel; leave it out")
     return TransferFunction.from_dict({k: v for k, v in data.items() if k not in ("format", "version")})
 
 

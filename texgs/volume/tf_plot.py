@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from texgs.core.figures import new_figure, words
 from texgs.volume.transfer import TransferFunction
@@ -20,21 +19,31 @@ SAMPLES = 512
 
 
 def plot(
-    histogram: ArrayLike,
-    minimum: float,
-    maximum: float,
+    channels: Mapping[str, Mapping[str, Any]],
     basic: Mapping[str, TransferFunction],
     title: str = "",
     size: tuple[float, float] = SIZE,
     dpi: float = DPI,
 ) -> Figure:
-    """Return a figure of basic transfer functions over a volume's histogram [n] over [minimum, maximum].
+    """Return a figure of basic transfer functions over the histograms of a volume's channels, see `Summary`.
 
     Opacity is the height of each coloured area; the grey area is the number of voxels, on a log axis.
+    Channels are one below the other, with their labels.
     """
-    counts = np.asarray(histogram, dtype=np.float64)
-    figure = new_figure(*size, dpi)
-    opacity = figure.add_subplot()
+    figure = new_figure(size[0], size[1] * len(channels), dpi)
+    for number, (label, summary) in enumerate(channels.items()):
+        own = {name: tf for name, tf in basic.items() if tf.channel == number}
+        above = ", ".join(filter(None, (title, label)))
+        _fill(figure.add_subplot(len(channels), 1, number + 1), summary, own, above)
+    return figure
+
+
+def _fill(
+    opacity: Axes, summary: Mapping[str, Any], basic: Mapping[str, TransferFunction], title: str
+) -> None:
+    """Draw the functions of a channel over its histogram."""
+    counts = np.asarray(summary["histogram"], dtype=np.float64)
+    minimum, maximum = summary["minimum"], summary["maximum"]
     voxels = opacity.twinx()
     opacity.set_zorder(voxels.get_zorder() + 1)
     opacity.patch.set_visible(False)  # or it would hide the histogram
@@ -47,7 +56,6 @@ def plot(
     margin = 0.02 * (high - low)  # so that nothing lies on the frame
     opacity.set(xlim=(low - margin, high + margin), xlabel="value", title=words(title))
     opacity.set(ylim=(0, 1.12), yticks=np.linspace(0, 1, 6), ylabel="opacity")
-    return figure
 
 
 def _draw(axes: Axes, name: str, tf: TransferFunction) -> None:

@@ -3,7 +3,7 @@
 import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from numbers import Real
 from typing import Any
@@ -33,6 +33,7 @@ class TransferFunction:
 
     opacity: tuple[tuple[float, float], ...]  # at least two (value, opacity in [0, 1] per opacity unit)
     color: tuple[tuple[float, float, float, float], ...]  # at least one (value, r, g, b), linear, in [0, 1]
+    channel: int = 0  # of the volume, whose values these are
 
     def __post_init__(self) -> None:
         # Lists, as they come from files, become tuples of floats.
@@ -43,6 +44,8 @@ class TransferFunction:
         low, high = self.support
         if not low < high:
             raise ArgumentError("opacity: expected some values with opacity above 0, got none; raise a point")
+        if type(self.channel) is not int or self.channel < 0:
+            raise ArgumentError(f"channel: expected a number from 0 on, got {self.channel!r:.100}")
 
     @property
     def support(self) -> tuple[float, float]:
@@ -78,17 +81,23 @@ class TransferFunction:
 
     def with_values(self, of: Callable[[float], float]) -> "TransferFunction":
         """Return the function whose points are at other values, in the same order."""
-        points = {key: [[of(value), *rest] for value, *rest in each] for key, each in self.to_dict().items()}
-        return TransferFunction.from_dict(points)
+        opacity, color = (
+            [(of(value), *rest) for value, *rest in each] for each in (self.opacity, self.color)
+        )
+        return self.with_points(opacity, color)
+
+    def with_points(self, opacity: Any, color: Any) -> "TransferFunction":
+        """Return the function of other points for the same channel."""
+        return replace(self, opacity=opacity, color=color)
 
     def rounded(self, low: float, high: float) -> "TransferFunction":
         """Return the function with numbers that are short to read and keep a millionth of a range of data."""
         digits = 6 + math.ceil(math.log10(max(max(abs(low), abs(high)) / (high - low), 1)))
-        short = {
-            key: [[float(f"{x:.{digits}g}") for x in point] for point in points]
-            for key, points in self.to_dict().items()
-        }
-        return TransferFunction.from_dict(short)
+        opacity, color = (
+            [[float(f"{x:.{digits}g}") for x in point] for point in points]
+            for points in (self.opacity, self.color)
+        )
+        return self.with_points(opacity, color)
 
     def without_steps(self, ramp: float | None = None) -> "TransferFunction":
         """Return the same function with strictly ascending points and opacity 0 at both ends.
@@ -113,19 +122,20 @@ class TransferFunction:
             opacity.insert(0, (opacity[0][0], 0.0))
         if opacity[-1][1] > 0:
             opacity.append((opacity[-1][0] + gap, 0.0))
-        return TransferFunction(ramps(opacity), ramps(self.color))
+        return self.with_points(ramps(opacity), ramps(self.color))
 
-    def to_dict(self) -> dict[str, list[list[float]]]:
-        """Return the points as lists, ready for JSON or YAML."""
-        return {"opacity": [list(p) for p in self.opacity], "color": [list(p) for p in self.color]}
+    def to_dict(self) -> dict[str, Any]:
+        """Return the points as lists, ready for JSON or YAML, and a channel that is not the first."""
+        points = {"opacity": [list(p) for p in self.opacity], "color": [list(p) for p in self.color]}
+        return points | ({"channel": self.channel} if self.channel else {})
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> "TransferFunction":
         """Return the function of such lists."""
-        if not isinstance(data, Mapping) or set(data) != {"opacity", "color"}:
+        if not isinstance(data, Mapping) or set(data) - {"channel"} != {"opacity", "color"}:
             keys = ", ".join(map(str, data)) if isinstance(data, Mapping) else type(data).__name__
             raise ArgumentError(f"transfer function: expected the keys opacity, color, got {keys or 'none'}")
-        return TransferFunction(data["opacity"], data["color"])
+        return TransferFunction(data["opacity"], data["color"], data.get("channel", 0))
 
 
 def right_limit(points: Sequence[tuple[float, ...]], values: Array) -> Array:
@@ -170,7 +180,7 @@ def row_text(row: Iterable[Any]) -> str:
 
 
 def combine(basic: Mapping[str, TransferFunction]) -> TransferFunction:
-    """Return one transfer function that shows what the basic ones show together."""
+    """Return one transfer function that shows what the basic ones of a channel show together."""
     if not basic:
         raise ArgumentError("transfer functions: expected at least one, got none")
     check_disjoint(basic)
@@ -186,7 +196,7 @@ def combine(basic: Mapping[str, TransferFunction]) -> TransferFunction:
         opacity += points
         end = just_above(high) if tf(high)[3] > 0 else high
         color += _cut(tf.color, low, high)
-    return TransferFunction(tuple(opacity), tuple(color))  # type: ignore[arg-type]
+    return tf.with_points(opacity, color)
 
 
 def just_above(value: float) -> float:
@@ -199,7 +209,7 @@ def just_above(value: float) -> float:
 
 
 def check_disjoint(basic: Mapping[str, TransferFunction]) -> None:
-    """Require that no value is visible in two basic transfer functions; ranges may touch."""
+    """Require that no value of a channel is visible in two basic transfer functions; ranges may touch."""
     if pair := overlapping(basic):
         one, two = (row_text(basic[name].support) for name in pair)
         raise ArgumentError(
@@ -210,10 +220,10 @@ def check_disjoint(basic: Mapping[str, TransferFunction]) -> None:
 
 def overlapping(functions: Mapping[str, TransferFunction]) -> tuple[str, str] | None:
     """Return the names of the first two functions that both show some values, if there are such."""
-    for (name, tf), (other, another) in combinations(functions.items(), 2):
-        one, two = tf.support, another.support
-        if max(one[0], two[0]) < min(one[1], two[1]):
-            return name, other
+    for (name, tf), (other_name, other) in combinations(functions.items(), 2):
+        one, two = tf.support, other.support
+        if tf.channel == other.channel and max(one[0], two[0]) < min(one[1], two[1]):
+            return name, other_name
     return None
 
 

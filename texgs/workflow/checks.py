@@ -1,8 +1,7 @@
 """Mistakes in the choice of a fit or an edit, told before any job runs and any earlier result goes."""
 
-from typing import Any
-
 from texgs.config.compose import compose
+from texgs.config.dataset import Dataset
 from texgs.config.project import Words, members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError, MissingDataError, located
@@ -39,16 +38,39 @@ def check_edit(config: Config) -> None:
         method.of(config.edit).check_fit(config.fit)
 
 
-def check_basic_tfs(dataset: Any) -> None:
+def check_basic_tfs(dataset: Dataset) -> None:
     """Check the points of all basic TFs of a data set, and that their ranges do not overlap."""
     from texgs.volume.transfer import TransferFunction, check_disjoint
 
+    check_channels(dataset)
     basic = {}
     for name, points in dataset.basic_tfs.items():
         with located(f"{dataset.name}: basic TF {name}"):
-            basic[name] = TransferFunction(points.opacity, points.color)
+            opacity, color = tuple(points.opacity), tuple(points.color)
+            basic[name] = TransferFunction(opacity, color, dataset.number_of(points))
     with located(f"{dataset.name}: basic TFs", " "):
         check_disjoint(basic)
+
+
+def check_channels(dataset: Dataset) -> None:
+    """Require that all basic TFs of a data set name channels, or none; a series in time has one."""
+    channels = dataset.channels
+    unnamed = [name for name, points in dataset.basic_tfs.items() if points.channel is None]
+    if channels and unnamed:
+        raise ConfigError(
+            f"{dataset.name}: basic TF {unnamed[0]}: expected a channel, as others name theirs "
+            f"({', '.join(channels)}), got none"
+        )
+    if channels and dataset.volume.channel is not None:
+        raise ConfigError(
+            f"dataset.volume.channel: expected none, as basic TFs of {dataset.name} name channels "
+            f"({', '.join(channels)}), got {dataset.volume.channel}"
+        )
+    if len(channels) > 1 and (dataset.series or dataset.volume.steps > 1):
+        raise ConfigError(
+            f"dataset.series of {dataset.name}: expected one channel, got {', '.join(channels)}; leave out "
+            "the others or the series"
+        )
 
 
 def require_fit(stage: Stage, config: Config) -> None:

@@ -90,7 +90,7 @@ def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, v
         with located(moment.name):
             if not target.exists():
                 own = settings if moment.time is None else replace(settings, time=moment.time)
-                prepared(settings, source(own, moment.file), target)
+                prepared(settings, [source(own, moment.file)], target)
             other = open_grid(target)
             if other.dims != grid.dims or not np.allclose(other.spacing, grid.spacing):
                 raise ArgumentError(

@@ -11,7 +11,8 @@
 extern "C" {
 #endif
 
-enum { TEXGS_BRICK = 4 }; /* cells along each side of a brick: what is known to be empty or not */
+enum { TEXGS_BRICK = 4 };     /* cells along each side of a brick: what is known to be empty or not */
+enum { TEXGS_CHANNELS = 16 }; /* volumes that a cast shows together, at most */
 typedef enum {
     TEXGS_U8,
     TEXGS_I8,
@@ -75,7 +76,9 @@ typedef struct {
     int32_t n_planes, unlit_faces;
 } texgs_cast_view;
 
-TEXGS_API int32_t texgs_cast(const texgs_volume*, const texgs_transfer*, const uint8_t* distance,
+/* Volumes [n] of one lattice and type, each with its transfer function, show together what all of them show: where
+ * several do, extinctions add up, and colours are means that these weigh. distance: the least of theirs. */
+TEXGS_API int32_t texgs_cast(const texgs_volume*, const texgs_transfer*, int32_t n, const uint8_t* distance,
                              const texgs_cast_view*, void* stream);
 
 #ifdef __cplusplus

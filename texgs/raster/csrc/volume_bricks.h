@@ -23,6 +23,18 @@ inline void check_points(const texgs_transfer& transfer) {
     require(transfer.n >= 2 && transfer.n <= 1 << 16, "transfer function: expected 2 to 65536 points");
 }
 
+inline void check_channels(const texgs_volume* volumes, const texgs_transfer* transfers, int32_t n) {
+    require(n >= 1 && n <= TEXGS_CHANNELS, "volumes: expected 1 to 16 that are shown together");
+    for (int c = 0; c < n; ++c) {
+        check_volume(volumes[c]);
+        check_points(transfers[c]);
+        bool is_alike = volumes[c].type == volumes->type;
+        for (int a = 0; a < 3; ++a)
+            is_alike &= volumes[c].size[a] == volumes->size[a] && volumes[c].half[a] == volumes->half[a];
+        require(is_alike, "volumes: expected those that are shown together to have one lattice and type");
+    }
+}
+
 inline void check_cast(const texgs_cast_view& view) {
     require(view.width >= 1 && view.height >= 1, "view: expected at least one pixel");
     require(view.width <= TEXGS_MAX_SIDE && view.height <= TEXGS_MAX_SIDE, "view: expected fewer pixels");

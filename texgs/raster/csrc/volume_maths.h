@@ -138,20 +138,26 @@ TEXGS_MATHS F mix(F a, F b, F t) {
     return fma(t, b - a, a);  // a where both are the same
 }
 
-// The opacity of a sample, whose stretch of a ray is `lengths` units of length: 1 - (1 - a)^lengths, with small
-// opacities as exact as large ones.
+// The logarithm to base 2 of the light that a stretch of `lengths` units of length lets through, (1 - a)^lengths,
+// exact for small opacities a, too. Those of matter at one place add up.
 template <class F>
-TEXGS_MATHS F step_opacity(F a, F lengths) {
+TEXGS_MATHS F log2_through(F a, F lengths) {
     const F s = a / (a - F(2.0f)), s2 = s * s;  // log2(1 - a) = 2 / ln 2 atanh(s)
     F p = fma(F(0.412198583f), s2, F(0.577078016f));
     p = fma(p, s2, F(0.961796694f));
     p = fma(p, s2, F(2.885390082f));
     const F y = lengths * select(a < F(0.25f), s * p, log2(max(F(1.0f) - a, F(1e-30f))));
+    return select(a < F(1.0f), y, F(-126.0f));
+}
+
+// The opacity 1 - 2^y of such a stretch.
+template <class F>
+TEXGS_MATHS F opacity_of(F y) {
     F q = fma(F(1.333355814e-3f), y, F(9.618129108e-3f));  // (2^y - 1) / y
     q = fma(q, y, F(5.550410866e-2f));
     q = fma(q, y, F(2.402265070e-1f));
     q = fma(q, y, F(6.931471806e-1f));
-    return select(a < F(1.0f), select(F(-0.25f) < y, F(0.0f) - y * q, F(1.0f) - exp2(y)), F(1.0f));
+    return select(F(-0.25f) < y, F(0.0f) - y * q, F(1.0f) - exp2(y));
 }
 
 // The eight corners of cells, x first, and the places inside of them.

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from texgs.config.dataset import BasicTF
 from texgs.config.views import ViewKeys
 from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json
 from texgs.workflow.inputs import is_changed, shown_tfs, sweep_of_fit, view_settings
 from texgs.workflow.stage import read
 from texgs.workflow.sweep import fit_variant
@@ -76,12 +75,24 @@ class OfScene(OfDataset):
 
 def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) -> dict[str, TransferFunction]:
     """Return basic TFs in the units of a prepared volume, volume.nrrd with volume.json beside it."""
-    summary = read_json(volume.with_name("volume.json"))
-    bounds = summary["minimum"], summary["maximum"]
-    return {name: in_data_values(name, each, tf_values, *bounds) for name, each in points.items()}
+    from texgs.volume.summaries import read_summaries
+
+    known, functions = read_summaries(volume), {}
+    for name, each in points.items():
+        if len(known) > 1 and each.channel not in known:
+            raise ArgumentError(
+                f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got {each.channel}"
+            )
+        channel = [*known].index(each.channel) if each.channel in known else 0
+        summary = [*known.values()][channel]
+        bounds = summary["minimum"], summary["maximum"]
+        functions[name] = in_data_values(name, each, tf_values, *bounds, channel)
+    return functions
 
 
-def in_data_values(name: str, points: BasicTF, tf_values: str, low: float, high: float) -> TransferFunction:
+def in_data_values(
+    name: str, points: BasicTF, tf_values: str, low: float, high: float, channel: int = 0
+) -> TransferFunction:
     """Return a basic TF in the units of the data.
 
     Args:
@@ -90,11 +101,12 @@ def in_data_values(name: str, points: BasicTF, tf_values: str, low: float, high:
         tf_values: "data", or "fraction" where the points are on fractions of the data's range.
         low: smallest value of the data.
         high: largest value of the data.
+        channel: number of the one that these are of.
     """
     from texgs.volume.transfer import TransferFunction
 
     try:
-        tf = TransferFunction(tuple(points.opacity), tuple(points.color))
+        tf = TransferFunction(tuple(points.opacity), tuple(points.color), channel)
         tf = tf.scaled(low, high) if tf_values == "fraction" else tf
     except ArgumentError as error:
         raise ArgumentError(f"basic TF {name}: {error}") from error

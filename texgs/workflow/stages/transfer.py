@@ -33,16 +33,15 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     It reads `volume`, the volume.nrrd; volume.json is beside it.
     """
     from texgs.core.figures import write_figure
-    from texgs.core.io import read_json
+    from texgs.volume.summaries import read_summaries
     from texgs.volume.tf_files import write_paraview
     from texgs.volume.tf_plot import plot
     from texgs.volume.transfer import check_disjoint
 
     basic = basic_tfs_of(inputs["volume"], settings.basic_tfs, settings.tf_values)
-    summary = read_json(inputs["volume"].with_name("volume.json"))
-    low, high = summary["minimum"], summary["maximum"]
     check_disjoint(basic)
-    write_figure(output / "transfer.png", plot(summary["histogram"], low, high, basic, settings.title))
+    channels = read_summaries(inputs["volume"])
+    write_figure(output / "transfer.png", plot(channels, basic, settings.title))
     for name, tf in basic.items():
         write_paraview(output / f"{name}.paraview.json", tf, f"{settings.dataset} {name}")
     ranges = {name: list(tf.support) for name, tf in basic.items()}

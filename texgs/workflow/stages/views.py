@@ -40,10 +40,9 @@ TURNTABLE = 320  # pixels of its longer side
 def framed_tfs(config: Config) -> dict[str, BasicTF]:
     """Return where basic TFs show something, which frames views; none where their distance is given."""
     dataset, names = config.dataset, config.dataset.framing if config.views.radius is None else []
-    return {
-        name: BasicTF([*map(shows, dataset.basic_tfs[name].opacity)], [[0.0, 1.0, 1.0, 1.0]])
-        for name in names
-    }
+    white = [[0.0, 1.0, 1.0, 1.0]]
+    framing = {name: dataset.basic_tfs[name] for name in names}
+    return {name: replace(tf, opacity=[*map(shows, tf.opacity)], color=white) for name, tf in framing.items()}
 
 
 def shows(point: Any) -> Any:
@@ -81,7 +80,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     grid = open_grid(inputs["volume"])
     (tf,) = basic_tfs_of(inputs["volume"], {settings.tf: settings.points}, settings.tf_values).values()
     appearance = appearance_of(views)
-    renderer = renderer_for(views.renderer, grid, appearance)
+    renderer = renderer_for(views.renderer, grid, appearance, tf.channel)
     times, coverages = Times(output / TIMES), []
     framed = basic_tfs_of(inputs["volume"], settings.framed, settings.tf_values)
     frame = frame_of(grid, framed.values()) if framed else None
@@ -116,15 +115,15 @@ def appearance_of(views: ViewKeys) -> Appearance:
     return Appearance(**asdict(views.shading), step=views.step, opacity_unit=views.opacity_unit)
 
 
-def renderer_for(kind: str, grid: Grid, appearance: Appearance) -> VolumeRenderer:
-    """Return the caster on the CPU or a GPU, or VTK."""
+def renderer_for(kind: str, grid: Grid, appearance: Appearance, channel: int) -> VolumeRenderer:
+    """Return the caster on the CPU or a GPU, or VTK, which knows one channel."""
     from texgs.core.check import torch_device
     from texgs.volume.caster import Caster
 
     if kind == "vtk":
         from texgs.volume.vtk_renderer import VtkRenderer
 
-        return VtkRenderer(grid, appearance)
+        return VtkRenderer(grid.channel(channel), appearance)
     return Caster(grid, appearance, torch_device("cuda" if kind == "gpu" else "cpu"))
 
 
@@ -133,7 +132,7 @@ def vtk_frame_ms(
 ) -> float | None:
     """Return the median milliseconds of views that VTK renders; None where it cannot, offscreen."""
     try:
-        vtk = renderer_for("vtk", grid, appearance)
+        vtk = renderer_for("vtk", grid, appearance, tf.channel)
     except DeviceError as error:
         print(f"{title}: VTK's time is not measured: {error}", file=sys.stderr)
         return None

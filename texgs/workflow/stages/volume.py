@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.dataset import Volume
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_json
 from texgs.core.memory import MIB
 from texgs.core.progress import progress
 from texgs.report.results import VolumeResult
@@ -31,31 +31,36 @@ class Settings(OfDataset):
     """What the stage reads of the configuration."""
 
     volume: Volume = read(lambda config: without(config.dataset.volume, "obtain"))
+    channels: list[str] = read("dataset.channels")
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
-    """Write volume.nrrd, which ParaView opens too, and volume.json: lattice, range and histogram.
+    """Write volume.nrrd, which ParaView opens too, and volume.json: lattice, ranges and histograms.
 
     It reads `source`, the volume's file, where it is not generated.
     """
-    volume = settings.volume
-    field = source(volume, inputs.get("source"))
-    if field.note:
-        sys.stderr.write(f"{settings.dataset}: {field.note}\n")
+    from texgs.volume.summaries import write_summaries
+
+    volume, target = settings.volume, output / "volume.nrrd"
+    channels = [replace(volume, channel=channel) for channel in settings.channels] or [volume]
+    fields = [source(channel, inputs.get("source")) for channel in channels]
+    if fields[0].note:
+        sys.stderr.write(f"{settings.dataset}: {fields[0].note}\n")
     shown = partial(progress, title=f"{settings.dataset}: volume", unit="slab")
-    summary = prepared(volume, field, output / "volume.nrrd", shown)
-    write_json(output / "volume.json", asdict(summary))
-    size = (output / "volume.nrrd").stat().st_size / MIB
-    told = {name: plain(getattr(summary, name)) for name in TOLD}
-    return Outcome(VolumeResult(**told, volume_mib=size))
+    summaries = prepared(volume, fields, target, shown)
+    write_summaries(target, summaries, settings.channels)
+    ends = min(each.minimum for each in summaries), max(each.maximum for each in summaries)
+    whole = replace(summaries[0], minimum=ends[0], maximum=ends[1])
+    told = {name: plain(getattr(whole, name)) for name in TOLD}
+    return Outcome(VolumeResult(**told, volume_mib=target.stat().st_size / MIB))
 
 
-def prepared(volume: Volume, field: Source, target: Path, shown: Any = None) -> Summary:
-    """Write the canonical file of a field as settings say."""
-    from texgs.volume.prepare import prepare
+def prepared(volume: Volume, fields: Sequence[Source], target: Path, shown: Any = None) -> list[Summary]:
+    """Write the canonical file of the channels of a field as settings say."""
+    from texgs.volume.prepare import prepare_channels
 
-    return prepare(
-        *(field, target),
+    return prepare_channels(
+        *(fields, target),
         crop=volume.crop and tuple(volume.crop),  # type: ignore[arg-type]
         reduce=volume.reduce,
         method=volume.method,

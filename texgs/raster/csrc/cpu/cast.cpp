@@ -24,6 +24,13 @@ struct Queue {
         if (!is_full()) store(k + n, vf(k[n - 1]));
         return is_full() ? kVectors : (n + kLanes - 1) / kLanes;
     }
+    // Adds those of a vector of samples that are chosen.
+    void add(vf number, vf its_value, vf its_weight, vm chosen) {
+        store_chosen(k + n, number, chosen);
+        store_chosen(value + n, its_value, chosen);
+        store_chosen(weight + n, its_weight, chosen);
+        n += count(chosen);
+    }
     // Takes these samples away.
     void drop() {
         n = is_full() ? n - kSamples : 0;
@@ -66,9 +73,11 @@ class Caster {
 public:
     Caster(const CastJob& job) : job_(job), lattice_(lattice_of(job.volume)), lamp_(lamp_of(job.view)) {
         for (int a = 0; a < 3; ++a) box_.lower[a] = job.lower[a], box_.upper[a] = job.upper[a];
-        const CastTable& t = job.table;
-        for (int a = 0; a < 3; ++a)
-            slope_[a] = static_cast<float>(lattice_.per_unit[a] / (t.value[t.n - 1] - t.value[0]));
+        for (int c = 0; c < job.n; ++c) {
+            const CastTable& t = job.channels[c].table;
+            for (int a = 0; a < 3; ++a)
+                slope_[c][a] = static_cast<float>(lattice_.per_unit[a] / (t.value[t.n - 1] - t.value[0]));
+        }
     }
 
     void cast(int x, int y) {
@@ -77,7 +86,7 @@ public:
         for (int a = 0; a < 3; ++a) sums.color[a] = 0.0f, sums.normal[a] = 0.0f;
         if (is_empty(pixel)) return write(pixel, sums);
         const CastRay ray = cast_ray(lattice_, job_.view, x, y);
-        Queue waiting, seen;
+        Queue waiting;
         int32_t k, end;
         clip(ray, box_, k, end);
         while (k < end && sums.light >= kOpaque) {
@@ -91,11 +100,12 @@ public:
             const vm chosen = are_visible(ray, next) & (next < vf(static_cast<float>(end)));
             store_chosen(waiting.k + waiting.n, next, chosen);
             waiting.n += count(chosen);
-            if (waiting.is_full()) weigh(ray, waiting, seen, sums);
+            if (waiting.is_full()) weigh(ray, waiting, sums);
             k += kLanes;
         }
-        if (waiting.n && sums.light >= kOpaque) weigh(ray, waiting, seen, sums);
-        if (seen.n) shade(ray, seen, sums);
+        if (waiting.n && sums.light >= kOpaque) weigh(ray, waiting, sums);
+        for (int c = 0; c < job_.n; ++c)
+            if (seen_[c].n) shade(ray, c, sums);
         write(pixel, sums);
     }
 
@@ -141,28 +151,37 @@ private:
     }
 
     // Finds what the first samples weigh, and lets those that show something wait.
-    void weigh(const CastRay& ray, Queue& waiting, Queue& seen, Sums& sums) {
-        const CastTable& t = job_.table;
+    void weigh(const CastRay& ray, Queue& waiting, Sums& sums) {
         const int vectors = waiting.vectors();
-        vf inside[kVectors][3], value[kVectors], alpha[kVectors];
-        load_blocks(ray, waiting, vectors, Rows::of_cell, inside);
-        for (int i = 0; i < vectors; ++i) {
-            value[i] = values_in(blocks_[i], inside[i]);
-            const vf opacity = Intervals(t, value[i]).mixed(t.opacity);
-            const vm visible = (vf(t.value[0]) <= value[i]) & (value[i] <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
-            const vm is_used = to_float(iota()) < vf(static_cast<float>(waiting.n - i * kLanes));
-            const vf lengths = vf(job_.view.step / job_.view.opacity_unit) * share(ray, load(waiting.k + i * kLanes));
-            alpha[i] = zero_unless(visible & is_used, step_opacity(opacity, lengths));
+        vf inside[kVectors][3], value[TEXGS_CHANNELS][kVectors], through[TEXGS_CHANNELS][kVectors], all[kVectors];
+        for (int c = 0; c < job_.n; ++c) {
+            const CastTable& t = job_.channels[c].table;
+            load_blocks(ray, waiting, vectors, Rows::of_cell, c, inside);
+            for (int i = 0; i < vectors; ++i) {
+                const vf v = values_in(blocks_[i], inside[i]), opacity = Intervals(t, v).mixed(t.opacity);
+                const vm visible = (vf(t.value[0]) <= v) & (v <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
+                const vm is_used = to_float(iota()) < vf(static_cast<float>(waiting.n - i * kLanes));
+                const vf lengths =
+                    vf(job_.view.step / job_.view.opacity_unit) * share(ray, load(waiting.k + i * kLanes));
+                value[c][i] = v;
+                through[c][i] = zero_unless(visible & is_used, log2_through(opacity, lengths));
+                all[i] = c ? all[i] + through[c][i] : through[c][i];
+            }
         }
         for (int i = 0; i < vectors && sums.light >= kOpaque; ++i) {
-            absorb(ray, waiting.k + i * kLanes, value[i], alpha[i], seen, sums);
-            if (seen.is_full()) shade(ray, seen, sums);
+            const float* const k = waiting.k + i * kLanes;
+            const vf weight = absorb(ray, k, opacity_of(all[i]), sums);
+            for (int c = 0; c < job_.n; ++c) {
+                const vf part = weight * (through[c][i] / all[i]);
+                seen_[c].add(load(k), value[c][i], part, (vf(0.0f) < weight) & (through[c][i] < vf(0.0f)));
+                if (seen_[c].is_full()) shade(ray, c, sums);
+            }
         }
         waiting.drop();
     }
 
-    // Takes light away where samples of some opacity show something.
-    TEXGS_INLINE void absorb(const CastRay& ray, const float* k, vf value, vf alpha, Queue& seen, Sums& sums) const {
+    // Takes light away where samples have some opacity; returns what each of them weighs.
+    TEXGS_INLINE vf absorb(const CastRay& ray, const float* k, vf alpha, Sums& sums) const {
         const vf behind = running_product(vf(1.0f) - alpha) * vf(sums.light);
         float light[kLanes + 1];  // before each sample and behind it
         light[0] = sums.light;
@@ -173,43 +192,43 @@ private:
             sums.median = ray.near + (k[count(vf(0.5f) < behind)] + 0.5f) * ray.z;
         sums.light = light[count(vf(kOpaque) <= before)];
         sums.depth = fma_where(is_seen, weight, fma(load(k) + vf(0.5f), ray.z, ray.near), sums.depth);
-        store_chosen(seen.k + seen.n, load(k), is_seen);
-        store_chosen(seen.value + seen.n, value, is_seen);
-        store_chosen(seen.weight + seen.n, weight, is_seen);
-        seen.n += count(is_seen);
+        return zero_unless(is_seen, weight);
     }
 
-    // Adds what the first samples that show something look like.
-    void shade(const CastRay& ray, Queue& seen, Sums& sums) {
-        const CastTable& t = job_.table;
+    // Adds what the first samples of a channel that show something look like.
+    void shade(const CastRay& ray, int c, Sums& sums) {
+        const CastTable& t = job_.channels[c].table;
+        Queue& seen = seen_[c];
         const int vectors = seen.vectors();
         vf inside[kVectors][3];
-        load_blocks(ray, seen, vectors, Rows::around, inside);
+        load_blocks(ray, seen, vectors, Rows::around, c, inside);
         for (int i = 0; i < vectors; ++i) {
             vf slope[3];
             differences_in(blocks_[i], inside[i], slope);
-            Vec3<vf> n = unit(Vec3<vf>{slope[0] * vf(slope_[0]), slope[1] * vf(slope_[1]), slope[2] * vf(slope_[2])});
+            const float* const s = slope_[c];
+            Vec3<vf> n = unit(Vec3<vf>{slope[0] * vf(s[0]), slope[1] * vf(s[1]), slope[2] * vf(s[2])});
             const Intervals intervals(t, load(seen.value + i * kLanes));
             const Vec3<vf> color{intervals.mixed(t.color[0]), intervals.mixed(t.color[1]), intervals.mixed(t.color[2])};
             const Vec3<vf> shown = lit(ray, load(seen.k + i * kLanes), color, n, lamp_);
             const Vec3<vf> against = turned(n, vf(0.0f) - along(n, ray.direction));
             const vf looks[3] = {shown.x, shown.y, shown.z}, normals[3] = {against.x, against.y, against.z};
             const vm is_used = to_float(iota()) < vf(static_cast<float>(seen.n - i * kLanes));
-            for (int c = 0; c < 3; ++c) {
-                sums.color[c] = fma_where(is_used, load(seen.weight + i * kLanes), looks[c], sums.color[c]);
-                sums.normal[c] = fma_where(is_used, load(seen.weight + i * kLanes), normals[c], sums.normal[c]);
+            for (int a = 0; a < 3; ++a) {
+                sums.color[a] = fma_where(is_used, load(seen.weight + i * kLanes), looks[a], sums.color[a]);
+                sums.normal[a] = fma_where(is_used, load(seen.weight + i * kLanes), normals[a], sums.normal[a]);
             }
         }
         seen.drop();
     }
 
     // Loads the blocks around the first samples, and where these are in their cells.
-    TEXGS_INLINE void load_blocks(const CastRay& ray, const Queue& samples, int vectors, Rows rows,
+    TEXGS_INLINE void load_blocks(const CastRay& ray, const Queue& samples, int vectors, Rows rows, int channel,
                                   vf (&inside)[kVectors][3]) {
+        const T* const values = static_cast<const T*>(job_.channels[channel].values);
         for (int i = 0; i < vectors; ++i) {
             vf cell[3];
             locate(ray, load(samples.k + i * kLanes), cell, inside[i]);
-            blocks_[i].fetch(static_cast<const T*>(job_.volume.values), job_.volume.size, cell, ray.ahead, rows);
+            blocks_[i].fetch(values, job_.volume.size, cell, ray.ahead, rows);
         }
     }
 
@@ -229,7 +248,8 @@ private:
     const Lamp lamp_;
     Extent box_;
     Blocks blocks_[kVectors];
-    float slope_[3];
+    Queue seen_[TEXGS_CHANNELS];  // samples of each channel that show something; empty between rays
+    float slope_[TEXGS_CHANNELS][3];
 };
 
 template <class T>

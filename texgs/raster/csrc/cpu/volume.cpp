@@ -192,19 +192,20 @@ int32_t texgs_volume_distance(const texgs_volume* volume, const float* extremes,
     });
 }
 
-int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, const uint8_t* distance,
+int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, int32_t n, const uint8_t* distance,
                    const texgs_cast_view* view, void*) {
     return guarded([&] {
-        check_volume(*volume);
-        check_transfer(*transfer);
+        check_channels(volume, transfer, n);
+        for (int c = 0; c < n; ++c) check_transfer(transfer[c]);
         check_cast(*view);
         clear(*view);
         int32_t size[3];
         count_bricks(*volume, size);
         const Shown shown(distance, size);
         if (!shown.any()) return;
-        const Table table(*transfer);
-        CastJob job{*volume, *view, table.view, distance, {}, {}};
+        const std::vector<Table> tables(transfer, transfer + n);
+        CastJob job{*volume, *view, n, {}, distance, {}, {}};
+        for (int c = 0; c < n; ++c) job.channels[c] = {volume[c].values, tables[c].view};
         for (int a = 0; a < 3; ++a) {
             job.lower[a] = static_cast<float>(kBrick * shown.lower[a]);
             job.upper[a] = static_cast<float>(std::min(kBrick * shown.upper[a], volume->size[a] - 1));

@@ -15,10 +15,16 @@ struct CastTable {
     const float *value, *per_width, *opacity, *color[3];
 };
 
-struct CastJob {
-    texgs_volume volume;
-    texgs_cast_view view;
+struct CastChannel {
+    const void* values;
     CastTable table;
+};
+
+struct CastJob {
+    texgs_volume volume;  // the first; others have its lattice and type
+    texgs_cast_view view;
+    int32_t n;
+    CastChannel channels[TEXGS_CHANNELS];
     const uint8_t* distance;   // [bricks]
     float lower[3], upper[3];  // corners of a box that holds all bricks in which something shows, in samples
 };

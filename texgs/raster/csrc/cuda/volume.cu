@@ -123,8 +123,16 @@ struct Interval {
     __device__ float column(int c) const { return mix(from[c], to[c], place); }
 };
 
-template <class T>
-__global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volume, const texgs_transfer transfer,
+// Volumes of one lattice that a cast shows together, each with its transfer function.
+struct Channels {
+    const void* values[TEXGS_CHANNELS];
+    texgs_transfer transfer[TEXGS_CHANNELS];
+    int n;
+};
+
+// kMost: 1, which needs no memory for values of channels, or TEXGS_CHANNELS.
+template <class T, int kMost>
+__global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volume, const Channels channels,
                                                         const uint8_t* distance, const texgs_cast_view view,
                                                         int tiles) {
     const int x = static_cast<int>(blockIdx.x) % tiles * kTileX + static_cast<int>(threadIdx.x) % kTileX;
@@ -133,8 +141,10 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
     const Lattice lattice = lattice_of(volume);
     const Lamp lamp = lamp_of(view);
     const CastRay ray = cast_ray(lattice, view, x, y);
-    const Samples<T> samples{static_cast<const T*>(volume.values), {volume.size[0], volume.size[1], volume.size[2]}};
-    const float low = transfer.points[0], high = transfer.points[5 * (transfer.n - 1)];
+    const int n = kMost == 1 ? 1 : channels.n;
+    const auto samples_of = [&](int c) {
+        return Samples<T>{static_cast<const T*>(channels.values[c]), {volume.size[0], volume.size[1], volume.size[2]}};
+    };
     float light = 1.0f, depth = 0.0f, median = 0.0f, color[3] = {}, normal[3] = {};
     for (int k = ray.first; k < ray.samples && light >= kOpaque;) {
         float place[3];
@@ -150,29 +160,42 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
             continue;
         }
         const Spot spot(lattice, ray, k);
-        const float value = spot.value(samples), at = static_cast<float>(k), z = ray.near + (at + 0.5f) * ray.z;
-        ++k;
-        if (!(value >= low && value <= high)) continue;
-        const Interval interval(transfer, value);
-        const float opacity = interval.column(1);
-        if (!(opacity > 0.0f)) continue;
+        const float at = static_cast<float>(k), z = ray.near + (at + 0.5f) * ray.z;
         const float lengths = view.step / view.opacity_unit * share(ray, at);
-        const float weight = light * step_opacity(opacity, lengths), left = light - weight;
+        float value[kMost], through[kMost], all = 0.0f;
+        for (int c = 0; c < n; ++c) {
+            const texgs_transfer& transfer = channels.transfer[c];
+            value[c] = spot.value(samples_of(c)), through[c] = 0.0f;
+            if (!(value[c] >= transfer.points[0] && value[c] <= transfer.points[5 * (transfer.n - 1)])) continue;
+            const float opacity = Interval(transfer, value[c]).column(1);
+            if (opacity > 0.0f) through[c] = log2_through(opacity, lengths);
+            all += through[c];
+        }
+        ++k;
+        if (all == 0.0f) continue;
+        const float weight = light * opacity_of(all), left = light - weight;
         if (light > 0.5f && left <= 0.5f) median = z;
         light = left;
         depth += weight * z;
-        Vec3<float> slope{spot.difference(samples, 0), spot.difference(samples, 1), spot.difference(samples, 2)};
-        const float scale = 1.0f / (high - low);
-        slope.x *= static_cast<float>(lattice.per_unit[0]) * scale;
-        slope.y *= static_cast<float>(lattice.per_unit[1]) * scale;
-        slope.z *= static_cast<float>(lattice.per_unit[2]) * scale;
-        Vec3<float> n = unit(slope);
-        const Vec3<float> own{interval.column(2), interval.column(3), interval.column(4)};
-        const Vec3<float> shown = lit(ray, at, own, n, lamp);
-        const Vec3<float> against = turned(n, -along(n, ray.direction));
-        color[0] = fma(weight, shown.x, color[0]), normal[0] = fma(weight, against.x, normal[0]);
-        color[1] = fma(weight, shown.y, color[1]), normal[1] = fma(weight, against.y, normal[1]);
-        color[2] = fma(weight, shown.z, color[2]), normal[2] = fma(weight, against.z, normal[2]);
+        for (int c = 0; c < n; ++c) {
+            if (through[c] == 0.0f) continue;
+            const texgs_transfer& transfer = channels.transfer[c];
+            const Samples<T> samples = samples_of(c);
+            const float part = weight * (through[c] / all);
+            const float scale = 1.0f / (transfer.points[5 * (transfer.n - 1)] - transfer.points[0]);
+            Vec3<float> slope{spot.difference(samples, 0), spot.difference(samples, 1), spot.difference(samples, 2)};
+            slope.x *= static_cast<float>(lattice.per_unit[0]) * scale;
+            slope.y *= static_cast<float>(lattice.per_unit[1]) * scale;
+            slope.z *= static_cast<float>(lattice.per_unit[2]) * scale;
+            Vec3<float> n_c = unit(slope);
+            const Interval interval(transfer, value[c]);
+            const Vec3<float> own{interval.column(2), interval.column(3), interval.column(4)};
+            const Vec3<float> shown = lit(ray, at, own, n_c, lamp);
+            const Vec3<float> against = turned(n_c, -along(n_c, ray.direction));
+            color[0] = fma(part, shown.x, color[0]), normal[0] = fma(part, against.x, normal[0]);
+            color[1] = fma(part, shown.y, color[1]), normal[1] = fma(part, against.y, normal[1]);
+            color[2] = fma(part, shown.z, color[2]), normal[2] = fma(part, against.z, normal[2]);
+        }
     }
     const int64_t pixel = int64_t(y) * view.width + x;
     const float alpha = 1.0f - light, per_alpha = alpha > 0.0f ? 1.0f / alpha : 0.0f;
@@ -243,16 +266,19 @@ int32_t texgs_volume_distance(const texgs_volume* volume, const float* extremes,
     });
 }
 
-int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, const uint8_t* distance,
+int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, int32_t n, const uint8_t* distance,
                    const texgs_cast_view* view, void* on) {
     return on_device_of(view->rgba, on, [&](cudaStream_t stream) {
-        check_volume(*volume);
-        check_points(*transfer);
+        check_channels(volume, transfer, n);
         check_cast(*view);
+        Channels channels{};
+        channels.n = n;
+        for (int c = 0; c < n; ++c) channels.values[c] = volume[c].values, channels.transfer[c] = transfer[c];
         const int tiles = (view->width + kTileX - 1) / kTileX, rows = (view->height + kTileY - 1) / kTileY;
         with_type(*volume, [&](auto sample) {
-            launch(cast_kernel<decltype(sample)>, int64_t(tiles) * rows, kThreads, stream, *volume, *transfer, distance,
-                   *view, tiles);
+            const auto kernel =
+                n == 1 ? cast_kernel<decltype(sample), 1> : cast_kernel<decltype(sample), TEXGS_CHANNELS>;
+            launch(kernel, int64_t(tiles) * rows, kThreads, stream, *volume, channels, distance, *view, tiles);
         });
     });
 }
