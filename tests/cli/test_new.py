@@ -182,8 +182,8 @@ def test_channels_have_no_steps_in_time(conf, scan, capsys):
     path = cells(conf.parent, scan, ["a", "b"])
     assert main(["new", str(path), "--series", str(path)]) == 2
     assert (
-        "dataset.series of cells: expected one channel, got a, b; leave out the others or the series\n"
-        in capsys.readouterr().err
+        "dataset.series of cells: expected one channel, got a, b; name it by dataset.volume.channel, or "
+        "leave out the series\n" in capsys.readouterr().err
     )
     assert not (conf / "dataset").exists()
 

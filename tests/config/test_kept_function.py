@@ -50,7 +50,7 @@ def channels_of(folder, is_scaled):
     sources = [ArraySource(Grid(sphere(16).values * factor)) for factor in (1, 10)]
     first, second = prepare_channels(sources, scene.volume.file)
     write_summaries(scene.volume.file, [first, second], ["DAPI", "GFP"])
-    document = yaml.safe_load(DATA_SET)
+    document = {**yaml.safe_load(DATA_SET), "volume": {"file": "cells.zarr"}}
     for tf, channel in zip(document["basic_tfs"].values(), ("DAPI", "GFP"), strict=True):
         tf["channel"] = channel
     if not is_scaled:

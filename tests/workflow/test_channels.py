@@ -123,8 +123,8 @@ def test_metrics_and_summary_tell_of_all_channels(both):
         ),
         (
             {},
-            {"steps": 3},
-            "dataset.series of cells: expected one channel, got DAPI, 1; leave out the others or the series",
+            {"generator": "sphere"},
+            "cells: basic TFs: expected none that name channels, as the volume is generated, got DAPI",
         ),
     ],
 )

@@ -44,7 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--name", help="of the data set (the file's name)")
     parser.add_argument(
-        "--count", type=int, help="number of transfer functions to suggest (as many as the histogram shows)"
+        "--count",
+        type=int,
+        help="number of transfer functions to suggest (what the histogram shows, or one for each channel)",
     )
     parser.add_argument(
         "--tf",

@@ -53,7 +53,7 @@ def check_basic_tfs(dataset: Dataset) -> None:
 
 
 def check_channels(dataset: Dataset) -> None:
-    """Require that all basic TFs of a data set name channels, or none; a series in time has one."""
+    """Require that all basic TFs of a data set name channels of its file, or none; a series has one."""
     channels = dataset.channels
     unnamed = [name for name, points in dataset.basic_tfs.items() if points.channel is None]
     if channels and unnamed:
@@ -66,10 +66,15 @@ def check_channels(dataset: Dataset) -> None:
             f"dataset.volume.channel: expected none, as basic TFs of {dataset.name} name channels "
             f"({', '.join(channels)}), got {dataset.volume.channel}"
         )
-    if len(channels) > 1 and (dataset.series or dataset.volume.steps > 1):
+    if channels and dataset.series:
         raise ConfigError(
-            f"dataset.series of {dataset.name}: expected one channel, got {', '.join(channels)}; leave out "
-            "the others or the series"
+            f"dataset.series of {dataset.name}: expected one channel, got {', '.join(channels)}; name it by "
+            "dataset.volume.channel, or leave out the series"
+        )
+    if channels and dataset.volume.generator:
+        raise ConfigError(
+            f"{dataset.name}: basic TFs: expected none that name channels, as the volume is generated, got "
+            f"{', '.join(channels)}; leave these out"
         )
 
 
