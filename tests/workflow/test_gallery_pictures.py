@@ -18,7 +18,8 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
-from texgs.workflow.stages.gallery import GalleryCell, GalleryRenderer
+from texgs.workflow.galleries import GalleryCell
+from texgs.workflow.stages.gallery import GalleryRenderer
 from texgs.workflow.stages.pse import compared
 from texgs.workflow.stages.settings import FitLabel, OfScene
 

@@ -1,9 +1,8 @@
 """What a gallery shows in each place: its row and its column, put together and checked."""
 
 import re
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
 
 from texgs.config.compose import compose
 from texgs.config.gallery import AS_FITTED, GridKeys, ShotKeys
@@ -22,6 +21,38 @@ FRONT, SIDE, ABOVE = [-90.0, 20.0], [0.0, 20.0], [-130.0, 50.0]  # azimuth, pola
 ANYWHERE = ("background", "light")  # changes of the whole scene
 
 
+@dataclass
+class GalleryCell:
+    """What the configuration says of one picture, see `ShotKeys`."""
+
+    scene: str  # its name among the inputs
+    show: str  # scene, volume, error, or "" for nothing
+    view: list[float]
+    fov_y: float | None
+    box: list[float]
+    pixels: int | None
+    light: list[float]
+    changes: list[str]
+
+
+@dataclass
+class GalleryRow:
+    """Places side by side."""
+
+    title: str
+    pictures: list[GalleryCell]
+
+
+@dataclass
+class Grid:
+    """What one file shows."""
+
+    name: str
+    caption: str
+    columns: list[str]
+    rows: list[GalleryRow]
+
+
 @dataclass(frozen=True)
 class Place:
     """One place of a grid."""
@@ -30,11 +61,10 @@ class Place:
     scene: str  # key of its file among the inputs
     file: Path
 
-    def picture(self) -> dict[str, Any]:
+    def picture(self) -> GalleryCell:
         """Return what the stage reads of the place."""
-        values = asdict(self.shot)
-        read = ("show", "view", "fov_y", "box", "pixels", "light", "changes")
-        return {"scene": self.scene, **{name: values[name] for name in read}}
+        said = {each.name: getattr(self.shot, each.name) for each in fields(GalleryCell)[1:]}
+        return GalleryCell(self.scene, **said)
 
 
 def gallery_command(config: Config) -> str:
@@ -43,17 +73,16 @@ def gallery_command(config: Config) -> str:
     return f"texgs run experiment={name}" if name in members("experiment") else ""
 
 
-def gallery_grids(config: Config) -> list[dict[str, Any]]:
+def gallery_grids(config: Config) -> list[Grid]:
     """Return what the stage reads of the pictures of all places."""
     shown = []
     for grid, places in places_of(config):
         rows = [
-            {"title": row.title, "pictures": [place.picture() for place in line]}
+            GalleryRow(row.title, [place.picture() for place in line])
             for row, line in zip(grid.rows, places, strict=True)
         ]
-        titles = [column.title for column in grid.columns]
         caption = " ".join(filter(None, (grid.caption, config.gallery.note)))
-        shown.append({"name": grid.name, "caption": caption, "columns": titles, "rows": rows})
+        shown.append(Grid(grid.name, caption, [column.title for column in grid.columns], rows))
     return shown
 
 

@@ -13,7 +13,7 @@ from texgs.core.progress import progress
 from texgs.edit.method import method_of
 from texgs.report.results import GalleryResult, Shown
 from texgs.workflow.edits import looks_of
-from texgs.workflow.galleries import gallery_command, gallery_grids, gallery_inputs
+from texgs.workflow.galleries import GalleryCell, Grid, gallery_command, gallery_grids, gallery_inputs
 from texgs.workflow.inputs import has_scene, is_first_recipe
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import OfScene, OfVolume, basic_tfs_of
@@ -39,38 +39,6 @@ def given(config: Config, follows: str) -> dict[str, str]:
     edits = [compose((f"edit={name}",)).edit for name in config.edits if config.edit.looks]
     own = [edit for edit in edits if method_of(edit).follows == follows and not config.gallery.grids]
     return looks_of(replace(config, edit=replace(own[0], looks=True))) if own else {}
-
-
-@dataclass
-class GalleryCell:
-    """What the configuration says of one picture, see `texgs.config.gallery`."""
-
-    scene: str  # its name among the inputs
-    show: str  # scene, volume, error, or "" for nothing
-    view: list[float]
-    fov_y: float | None
-    box: list[float]
-    pixels: int | None
-    light: list[float]
-    changes: list[str]
-
-
-@dataclass
-class GalleryRow:
-    """Places side by side."""
-
-    title: str
-    pictures: list[GalleryCell]
-
-
-@dataclass
-class Grid:
-    """What one file shows."""
-
-    name: str
-    caption: str
-    columns: list[str]
-    rows: list[GalleryRow]
 
 
 @dataclass(kw_only=True)
