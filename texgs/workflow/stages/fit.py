@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,14 +18,11 @@ from texgs.workflow.stage import Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import OfTF, Recipe
 
 if TYPE_CHECKING:
-    import torch
     from torch import Tensor
 
     from texgs.fields.field import Field
     from texgs.fields.surfels.model import Surfels
     from texgs.fields.surfels.shading import ShadingModel
-    from texgs.volume.images import Images
-    from texgs.volume.view_set import ViewSet
 
 PHASE = Rule("phase", "{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",), target="fits", gpu=("fit",))
 
@@ -37,17 +34,8 @@ class PhaseSettings(OfTF):
     fit: Recipe
 
 
-@dataclass(frozen=True, eq=False)
-class FitJob:
-    """One phase of the fit of a basic TF: what it starts with, and how its result is told."""
-
-    fit: Recipe
-    title: str  # of progress bars
-    device: torch.device
-    views: ViewSet
-    images: Images  # the training views, reduced
-    output: Path
-    metadata: Mapping[str, str]  # of the field: where it is from
+class FitJob(FitTask[Recipe]):
+    """One phase of the fit of a basic TF, by its recipe: what it starts with, and how its result is told."""
 
     @classmethod
     def of(cls, settings: PhaseSettings, inputs: Mapping[str, Path], output: Path) -> FitJob:
@@ -60,7 +48,7 @@ class FitJob:
         title = f"{settings.dataset}/{settings.tf}: {settings.stage}"
         metadata = {"dataset": settings.dataset, "tf": settings.tf}
         images = load(views.train, fit.reduce)
-        return cls(fit, title, torch_device(fit.device), views, images, output, metadata)
+        return cls(fit, views, images, output, torch_device(fit.device), fit.seed, title, metadata)
 
     def run(
         self, parameters: Mapping[str, Tensor], shading: ShadingModel, phase: Phase
@@ -77,7 +65,7 @@ class FitJob:
         from texgs.fitting.densify import is_shared
         from texgs.fitting.loop import Fit
 
-        fit = Fit(parameters, shading, self.images, phase, self.fit.seed)
+        fit = Fit(parameters, shading, self.images, phase, self.seed)
         seconds = run_to_end(fit, self.output / FOLDER, self.title)
         order = z_order_of(fit.parameters["means"].detach())
         ordered = {
@@ -101,7 +89,7 @@ class FitJob:
         from texgs.fitting import checkpoint
         from texgs.volume.images import smaller
 
-        camera = smaller(self.views.train[0].camera, self.fit.reduce)
+        camera = smaller(self.views.train[0].camera, self.settings.reduce)
         scores: dict[str, Any] = {}
         for split in measured:
             scores |= self.quality(field, split)
@@ -118,7 +106,7 @@ class FitJob:
 
         if not (views := getattr(self.views, split)):
             return {}
-        scores = mean(evaluate(field, views, self.fit.reduce, f"{self.title}: {split} views"))
+        scores = mean(evaluate(field, views, self.settings.reduce, f"{self.title}: {split} views"))
         return scores if split == "test" else {f"{split}_{name}": scores[name] for name in ("psnr", "ssim")}
 
 
@@ -138,10 +126,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     if kind.settings is None or kind.fit is None:
         raise ArgumentError(f"{kind.name}: expected a kind of field that is fitted in one phase")
     keys = typed(kind.settings, settings.keys)
-    task = FitTask(
-        keys, job.views, job.images, output, job.device, settings.fit.seed, job.title, job.metadata
-    )
-    fitted = kind.fit(task)
+    fitted = kind.fit(replace(job, settings=keys))
     field, notes = fitted.field, dict(fitted.notes)
     kind.field.write(output / "model.safetensors", field)
     told = (fitted.seconds, fitted.iterations, fitted.losses)
