@@ -44,7 +44,7 @@ def measured(scene: Scene) -> list[dict[str, object]]:
     """Return PSNRs of all kinds of file, by the mean and the least of the views, and their bytes."""
     composed, background, rows = scene.open(), torch.tensor(scene.background), []
     for size in SIZES:
-        cameras = spiral(VIEWS, *scene.framed(composed).lens(width=size, height=size))
+        cameras = spiral(VIEWS, scene.framed(composed).lens(width=size, height=size))
         shown = [composed.render(each, scene.light, scene.edits, background=background) for each in cameras]
         for kind in KINDS:
             clouds, n_bytes = written(scene, kind)

@@ -54,7 +54,7 @@ def closer(scene: Scene) -> dict[str, float]:
     lens = scene.framed(composed).lens(width=SIZE, height=SIZE)
     scores = [
         compare(composed.render(camera, HEADLIGHT), twin.render(camera, scene, composed.palettes))
-        for camera in spiral(VIEWS, *lens._replace(radius=CLOSER * lens.radius))
+        for camera in spiral(VIEWS, lens._replace(radius=CLOSER * lens.radius))
     ]
     return {name: fmean(each[name] for each in scores) for name in MEASURED}
 

@@ -112,7 +112,7 @@ def lens_of(grid: Grid, tf: TransferFunction) -> Lens:
 def quality(model: Surfels, grid: Grid, tf: TransferFunction) -> float:
     """Return the mean PSNR on test views."""
     caster, values = Caster(grid, LOOK), []
-    for camera in spiral(VIEWS, *lens_of(grid, tf)):
+    for camera in spiral(VIEWS, lens_of(grid, tf)):
         seen = caster.cast(tf, camera, HEADLIGHT).rgba
         values.append(psnr(model.render(camera).color, seen[..., :3] + 1 - seen[..., 3:]))
     return fmean(values)

@@ -50,7 +50,7 @@ def _run(settings: Settings) -> Section:
     section = Section()
     size, pixels, n_views = (24, 64, 2) if settings.is_quick else (128, 512, 64)
     grid, look = sphere(size), Appearance()
-    shots = icosphere(3, *Lens().square(pixels))[:n_views]
+    shots = icosphere(3, Lens().square(pixels))[:n_views]
     where = {"volume": size, "size": pixels}
     vtk = VtkCaster(grid, look, settings.threads[-1])
     renderers: dict[str, Any] = {"texgs": Caster(grid, look), "VTK": vtk}

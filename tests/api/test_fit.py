@@ -66,7 +66,7 @@ def test_results_are_a_table(scene, folder):
 def test_psnr_is_the_mean_beside_the_volume(scene):
     session = scene.session
     lens = session.scene.framed().lens(width=24, height=24)
-    each = [compare(*session.beside(camera, session.scene))["psnr"] for camera in spiral(3, *lens)]
+    each = [compare(*session.beside(camera, session.scene))["psnr"] for camera in spiral(3, lens)]
     assert scene.psnr(views=3, width=24) == pytest.approx(np.mean(each))
     assert min(each) > 15
 

@@ -5,6 +5,7 @@ from torch.nn.functional import normalize
 
 from tests.edit.scenes import on_sphere
 from tests.fitting.scenes import logit
+from texgs.core.lens import Lens
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
@@ -44,7 +45,7 @@ def nested(opacity=0.3, n=2500):
 
 def cameras(size=96, frequency=2):
     """All around; 42 of them."""
-    return icosphere(frequency, 4.0, 22.0, size, size)
+    return icosphere(frequency, Lens(4.0, 22.0, size, size))
 
 
 def truth(model, of_class, camera):

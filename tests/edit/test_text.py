@@ -257,7 +257,7 @@ def test_six_views_of_the_size_asked_for_in_the_aspect_of_the_first(model):
 
 
 def test_training_views_nearest_to_the_axes_as_they_are_but_for_their_size(model):
-    guidance, cameras = Tint((0.1, 0.2, 0.3)), icosphere(4, *Lens(3.0, 30.0, 64, 64))
+    guidance, cameras = Tint((0.1, 0.2, 0.3)), icosphere(4, Lens(3.0, 30.0, 64, 64))
     edit_by_text(model, cameras, guidance, "x", TextRecipe("nearest"), size=32)
     (views,) = guidance.seen
     assert views.images.shape == (6, 32, 32, 3)
@@ -346,7 +346,7 @@ def test_top_and_bottom_are_upright():
 @pytest.mark.parametrize(("frequency", "degrees"), [(2, 0.0), (3, 11.64), (4, 0.0)])
 def test_training_views_nearest_to_the_axes(frequency, degrees):
     """Of 42 and 162 views six are on the axes but for the poles; of 92 the nearest are 11.64 degrees off."""
-    chosen = nearest_to_axes(icosphere(frequency, 4.0, 30.0, 8, 8), BOX)
+    chosen = nearest_to_axes(icosphere(frequency, Lens(4.0, 30.0, 8, 8)), BOX)
     assert len({id(camera) for camera in chosen}) == 6
     off = torch.rad2deg(torch.acos((directions(chosen) * AXES).sum(1).clamp(-1, 1)))
     assert_close(off, torch.full((6,), degrees), atol=0.03, rtol=0)  # float32, and poles are 0.01 degrees off

@@ -9,6 +9,7 @@ import torch
 from tests.fields.surfels.test_composition import ball
 from tests.models.clips import write_clip
 from texgs.core.checksum import Checksums
+from texgs.core.lens import Lens
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
@@ -20,7 +21,7 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.volume.cameras import spiral as path
 
-CAMERAS = path(12, 4.0, 30.0, 32, 32)
+CAMERAS = path(12, Lens(4.0, 30.0, 32, 32))
 CLIP = "clip-vit-base-patch32"
 MISSING = {"vgg16": None, "lpips_vgg": None, CLIP: None}
 

@@ -5,12 +5,13 @@ import pytest
 import torch
 
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
 from texgs.metrics.surface import Points, compare, distances, nearest, sample, seen
 from texgs.volume.cameras import icosphere
 from texgs.volume.isosurface import Mesh
 
 RADIUS = 0.4
-CAMERAS = icosphere(1, 4.0, 30.0, 101, 101)  # the origin is in the middle of a pixel
+CAMERAS = icosphere(1, Lens(4.0, 30.0, 101, 101))  # the origin is in the middle of a pixel
 
 
 def sphere(radius, count=40_000, seed=0):

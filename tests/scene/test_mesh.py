@@ -5,6 +5,7 @@ import torch
 from tests.fields.surfels.ply_files import vertices
 from tests.fields.surfels.samples import sample
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Render
@@ -13,7 +14,7 @@ from texgs.volume.cameras import geodesic_vertices, icosphere
 from texgs.volume.isosurface import Mesh
 
 RADIUS, VOXEL = 0.4, 1 / 128
-VIEWS = icosphere(2, 4.0311, 30, 256, 256)  # pixels about as wide as a voxel
+VIEWS = icosphere(2, Lens(4.0311, 30, 256, 256))  # pixels about as wide as a voxel
 RED = torch.tensor([1.0, 0.25, 0.0])
 
 

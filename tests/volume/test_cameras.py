@@ -8,11 +8,12 @@ import torch
 
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
 from texgs.volume import cameras
 from texgs.volume.cameras import geodesic_vertices
 
 RADIUS = 4.0311  # of the published views
-LENS = {"radius": RADIUS, "fov_y": 30.0, "width": 80, "height": 60}
+LENS = Lens(RADIUS, 30.0, 80, 60)
 
 
 def published(split):
@@ -31,7 +32,7 @@ def positions(views):
 
 @pytest.mark.parametrize(
     ("split", "count", "ours"),
-    [("train", 92, cameras.icosphere(3, **LENS)), ("test", 181, cameras.spiral(181, **LENS))],
+    [("train", 92, cameras.icosphere(3, LENS)), ("test", 181, cameras.spiral(181, LENS))],
 )
 def test_they_are_the_published_sets_view_by_view(split, count, ours):
     ours, theirs = camera_to_world(ours), published(split)
@@ -57,7 +58,7 @@ def test_icosphere_has_its_symmetries_and_is_even(frequency):
 
 @pytest.mark.parametrize("frequency", [2, 4])
 def test_icosphere_with_views_at_the_poles_stops_short_of_them(frequency):
-    views = cameras.icosphere(frequency, **LENS)
+    views = cameras.icosphere(frequency, LENS)
     heights = positions(views)[:, 1] / RADIUS
     assert (np.diff(heights) > -1e-6).all()
     np.testing.assert_allclose(heights[[0, -1]], [-1, 1], atol=1e-7)
@@ -67,21 +68,21 @@ def test_icosphere_with_views_at_the_poles_stops_short_of_them(frequency):
 
 
 def test_162_views_hold_the_six_along_the_axes():
-    directions = positions(cameras.icosphere(4, **LENS)) / RADIUS
+    directions = positions(cameras.icosphere(4, LENS)) / RADIUS
     for axis in np.vstack([np.eye(3), -np.eye(3)]):
         assert (directions @ axis).max() > 1 - 1e-6
 
 
 def test_test_path_of_any_length_goes_from_pole_to_pole():
-    ours = positions(cameras.spiral(7, **LENS))
-    full = positions(cameras.spiral(181, **LENS))
+    ours = positions(cameras.spiral(7, LENS))
+    full = positions(cameras.spiral(181, LENS))
     np.testing.assert_allclose(ours, full[::30], atol=1e-5)
     with pytest.raises(ArgumentError, match="count: expected at least 2 cameras on a path from pole to pole"):
-        cameras.spiral(1, **LENS)
+        cameras.spiral(1, LENS)
 
 
 def test_orbit_path_is_one_turn_without_its_end():
-    views = cameras.orbit_path(4, 30, **LENS)
+    views = cameras.orbit_path(4, 30, LENS)
     flat, up = RADIUS * np.cos(np.pi / 6), RADIUS / 2
     expected = [[0, up, flat], [flat, up, 0], [0, up, -flat], [-flat, up, 0]]
     np.testing.assert_allclose(positions(views), expected, atol=1e-6)
@@ -89,7 +90,7 @@ def test_orbit_path_is_one_turn_without_its_end():
 
 
 def test_cameras_are_spread_evenly_over_a_path():
-    path = cameras.spiral(181, **LENS)
+    path = cameras.spiral(181, LENS)
     assert cameras.spread(path, 181) == cameras.spread(path, 500) == path
     places = [path.index(camera) for camera in cameras.spread(path, 61)]
     assert len(places) == 61

@@ -115,7 +115,7 @@ class Scene(Editing):
 
         scene = self.session.scene
         lens = scene.framed(self.session.composition).lens(width=width, height=width)
-        pairs = (self.session.beside(camera, scene) for camera in spiral(views, *lens))
+        pairs = (self.session.beside(camera, scene) for camera in spiral(views, lens))
         return fmean(compare(*pair)["psnr"] for pair in pairs)
 
     # ---- Files --------------------------------------------------------------

@@ -93,7 +93,7 @@ def refined(
 
 def cast_views(caster: Caster, tf: TransferFunction, lens: Lens, title: str, seed: int) -> Images:
     """Cast the training views of a function, under lights of their own."""
-    cameras = icosphere(FREQUENCY, *lens)
+    cameras = icosphere(FREQUENCY, lens)
     lights = [
         light if index % HEADLIGHTS else HEADLIGHT
         for index, light in enumerate(random_lights(len(cameras), seed, 0))

@@ -119,7 +119,7 @@ def known(device: torch.device | str = "cpu") -> Likeness:
 def scene_likeness(scene: Scene, shown: Composed, vgg: Vgg) -> Likeness | None:
     """Describe framed views of a scene, which is opened, on a path of their own; None where nothing shows."""
     views = []
-    for camera in spiral(VIEWS, *scene.framed(shown).lens().square(SIZE)):
+    for camera in spiral(VIEWS, scene.framed(shown).lens().square(SIZE)):
         view = shown.render(camera.to(shown.device), scene.light, scene.edits)
         where = view.alpha > min(0.5, 0.5 * float(view.alpha.max()))
         if bool(where.any()):

@@ -30,7 +30,7 @@ def write_before_and_after(
     before: Scene, after: Scene, kind: Kind, lens: Lens, output: Path, device: torch.device, title: str
 ) -> None:
     """Write edit.png, views of both, under another light where they can be relit too, and turntable.mp4."""
-    cameras = orbit_path(SHOWN, POLAR, *lens.square(SIZE))
+    cameras = orbit_path(SHOWN, POLAR, lens.square(SIZE))
     lights, titles = [before.light] * SHOWN, [f"view {index + 1}" for index in range(SHOWN)]
     if "relight" in kind.can:
         cameras, lights, titles = [*cameras, cameras[0]], [*lights, SIDE], [*titles, "light from the side"]
@@ -40,7 +40,7 @@ def write_before_and_after(
         shown = pictures(scene, cameras, lights, device)
         rows[name] = list(progress(shown, len(cameras), title=f"{title}, {name}", unit="picture"))
     write_grid(output / "edit.png", rows, titles)
-    turn = orbit_path(TURN, POLAR, *lens.square(kind.film_size))
+    turn = orbit_path(TURN, POLAR, lens.square(kind.film_size))
     halves = [pictures(scene, turn, [scene.light] * TURN, device) for scene in scenes.values()]
     frames = (np.concatenate(pair, axis=1) for pair in zip(*halves, strict=True))
     write_frames(output / "turntable.mp4", progress(frames, TURN, title=f"{title}, turntable", unit="frame"))

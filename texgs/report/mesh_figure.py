@@ -32,7 +32,7 @@ def write_mesh_figure(
     truth, ours = sample(reference, COUNT), sample(mesh, COUNT)
     error = Scale(0, FAR, "inferno")
     errors, rows, visible = error(distances(ours, surface)[0]), [], []
-    for index, camera in enumerate(orbit_path(2, POLAR, *lens.square(SIZE)), start=1):
+    for index, camera in enumerate(orbit_path(2, POLAR, lens.square(SIZE)), start=1):
         views = [
             drawn(truth, reference, lit(truth, camera), camera),
             drawn(ours, mesh, lit(ours, camera), camera),

@@ -138,5 +138,5 @@ def picture(path: Path) -> np.ndarray:
     from texgs.volume.cameras import orbit_path
 
     scene = read_scene(path)
-    cameras = orbit_path(1, POLAR, *scene.framed().lens().square(PIXELS))
+    cameras = orbit_path(1, POLAR, scene.framed().lens().square(PIXELS))
     return next(pictures(scene, cameras, [scene.light], torch.device("cpu")))

@@ -50,16 +50,16 @@ def shots_of(
     from texgs.volume.cameras import orbit_path, spiral
 
     if path == "test":
-        return ((camera, scene) for camera in spiral(count, *lens))
+        return ((camera, scene) for camera in spiral(count, lens))
     if path == "orbit":
-        return ((camera, scene) for camera in orbit_path(count, polar, *lens, start=azimuth))
+        return ((camera, scene) for camera in orbit_path(count, polar, lens, start=azimuth))
     camera = orbit(azimuth, polar, *lens)
     if path == "view":
         return ((camera, scene) for _ in range(count))
     shares = (i / max(count - 1, 1) for i in range(count))
     if path in ("time", "orbit-time"):
         last = len(scene.timeline.steps) - 1
-        turn = orbit_path(count, polar, *lens, start=azimuth) if path == "orbit-time" else repeat(camera)
+        turn = orbit_path(count, polar, lens, start=azimuth) if path == "orbit-time" else repeat(camera)
         return ((place, scene.at(round(share * last))) for place, share in zip(turn, shares, strict=False))
     if path == "cut":
         low, high = swept(scene, composition)

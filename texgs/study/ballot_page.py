@@ -56,7 +56,7 @@ def write_film(
         return [frame(composition, camera, scene, twin=twin) for composition, scene, twin in shown]
 
     lens = scenes[0].framed(shown[0][0]).lens().square(size)
-    turn = progress(orbit_path(frames, POLAR, *lens), title=title, unit="frame")
+    turn = progress(orbit_path(frames, POLAR, lens), title=title, unit="frame")
     return write_frames(path, (mosaic(draw(camera)) for camera in turn), crf=CRF)
 
 

@@ -3,22 +3,20 @@
 from collections.abc import Sequence
 from itertools import combinations, product
 from math import asin, atan2, degrees, sqrt
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
-from texgs.core.lens import ORIGIN, Lens, frequency_of
+from texgs.core.lens import Lens, frequency_of
 
 POLE = 89.99  # degrees; the paper's views stop short of the poles, so that +y is up in every one of them
 T = TypeVar("T")
 FRONT = -90.0  # azimuth of +z, degrees
 
 
-def icosphere(
-    frequency: int, radius: float, fov_y: float, width: int, height: int, target: Sequence[float] = ORIGIN
-) -> list[Camera]:
+def icosphere(frequency: int, lens: Lens) -> list[Camera]:
     """Return cameras on a geodesic icosphere, looking at its middle: the paper's training views.
 
     From the bottom to the top (+y), and by azimuth from -180 to 180 degrees where several are at one
@@ -28,45 +26,34 @@ def icosphere(
     angles = [(degrees(asin(y)), degrees(atan2(-z, x))) for x, y, z in geodesic_vertices(frequency).tolist()]
     # Rounded, because heights that are equal by symmetry differ in the last bit.
     angles.sort(key=lambda pair: (round(pair[0], 9), pair[1]))
-    return [_orbit(azimuth, polar, radius, fov_y, width, height, target) for polar, azimuth in angles]
+    return [_orbit(azimuth, polar, lens) for polar, azimuth in angles]
 
 
 def icosphere_of(count: int, lens: Lens, where: str = "views") -> list[Camera]:
     """Return the icosphere with so many cameras, 10 f^2 + 2 for some frequency f; see `frequency_of`."""
-    return icosphere(frequency_of(count, where), *lens)
+    return icosphere(frequency_of(count, where), lens)
 
 
-def spiral(
-    count: int, radius: float, fov_y: float, width: int, height: int, target: Sequence[float] = ORIGIN
-) -> list[Camera]:
+def spiral(count: int, lens: Lens) -> list[Camera]:
     """Return cameras on a spiral from below to above that turns once, looking inwards: the test views.
 
     View i is at azimuth -180 + 360 i / (count - 1) and polar angle -90 + 180 i / (count - 1) degrees, with
-    polar angles kept 0.01 degrees off the poles. The paper has 181 of them; the lens is that of `icosphere`.
+    polar angles kept 0.01 degrees off the poles. The paper has 181 of them.
     """
     if count < 2:
         raise ArgumentError(f"count: expected at least 2 cameras on a path from pole to pole, got {count}")
     steps = [index / (count - 1) for index in range(count)]
-    return [_orbit(-180 + 360 * t, -90 + 180 * t, radius, fov_y, width, height, target) for t in steps]
+    return [_orbit(-180 + 360 * t, -90 + 180 * t, lens) for t in steps]
 
 
-def orbit_path(
-    count: int,
-    polar: float,
-    radius: float,
-    fov_y: float,
-    width: int,
-    height: int,
-    target: Sequence[float] = ORIGIN,
-    start: float = FRONT,
-) -> list[Camera]:
+def orbit_path(count: int, polar: float, lens: Lens, start: float = FRONT) -> list[Camera]:
     """Return cameras on one turn around +y that does not repeat its start.
 
     They are `polar` degrees above the horizon, the first at the azimuth `start`: by default in front (+z, for
-    polar 0). The lens is that of `icosphere`.
+    polar 0).
     """
     turn = [start + 360 * index / count for index in range(count)]
-    return [orbit(azimuth, polar, radius, fov_y, width, height, target) for azimuth in turn]
+    return [orbit(azimuth, polar, *lens) for azimuth in turn]
 
 
 def spread(path: Sequence[T], count: int) -> list[T]:
@@ -75,7 +62,7 @@ def spread(path: Sequence[T], count: int) -> list[T]:
     return [path[index * len(path) // count] for index in range(count)]
 
 
-def _orbit(azimuth: float, polar: float, *lens: Any) -> Camera:
+def _orbit(azimuth: float, polar: float, lens: Lens) -> Camera:
     """Return a camera with +y up everywhere, as the paper has them at the poles."""
     return orbit(azimuth, max(-POLE, min(POLE, polar)), *lens)
 

@@ -157,7 +157,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
         return of.render(camera.to(task.device), task.scene.light).color.clamp(0, 1)
 
     marked = overlay(shown(model, clicks.camera), lifted.reference, clicks)
-    around = orbit_path(SHOWN, POLAR, *task.lens)
+    around = orbit_path(SHOWN, POLAR, task.lens)
     pictures = [marked, shown(dimmed, clicks.camera), *(shown(dimmed, camera) for camera in around)]
     titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN))]
     write_grid(task.output / "edit.png", {"": [image.cpu().numpy() for image in pictures]}, titles)

@@ -40,7 +40,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     edit, views, device = settings.edit, settings.views, torch_device(settings.fit.device)
     before, after = read_scene(inputs["before"]), read_scene(inputs["scene"])
-    path = spiral(max(2, views.test.count), *views.lens(before.frame))
+    path = spiral(max(2, views.test.count), views.lens(before.frame))
     cameras = [camera.to(device) for camera in path]
     measured = MeasuredScene(
         title=f"{settings.dataset}: {edit.name}",

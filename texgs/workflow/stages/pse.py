@@ -51,7 +51,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     scene = read_scene(inputs["scene"])
     device = torch_device(settings.fit.device)
     composition, twin = scene.open(device), None if scene.volume is None else Twin(scene, device)
-    cameras = orbit_path(COMPARED, POLAR, *settings.views.lens(scene.frame))
+    cameras = orbit_path(COMPARED, POLAR, settings.views.lens(scene.frame))
     can = kinds()[settings.fit.field].can
     groups = {"pse": chain(scene, composition.palettes, can), "relight": light_sweep(scene)}
     done: dict[str, list[Comparison]] = {group: [] for group in groups}

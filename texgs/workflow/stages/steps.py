@@ -78,7 +78,7 @@ def measured(
     names = scene.timeline.steps
     spread = np.linspace(0, len(names) - 1, max(MEASURED, len(names) // EVERY + 1))
     listed = sorted(set(spread.round().astype(int).tolist()))
-    cameras, measures, rows = orbit_path(COMPARED, POLAR, *lens), [], dict[str, list[np.ndarray]]()
+    cameras, measures, rows = orbit_path(COMPARED, POLAR, lens), [], dict[str, list[np.ndarray]]()
     for step in progress(listed, len(listed), title=title, unit="step"):
         shown = scene.at(step)
         entry, pictures = compared(names[step], shown, shown.open(device), Twin(shown, device), cameras)

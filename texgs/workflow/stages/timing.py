@@ -28,7 +28,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.volume.cameras import spiral, spread
 
     scene, views = read_scene(inputs["scene"]), settings.views
-    path = spiral(max(2, views.test.count), *views.lens(scene.frame))
+    path = spiral(max(2, views.test.count), views.lens(scene.frame))
     device = torch_device(settings.fit.device)
     composition = scene.open(device)
     title = f"{settings.dataset}: timing"

@@ -149,10 +149,10 @@ def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
     from texgs.volume.cameras import icosphere, orbit_path, spiral
 
     if path.kind == "icosphere":
-        return icosphere(path.frequency, *lens)
+        return icosphere(path.frequency, lens)
     if path.kind == "spiral":
-        return spiral(path.count, *lens)
-    return orbit_path(path.count, path.polar, *lens)
+        return spiral(path.count, lens)
+    return orbit_path(path.count, path.polar, lens)
 
 
 def views_of(views: ViewKeys, lens: Lens, output: Path) -> dict[Split, list[View]]:
@@ -203,7 +203,7 @@ def turntable(
 
     scale = min(1.0, TURNTABLE / max(lens.width, lens.height))
     width, height = (max(1, round(scale * size)) for size in (lens.width, lens.height))
-    around = orbit_path(count, 15.0, *lens._replace(width=width, height=height))
+    around = orbit_path(count, 15.0, lens._replace(width=width, height=height))
     shot = [
         View(camera, output / "turntable" / f"r_{index:04}.png", Light("headlight"))
         for index, camera in enumerate(around)
