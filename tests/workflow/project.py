@@ -43,9 +43,9 @@ class Project:
         (self.sources / "sitecustomize.py").write_text(ONLY_COPIED_SOURCES)
         self.environment = {**os.environ, "PYTHONPATH": str(self.sources)}
 
-    def texgs(self, *words: str) -> subprocess.CompletedProcess[str]:
-        """A verb of the command line, on the volume and views of TINY where it takes KEY=VALUE."""
-        command = [sys.executable, "-P", "-m", "texgs.cli.main", *words, *TINY.split()]
+    def texgs(self, verb: str, *words: str) -> subprocess.CompletedProcess[str]:
+        """A verb with KEY=VALUE, on the volume and views of TINY unless these say otherwise."""
+        command = [sys.executable, "-P", "-m", "texgs.cli.main", verb, *TINY.split(), *words]
         run = {"cwd": self.work, "env": self.environment, "text": True, "capture_output": True}
         return subprocess.run(command, check=False, **run)
 

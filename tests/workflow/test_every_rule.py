@@ -5,9 +5,14 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.workflow.project import Project
+from texgs.volume import generate
+from texgs.volume.grid import Grid
+from texgs.volume.prepare import prepare
+from texgs.volume.slabs import ArraySource
 
 pytestmark = pytest.mark.workflow
 
@@ -24,6 +29,7 @@ EDITS = {
 }
 SWEEP = "name: tiny\nvariants:\n  few: [fit.seeds.count=150]\n"
 SMALL = (
+    "dataset.volume.generator=null dataset.volume.file=0.nrrd dataset.series=[*.nrrd] data_folder=. "
     "fit.seeds.count=200 fit.surfels.iterations=4 fit.shading.iterations=12 fit.shading.densify.stop=10 "
     "fits=[demo,ball] edits=[glass,piece,red,fade] edit.image.iterations=2 "
     "mesh.tfs=[TF01] +sweeps.tiny=sphere"
@@ -32,7 +38,7 @@ OPTIONS: dict = {"targets": (), "config": ("tracking=none", "dataset=sphere", "f
 
 FITS = {"surfels", "shading", "texture"}  # all by the rule `phase`
 AFTER_FITS = {
-    *("figure", "comparison", "mesh", "compose", "pse", "timing", "page"),
+    *("figure", "comparison", "mesh", "compose", "steps", "pse", "timing", "page"),
     *("edit", "edit_metrics", "gallery"),
 }
 TABLES = {"tables", "report"}
@@ -80,6 +86,10 @@ def project(tmp_path_factory):
         (project.sources / "conf" / "edit" / f"{name}.yaml").write_text(text)
     (project.sources / "conf" / "sweep" / "tiny.yaml").write_text(SWEEP)
     (project.sources / "conf" / "fit" / "ball.yaml").write_text(BALL)
+    orbital = generate.orbital(24)
+    for step in range(2):  # of a series in time
+        moved = Grid(np.roll(orbital.values, step, axis=2), orbital.spacing)
+        prepare(ArraySource(moved, "made"), project.work / f"{step}.nrrd")
     assert run(project) == RULES
     return project
 
@@ -101,7 +111,7 @@ def sources(project):
 
 def test_every_result_is_there_and_recorded(project):
     results = project.work / "results"
-    of_surfels, of_ball, of_sweep = 5 + 3 + 4 + 3, 2 + 3 + 2, 3
+    of_surfels, of_ball, of_sweep = 5 + 4 + 4 + 3, 2 + 3 + 2, 3
     pages = 4  # of surfels as fitted, and of their three looks
     side_by_side = 2  # comparison and gallery
     of_volume = 5  # the volume, its TFs, a sheet, and views under many lights and under one
@@ -157,6 +167,7 @@ def test_a_changed_line_runs_the_stages_that_import_it(project, sources):
     old = "from math import ceil\n"
     sources("texgs/report/fit_figure.py", old, f"{old}\nCHANGED = True\n")
     pictures = {"figure", "comparison", "gallery", "mesh", "pse", "tables", "report"}
+    pictures |= {"steps", "edit", "edit_metrics", "page"}  # steps are pictured as `pse` does, and edited then
     assert changed(project) == pictures
     sources("texgs/config/recipes.py", '"seed of random numbers', '"seed of all random numbers')
     assert changed(project) == pictures, "help texts do not count"
