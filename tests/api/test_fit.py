@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import texgs
+from tests.fitting.short_fits import shorten
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.metrics.quality import compare
 from texgs.scene.scene_file import read_scene
@@ -105,9 +106,7 @@ def test_surfels_as_polygons_lie_where_the_volume_does(scene):
 
 
 def test_models_in_seconds(ball, monkeypatch, tmp_path):
-    monkeypatch.setattr("texgs.fitting.now.FREQUENCY", 1)
-    monkeypatch.setattr("texgs.fitting.now.SURFELS", 300)
-    monkeypatch.setattr("texgs.fitting.now.PASSES", (20, 20))
+    shorten(monkeypatch, frequency=1, surfels=300, iterations=20)
     overlapping = {**TFS, "all": texgs.TransferFunction([[0.1, 0.0], [1, 0.1]], [[0, 1, 1, 1]])}
     scene = texgs.fit(ball, overlapping, "now", size=32, folder=tmp_path)
     assert scene.parts == ["outer", "inner", "all"]

@@ -6,6 +6,7 @@ import pytest
 
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.test_composition import ball
+from tests.fitting.short_fits import shorten
 from tests.scene.test_twin import HIGH, LOW, peak, sphere_volume
 from tests.viewer.pages import on_page
 from texgs.cli.main import main
@@ -15,7 +16,6 @@ from texgs.edit.function_model import overlap_of, tried, with_model
 from texgs.fields.gaussians.files import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
-from texgs.fitting import now
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import Twin
@@ -24,8 +24,7 @@ from texgs.scene.twin import Twin
 @pytest.fixture
 def scene_file(tmp_path, monkeypatch):
     """A scene of a sphere that tries a function over both basic ones; fits take a moment."""
-    for name, value in {"FREQUENCY": 1, "SURFELS": 600, "PASSES": (20, 20)}.items():
-        monkeypatch.setattr(now, name, value)
+    shorten(monkeypatch, frequency=1, surfels=600, iterations=20)
     models = {
         name: SceneModel(write_model(tmp_path / f"{name}.safetensors", ball(1))) for name in ("low", "high")
     }

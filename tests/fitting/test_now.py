@@ -1,13 +1,13 @@
 """A model of a function in seconds: where its surfels start, and what comes of them."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.fitting.short_fits import shorten
 from tests.scene.test_twin import HIGH, LOOK, LOW
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
@@ -19,13 +19,13 @@ from texgs.volume.generate import sphere
 from texgs.volume.transfer import TransferFunction
 
 LENS = Lens(3.0, 30.0, 64, 64)
+FAINT = replace(LOW, opacity=((0.2, 0), (0.3, 0.05), (0.4, 0)))
 
 
 @pytest.fixture
 def small(monkeypatch):
     """Fits of seconds."""
-    for name, value in {"FREQUENCY": 2, "SURFELS": 1500, "PASSES": (120, 120)}.items():
-        monkeypatch.setattr(now, name, value)
+    shorten(monkeypatch, frequency=2, surfels=1500, iterations=120)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_surfels_start_where_views_see_something_also_behind_other_layers(small,
     """Of a shell, as many start on its far side as that side adds to the picture."""
     shell = of_range(replace(LOW, opacity=((0.2, 0), (0.3, height), (0.4, 0))), grid)
     caster, camera = Caster(grid, LOOK), orbit(20, 10, *LENS)
-    points = now.ends_of_rays(caster, LOOK, shell, SimpleNamespace(cameras=[camera] * 60), 0)
+    points = now.ends_of_rays(caster, LOOK, shell, [camera.resized(32)] * 60, 0)
     assert len(points.places) > 1000
     depth = (points.places @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3])[:, 2]
     middle = torch.stack([torch.zeros(64, 64), torch.full((64, 64), LENS.radius)])
@@ -78,6 +78,32 @@ def test_surfels_start_where_views_see_something_also_behind_other_layers(small,
 def test_thicker_matter_lets_a_power_of_the_light_through(alpha, factor):
     tf = TransferFunction(((0, alpha), (1, 0.5)), ((0, 1, 1, 1),))
     assert 1 - now.thickened(tf, factor).opacity[0][1] == pytest.approx((1 - alpha) ** factor, abs=1e-12)
+
+
+@pytest.mark.parametrize(("tf", "side", "others"), [(HIGH, 64, 28), (FAINT, 32, 14)])
+def test_translucent_matter_is_seen_in_smaller_views_first_and_in_fewer_later(
+    small, grid, monkeypatch, tf, side, others
+):
+    """42 cameras, of which 14 have a headlight."""
+    seen = []
+    refine = now.refined
+    monkeypatch.setattr(
+        now, "refined", lambda model, images, *rest: (seen.append(images), refine(model, images, *rest))[1]
+    )
+    list(now.fit_now(Caster(grid, LOOK), LOOK, of_range(tf, grid), LENS, "sphere"))
+    first, second = seen
+    assert (first.size, len(first)) == ((side, side), 42)
+    assert (second.size, len(second)) == ((64, 64), 14 + others)
+    assert sum(light == HEADLIGHT for light in second.lights) == 14
+
+
+def test_the_mean_alpha_is_that_of_what_is_seen(grid):
+    camera = orbit(20, 10, *LENS)
+    tf, caster = of_range(LOW, grid), Caster(grid, LOOK)
+    alpha = caster.cast(tf, camera, HEADLIGHT).rgba[..., 3]
+    seen = alpha[alpha > now.FAINT]
+    assert 0 < len(seen) < alpha.numel()
+    assert now.mean_alpha(caster, tf, [camera, camera]) == pytest.approx(float(seen.mean()))
 
 
 def test_a_function_that_shows_nothing_is_told(small, grid):

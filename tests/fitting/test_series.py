@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from tests.fitting.short_fits import shorten
 from tests.scene.test_twin import LOOK
 from tests.volume.test_motion import TF, blob
 from texgs.core.camera import orbit
@@ -21,15 +22,13 @@ from texgs.volume.grid import Grid
 from texgs.volume.motion import Motion
 
 WAY, OTHER = (0.06, -0.04, 0.05), (0.25, 0.15, 0.2)
-SETTLED = {"SURFELS": 1500, "PASSES": (150, 150), "FREQUENCY": 2}
 
 
 @pytest.fixture(scope="module")
 def key():
     """A model of a ball, with texels, and its volume."""
     with pytest.MonkeyPatch.context() as patch:
-        for name, value in SETTLED.items():
-            patch.setattr(now, name, value)
+        shorten(patch, frequency=2, surfels=1500, iterations=150)
         grid = blob((0, 0, 0))
         lens = frame_of(grid, [TF]).lens(width=64, height=64)
         *_, model = fit_now(Caster(grid, LOOK), LOOK, TF, lens, "ball")
@@ -55,7 +54,7 @@ def test_surfels_move_with_a_ball_and_all_else_stays(key):
     model, before = key
     after = blob(WAY)
     step = Follower(model, LOOK, TF).step(model, before, after, "ball", 1)
-    assert psnr(step, after) > psnr(model, before) - 1.5
+    assert psnr(step, after) > psnr(model, before) - 2.5
     assert psnr(step, after) > psnr(model, after) + 8
     for name in ("texels", "sizes", "offsets", "palette", "ambient", "shininess"):
         assert torch.equal(step.parameters[name], model.parameters[name])

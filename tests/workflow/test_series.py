@@ -10,6 +10,7 @@ import yaml
 from pydicom.uid import generate_uid
 
 import texgs
+from tests.fitting.short_fits import shorten
 from tests.volume.test_dicom import write_series as write_slices
 from tests.volume.test_motion import TF, blob
 from tests.volume.zarr_files import axes_of, write_image
@@ -53,10 +54,9 @@ def write_steps(folder, places=PLACES):
 @pytest.fixture(scope="module")
 def fitted():
     with pytest.MonkeyPatch.context() as patch:
-        for name, value in {"SURFELS": 800, "PASSES": (80, 80), "FREQUENCY": 2}.items():
-            patch.setattr(now, name, value)
+        shorten(patch, frequency=2, surfels=800, iterations=80)
         grid = blob((0, 0, 0))
-        lens = frame_of(grid, [TF]).lens(width=48, height=48)
+        lens = frame_of(grid, [TF]).lens(width=96, height=96)
         return list(fit_now(Caster(grid, Appearance()), Appearance(), TF, lens, "ball"))[-1]
 
 

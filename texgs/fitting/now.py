@@ -1,7 +1,7 @@
 """A model of a transfer function in seconds: views cast in memory, surfels where rays end, two short fits."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import facing, z_order_of
 from texgs.core.lens import Lens
-from texgs.core.light import HEADLIGHT, random_lights
+from texgs.core.light import HEADLIGHT, Light, random_lights
 from texgs.core.progress import progress
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, in_full_light, raw_material
@@ -27,15 +27,32 @@ from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
 FREQUENCY = 4  # of the icosphere of cameras, of which it has 162
-STEP = 0.5  # voxels between the samples of views
 SURFELS, OPACITY = 20_000, 0.05
 PIXELS = 4000  # of each view, of which surfels are drawn
 LEAST, DENSEST = 100, 1 - 1e-6  # points
 FAINT = 0.02  # alpha below which a pixel shows nothing to speak of
 HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of their own
+GLANCE = 3  # times smaller views, which say where rays end
 RATES = Rates(quats=0.016, scales=0.05, opacities=0.1)
-PASSES = (800, 1200)  # iterations of the first fit, and of the one that goes on from it
 TEXTURE = TextureKeys(sweeps=1)
+
+
+Sight = tuple[Camera, Light]
+
+
+class Effort(NamedTuple):
+    """What two passes of a fit get."""
+
+    step: float  # voxels between the samples of views
+    reduce: int  # times smaller views of the first pass
+    others: int  # of the views that have no headlight, one of so many is in the second pass
+    iterations: tuple[int, int]
+
+
+# Rays go far through translucent matter, which is smooth: its views take longest and need the fewest samples.
+OPAQUE = Effort(step=0.5, reduce=1, others=1, iterations=(650, 1300))
+TRANSLUCENT = Effort(step=1.0, reduce=2, others=2, iterations=(950, 1000))
+MEAN_ALPHA = 0.7  # of what is seen: with less it is translucent
 
 
 class Points(NamedTuple):
@@ -66,18 +83,35 @@ def fit_now(
     Raises:
         ArgumentError: if the function shows nothing.
     """
-    images = cast_views(caster.with_appearance(replace(look, step=STEP)), tf, lens, title, seed)
+    glances = [smaller(camera, GLANCE) for camera in icosphere(FREQUENCY, lens)[::HEADLIGHTS]]
+    points = ends_of_rays(caster, look, tf, glances, seed)
+    effort = TRANSLUCENT if mean_alpha(caster, tf, glances[::HEADLIGHTS]) < MEAN_ALPHA else OPAQUE
+    caster = caster.with_appearance(replace(look, step=effort.step))
+    sights = lit_views(lens, seed)
+    headlit = cast_views(caster, tf, sights[::HEADLIGHTS], f"{title}, headlit views")
     shading = ShadingModel(local_viewer=caster.local_viewer)
-    points = ends_of_rays(caster, look, tf, images, seed)
-    parameters = surfels_on(points, seed)
     factors = (look.ambient, look.diffuse, look.specular, look.shininess)
-    parameters |= raw_material(*factors, kind=shading.material)
-    lit_alike = images[::HEADLIGHTS]
-    for number, iterations in enumerate(PASSES, start=1):
-        named = f"{title}, pass {number}"
-        parameters = refined(Surfels(parameters, shading), images, iterations, RATES, seed, named)
+    parameters = surfels_on(points, seed) | raw_material(*factors, kind=shading.material)
+    for number, images in enumerate(views_of_passes(caster, tf, headlit, sights, effort, title)):
+        named = f"{title}, pass {number + 1}"
+        model = Surfels(parameters, shading)
+        parameters = refined(model, images, effort.iterations[number], RATES, seed, named)
         model = Surfels(in_full_light(parameters, shading.material), shading)
-        yield texturize(model, lit_alike, TEXTURE, seed, f"{title}, texture")
+        yield texturize(model, headlit, TEXTURE, seed, f"{title}, texture")
+
+
+def views_of_passes(
+    caster: Caster, tf: TransferFunction, headlit: Images, sights: list[Sight], effort: Effort, title: str
+) -> Iterator[Images]:
+    """Yield the views of the first pass, and of the second."""
+    if effort.reduce > 1:
+        reduced = [(smaller(camera, effort.reduce), light) for camera, light in sights]
+        yield cast_views(caster, tf, reduced, f"{title}, smaller views")
+    others = [sight for index, sight in enumerate(sights) if index % HEADLIGHTS][:: effort.others]
+    images = joined(headlit, cast_views(caster, tf, others, f"{title}, other views"))
+    yield images
+    if effort.reduce == 1:
+        yield images
 
 
 def refined(
@@ -91,33 +125,52 @@ def refined(
     return {name: x.detach() for name, x in fit.parameters.items()}
 
 
-def cast_views(caster: Caster, tf: TransferFunction, lens: Lens, title: str, seed: int) -> Images:
-    """Cast the training views of a function, under lights of their own."""
+def lit_views(lens: Lens, seed: int) -> list[Sight]:
+    """Return training views: every third has a headlight, the others a random one."""
     cameras = icosphere(FREQUENCY, lens)
-    lights = [
-        light if index % HEADLIGHTS else HEADLIGHT
-        for index, light in enumerate(random_lights(len(cameras), seed, 0))
-    ]
-    planes = torch.empty(len(cameras), 4, lens.height, lens.width, dtype=torch.uint8)
-    for index, camera in enumerate(progress(cameras, title=f"{title}, views", unit="view")):
+    random = random_lights(len(cameras), seed, 0)
+    lights = [light if index % HEADLIGHTS else HEADLIGHT for index, light in enumerate(random)]
+    return list(zip(cameras, lights, strict=True))
+
+
+def cast_views(caster: Caster, tf: TransferFunction, sights: Sequence[Sight], title: str) -> Images:
+    """Cast what a function shows, from cameras of one size."""
+    cameras, lights = map(list, zip(*sights, strict=True))
+    planes = torch.empty(len(cameras), 4, cameras[0].height, cameras[0].width, dtype=torch.uint8)
+    for index, camera in enumerate(progress(cameras, title=title, unit="view")):
         seen = caster.cast(tf, camera, lights[index]).rgba.permute(2, 0, 1)
         over_white = torch.cat([seen[:3] + 1 - seen[3], seen[3:]])
         planes[index] = (255 * over_white).round_().clamp_(0, 255).to(torch.uint8)
     return Images(planes, cameras, lights)
 
 
-def ends_of_rays(caster: Caster, look: Appearance, tf: TransferFunction, images: Images, seed: int) -> Points:
+def joined(one: Images, other: Images) -> Images:
+    """Return the views of both."""
+    planes = torch.cat([one.planes, other.planes])
+    return Images(planes, one.cameras + other.cameras, one.lights + other.lights)
+
+
+def mean_alpha(caster: Caster, tf: TransferFunction, cameras: list[Camera]) -> float:
+    """Return the mean alpha of what views show."""
+    alphas = [caster.cast(tf, camera, HEADLIGHT).rgba[..., 3] for camera in cameras]
+    seen = torch.cat([alpha[alpha > FAINT] for alpha in alphas])
+    return float(seen.mean())
+
+
+def ends_of_rays(
+    caster: Caster, look: Appearance, tf: TransferFunction, cameras: list[Camera], seed: int
+) -> Points:
     """Return where rays of random pixels lose some part of their light, another one in each view.
 
     So there are as many ends on a layer as it shows, also behind others.
     """
     unlit = caster.with_appearance(replace(look, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
     generator = torch.Generator().manual_seed(seed)
-    count, parts = len(images.cameras), []
+    count, parts = len(cameras), []
     shares = (torch.randperm(count, generator=generator) + 0.5) / count  # spread evenly, in random order
-    for camera, left in zip(images.cameras, shares.tolist(), strict=True):
+    for camera, left in zip(cameras, shares.tolist(), strict=True):
         thick = thickened(tf, math.log(0.5) / math.log(left))  # half of its light is left where `left` was
-        parts.append(ends_of(unlit, thick, smaller(camera, 2), generator))
+        parts.append(ends_of(unlit, thick, camera, generator))
     points = Points(*map(torch.cat, zip(*parts, strict=True)))
     if len(points.places) < LEAST:
         raise ArgumentError(

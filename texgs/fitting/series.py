@@ -13,13 +13,14 @@ from texgs.core.lens import Lens
 from texgs.fields.surfels.model import TEXTURE, Surfels
 from texgs.fields.surfels.step_file import UNITS
 from texgs.fields.surfels.texels import untextured
-from texgs.fitting.now import HEADLIGHTS, Points, cast_views, ends_of_rays, refined, surfels_on
+from texgs.fitting.now import HEADLIGHTS, Points, cast_views, ends_of_rays, lit_views, refined, surfels_on
 from texgs.fitting.now import RATES as RATES_OF_SEEDS
 from texgs.fitting.seeds import shown
 from texgs.fitting.settings import Rates
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
+from texgs.volume.images import smaller
 from texgs.volume.motion import Motion, motion
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
@@ -84,8 +85,8 @@ class Follower:
         self, plain: Mapping[str, Tensor], caster: Caster, lens: Lens, title: str, seed: int
     ) -> dict[str, Tensor]:
         """Plant surfels without texels, and fit all to views of a volume."""
-        images = cast_views(caster, self._tf, lens, title, seed)
-        points = ends_of_rays(caster, self._look, self._tf, images, seed)
+        images = cast_views(caster, self._tf, lit_views(lens, seed), f"{title}, views")
+        points = ends_of_rays(caster, self._look, self._tf, [smaller(x, 2) for x in images.cameras], seed)
         weights = shown(Surfels(plain, self._shading), images[::HEADLIGHTS])
         model = Surfels(planted(plain, points, weights, seed), self._shading)
         return refined(model, images, ITERATIONS, RATES, seed, title)

@@ -1,0 +1,13 @@
+"""Fits while somebody waits, of a moment."""
+
+import pytest
+
+from texgs.fitting import now
+
+
+def shorten(patch: pytest.MonkeyPatch, *, frequency: int, surfels: int, iterations: int) -> None:
+    """Let `fit_now` take so many surfels and iterations of each pass, and views of an icosphere."""
+    patch.setattr(now, "FREQUENCY", frequency)
+    patch.setattr(now, "SURFELS", surfels)
+    for name in ("OPAQUE", "TRANSLUCENT"):
+        patch.setattr(now, name, getattr(now, name)._replace(iterations=(iterations, iterations)))
