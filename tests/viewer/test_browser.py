@@ -106,7 +106,7 @@ def test_the_camera_moves_and_stands_in_the_link(chromium, scene_file):
         )
         page.get_by_label("From").select_option("From +y")
         expect(page).to_have_url(re.compile(r"azimuth=-90&polar=90&"), timeout=WAIT)
-        page.get_by_label("Show").select_option("Normals")
+        page.get_by_label("Show", exact=True).select_option("Normals")
         expect(page).to_have_url(re.compile("mode=normal"), timeout=WAIT)
 
 
@@ -203,7 +203,7 @@ def test_a_scene_is_seen_beside_its_volume(chromium, tmp_path):
     volume = sphere_volume(tmp_path, low=LOW, high=HIGH)
     scene_file = write_scene(tmp_path / "scene.yaml", Scene(models, volume=volume))
     with served(scene_file) as (_, address), opened(chromium, address) as page:
-        scene, show = still(page), page.get_by_label("Show")
+        scene, show = still(page), page.get_by_label("Show", exact=True)
         expect(page.get_by_text("PSNR of this view")).to_have_count(0)
         show.select_option("Volume")
         truth = still(page)
@@ -238,7 +238,7 @@ def test_what_cannot_be_shown_leaves_no_picture_of_before(chromium, tmp_path):
         told = page.get_by_text("Training views show one transfer function each")
         assert shown(page).std() > 1
         for mode in ("Nearest training view", "Difference from that view"):
-            page.get_by_label("Show").select_option(mode)
+            page.get_by_label("Show", exact=True).select_option(mode)
             expect(told).to_be_visible(timeout=WAIT)
             nothing = shown(page)
             assert np.ptp(nothing[:150], axis=(0, 1)).max() == 0, "the sentence is below"

@@ -44,7 +44,7 @@ def test_a_picture_of_another_size_is_what_the_command_renders(chromium, scene_f
         page.get_by_role("button", name="Save picture").click()
         expect(page.get_by_role("dialog")).to_be_visible()  # the browser says what is too large
         page.get_by_role("button", name="Cancel").click()
-        page.get_by_label("Show").select_option("alpha")
+        page.get_by_label("Show", exact=True).select_option("alpha")
         dialog.click()
         expect(page.get_by_label("Transparent background")).to_be_disabled()
 

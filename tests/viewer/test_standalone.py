@@ -274,14 +274,14 @@ def test_pointers_and_keys_turn_the_camera(page, file):
 
 def test_a_link_leads_back_to_the_view(page, chromium, file):
     page.locator("#picture").press("ArrowLeft")
-    page.get_by_label("Show").select_option("normal")
+    page.get_by_label("Show", exact=True).select_option("normal")
     page.wait_for_url(re.compile("mode=normal"))
     other = chromium.new_page(viewport=SIZE)
     other.goto(page.url)
     other.wait_for_selector("#picture:not([hidden])")
     settle(other)
     page.locator("#picture").evaluate("each => each.blur()")
-    assert other.get_by_label("Show").input_value() == "normal"
+    assert other.get_by_label("Show", exact=True).input_value() == "normal"
     assert np.abs(shown(other).astype(int) - shown(page))[4:-4, 4:-4].max() <= 1
     other.close()
 

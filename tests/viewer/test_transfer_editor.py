@@ -40,7 +40,7 @@ def test_what_is_dragged_is_the_volume_that_texgs_renders(chromium, sphere_file)
     with served(sphere_file) as (_, address), opened(chromium, address) as page:
         before = still(page)
         drag(page, page.get_by_role("slider", name="Point 2 of low"), (0.5, 0.5), (6, -3))
-        expect(page.get_by_label("Show")).to_have_value("volume")
+        expect(page.get_by_label("Show", exact=True)).to_have_value("volume")
         expect(page.get_by_role("listitem")).to_have_text(["functions low"])
         save_as(page, "tried.yaml")
         tried = read_scene(sphere_file.parent / "tried.yaml")
@@ -51,7 +51,7 @@ def test_what_is_dragged_is_the_volume_that_texgs_renders(chromium, sphere_file)
         assert picture == rendered(sphere_file.parent / "tried.yaml", page, "--mode", "volume")
         assert np.abs(shown(page) - pixels(picture)[:-50]).mean() < JPEG
         page.get_by_role("button", name="Undo").click()
-        page.get_by_label("Show").select_option("Shaded")
+        page.get_by_label("Show", exact=True).select_option("Shaded")
         assert still(page) == before
 
 
