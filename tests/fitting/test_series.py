@@ -39,7 +39,7 @@ def key():
 def small(monkeypatch):
     """Steps of a second."""
     monkeypatch.setattr(now, "FREQUENCY", 2)
-    for name, value in {"SIZE": 48, "ITERATIONS": 60}.items():
+    for name, value in {"SIZE": 48, "ROUNDS": 2}.items():
         monkeypatch.setattr(series, name, value)
 
 

@@ -27,7 +27,7 @@ from texgs.volume.transfer import TransferFunction
 
 SIZE = 128  # pixels of the views of a step: surfels have their places, views only say how far they are off
 STEP = 1.0  # voxels between the samples of views
-ITERATIONS = 400
+ROUNDS = 3  # through all views: a part of one would bend surfels towards the views that are in it
 SLOWER = 0.3  # times the rates of surfels that start anywhere
 RATES = Rates(**{name: SLOWER * getattr(RATES_OF_SEEDS, name) for name in UNITS}, material=0.0)
 SHARE = 0.1  # of all surfels: so many of those that show least are planted where most is missing
@@ -86,10 +86,11 @@ class Follower:
     ) -> dict[str, Tensor]:
         """Plant surfels without texels, and fit all to views of a volume."""
         images = cast_views(caster, self._tf, lit_views(lens, seed), f"{title}, views")
-        points = ends_of_rays(caster, self._look, self._tf, [smaller(x, 2) for x in images.cameras], seed)
+        glances = [smaller(camera, 2) for camera in images.cameras[::HEADLIGHTS]]
+        points = ends_of_rays(caster, self._look, self._tf, glances, seed)
         weights = shown(Surfels(plain, self._shading), images[::HEADLIGHTS])
         model = Surfels(planted(plain, points, weights, seed), self._shading)
-        return refined(model, images, ITERATIONS, RATES, seed, title)
+        return refined(model, images, ROUNDS * len(images), RATES, seed, title)
 
 
 def lens_of(grid: Grid, tf: TransferFunction) -> Lens | None:
