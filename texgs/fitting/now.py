@@ -50,7 +50,7 @@ class Effort(NamedTuple):
 
 
 # Rays go far through translucent matter, which is smooth: its views take longest and need the fewest samples.
-OPAQUE = Effort(step=0.5, reduce=1, others=1, iterations=(650, 1300))
+OPAQUE = Effort(step=0.5, reduce=1, others=1, iterations=(600, 1350))
 TRANSLUCENT = Effort(step=1.0, reduce=2, others=2, iterations=(950, 1000))
 MEAN_ALPHA = 0.7  # of what is seen: with less it is translucent
 

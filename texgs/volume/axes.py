@@ -86,7 +86,8 @@ def _place(axis: Axis, wanted: str) -> int:
         if wanted in names:
             return names.index(wanted)
     known = ", ".join(map("{} ({})".format, numbers, labels)) or f"0 to {axis.size - 1}"
-    raise ArgumentError(f"dataset.volume.{axis.kind}: expected one of {known}, got {wanted or 'none'}")
+    key = f"dataset.volume.{axis.kind}" + ", or a basic TF's channel" * (axis.kind == "channel")
+    raise ArgumentError(f"{key}: expected one of {known}, got {wanted or 'none'}")
 
 
 def lattice(
