@@ -30,11 +30,16 @@ from tools import workflow_picture
 DOCS, RUNS = ROOT / "docs", ROOT / "build" / "pictures"
 PROGRAM = Path(sys.executable).with_name("texgs")
 STYLES = ("strokes", "glass", "marble", "weave", "dots", "waves")
+METHODS = (  # of the paper's tables, by their authors' iterations: hours
+    "galleries dataset=engine views.width=400 views.height=400 fits=[default,gaussians,plenoxels_quick]"
+    " edit.looks=true edit.image.lambda_s=1 edit.text.guidance=filters edit.in2n.guidance=filters"
+    " edit.igs2gs.guidance=filters"
+)
 RUN = {  # words of `texgs run`, by the folder of its results
     "demo": "experiment=demo",
     "fields": "experiment=fields comparisons",
-    "image": "experiment=paper_image_quick dataset=engine galleries",
-    "text": "experiment=paper_text_quick dataset=engine galleries",
+    "image": f"{METHODS} edits=[style,style_untextured,stylesplat,arf] gallery.section=image",
+    "text": f"{METHODS} edits=[text,text_untextured,in2n,igs2gs,igs2gs_frozen] gallery.section=text",
     "styles": "datasets=[vortex,engine] dataset.vortex.fit.reduce=2 dataset.engine.views.width=400"
     f" dataset.engine.views.height=400 fit=quick edit=style edit.image.style={','.join(STYLES)}"
     " edit.image.recipe=preview,default",
@@ -103,9 +108,9 @@ def styles(run: Path) -> Image.Image:
     return as_picture(lay_out(grid_rows(rows, ["picture", *(("laid onto it", "edited") * 2)])))
 
 
-def copy(pattern: str) -> Callable[[Path], Image.Image]:
-    """Take a picture that the run itself makes."""
-    return lambda run: Image.open(next(run.glob(pattern)))
+def copy(pattern: str, smaller: int = 1) -> Callable[[Path], Image.Image]:
+    """Take a picture that the run itself makes, so many times smaller."""
+    return lambda run: Image.open(next(run.glob(pattern))).convert("RGB").reduce(smaller)
 
 
 def viewer(run: Path) -> Image.Image:
@@ -196,9 +201,11 @@ PICTURES = {
         copy("vortex/TF04_400/comparison/*/*.png"), "fields", f"{FIT} gaussians voxels comparison"
     ),
     "image_methods": Picture(
-        copy(GALLERY), "image", f"{FIT} gaussians voxels palette image stylesplat arf stylerf gallery"
+        copy(GALLERY, smaller=2), "image", f"{FIT} gaussians voxels image stylesplat arf gallery"
     ),
-    "text_methods": Picture(copy(GALLERY), "text", f"{FIT} gaussians voxels text in2n igs2gs dge gallery"),
+    "text_methods": Picture(
+        copy(GALLERY, smaller=2), "text", f"{FIT} gaussians voxels text in2n igs2gs gallery"
+    ),
     "styles": Picture(styles, "styles", f"{FIT} image"),
     "viewer": Picture(viewer, "engine", f"{FIT} compose texgs.viewer.server"),
     "quality_over_time": Picture(quality_over_time, "2026-11-23-quality-over-time-xeon.csv"),
