@@ -79,7 +79,7 @@ def test_what_is_kept_is_behind_all_planes(seed, n, radius):
     begins = position + near[..., None] * rays  # [7, 9, 3]
     for i in range(n):
         distance = begins[face == i] @ unit[i].double() - offsets[i] / normals[i].norm()
-        assert (distance.abs() < 1e-4).all()
+        assert (distance.abs() < 1e-4 * near[face == i].clamp_min(1)).all()  # single precision
         assert (near[face == i] > 0).all()
 
 
