@@ -35,9 +35,7 @@ HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of the
 GLANCE = 3  # times smaller views, which say where rays end
 RATES = Rates(quats=0.016, scales=0.05, opacities=0.1)
 TEXTURE = TextureKeys(sweeps=1)
-
-
-Sight = tuple[Camera, Light]
+LitCamera = tuple[Camera, Light]
 
 
 class Effort(NamedTuple):
@@ -87,12 +85,12 @@ def fit_now(
     points = ends_of_rays(caster, look, tf, glances, seed)
     effort = TRANSLUCENT if mean_alpha(caster, tf, glances[::HEADLIGHTS]) < MEAN_ALPHA else OPAQUE
     caster = caster.with_appearance(replace(look, step=effort.step))
-    sights = lit_views(lens, seed)
-    headlit = cast_views(caster, tf, sights[::HEADLIGHTS], f"{title}, headlit views")
+    lit = lit_cameras(lens, seed)
+    headlit = cast_views(caster, tf, lit[::HEADLIGHTS], f"{title}, headlit views")
     shading = ShadingModel(local_viewer=caster.local_viewer)
     factors = (look.ambient, look.diffuse, look.specular, look.shininess)
     parameters = surfels_on(points, seed) | raw_material(*factors, kind=shading.material)
-    for number, images in enumerate(views_of_passes(caster, tf, headlit, sights, effort, title)):
+    for number, images in enumerate(views_of_passes(caster, tf, headlit, lit, effort, title)):
         named = f"{title}, pass {number + 1}"
         model = Surfels(parameters, shading)
         parameters = refined(model, images, effort.iterations[number], RATES, seed, named)
@@ -101,13 +99,13 @@ def fit_now(
 
 
 def views_of_passes(
-    caster: Caster, tf: TransferFunction, headlit: Images, sights: list[Sight], effort: Effort, title: str
+    caster: Caster, tf: TransferFunction, headlit: Images, lit: list[LitCamera], effort: Effort, title: str
 ) -> Iterator[Images]:
     """Yield the views of the first pass, and of the second."""
     if effort.reduce > 1:
-        reduced = [(smaller(camera, effort.reduce), light) for camera, light in sights]
+        reduced = [(smaller(camera, effort.reduce), light) for camera, light in lit]
         yield cast_views(caster, tf, reduced, f"{title}, smaller views")
-    others = [sight for index, sight in enumerate(sights) if index % HEADLIGHTS][:: effort.others]
+    others = [each for index, each in enumerate(lit) if index % HEADLIGHTS][:: effort.others]
     images = joined(headlit, cast_views(caster, tf, others, f"{title}, other views"))
     yield images
     if effort.reduce == 1:
@@ -125,17 +123,17 @@ def refined(
     return {name: x.detach() for name, x in fit.parameters.items()}
 
 
-def lit_views(lens: Lens, seed: int) -> list[Sight]:
-    """Return training views: every third has a headlight, the others a random one."""
+def lit_cameras(lens: Lens, seed: int) -> list[LitCamera]:
+    """Return the cameras of training views: every third has a headlight, the others a random light."""
     cameras = icosphere(FREQUENCY, lens)
     random = random_lights(len(cameras), seed, 0)
     lights = [light if index % HEADLIGHTS else HEADLIGHT for index, light in enumerate(random)]
     return list(zip(cameras, lights, strict=True))
 
 
-def cast_views(caster: Caster, tf: TransferFunction, sights: Sequence[Sight], title: str) -> Images:
+def cast_views(caster: Caster, tf: TransferFunction, lit: Sequence[LitCamera], title: str) -> Images:
     """Cast what a function shows, from cameras of one size."""
-    cameras, lights = map(list, zip(*sights, strict=True))
+    cameras, lights = map(list, zip(*lit, strict=True))
     planes = torch.empty(len(cameras), 4, cameras[0].height, cameras[0].width, dtype=torch.uint8)
     for index, camera in enumerate(progress(cameras, title=title, unit="view")):
         seen = caster.cast(tf, camera, lights[index]).rgba.permute(2, 0, 1)

@@ -13,7 +13,7 @@ from texgs.core.lens import Lens
 from texgs.fields.surfels.model import TEXTURE, Surfels
 from texgs.fields.surfels.step_file import UNITS
 from texgs.fields.surfels.texels import untextured
-from texgs.fitting.now import HEADLIGHTS, Points, cast_views, ends_of_rays, lit_views, refined, surfels_on
+from texgs.fitting.now import HEADLIGHTS, Points, cast_views, ends_of_rays, lit_cameras, refined, surfels_on
 from texgs.fitting.now import RATES as RATES_OF_SEEDS
 from texgs.fitting.seeds import shown
 from texgs.fitting.settings import Rates
@@ -85,7 +85,7 @@ class Follower:
         self, plain: Mapping[str, Tensor], caster: Caster, lens: Lens, title: str, seed: int
     ) -> dict[str, Tensor]:
         """Plant surfels without texels, and fit all to views of a volume."""
-        images = cast_views(caster, self._tf, lit_views(lens, seed), f"{title}, views")
+        images = cast_views(caster, self._tf, lit_cameras(lens, seed), f"{title}, views")
         glances = [smaller(camera, 2) for camera in images.cameras[::HEADLIGHTS]]
         points = ends_of_rays(caster, self._look, self._tf, glances, seed)
         weights = shown(Surfels(plain, self._shading), images[::HEADLIGHTS])

@@ -15,6 +15,7 @@ from texgs.core.errors import ArgumentError
 from texgs.volume.dicom_phases import ALL, FileSeries, phases_of
 from texgs.volume.grid import require_room
 from texgs.volume.itk_image import require_volume, sentence
+from texgs.volume.slabs import require_step
 
 OF_SERIES = "0020|0011", "0008|103e", "0020|0100"  # tags: number, description and position in time
 PLACE, ORIENTATION = "0020|0032", "0020|0037"  # and of a slice
@@ -74,32 +75,31 @@ def read_dicom(folder: Path, series: str | None, time: int) -> tuple[dict[str, A
 
 def step_at(folder: Path, series: str | None, time: int) -> tuple[list[Slice], int, str]:
     """Return the slices of a step, how many steps there are, and what there is to say about them."""
-    every, note = series_in(folder), ""
-    steps: Any
+    every = series_in(folder)
     if series == ALL and len(every) > 1:
-        steps, note = phases_of(every)
-    else:
-        steps = steps_of(slices_of(chosen(every, series)))
-    if not 0 <= time < len(steps):
-        raise ArgumentError(f"dataset.volume.time: expected one of 0 to {len(steps) - 1}, got {time}")
-    return slices_of(steps[time]) if note else steps[time], len(steps), note
+        phases, note = phases_of(every)
+        require_step(time, len(phases))
+        return slices_of(phases[time]), len(phases), note
+    steps = steps_of(slices_of(chosen(every, series)))
+    require_step(time, len(steps))
+    return steps[time], len(steps), ""
 
 
 def series_in(folder: Path) -> list[FileSeries]:
     """Return all series of a folder, one at least; no slice may be damaged."""
-    found, reader = [], sitk.ImageSeriesReader
+    every, reader = [], sitk.ImageSeriesReader
     for uid in reader.GetGDCMSeriesIDs(str(folder)):
         files = reader.GetGDCMSeriesFileNames(str(folder), uid)
         first, lattice = header(Path(files[0])), lattice_of(Path(files[0]), len(files))
         number, description, position = (tag(first, each) for each in OF_SERIES)
-        found.append(FileSeries(number, description, position, uid, files, lattice))
-    names = {Path(file).name for each in found for file in each.files}
+        every.append(FileSeries(number, description, position, uid, files, lattice))
+    names = {Path(file).name for each in every for file in each.files}
     unlisted = (path for path in sorted(folder.iterdir()) if path.name not in names)
     if damaged := next((path.name for path in unlisted if is_slice(path)), None):
         raise ArgumentError(f"{damaged}: cut off or damaged; put the whole slice there, or take it away")
-    if not found:
+    if not every:
         raise ArgumentError("expected a folder of DICOM slices or TIFFs (.tif, .tiff), found none in it")
-    return found
+    return every
 
 
 def lattice_of(file: Path, count: int) -> tuple[float, ...]:
@@ -114,14 +114,14 @@ def lattice_of(file: Path, count: int) -> tuple[float, ...]:
 
 def chosen(every: Sequence[FileSeries], series: str | None) -> FileSeries:
     """Return the only series, or the one whose number or UID is asked for."""
-    found = [each for each in every if series in (None, ALL, each.uid, each.number)]
-    if len(found) != 1:
-        what = "several series" if series is None else f"{len(found)} series for {series!r}"
+    matching = [each for each in every if series in (None, ALL, each.uid, each.number)]
+    if len(matching) != 1:
+        what = "several series" if series is None else f"{len(matching)} series for {series!r}"
         raise ArgumentError(
             f"expected one series of DICOM slices, got {what}; choose one by dataset.volume.series=NUMBER "
             f"or UID, or series={ALL} for those alike, as steps in time, of {'; '.join(map(str, every))}"
         )
-    return found[0]
+    return matching[0]
 
 
 def slices_of(series: FileSeries) -> list[Slice]:

@@ -48,8 +48,8 @@ def phases_of(every: Sequence[FileSeries]) -> tuple[list[FileSeries], str]:
 def in_order(phases: Sequence[FileSeries]) -> tuple[list[FileSeries], str]:
     """Return series in the order of time, and what tells it."""
     for name, (field, pattern) in ORDERS.items():
-        found = [re.search(pattern, getattr(each, field)) for each in phases]
-        numbers = {each: float(match[1]) for each, match in zip(phases, found, strict=True) if match}
+        matches = [re.search(pattern, getattr(each, field)) for each in phases]
+        numbers = {each: float(match[1]) for each, match in zip(phases, matches, strict=True) if match}
         if len({*numbers.values()}) == len(phases):
             return sorted(phases, key=numbers.__getitem__), name
         if len({*map(numbers.get, phases)}) > 1:

@@ -24,7 +24,7 @@ from texgs.volume.grid import (
 )
 from texgs.volume.netcdf import open_netcdf
 from texgs.volume.ome_zarr import is_zarr, open_zarr
-from texgs.volume.slabs import ArraySource, RawSource, Source, size_text, step_note
+from texgs.volume.slabs import ArraySource, RawSource, Source, require_step, size_text, step_note
 from texgs.volume.text_columns import ColumnSource
 from texgs.volume.tiff import open_tiff, tiffs_in
 
@@ -168,8 +168,7 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time:
         if stored.fields:
             raise ArgumentError(f"expected a scalar volume, got {len(stored.fields)} components per sample")
         n_steps, *rest = image.shape[3:] or (1,)
-        if time not in range(n_steps):
-            raise ArgumentError(f"dataset.volume.time: expected one of 0 to {n_steps - 1}, got {time}")
+        require_step(time, n_steps)
         shape = image.shape[:3] + tuple(size for size in rest if size != 1)
         x, y, z = dims_of(shape)[::-1]
         check_lattice((x, y, z), stored)
