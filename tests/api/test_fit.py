@@ -11,6 +11,7 @@ from tests.fitting.short_fits import shorten
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.metrics.quality import compare
 from texgs.scene.scene_file import read_scene
+from texgs.viewer.origins import Origins
 from texgs.volume.cameras import spiral
 
 TFS = {
@@ -44,6 +45,14 @@ def test_it_is_what_the_workflow_makes(scene, folder):
     numbers = json.loads((folder / "ball" / "inner" / "quick" / "texture" / "metrics.json").read_text())
     assert numbers["numbers"]["train_views"] == 12
     assert numbers["numbers"]["width"] == 32
+
+
+def test_a_saved_scene_keeps_its_volume_and_the_histogram(scene, ball, tmp_path):
+    saved = read_scene(scene.save(tmp_path / "kept"))
+    assert saved.volume.file == tmp_path / "kept" / "volume.nrrd"
+    shown = Origins(saved).transfer
+    assert (shown["minimum"], shown["maximum"]) == (ball.summary.minimum, ball.summary.maximum)
+    assert sum(shown["histogram"]) == 20**3
 
 
 def test_a_second_fit_in_the_folder_does_nothing(scene, ball, folder):

@@ -21,7 +21,8 @@ async def talk(address, scene):
             assert answer.status == 403
         async with client.ws_connect(address + "socket", headers=headers) as socket:
             page = Browser(socket)
-            await page.next("scene")
+            opened = await page.next("scene")
+            assert opened["title"] == "TF01, TF02"
             edit = {"part": "TF01", "key": "opacity", "value": 0.25, "step": 1}
             await page.send(type="edit", **edit)
             await page.past("TF01 opacity 0.25")

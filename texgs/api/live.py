@@ -28,7 +28,8 @@ class Viewer:
     """
 
     def __init__(self, session: Session, folder: Path) -> None:
-        opened = Opened(session.scene, folder / SCENE, folder, SCENE)
+        title = ", ".join(session.scene.models)
+        opened = Opened(session.scene, folder / SCENE, folder, SCENE, title=title)
         self._server = Server(opened, session.composition.device, session=session)
         self._loop, self._token = asyncio.new_event_loop(), secrets.token_urlsafe(32)
         threading.Thread(target=self._loop.run_forever, name="texgs viewer", daemon=True).start()

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from texgs.api.arrays import grid_of, three
 from texgs.api.display import as_light, camera_of, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
-from texgs.core.io import write_json
 from texgs.fields.part_edit import color
 from texgs.scene.frame import quantized
 from texgs.scene.scene import WHITE
@@ -27,6 +26,7 @@ from texgs.volume.render import Appearance
 from texgs.volume.slabs import ArraySource
 from texgs.volume.sources import open_source
 from texgs.volume.suggest import suggest
+from texgs.volume.summaries import write_summaries
 
 if TYPE_CHECKING:
     import pyvista
@@ -82,7 +82,7 @@ class Volume:
             source = ArraySource(grid_of(data, spacing, origin), name)
         self._channel = source.channel
         self.summary = prepare(source, self.file, up=up, nan_value=nan_value)
-        write_json(self.file.with_name("volume.json"), vars(self.summary))
+        write_summaries(self.file, [self.summary], [""])
 
     @classmethod
     def from_pyvista(cls, image: pyvista.ImageData, **options: Any) -> Volume:

@@ -88,7 +88,9 @@ def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> I
     else:
         from tqdm import tqdm  # slow to import
 
-    look: dict[str, Any] = {"dynamic_ncols": True, "leave": not is_notebook}  # a cell keeps no long list
+    look: dict[str, Any] = {"dynamic_ncols": True}
+    if is_notebook:  # a cell keeps no long list, and shows what goes to stderr as a fault
+        look |= {"leave": False, "file": sys.stdout}
     bar: Iterable[T] = tqdm(iterable, desc=title, total=total, unit=unit, **look)
     return bar
 

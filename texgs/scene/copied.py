@@ -9,6 +9,7 @@ from texgs.core.names import file_name
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import write_scene
 from texgs.scene.series_file import Series, write_series
+from texgs.volume import summaries
 
 Entry = TypeVar("Entry", SceneModel, SceneSegment)
 SCENE = "scene.yaml"
@@ -25,7 +26,7 @@ def write_copy(folder: str | Path, scene: Scene) -> Path:
         segments = {key: copies.entry(each, name, key) for key, each in model.segments.items()}
         models[name] = replace(copies.entry(model, name), segments=segments)
     series = scene.series and copies.series(scene.series)
-    volume = scene.volume and replace(scene.volume, file=copies.copy(scene.volume.file, "volume"))
+    volume = scene.volume and replace(scene.volume, file=copies.volume(scene.volume.file))
     return write_scene(copies.folder / SCENE, replace(scene, models=models, volume=volume, series=series))
 
 
@@ -40,6 +41,13 @@ class Copies:
         """Return a model or a segment with copies of its file and its texture."""
         texture = entry.texture and self.copy(entry.texture, *names, "texture")
         return replace(entry, file=self.copy(entry.file, *names), texture=texture)
+
+    def volume(self, file: Path) -> Path:
+        """Return the copy of a volume, with what is known of its values beside it."""
+        summary = file.with_name(summaries.FILE)
+        if summary.exists():
+            self.copy(summary, summary.stem)
+        return self.copy(file, "volume")
 
     def series(self, series: Series) -> Series:
         """Return the series with copies of its volumes and steps of models."""

@@ -19,12 +19,13 @@ from texgs.core.lens import ORIGIN
 from texgs.core.names import is_number
 from texgs.fields.files import kind_of
 from texgs.scene.scene import Scene
+from texgs.volume import summaries
 from texgs.volume.view_set import View as Image
 from texgs.volume.view_set import read_views
 
 log = logging.getLogger("texgs.viewer")
 NEAR = 5  # folders above a model in which its views are looked for
-VIEWS, SUMMARY = ("views", f"views{ONE_LIGHT}"), "volume.json"
+VIEWS = "views", f"views{ONE_LIGHT}"
 BINS = 256  # of a histogram that a page shows, at most
 SAME = 1e-3  # by which elements of two cameras may differ
 
@@ -90,7 +91,7 @@ class Origins:
         if self._volume is None or self._volume.has_channels:
             return None
         ends = [value for tf in self._volume.tfs.values() for value in tf.support]
-        range_of_values, counts = histogram_of(self._volume.file.parent / SUMMARY)
+        range_of_values, counts = histogram_of(self._volume.file.with_name(summaries.FILE))
         low, high = range_of_values or (min(ends, default=0.0), max(ends, default=1.0))
         return {"minimum": low, "maximum": high, "histogram": counts}
 
@@ -99,11 +100,13 @@ def histogram_of(file: Path) -> tuple[tuple[float, float] | None, list[int]]:
     """Return the range of values and the histogram in a volume.json; none where it is damaged or missing."""
     try:
         summary = read_json(file)
-        low, high, counts = summary["minimum"], summary["maximum"], summary["histogram"]
-        if not counts or not all(map(is_number, (low, high, *counts))):
-            raise ArgumentError(f"{file}: expected a range and a histogram in numbers")
-    except (TexgsError, KeyError, TypeError) as error:
-        log.warning("%s: %s", file, error)
+    except TexgsError as error:
+        log.warning("%s; functions are shown without a histogram", error)
+        return None, []
+    known = summary if isinstance(summary, dict) else {}
+    low, high, counts = (known.get(key) for key in ("minimum", "maximum", "histogram"))
+    if not (isinstance(counts, list) and counts and all(map(is_number, (low, high, *counts)))):
+        log.warning("%s: expected a range and a histogram in numbers; functions are shown without", file)
         return None, []
     return (low, high), [int(part.sum()) for part in np.array_split(counts, min(BINS, len(counts)))]
 

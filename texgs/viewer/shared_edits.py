@@ -37,6 +37,7 @@ class Opened:
     folder: Path
     name: str  # that a scene file gets unless another one is chosen
     file: Path | None = None  # of the scene, where edits may be written to it
+    title: str = ""  # by which a page knows the scene; the end of the path by default
 
 
 def open_scene(path: Path, folder: Path | None = None) -> Opened:
@@ -79,7 +80,8 @@ class SharedEdits:
 
     def __init__(self, session: Session, opened: Opened) -> None:
         self._session, self._folder = session, opened.folder
-        self.name, self._source, self._title = opened.name, opened.source, title_of(opened.source)
+        self.name, self._source = opened.name, opened.source
+        self._title = opened.title or title_of(opened.source)
         files = [opened.file.resolve()] if opened.file else []
         self._own = {file: state_of(file) for file in files}  # replaced without a question, while they are so
         self.original = self._saved = session.scene
