@@ -76,6 +76,16 @@ def test_a_second_time_does_nothing_and_force_does_it_again(folder, capsys):
     assert times[0] == times[1] < times[2]
 
 
+def test_a_volume_that_memory_does_not_hold_is_told(folder, capsys, monkeypatch):
+    assert main(["volume", *TINY]) == 0
+    assert "GiB" not in capsys.readouterr().err
+    monkeypatch.setattr("texgs.workflow.stages.volume.free_memory", lambda: 10_000)
+    assert main(["volume", "--force", *TINY]) == 0
+    said = capsys.readouterr().err
+    assert "sphere: the volume has" in said
+    assert "dataset.volume.reduce=2 makes it smaller" in said
+
+
 def test_another_setting_does_not_mix_with_what_is_there(folder):
     main(["views", *TINY])
     (views,) = folder.glob("*/views")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.config.dataset import Volume
 from texgs.core.errors import ArgumentError
-from texgs.core.memory import MIB
+from texgs.core.memory import GIB, MIB, free_memory
 from texgs.core.progress import progress
 from texgs.report.results import VolumeResult
 from texgs.workflow.inputs import has_volume, without
@@ -51,8 +51,14 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     write_summaries(target, summaries, settings.channels)
     ends = min(each.minimum for each in summaries), max(each.maximum for each in summaries)
     whole = replace(summaries[0], minimum=ends[0], maximum=ends[1])
-    told = {name: plain(getattr(whole, name)) for name in TOLD}
-    return Outcome(VolumeResult(**told, volume_mib=target.stat().st_size / MIB))
+    told, size = {name: plain(getattr(whole, name)) for name in TOLD}, target.stat().st_size
+    if size > (free := free_memory()):
+        sys.stderr.write(
+            f"{settings.dataset}: the volume has {size / GIB:.3g} GiB, but {free / GIB:.3g} GiB of memory are "
+            "free: rays would read it from the disk again and again; "
+            f"dataset.volume.reduce={2 * volume.reduce} makes it smaller\n"
+        )
+    return Outcome(VolumeResult(**told, volume_mib=size / MIB))
 
 
 def prepared(volume: Volume, fields: Sequence[Source], target: Path, shown: Any = None) -> list[Summary]:
