@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from filecmp import cmp
-from functools import partial
 from pathlib import Path
-from shutil import copyfileobj
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
@@ -16,9 +14,10 @@ from texgs.api.scene import Scene
 from texgs.api.volume import Volume
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
-from texgs.core.io import write_atomic
+from texgs.core.io import copy_atomic
 from texgs.core.names import file_name
 from texgs.scene.session import Session
+from texgs.volume.summaries import write_summaries
 from texgs.volume.transfer import TransferFunction
 
 if TYPE_CHECKING:
@@ -134,9 +133,9 @@ def configuration(
 
 
 def copied(volume: Volume, folder: Path) -> Path:
-    """Return a copy of the volume's file in a folder, where later processes find the same one."""
+    """Return a copy of the volume in a folder, where later processes find the same one."""
     file = folder / file_name("volume.name", f"{volume.name}.nrrd")
     if not (file.is_file() and cmp(file, volume.file, shallow=False)):
-        with volume.file.open("rb") as samples:
-            write_atomic(file, partial(copyfileobj, samples))
+        copy_atomic(volume.file, file)
+    write_summaries(file, [volume.summary], [""])
     return file

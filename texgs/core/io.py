@@ -7,7 +7,9 @@ import re
 import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from shutil import copyfileobj
 from stat import S_ISDIR, S_ISFIFO, S_ISREG
 from typing import Any, BinaryIO
 
@@ -48,6 +50,12 @@ def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
             raise ArgumentError(f"{path}: expected the name of a file, got a folder; add a name") from error
         raise
     return path
+
+
+def copy_atomic(source: Path, target: Path) -> None:
+    """Copy a file, replacing the target in one step."""
+    with source.open("rb") as file:
+        write_atomic(target, partial(copyfileobj, file))
 
 
 def remove_scratch(folder: Path) -> None:

@@ -1,15 +1,19 @@
 """A scene with all of its files in one folder, to keep or to pass on."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from filecmp import cmp
+from itertools import count
 from pathlib import Path
-from shutil import copyfile
 from typing import TypeVar
 
+from texgs.core.errors import ArgumentError
+from texgs.core.io import copy_atomic
 from texgs.core.names import file_name
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import write_scene
 from texgs.scene.series_file import Series, write_series
-from texgs.volume import summaries
+from texgs.volume.summaries import summary_file
 
 Entry = TypeVar("Entry", SceneModel, SceneSegment)
 SCENE = "scene.yaml"
@@ -18,14 +22,18 @@ SCENE = "scene.yaml"
 def write_copy(folder: str | Path, scene: Scene) -> Path:
     """Copy models, textures, segments and the volume into a folder, and write scene.yaml there; return it.
 
-    Files are named after parts, those of the same names are replaced, and others stay.
+    Files are named after parts. A file of that name with other contents stays, as steps that can be undone or
+    other scenes may need it, and the copy gets a number; only scene.yaml and the files of a series are
+    replaced.
+
+    Raises:
+        ArgumentError: if the folder cannot be made.
     """
-    copies = Copies(Path(folder))
-    models = {}
+    copies, models = Copies(Path(folder)), {}
+    series = scene.series and copies.series(scene.series)
     for name, model in scene.models.items():
         segments = {key: copies.entry(each, name, key) for key, each in model.segments.items()}
         models[name] = replace(copies.entry(model, name), segments=segments)
-    series = scene.series and copies.series(scene.series)
     volume = scene.volume and replace(scene.volume, file=copies.volume(scene.volume.file))
     return write_scene(copies.folder / SCENE, replace(scene, models=models, volume=volume, series=series))
 
@@ -35,7 +43,10 @@ class Copies:
 
     def __init__(self, folder: Path) -> None:
         self.folder, self._copies = folder, dict[Path, Path]()
-        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ArgumentError(f"{folder}: expected a folder, but it cannot be made ({error.strerror})") from error
 
     def entry(self, entry: Entry, *names: str) -> Entry:
         """Return a model or a segment with copies of its file and its texture."""
@@ -44,27 +55,44 @@ class Copies:
 
     def volume(self, file: Path) -> Path:
         """Return the copy of a volume, with what is known of its values beside it."""
-        summary = file.with_name(summaries.FILE)
+        target, summary = self.copy(file, "volume"), summary_file(file)
         if summary.exists():
-            self.copy(summary, summary.stem)
-        return self.copy(file, "volume")
+            self.put(summary, summary_file(target))
+        return target
 
     def series(self, series: Series) -> Series:
         """Return the series with copies of its volumes and steps of models."""
         copied = replace(series, file=self.folder / series.file.name)
         for step in range(len(series.steps)):
             for name in series.models:
-                self.copy(series.model(name, step), copied.model(name, step).stem)
-            self.copy(series.volume(step), copied.volume(step).stem)
+                self.put(series.model(name, step), copied.model(name, step))
+            self.put(series.volume(step), copied.volume(step))
         write_series(copied)
         return copied
 
     def copy(self, file: Path, *names: str) -> Path:
-        """Return the copy of a file, which has these names and its ending."""
+        """Return the copy of a file, which has these names, a number where that is needed, and its ending."""
         source = file.resolve()
         if source not in self._copies:
-            target = self.folder / file_name("part", f"{'-'.join(names)}{file.suffix}".replace("/", "-"))
-            if target.resolve() != source:
-                copyfile(source, target)
-            self._copies[source] = target
+            free = (each for each in self.targets(file.suffix, names) if self.is_free(each, source))
+            self.put(source, next(free))
         return self._copies[source]
+
+    def targets(self, suffix: str, names: tuple[str, ...]) -> Iterator[Path]:
+        """Yield files of these names: without a number, with 2, with 3 ..."""
+        for number in count(1):
+            words = "-".join([*names, *([str(number)] if number > 1 else [])])
+            yield self.folder / file_name("part", f"{words}{suffix}".replace("/", "-"))
+
+    def is_free(self, target: Path, source: Path) -> bool:
+        """Return whether no other file has this name, here or among the copies."""
+        if target in self._copies.values():
+            return False
+        return not target.exists() or target.samefile(source) or cmp(target, source, shallow=False)
+
+    def put(self, source: Path, target: Path) -> Path:
+        """Copy a file, unless it is there already, and return the copy."""
+        if target.resolve() != source.resolve():
+            copy_atomic(source, target)
+        self._copies[source.resolve()] = target
+        return target

@@ -19,7 +19,7 @@ from texgs.core.lens import ORIGIN
 from texgs.core.names import is_number
 from texgs.fields.files import kind_of
 from texgs.scene.scene import Scene
-from texgs.volume import summaries
+from texgs.volume.summaries import summary_file
 from texgs.volume.view_set import View as Image
 from texgs.volume.view_set import read_views
 
@@ -91,7 +91,7 @@ class Origins:
         if self._volume is None or self._volume.has_channels:
             return None
         ends = [value for tf in self._volume.tfs.values() for value in tf.support]
-        range_of_values, counts = histogram_of(self._volume.file.with_name(summaries.FILE))
+        range_of_values, counts = histogram_of(summary_file(self._volume.file))
         low, high = range_of_values or (min(ends, default=0.0), max(ends, default=1.0))
         return {"minimum": low, "maximum": high, "histogram": counts}
 
