@@ -8,7 +8,7 @@ import pytest
 
 import texgs
 from tests.fitting.short_fits import shorten
-from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.errors import ArgumentError, ConfigError, DeviceError
 from texgs.metrics.quality import compare
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.origins import Origins
@@ -45,6 +45,16 @@ def test_it_is_what_the_workflow_makes(scene, folder):
     numbers = json.loads((folder / "ball" / "inner" / "quick" / "texture" / "metrics.json").read_text())
     assert numbers["numbers"]["train_views"] == 12
     assert numbers["numbers"]["width"] == 32
+
+
+def test_a_fit_in_seconds_has_the_histogram_too(ball, tmp_path, monkeypatch):
+    shorten(monkeypatch, frequency=1, surfels=300, iterations=20)
+    with pytest.raises(ArgumentError, match="overrides: not for the recipe now"):
+        texgs.fit(ball, TFS, "now", overrides=SMALL)
+    made = texgs.fit(ball, {"inner": TFS["inner"]}, "now", size=32, folder=tmp_path)
+    assert Origins(made.session.scene).transfer["maximum"] == ball.summary.maximum
+    with pytest.raises(DeviceError, match="device: expected cpu or cuda, got gpu"):
+        texgs.fit(ball, TFS, device="gpu")
 
 
 def test_a_saved_scene_keeps_its_volume_and_the_histogram(scene, ball, tmp_path):

@@ -13,7 +13,7 @@ from PIL import Image
 import texgs
 from tests.scene.balls import ball_models, write_balls
 from texgs.cli.main import main
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.image import read_rgba
 from texgs.core.light import Light
 from texgs.fields.surfels.step_file import write_step
@@ -73,15 +73,27 @@ def test_light_background_and_cuts(scene):
     assert scene["TF02"].opacity == 2
 
 
-def test_slips_are_sentences(scene):
+def test_slips_are_sentences(scene, tmp_path):
     with pytest.raises(AttributeError):
         scene["TF01"].opactiy = 0.5
     with pytest.raises(ArgumentError, match=r"models.TF01.opacity: expected a factor from 0"):
         scene["TF01"].opacity = -1
     with pytest.raises(ArgumentError, match=r"expected a model of the scene \(TF01, TF02\), got TF03"):
         scene["TF03"]
-    with pytest.raises(ArgumentError, match='light: expected "headlight", or azimuth and polar angle'):
+    with pytest.raises(ArgumentError, match="light: expected headlight, or azimuth and polar in degrees"):
         scene.light = 3, 4, 5
+    with pytest.raises(ArgumentError, match="light: expected headlight"):
+        scene.light = None
+    with pytest.raises(ArgumentError, match=r"kind: expected one of 3dgs, .*, got 3dg"):
+        scene.export("a.ply", "3dg")
+    with pytest.raises(ArgumentError, match=r"point: expected pixel x, y, or several, got \[1, 2, 3\]"):
+        scene.segment("spot", [1, 2, 3], model="TF01")
+    with pytest.raises(ArgumentError, match=r"edit.parts: expected some of TF01, TF02, got TF03"):
+        scene.style("glass", recipe="preview", parts="TF03")
+    with pytest.raises(ArgumentError, match=r"width: expected a whole number of pixels, got 8\.5"):
+        scene.render(width=8.5)
+    with pytest.raises(DeviceError, match="device: expected cpu or cuda, got gpu"):
+        texgs.open(scene.session.save(tmp_path / "s.yaml"), device="gpu")
     with pytest.raises(ArgumentError, match="what: expected one of view, test"):
         scene.film("x.mp4", "spin")
     with pytest.raises(ArgumentError, match=r"nowhere.yaml: no such file"):
@@ -90,6 +102,17 @@ def test_slips_are_sentences(scene):
     assert scene["TF01"].opacity == 1
     assert list(scene) == ["TF01", "TF02"]
     assert len(scene) == 2
+    assert scene.render(width=np.int64(16)).size == (16, 16)
+
+
+def test_a_look_that_was_saved_and_undone_is_gone(tmp_path):
+    scene = texgs.open(write_balls(tmp_path))
+    scene.style("glass", recipe="preview", parts="TF01").save(tmp_path)
+    before = pixels(scene)
+    scene.style("dots", recipe="preview", parts="TF01").save(tmp_path)
+    assert not np.array_equal(pixels(scene), before)
+    assert scene.undo()
+    assert np.array_equal(pixels(scene), before)
 
 
 # ---- Pictures ---------------------------------------------------------------

@@ -75,6 +75,22 @@ def test_xarray_is_known_by_names_and_coordinates():
     assert np.array_equal(volume.grid.values, values[:, ::-1])
     assert volume.grid.spacing == (1.0, 2.0, 0.5)
     assert volume.grid.origin == (0.0, 0.0, 1.0)
+    metres, kilometres = {"units": "m"}, {"units": "km"}
+    array = xarray.DataArray(
+        values,
+        dims=("z", "y", "x"),
+        coords={
+            "z": ("z", [0.0, 1.0, 2.004, 3.0], kilometres),
+            "y": ("y", 500.0 * np.arange(5), metres),
+            "x": ("x", 500.0 * np.arange(6), metres),
+        },
+    )
+    assert texgs.Volume(array).grid.spacing == pytest.approx((500, 500, 1000)), "as from a file"
+    array["z"].attrs["units"] = "degrees"
+    with pytest.warns(UserWarning, match="units along x, y, z are m, m, degrees"):
+        assert texgs.Volume(array).grid.spacing == (1.0, 1.0, 1.0)
+    uneven = xarray.DataArray(values, dims=("z", "y", "x"), coords={"x": [0, 1, 2, 3, 4, 9]})
+    assert texgs.Volume(uneven, spacing=(1, 2, 3)).grid.spacing == (1.0, 2.0, 3.0)
     unnamed = texgs.Volume(xarray.DataArray(values, dims=("level", "lat", "lon")))
     assert np.array_equal(unnamed.grid.values, values)
     assert unnamed.grid.spacing == (1.0, 1.0, 1.0)
@@ -91,7 +107,7 @@ def test_xarray_is_known_by_names_and_coordinates():
         (xarray.DataArray(np.zeros((2, 3, 3, 3)), dims=("time", "z", "y", "x")), r"isel\(time=0\)"),
         (
             xarray.DataArray(field(3, 3, 3), dims=("z", "y", "x"), coords={"x": [0, 1, 5]}),
-            "expected equal steps along x, got 1 to 4",
+            "DataArray: expected even distances along x; resample, or set spacing",
         ),
         ("no-such-file.nrrd", "no such file or folder"),
     ],
@@ -167,12 +183,16 @@ def test_at_the_end_of_a_cell_there_are_facts_and_a_picture():
 
 
 def test_functions_and_light_are_checked():
+    with pytest.raises(ArgumentError, match="spacign: only for files; leave them out"):
+        texgs.Volume(field(8, 8, 8), spacign=2)
     volume = texgs.Volume(field(8, 8, 8))
+    with pytest.raises(ArgumentError, match="count: expected at least 1, got 0"):
+        volume.suggest(0)
     with pytest.raises(ArgumentError, match="functions: expected at least one transfer function, got none"):
         volume.render([])
     with pytest.raises(ArgumentError, match=r"TF01: expected a texgs.TransferFunction, got str"):
         volume.render(["red"])
-    with pytest.raises(ArgumentError, match='light: expected "headlight"'):
+    with pytest.raises(ArgumentError, match="light: expected headlight, or azimuth"):
         volume.render(RED, light="sun")
     with pytest.raises(ArgumentError, match="width: expected at least 1 pixel, got 0"):
         volume.render(RED, width=0)

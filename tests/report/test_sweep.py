@@ -1,11 +1,10 @@
 import pytest
 
 from tests.fields.surfels.test_composition import ball
-from tests.report.written import job, metrics
+from tests.report.written import job, metrics, read
 from texgs.core.errors import ArgumentError
 from texgs.core.figures import CELL, DPI
 from texgs.fields.surfels.model_file import write_model
-from texgs.report.metrics_files import read
 from texgs.report.results import EditMeasures, EditResult, FitResult
 from texgs.report.sweep_figure import ACROSS, WIDTH, sweep_figure
 from texgs.report.sweep_table import sweep

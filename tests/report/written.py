@@ -7,9 +7,14 @@ from importlib.resources import files
 
 from PIL import Image
 
-from texgs.report.metrics_files import read
+from texgs.report.metrics_files import read_known
 from texgs.report.results import plain
 from texgs.report.table import SOURCES
+
+
+def read(paths):
+    """The records of metrics files."""
+    return read_known(paths)[0]
 
 
 def metrics(folder, stage, result, dataset="engine", tf=None, recipe="quick", name="", **facts):

@@ -2,9 +2,10 @@
 
 import pytest
 
+from tests.report.written import read
 from tests.study.studies import WORDS, edit, fit, job, study
 from texgs.core.errors import ArgumentError
-from texgs.report.metrics_files import below, read
+from texgs.report.metrics_files import below
 from texgs.report.results import EditResult
 from texgs.study.questions import questions_of, rank_name, read_key, write_key
 

@@ -5,12 +5,12 @@ import pytest
 import yaml
 
 from tests.cli.conftest import DEMO, VIEWS, copied, hide_weights, numbers
+from tests.report.written import read
 from tests.volume.test_motion import blob
 from texgs.cli.main import main
 from texgs.config.compose import compose
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.fitting import series
-from texgs.report.metrics_files import read
 from texgs.report.tables import tables_of
 from texgs.scene.scene_file import read_scene
 from texgs.volume.generate_series import flame

@@ -1,15 +1,16 @@
 """Grids from objects of other libraries, which are known by what they can: none of these is imported."""
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, located
+from texgs.volume.axes import along, lattice
 from texgs.volume.grid import Grid, Triple
 
 AXES = "zyx"
-UNEVEN = 1e-3  # of a step: how far a coordinate of xarray may be from its place in a row of equal steps
 
 
 def grid_of(data: Any, spacing: Sequence[float] | None, origin: Sequence[float] | None) -> Grid:
@@ -24,13 +25,14 @@ def grid_of(data: Any, spacing: Sequence[float] | None, origin: Sequence[float] 
     Raises:
         ArgumentError, ShapeError: if there is no scalar field on a regular lattice.
     """
+    said = three("spacing", spacing), three("origin", origin)
+    if hasattr(data, "dims") and hasattr(data, "coords"):
+        return of_data_array(data, *said)
     if hasattr(data, "GetDirectionMatrix"):
         values, steps, first = of_image_data(data)
-    elif hasattr(data, "dims") and hasattr(data, "coords"):
-        values, steps, first = of_data_array(data)
     else:
         values, steps, first = np.asarray(data), (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
-    return Grid(values, three("spacing", spacing) or steps, three("origin", origin) or first)
+    return Grid(values, said[0] or steps, said[1] or first)
 
 
 def three(name: str, numbers: Sequence[float] | None) -> Triple | None:
@@ -64,8 +66,8 @@ def of_image_data(image: Any) -> tuple[np.ndarray, Triple, Triple]:
     return values.reshape(z, y, x, *values.shape[1:]), tuple(image.spacing), tuple(image.origin)
 
 
-def of_data_array(array: Any) -> tuple[np.ndarray, Triple, Triple]:
-    """Return samples [Z, Y, X], spacing and origin of xarray's data, with what its coordinates tell."""
+def of_data_array(array: Any, spacing: Triple | None, origin: Triple | None) -> Grid:
+    """Return the grid of xarray's data, with what its coordinates and their units tell, as those of files."""
     names = [str(name) for name in array.dims]
     if len(names) != 3:
         raise ArgumentError(
@@ -74,25 +76,12 @@ def of_data_array(array: Any) -> tuple[np.ndarray, Triple, Triple]:
         )
     if {name.lower() for name in names} == set(AXES):
         array = array.transpose(*sorted(array.dims, key=lambda name: AXES.index(str(name).lower())))
-    rows = [row_of(array, name) for name in reversed(array.dims)]
-    (dx, x), (dy, y), (dz, z) = rows
-    flips = tuple(slice(None, None, -1 if step < 0 else 1) for step, _ in reversed(rows))
-    return np.asarray(array.values)[flips], (abs(dx), abs(dy), abs(dz)), (x, y, z)
-
-
-def row_of(array: Any, name: Any) -> tuple[float, float]:
-    """Return the step of a dimension's coordinate, below 0 where it falls, and its least value."""
-    if name not in array.coords:
-        return 1.0, 0.0
-    places = np.asarray(array.coords[name].values)
-    if places.dtype.kind not in "iuf" or len(places) < 2:
-        return 1.0, 0.0
-    places = places.astype(np.float64)
-    steps = np.diff(places)
-    step = float((places[-1] - places[0]) / (len(places) - 1))
-    if not np.isfinite(step) or step == 0 or float(np.abs(steps - step).max()) > UNEVEN * abs(step):
-        raise ArgumentError(
-            f"DataArray: expected equal steps along {name}, got {steps.min():g} to {steps.max():g}; "
-            f"interpolate it by .interp({name}=...)"
-        )
-    return step, float(places.min())
+    places = [array.coords.get(name) for name in array.dims]
+    numbers = [None if each is None or each.dtype.kind not in "iuf" else each for each in places]
+    axes = [along(*row) for row in zip(map(str, array.dims), array.shape, numbers, strict=True)]
+    with located("DataArray"):
+        steps, first, remark = lattice(axes[::-1], spacing, origin)
+    if remark:
+        warnings.warn(f"DataArray: {remark}", stacklevel=4)
+    flips = tuple(slice(None, None, -1 if axis.step < 0 else 1) for axis in axes)
+    return Grid(np.asarray(array.values)[flips], steps, first)

@@ -9,10 +9,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.camera import Camera, orbit
-from texgs.core.errors import ArgumentError
 from texgs.core.lens import Frame
-from texgs.core.light import Light
-from texgs.core.names import is_number
 
 if TYPE_CHECKING:
     import numpy as np
@@ -79,23 +76,8 @@ def camera_of(
     target: Sequence[float] | None = None,
 ) -> Camera:
     """Return the camera that shows all that is framed; distance and target may be others."""
-    for name, size in (("width", width), ("height", width if height is None else height)):
-        if not isinstance(size, int) or size < 1:
-            raise ArgumentError(f"{name}: expected at least 1 pixel, got {size}")
-    lens = framed.lens(fov_y, width, width if height is None else height)
-    radius = lens.radius if radius is None else radius
-    return orbit(azimuth, polar, *lens._replace(radius=radius, target=target or lens.target))
-
-
-def as_light(value: Light | str | Sequence[float]) -> Light:
-    """Return a light from "headlight", or azimuth and polar angle in degrees."""
-    if isinstance(value, Light):
-        return value
-    if value == "headlight":
-        return Light("headlight")
-    if not isinstance(value, str) and len(value) == 2 and all(map(is_number, value)):
-        return Light("directional", *map(float, value))
-    raise ArgumentError(f'light: expected "headlight", or azimuth and polar angle in degrees, got {value!r}')
+    height = width if height is None else height
+    return orbit(azimuth, polar, *framed.lens(fov_y, width, height, radius, target))
 
 
 def picture_of(pixels: np.ndarray) -> Image:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import torch
 
-from texgs.api.display import as_light, camera_of, picture_of
+from texgs.api.display import camera_of, picture_of
 from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
@@ -19,6 +19,7 @@ from texgs.core.light import Light
 from texgs.core.names import part_file
 from texgs.scene.changes import apply_all
 from texgs.scene.parts import part_names
+from texgs.scene.scene_file import light_of
 from texgs.scene.session import Session
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ class Editing:
 
     @light.setter
     def light(self, value: Light | str | Sequence[float]) -> None:
-        self.session.set_light(as_light(value))
+        self.session.set_light(light_of(value))
         self.changed(f"light {value}")
 
     @property
@@ -185,7 +186,10 @@ class Editing:
         scene, device = self.session.scene, self.session.composition.device
         part = f"{model_name(scene, model, 'model')}/{name}"
         framed = scene.framed(self.session.composition)
-        pixels = torch.tensor(point, dtype=torch.float32, device=device).reshape(-1, 2) + 0.5
+        try:
+            pixels = torch.tensor(point, dtype=torch.float32, device=device).reshape(-1, 2) + 0.5
+        except (TypeError, ValueError, RuntimeError) as error:
+            raise ArgumentError(f"point: expected pixel x, y, or several, got {point!r:.100}") from error
         every = torch.ones(len(pixels), dtype=torch.bool, device=device)
         clicks = Clicks(camera_of(framed, azimuth, polar, size).to(device), pixels, every)
         around = [each.to(device) for each in icosphere_of(views, framed.lens().square(VOTING))]
@@ -207,8 +211,9 @@ class Editing:
         from texgs.scene.parts import look_of
 
         before, device = self.session.scene, self.session.composition.device
+        names = [parts] if isinstance(parts, str) else [*parts]
         try:
-            edit = typed(Edit, {"name": method, "method": method, "parts": [*parts], method: values})
+            edit = typed(Edit, {"name": method, "method": method, "parts": names, method: values})
         except ValueMismatch as error:
             raise ArgumentError(str(error)) from error
         method_of(edit).of(edit).check()

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from texgs.api.functions import AnyFunctions, named
 from texgs.api.scene import Scene
 from texgs.api.volume import Volume
+from texgs.core.check import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
 from texgs.core.io import copy_atomic
@@ -52,7 +53,7 @@ def fit(
         device: "cpu" or "cuda".
         overrides: more keys of the configuration, such as "views.train.frequency=3"; not for `now`.
         folder: for all files, a copy of the volume too. A fit that was interrupted goes on there, and one
-            that is done is opened. Default: one that is gone with the scene.
+            that is done is opened; `now` begins anew. Default: one that is gone with the scene.
 
     Raises:
         ArgumentError: if functions overlap, a key or a recipe is unknown, or nothing is visible.
@@ -61,6 +62,9 @@ def fit(
         raise ArgumentError(f"volume: expected a texgs.Volume, got {type(volume).__name__}")
     if size < LEAST:
         raise ArgumentError(f"size: expected at least {LEAST} pixels, got {size}")
+    if recipe == NOW and overrides:
+        raise ArgumentError(f"overrides: not for the recipe {NOW}; leave them out")
+    torch_device(device)
     shown = named(volume.suggest() if functions is None else functions)
     kept = TemporaryDirectory(prefix="texgs-") if folder is None else folder
     place = Path(kept.name if isinstance(kept, TemporaryDirectory) else kept)

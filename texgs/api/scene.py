@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.api.display import MB, LivePage, Page, camera_of, picture_of
 from texgs.api.editing import Editing
+from texgs.core.check import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
 from texgs.core.names import EXPORTS
@@ -143,6 +144,8 @@ class Scene(Editing):
 
         path, scene = Path(path), self.session.scene
         able = {key: endings for key, endings in EXPORTS.items() if key not in OF_MODELS}
+        if kind and kind not in able:
+            raise ArgumentError(f"kind: expected one of {', '.join(able)}, got {kind}")
         chosen = kind or next((key for key, endings in able.items() if path.suffix in endings), "")
         if path.suffix not in able.get(chosen, ()):
             endings = dict.fromkeys(ending for each in able.values() for ending in each)
@@ -209,6 +212,6 @@ def open_scene(path: str | Path, device: str = "cpu") -> Scene:
     """
     from texgs.viewer.shared_edits import open_scene as opened
 
-    scene = Scene(Session(opened(Path(path)).scene, device))
+    scene = Scene(Session(opened(Path(path)).scene, torch_device(device)))
     _ = scene.session.composition  # what is wrong with its files is told now
     return scene

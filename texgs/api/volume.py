@@ -11,11 +11,13 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from texgs.api.arrays import grid_of, three
-from texgs.api.display import as_light, camera_of, inline, picture_of
+from texgs.api.display import camera_of, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
+from texgs.core.errors import ArgumentError
 from texgs.fields.part_edit import color
 from texgs.scene.frame import quantized
 from texgs.scene.scene import WHITE
+from texgs.scene.scene_file import light_of
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
@@ -78,6 +80,8 @@ class Volume:
         if isinstance(data, str | Path):
             steps, first = three("spacing", spacing), three("origin", origin)
             source = open_source(data, spacing=steps, origin=first, **keys)
+        elif keys:
+            raise ArgumentError(f"{', '.join(keys)}: only for files; leave them out")
         else:
             source = ArraySource(grid_of(data, spacing, origin), name)
         self._channel = source.channel
@@ -134,7 +138,7 @@ class Volume:
         shown = named(self.suggest() if functions is None else functions)
         caster = Caster(self.grid, replace(Appearance(), step=step))
         view = camera_of(frame_of(self.grid, shown.values()), azimuth, polar, width, height)
-        rgba = caster.cast(overlays(shown), view, as_light(light)).rgba
+        rgba = caster.cast(overlays(shown), view, light_of(light)).rgba
         behind = rgba.new_tensor(color("background", background))
         return picture_of(quantized(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))
 

@@ -42,7 +42,7 @@ def add_lens(parser: argparse.ArgumentParser, width: str, height: str) -> None:
 def lens_of(arguments: argparse.Namespace, framed: Frame) -> Lens:
     """Return what `add_lens` has added; pictures are square and show all that is framed by default."""
     size = arguments.width, arguments.width if arguments.height is None else arguments.height
-    is_paper = arguments.frame == "paper"
-    lens = Lens(LENS.radius, arguments.fov, *size) if is_paper else framed.lens(arguments.fov, *size)
-    radius = lens.radius if arguments.radius is None else arguments.radius
-    return lens._replace(radius=radius, target=arguments.target or lens.target)
+    radius, target = arguments.radius, arguments.target
+    if arguments.frame != "paper":
+        return framed.lens(arguments.fov, *size, radius, target)
+    return Lens(LENS.radius if radius is None else radius, arguments.fov, *size, target or LENS.target)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, isfinite, radians, sin, tan
+from numbers import Integral
 from typing import Self
 
 import torch
@@ -22,11 +23,13 @@ class Camera:
     height: int  # pixels
 
     def __post_init__(self) -> None:
-        check.shape("viewmat", self.viewmat, "4 4")
-        check.shape("K", self.K, "3 3")
         for name, size in (("width", self.width), ("height", self.height)):
+            if not isinstance(size, Integral):
+                raise ArgumentError(f"{name}: expected a whole number of pixels, got {size}")
             if size < 1:
                 raise ArgumentError(f"{name}: expected at least 1 pixel, got {size}")
+        check.shape("viewmat", self.viewmat, "4 4")
+        check.shape("K", self.K, "3 3")
 
     @property
     def position(self) -> Tensor:
@@ -118,7 +121,8 @@ def intrinsics(fov_y: float, width: int, height: int) -> Tensor:
     if not 0 < fov_y < 180:
         raise ArgumentError(f"fov_y: expected degrees between 0 and 180, got {fov_y}")
     focal = 0.5 * height / tan(radians(0.5 * fov_y))
-    return torch.tensor([[focal, 0.0, 0.5 * width], [0.0, focal, 0.5 * height], [0.0, 0.0, 1.0]])
+    rows = [[focal, 0.0, 0.5 * width], [0.0, focal, 0.5 * height], [0.0, 0.0, 1.0]]
+    return torch.tensor(rows, dtype=torch.float32)  # sizes may be NumPy's
 
 
 def orbit_direction(azimuth: float, polar: float) -> Tensor:

@@ -101,7 +101,9 @@ def constant(**tensors: Tensor | None) -> None:
 
 
 def torch_device(name: str) -> torch.device:
-    """Return a device of torch by its name; refuse a GPU where torch sees none."""
+    """Return a device of torch by its name; refuse others, and a GPU where torch sees none."""
+    if name not in ("cpu", "cuda"):
+        raise DeviceError(f"device: expected cpu or cuda, got {name}")
     if name == "cuda" and not torch.cuda.is_available():
         raise DeviceError("device=cuda: torch sees no GPU; leave it out to work on the CPU, see texgs doctor")
     return torch.device(name)

@@ -38,15 +38,25 @@ class Frame:
         if len(self.target) != 3:
             raise ArgumentError(f"target: expected three numbers, got {self.target}")
 
-    def lens(self, fov_y: float = Lens().fov_y, width: int = 800, height: int = 800) -> Lens:
+    def lens(
+        self,
+        fov_y: float = Lens().fov_y,
+        width: int = 800,
+        height: int = 800,
+        radius: float | None = None,
+        target: Sequence[float] | None = None,
+    ) -> Lens:
         """Return the lens that shows the ball on 90 % of the smaller side of images.
+
+        Distance and target may be others.
 
         The silhouette of a ball of radius r at distance d is a disc whose tangent is r / sqrt(d^2 - r^2).
         """
         if not 0 < fov_y < 180:
             raise ArgumentError(f"fov_y: expected degrees between 0 and 180, got {fov_y}")
         tangent = FILLED * tan(radians(0.5 * fov_y)) * min(1.0, max(width, 1) / max(height, 1))
-        return Lens(self.radius * sqrt(1 + tangent**-2), fov_y, width, height, self.target)
+        distance = self.radius * sqrt(1 + tangent**-2) if radius is None else radius
+        return Lens(distance, fov_y, width, height, self.target if target is None else target)
 
 
 def frequency_of(count: int, where: str = "views") -> int:

@@ -83,10 +83,15 @@ def visible_range(seen: Tensor) -> slice:
     return slice(start, stop)
 
 
+def some(cameras: Sequence[Camera]) -> Sequence[Camera]:
+    """Return a few of many cameras, which tell how much surfels show."""
+    return cameras[:: -(-len(cameras) // VIEWS)]
+
+
 @torch.no_grad()
 def mean_alpha(model: Surfels, cameras: Sequence[Camera], opacity: float = 1.0) -> float:
     """Return the mean alpha of a few views of a model with a factor on its opacities, see `weighted_mean`."""
-    parts = (around(model, camera.to(model.device)) for camera in cameras[:: -(-len(cameras) // VIEWS)])
+    parts = (around(model, camera.to(model.device)) for camera in some(cameras))
     nothing = model.parameters["means"][:, :1]
     return weighted_mean(model.rasterized(part, opacity, features=nothing).alpha for part in parts)
 

@@ -8,12 +8,11 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.edit.canvas import around
+from texgs.edit.canvas import around, some
 from texgs.fields.surfels.model import Surfels
 
 PLACE = ("means", "quats", "scales")
 MOVED = (*PLACE, "opacities")  # of surfels, in a series
-SHOWN_IN = 6  # views that tell how much surfels show
 BETTER = 4.0  # times as much as before: from then on, a surfel learns from another step
 
 
@@ -75,8 +74,3 @@ def shots_of(
         shots.append(others[best]._replace(surfels=gains[best] > 0))
         known = known.maximum(BETTER * shown[best])
     return [shot for shot in shots if bool(shot.surfels.any())]
-
-
-def some(cameras: Sequence[Camera]) -> Sequence[Camera]:
-    """Return a few of many cameras, which tell how much surfels show."""
-    return cameras[:: -(-len(cameras) // SHOWN_IN)]

@@ -109,18 +109,18 @@ def told(values: Sequence[float]) -> dict[str, float]:
     return {"mean": fmean(values), "percentile_5": low, "worst": min(values), "floor": floor_of(values)}
 
 
-def floor_of(values: Sequence[float], missed: float = MISSED) -> float:
-    """Return what a new value reaches with a probability of 1 - missed at least: split conformal prediction.
+def floor_of(values: Sequence[float]) -> float:
+    """Return what a new value reaches with a probability of 1 - MISSED at least: split conformal prediction.
 
-    It is the k-th smallest of n values, k = floor(missed (n + 1)): of 64 the third. Proof: the new value and
+    It is the k-th smallest of n values, k = floor(MISSED (n + 1)): of 64 the third. Proof: the new value and
     the n are exchangeable, so that its rank among all n + 1, ties broken at random, is uniform. If it is
     below the k-th smallest of the others, at most k - 1 of them are not above it, and its rank is k at most,
-    which has the probability k / (n + 1) <= missed (Vovk, Gammerman and Shafer 2005).
+    which has the probability k / (n + 1) <= MISSED (Vovk, Gammerman and Shafer 2005).
 
     Raises:
         ArgumentError: if there are too few for k = 1.
     """
-    k = int(missed * (len(values) + 1))
+    k = int(MISSED * (len(values) + 1))
     if k < 1:
-        raise ArgumentError(f"views: expected at least {round(1 / missed) - 1}, got {len(values)}")
+        raise ArgumentError(f"views: expected at least {round(1 / MISSED) - 1}, got {len(values)}")
     return sorted(values)[k - 1]

@@ -121,6 +121,6 @@ def meshes(records: Iterable[Record[Any]]) -> Table:
     measured = columns("meshes")
     rows = [
         cells(record, **{column.title: getattr(record.result, key) for key, column in measured.items()})
-        for record in in_order(of(MeshResult, records))
+        for record in in_order(each for each in of(MeshResult, records) if not each.is_swept)
     ]
     return Table(caption, [*map(Column, (DATA, "TF", LABEL)), *measured.values()], rows)

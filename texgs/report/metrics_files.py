@@ -73,13 +73,8 @@ class OtherVersionError(ArgumentError):
     """A metrics file is of another version of texgs."""
 
 
-def read(paths: Iterable[str | Path]) -> list[Record[Any]]:
-    """Read all metrics, in the order of their paths."""
-    return [_record(path) for path in sorted(map(Path, paths))]
-
-
 def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[LeftOut]]:
-    """Read the metrics of this version of texgs, as `read`, and say how many are of other versions."""
+    """Read the metrics of this version of texgs, in the order of their paths; say how many are of others."""
     records: list[Record[Any]] = []
     others: dict[Path, OtherVersionError] = {}
     for path in sorted(map(Path, paths)):

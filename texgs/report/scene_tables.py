@@ -146,7 +146,7 @@ def edits(records: Iterable[Record[Any]]) -> Table:
 def steps(records: Iterable[Record[Any]]) -> Table:
     """Return how close the steps of series are to their volumes, and what one costs."""
     rows = []
-    for record in in_order(of(StepsResult, records)):
+    for record in in_order(each for each in of(StepsResult, records) if not each.is_swept):
         result = record.result
         scores = [step.psnr for step in result.compared if step.psnr is not None]
         quality = {

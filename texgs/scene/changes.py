@@ -98,8 +98,6 @@ def _change_scene(session: Session, key: str, text: str) -> None:
     """Change the light, the background or the step; an empty text takes it back."""
     known({key: text}, ("light", "background", "cut", "time"), "the scene")
     value = _plain(text) if text else SCENE_KEYS[key]
-    if key == "light" and isinstance(value, list) and len(value) == 2:
-        value = dict(zip(("azimuth", "polar"), value, strict=True))
     session.set_of_scene(key, value)
 
 

@@ -46,7 +46,9 @@ class Copies:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise ArgumentError(f"{folder}: expected a folder, but it cannot be made ({error.strerror})") from error
+            raise ArgumentError(
+                f"{folder}: expected a folder, but it cannot be made ({error.strerror})"
+            ) from error
 
     def entry(self, entry: Entry, *names: str) -> Entry:
         """Return a model or a segment with copies of its file and its texture."""

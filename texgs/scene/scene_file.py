@@ -13,7 +13,7 @@ from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading, write_bytes
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.lens import Frame
-from texgs.core.light import Light
+from texgs.core.light import HEADLIGHT, Light
 from texgs.core.names import close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
 from texgs.fields.part_edit import PartEdit, color
@@ -162,9 +162,13 @@ def plain_functions(functions: Mapping[str, TransferFunction]) -> dict[str, Any]
 
 
 def light_of(value: Any) -> Light:
-    """Return the light that a value of a scene file stands for."""
-    if value == "headlight":
-        return Light("headlight")
+    """Return a light from one, "headlight", or azimuth and polar angle in degrees, with or without names."""
+    if isinstance(value, Light):
+        return value
+    if isinstance(value, str) and value == "headlight":
+        return HEADLIGHT
+    if isinstance(value, list | tuple) and len(value) == 2:
+        value = dict(zip(("azimuth", "polar"), value, strict=True))
     if isinstance(value, dict) and set(value) <= {"azimuth", "polar"} and all(map(is_number, value.values())):
         return Light("directional", **{key: float(angle) for key, angle in value.items()})
     raise ArgumentError(f"light: expected headlight, or azimuth and polar in degrees, got {value!r}")

@@ -2,10 +2,10 @@
 
 import sys
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 import torch
@@ -28,6 +28,7 @@ from texgs.scene.scene_file import EDITS, cuts_of, functions_of, known, light_of
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.twin import Twin, needs_twin
 
+T = TypeVar("T")
 SCENE_KEYS: dict[str, Any] = {
     "light": "headlight",
     "background": WHITE,
@@ -36,7 +37,7 @@ SCENE_KEYS: dict[str, Any] = {
     "time": 0,
 }  # what is edited of a whole scene, and without edits
 MOST_STEPS = 200  # of the history: of more, the oldest cannot be undone
-KEPT = 3  # compositions of files as they are: pages may show others in turn, as before an edit and after it
+KEPT = 3  # compositions and twins: pages may show others in turn, as before an edit and after it
 
 
 class Session:
@@ -54,8 +55,8 @@ class Session:
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
         self._past, self._future = [(scene, "")], list[tuple[Scene, str]]()  # with titles of steps
         self._device = device
-        self._opened = deque[tuple[list[object], Composed]](maxlen=KEPT)
-        self._twin: tuple[object, Twin] | None = None
+        self._opened = deque[tuple[object, Composed]](maxlen=KEPT)
+        self._twins = deque[tuple[object, Twin]](maxlen=KEPT)
 
     @classmethod
     def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Self:
@@ -254,11 +255,9 @@ class Session:
         return point_at(self.composition_of(scene), camera, scene, mode, twin, pixel)
 
     def twin_of(self, scene: Scene) -> Twin:
-        """Return the twin of a scene of the history; kept as long as the volume is the same."""
+        """Return the twin of a scene of the history; the last ones are kept."""
         state = (scene.volume, state_of(scene.volume.file if scene.volume else None))
-        if self._twin is None or self._twin[0] != state:
-            self._twin = (state, Twin(scene, self._device))
-        return self._twin[1]
+        return last_of(self._twins, state, lambda: Twin(scene, self._device))
 
     def beside(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
         """Return a view of a scene of the history, and the same view of its volume; see `beside`."""
@@ -270,13 +269,8 @@ class Session:
 
     def composition_of(self, scene: Scene) -> Composed:
         """Return the models of a scene, joined, as long as their files are the same."""
-        states: list[object] = [state_of(file) for file in files_of(scene)]
-        for each, composition in tuple(self._opened):  # another thread may put another one there
-            if each == states:
-                return composition
-        composition = scene.open(self._device)
-        self._opened.append((states, composition))
-        return composition
+        states = [state_of(file) for file in files_of(scene)]
+        return last_of(self._opened, states, lambda: scene.open(self._device))
 
     # ---- History ------------------------------------------------------------
 
@@ -291,6 +285,16 @@ class Session:
         """Add a scene; what was undone is gone."""
         self._past = [*self._past[-MOST_STEPS:], (scene, "")]
         self._future.clear()
+
+
+def last_of(kept: deque[tuple[object, T]], state: object, make: Callable[[], T]) -> T:
+    """Return what was kept of a state; else make it, and keep it in place of the oldest."""
+    for each, value in tuple(kept):  # another thread may put another one there
+        if each == state:
+            return value
+    value = make()
+    kept.append((state, value))
+    return value
 
 
 def files_of(scene: Scene) -> list[Path | None]:

@@ -97,7 +97,6 @@ class Twin:
             outputs: `depth` and `median`, besides colour and alpha; none where no model is visible.
         """
         shown, edits, functions = {}, list[PartEdit](), functions or {}
-        look = self._volume.appearance
         for (name, model), palette in zip(scene.models.items(), palettes, strict=True):
             if model.edit.visible and model.edit.opacity > 0:
                 tf = functions.get(name) or self._tf(name)
@@ -109,12 +108,13 @@ class Twin:
             alpha = torch.zeros(camera.height, camera.width, device=self._device)
             return Render(behind.expand(*alpha.shape, 3), alpha)
         edit = edits[0] if edits else PartEdit()
+        look = self._volume.appearance
         look = replace(look, **{key: getattr(look, key) * getattr(edit, key) for key in MATERIAL})
         cut = range_of(scene.cuts, camera) if cut is None and scene.cuts else cut
         casts = {}
         for share in dict.fromkeys(edit.tint):  # all channels are lit alike but for that
-            self._caster = self._caster.with_appearance(replace(look, specular=share * look.specular))
-            casts[share] = self._caster.cast(
+            caster = self._caster.with_appearance(replace(look, specular=share * look.specular))
+            casts[share] = caster.cast(
                 *(overlays(shown), camera, scene.light, outputs),
                 depth_range=None if cut is None else cut.depth_range,
                 faces=cut,
@@ -143,12 +143,9 @@ def volume_of(scene: Scene) -> SceneVolume:
     return scene.volume
 
 
-def twin_of(scene: Scene, device: torch.device | str = "cpu", mode: str = "shaded") -> Twin | None:
-    """Return the twin that a mode of frames needs of a scene; None where it needs none.
-
-    Faces of cuts show it as far as there is one; the mode volume is nothing else.
-    """
-    return Twin(scene, device) if needs_twin(scene, mode) else None
+def twin_of(scene: Scene, device: torch.device | str = "cpu") -> Twin | None:
+    """Return the twin that shaded frames need of a scene: faces of cuts show it; None without cuts."""
+    return Twin(scene, device) if needs_twin(scene, "shaded") else None
 
 
 def needs_twin(scene: Scene, mode: str) -> bool:

@@ -21,10 +21,11 @@ from torch import Tensor
 
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
-from texgs.core.figures import Scale
 from texgs.core.movie import save_png
 from texgs.metrics.quality import compare
-from texgs.report.fit_figure import DIVERGING, signed_error
+from texgs.report.beside_volume import scale_of
+from texgs.report.fit_figure import signed_error
+from texgs.scene.frame import quantized
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer.messages import View
@@ -160,8 +161,8 @@ def shown(view: View, image: Tensor, truth: Tensor) -> np.ndarray:
     """
     picture, width = truth, image.shape[1]
     if view.mode == "difference":
-        picture = Scale(-1 / view.gain, 1 / view.gain, DIVERGING)(signed_error(image, truth))
+        picture = scale_of(view.gain)(signed_error(image, truth))
     elif view.mode == "wipe":
         left, right = (width, 0) if view.wipe is None else [round(view.wipe * width)] * 2
         picture = torch.cat([image[:, :left], truth[:, right:]], dim=1)
-    return (picture.clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy()
+    return quantized(picture)

@@ -254,7 +254,7 @@ def title_of_value(value: Any) -> str:
         return ", ".join(f"{key} {angle:.0f}°" for key, angle in value.items())
     if isinstance(value, list):
         return "#" + "".join(f"{round(255 * x):02x}" for x in value)
-    return value if isinstance(value, str) else f"{value:.4g}"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def title_of_cuts(cuts: Mapping[str, Any]) -> str:

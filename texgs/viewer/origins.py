@@ -104,7 +104,8 @@ def histogram_of(file: Path) -> tuple[tuple[float, float] | None, list[int]]:
         log.warning("%s; functions are shown without a histogram", error)
         return None, []
     known = summary if isinstance(summary, dict) else {}
-    low, high, counts = (known.get(key) for key in ("minimum", "maximum", "histogram"))
+    values: list[Any] = [known.get(key) for key in ("minimum", "maximum", "histogram")]
+    low, high, counts = values
     if not (isinstance(counts, list) and counts and all(map(is_number, (low, high, *counts)))):
         log.warning("%s: expected a range and a histogram in numbers; functions are shown without", file)
         return None, []

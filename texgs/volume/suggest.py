@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Channel
 from texgs.volume.transfer import TransferFunction
 
@@ -51,6 +52,8 @@ def suggest(
     `count` functions, fewer where there are fewer values; by default what shows, at most 5. Of a channel with
     a window it is one by default, see `windowed`.
     """
+    if count is not None and count < 1:
+        raise ArgumentError(f"count: expected at least 1, got {count}")
     if count is None and channel and (shown := windowed(channel, minimum, maximum)):
         return {"TF01": shown}
     counts = np.asarray(histogram, dtype=np.float64)

@@ -102,8 +102,9 @@ def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, v
 def settings_of(file: Path) -> Volume:
     """Return how the workflow has read and prepared a volume; plainly, where it was not the workflow."""
     facts = file.with_name("metrics.json")
-    sha = read_json(facts).get("config_sha") if facts.is_file() else None
-    record = file.resolve().parents[2] / ".conf" / f"volume-{sha}.yaml"
+    if not facts.is_file():
+        return Volume()
+    record = file.resolve().parents[2] / ".conf" / f"volume-{read_json(facts).get('config_sha')}.yaml"
     if not record.is_file():
         return Volume()
     return replace(typed(Volume, parse_yaml(record.read_text(encoding="utf-8"))["volume"]), url=None)

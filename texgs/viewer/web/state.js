@@ -53,7 +53,9 @@ function partsOf(scene) {
 
 /** What the list of steps calls an edit, as the server does. */
 export function titleOf({ part, key, value }) {
-  return `${part} ${key} ${key === "cuts" && value ? titleOfCuts(value) : titleOfValue(value)}`.trim();
+  const ofScene = { cuts: titleOfCuts, functions: (functions) => Object.keys(functions).join(", ") };
+  const title = value && ofScene[key] ? ofScene[key](value) : titleOfValue(value);
+  return `${part} ${key} ${title}`.trim();
 }
 
 function titleOfCuts({ planes, box, faces }) {

@@ -54,8 +54,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     told, size = {name: plain(getattr(whole, name)) for name in TOLD}, target.stat().st_size
     if size > (free := free_memory()):
         sys.stderr.write(
-            f"{settings.dataset}: the volume has {size / GIB:.3g} GiB, but {free / GIB:.3g} GiB of memory are "
-            "free: rays would read it from the disk again and again; "
+            f"{settings.dataset}: the volume has {size / GIB:.3g} GiB, but {free / GIB:.3g} GiB of memory "
+            "are free: rays would read it from the disk again and again; "
             f"dataset.volume.reduce={2 * volume.reduce} makes it smaller\n"
         )
     return Outcome(VolumeResult(**told, volume_mib=size / MIB))
