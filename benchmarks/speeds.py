@@ -21,9 +21,9 @@ from typing import NamedTuple
 from benchmarks.command import call
 from texgs.core.checksum import Checksums
 from texgs.core.io import read_json
+from texgs.core.names import METRICS
 from texgs.workflow.forecast import PROBE, Speed, probe, speeds, work_of
 from texgs.workflow.graph import drawn
-from texgs.workflow.result import METRICS
 from texgs.workflow.sweep import as_sweep
 
 FILE = Path(str(files("texgs.workflow").joinpath("speeds.csv")))

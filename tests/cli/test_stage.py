@@ -8,9 +8,9 @@ from texgs.cli.main import main
 from texgs.config.compose import compose
 from texgs.core.errors import DeviceError
 from texgs.core.light import HEADLIGHT, Light, random_lights
+from texgs.core.names import METRICS
 from texgs.volume.view_set import read_views
 from texgs.workflow.job import settings_file
-from texgs.workflow.result import METRICS
 from texgs.workflow.stage_table import STAGES
 from texgs.workflow.stages import views as views_stage
 

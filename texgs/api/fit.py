@@ -16,7 +16,7 @@ from texgs.core.check import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
 from texgs.core.io import copy_atomic
-from texgs.core.names import file_name
+from texgs.core.names import SCENE, file_name
 from texgs.scene.session import Session
 from texgs.volume.summaries import write_summaries
 from texgs.volume.transfer import TransferFunction
@@ -82,7 +82,6 @@ def fit_now_into(
     """Fit models in memory, and write them and a scene into a folder; return the scene's file."""
     from texgs.fields.surfels.model_file import write_model
     from texgs.fitting.now import fit_now
-    from texgs.scene.copied import SCENE
     from texgs.scene.scene import Scene as Models
     from texgs.scene.scene import SceneModel
     from texgs.scene.scene_file import write_scene

@@ -8,9 +8,10 @@ from pathlib import Path
 from aiohttp import web
 
 from texgs.core.errors import ArgumentError
+from texgs.core.names import SCENE
 from texgs.scene.session import Session
 from texgs.viewer.server import Server
-from texgs.viewer.shared_edits import SCENE, Opened
+from texgs.viewer.shared_edits import Opened
 
 HOST = "127.0.0.1"
 PATIENCE = 60.0  # seconds for the server to start
@@ -36,8 +37,11 @@ class Viewer:
         serving = asyncio.run_coroutine_threadsafe(self._serve(), self._loop)
         try:
             self.address = serving.result(PATIENCE)
-        except OSError as error:
-            raise ArgumentError(f"{HOST}: cannot listen there ({error.strerror})") from error
+        except OSError as error:  # a TimeoutError is one
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            raise ArgumentError(
+                f"{HOST}: cannot listen there ({error.strerror or 'it takes too long'})"
+            ) from error
 
     def tell(self) -> None:
         """Tell all pages what the scene is now."""

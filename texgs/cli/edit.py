@@ -28,9 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="MODEL.KEY=VALUE with visible, palette (r,g,b from 0 to 1, or #rrggbb), opacity, ambient, "
         "diffuse, specular, shininess (factors), tint (a colour, of highlights), texture (a file) or file "
-        "(another model); light=headlight or light=AZIMUTH,POLAR; background=#rrggbb; cut=AXIS,POSITION "
-        "(x, -x, y, ...; world units, or samples as in 64v) or cut=NX,NY,NZ,OFFSET adds a plane, cut.1=... "
-        "replaces it, cut= takes all back; "
+        "(another model); light=headlight or light=AZIMUTH,POLAR; background=#rrggbb; time=STEP of a "
+        "series; cut=AXIS,POSITION (x, -x, y, ...; world units, or samples as in 64v) or "
+        "cut=NX,NY,NZ,OFFSET adds a plane, cut.1=... replaces it, cut= takes all back; "
         "cut.box=X0,Y0,Z0,X1,Y1,Z1; cut.faces=shaded or unlit; MODEL.KEY= takes an edit back; "
         "MODEL/SEGMENT.KEY=VALUE edits a segment, MODEL/SEGMENT=FILE adds one from a file and MODEL/SEGMENT= "
         "removes it",
@@ -67,7 +67,6 @@ def run_model(arguments: argparse.Namespace) -> int:
     """Fit a model of a function that a scene tries, in seconds, into the scene; or keep it in a data set."""
     from texgs.config.kept_function import keep
     from texgs.core.check import torch_device
-    from texgs.core.errors import located
     from texgs.edit.function_model import models_of, overlap_of, tried, with_model
     from texgs.fields.surfels.model_file import write_model
     from texgs.scene.scene_file import read_scene, write_scene

@@ -11,6 +11,7 @@ from texgs.config.dataset_text import require_read, with_basic_tf
 from texgs.config.project import ROOT, check_name, own_folder, shown
 from texgs.core.errors import ArgumentError, ConfigError, located
 from texgs.core.io import read_json, write_bytes
+from texgs.core.names import METRICS
 from texgs.scene.scene import Scene
 from texgs.volume.framing import frame_of, out_of_frame
 from texgs.volume.nrrd_file import open_grid
@@ -59,7 +60,7 @@ def keep(scene: Scene, name: str) -> str:
 def file_of(volume: Path) -> Path:
     """Return the file of the data set of a prepared volume: one of this project, that can be written."""
     with located("volume: expected one that texgs volume has made of a data set"):
-        facts = read_json(volume.with_name("metrics.json"))
+        facts = read_json(volume.with_name(METRICS))
         check_name("its name", name := str(facts.get("dataset") if isinstance(facts, dict) else facts))
     file, shipped = (folder / "dataset" / f"{name}.yaml" for folder in (own_folder(), ROOT / "conf"))
     if not file.is_file():

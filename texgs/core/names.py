@@ -16,6 +16,7 @@ EXPORTS = {  # endings of what `texgs export` writes, by its kind
     **{"compact": (".texgs",), "html": (".html",)},
     **{"usd": (".usdc", ".usda"), "gltf": (".glb",), "spz": (".spz",), "vtp": (".vtp",)},
 }
+SCENE, METRICS = "scene.yaml", "metrics.json"  # as jobs write them
 POINTS = "points3d.ply"  # where fits start, in a folder of views
 SLICES = (".tif", ".tiff")  # suffixes of the files in a folder of slices
 LARGEST = 10**300  # there are whole numbers that no float can hold

@@ -9,6 +9,7 @@ from texgs.config.schema import NO_SWEEP
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.core.keys import MissingKey, UnknownKey, ValueMismatch, typed
+from texgs.core.names import METRICS
 from texgs.metrics.metric import metrics
 from texgs.report.results import EditMeasures, Result
 
@@ -122,7 +123,7 @@ def below(folder: str | Path) -> list[Path]:
     def is_aside(name: str) -> bool:
         return name.startswith(".") or name == COPIES
 
-    paths = Path(folder).rglob("metrics.json")
+    paths = Path(folder).rglob(METRICS)
     return sorted(path for path in paths if not any(map(is_aside, path.relative_to(folder).parts)))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image
 
 from texgs.core.figures import DPI, as_picture, grid_rows, lay_out, new_figure, words
+from texgs.core.names import SCENE
 from texgs.report.metrics_files import Record
 from texgs.report.sweep_table import measured, natural, number, sweep_runs, variants
 from texgs.report.table import SOURCES
@@ -123,7 +124,7 @@ def scene_pictures(runs: DataFrame) -> dict[str, dict[str, np.ndarray]]:
     by_series: dict[str, dict[str, np.ndarray]] = {}
     for run in runs[runs["edit"] != ""].to_dict("records"):
         by_variant = by_series.setdefault(run["series"], {})
-        scene = run[SOURCES][0].with_name("scene.yaml")
+        scene = run[SOURCES][0].with_name(SCENE)
         if run["variant"] not in by_variant and scene.is_file():
             by_variant[run["variant"]] = picture(scene)
     return {series: by_variant for series, by_variant in by_series.items() if by_variant}

@@ -9,14 +9,13 @@ from typing import TypeVar
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import copy_atomic
-from texgs.core.names import file_name
+from texgs.core.names import SCENE, file_name
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import write_scene
 from texgs.scene.series_file import Series, write_series
 from texgs.volume.summaries import summary_file
 
 Entry = TypeVar("Entry", SceneModel, SceneSegment)
-SCENE = "scene.yaml"
 
 
 def write_copy(folder: str | Path, scene: Scene) -> Path:

@@ -11,7 +11,7 @@ from torch import Tensor
 from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.errors import ArgumentError, located
 from texgs.core.lens import Frame
-from texgs.core.light import Light
+from texgs.core.light import HEADLIGHT, Light
 from texgs.core.names import is_number
 from texgs.fields.field import Composed, Field
 from texgs.fields.files import open_field
@@ -100,7 +100,7 @@ class Scene:
     """Models by name in the order in which they were added; the rest holds for all of them."""
 
     models: Mapping[str, SceneModel]
-    light: Light = field(default_factory=lambda: Light("headlight"))
+    light: Light = HEADLIGHT
     background: tuple[float, float, float] = WHITE
     cuts: Cuts = NO_CUTS
     volume: SceneVolume | None = None  # that it was made from, see `Twin`

@@ -15,6 +15,7 @@ from typing import Any
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, reading, write_json
 from texgs.core.keys import typed
+from texgs.core.names import SCENE
 from texgs.report.metrics_files import Record, of
 from texgs.report.results import EditResult, FitResult, SceneResult
 
@@ -111,7 +112,7 @@ def question_of(
             f"{first.dataset}; choose some with --edits"
         )
     options = [
-        Option(each.label, each.result.edit, each.result.method, each.path.with_name("scene.yaml").as_posix())
+        Option(each.label, each.result.edit, each.result.method, each.path.with_name(SCENE).as_posix())
         for each in looks
     ]
     order.shuffle(options)
@@ -125,7 +126,7 @@ def question_of(
 def original_of(dataset: str, fits: set[str], records: Sequence[Record[Any]]) -> Path:
     """Return the scene before the edits: of the fits that are closest to their test views."""
     scenes = {
-        fit_of(record): record.path.with_name("scene.yaml")
+        fit_of(record): record.path.with_name(SCENE)
         for record in of(SceneResult, records)
         if record.dataset == dataset and fit_of(record) in fits
     }

@@ -9,7 +9,7 @@ from typing import Any
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.core.names import SCENES, file_name, label, new_part_file
+from texgs.core.names import METRICS, SCENE, SCENES, file_name, label, new_part_file
 from texgs.edit.function_model import with_model
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
@@ -22,8 +22,6 @@ from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
 from texgs.volume.transfer import TransferFunction
 
-SCENE = "scene.yaml"  # as jobs write it
-OF_JOBS = "metrics.json"  # beside what a job wrote, and would write again
 MOST_LISTED = 5
 Change = Edit | Undo | Redo | Rename | Remove
 
@@ -48,7 +46,7 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
     """
     if path.is_dir():
         path = _only_scene(path)
-    of_job = (path.parent / OF_JOBS).exists()
+    of_job = (path.parent / METRICS).exists()
     folder = folder or (Path.cwd() if of_job else path.parent)
     if path.suffix in SCENES:
         name, file = ("edited.yaml", None) if of_job and path.name == SCENE else (path.name, path)

@@ -16,7 +16,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.image import open_picture, read_rgba
 from texgs.core.io import read_json, reading_as, write_json
-from texgs.core.light import Light
+from texgs.core.light import HEADLIGHT, Light
 from texgs.core.names import is_number, named_file
 
 Split = Literal["train", "test", "relit"]
@@ -140,7 +140,7 @@ def _light(where: str, frame: Mapping[str, Any]) -> Light:
     if not isinstance(light, dict) or light.get("kind") not in ("headlight", "directional"):
         raise ArgumentError(f"{where}: light: expected the kind headlight or directional, got {light!r}")
     if light["kind"] == "headlight":
-        return Light("headlight")
+        return HEADLIGHT
     return Light("directional", _number(where, light, "azimuth"), _number(where, light, "polar"))
 
 

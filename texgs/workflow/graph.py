@@ -10,12 +10,13 @@ from texgs.config.schema import Config
 from texgs.core.checksum import Checksums
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.io import read_json
+from texgs.core.names import METRICS
 from texgs.report.metrics_files import below
 from texgs.workflow.checks import check_basic_tfs, check_edit, check_fit
 from texgs.workflow.experiments import LeftOut, Selection, selected
 from texgs.workflow.job import Job, settings_digest
 from texgs.workflow.missing import lacking, missing_weights
-from texgs.workflow.result import METRICS, fingerprint, is_complete, stamped
+from texgs.workflow.result import fingerprint, is_complete, stamped
 from texgs.workflow.stage_table import STAGES, SWEPT
 from texgs.workflow.stage_table import jobs as jobs_of
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from texgs.core.cache import keep, recall
 from texgs.core.checksum import Checksums, sha256
 from texgs.core.io import write_bytes
+from texgs.core.names import METRICS
 from texgs.workflow.job import Job
-from texgs.workflow.result import METRICS
 
 LONG_AGO = 946684800  # the year 2000, in seconds
 

@@ -22,12 +22,11 @@ from filelock import FileLock, Timeout
 from texgs.core.checksum import Checksums, combined, sha256
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, remove_scratch, write_json
-from texgs.core.names import POINTS, SLICES
+from texgs.core.names import METRICS, POINTS, SLICES
 from texgs.volume.headers import samples_of
 
 STAMP = ".job.json"
 FILES = ".files.json"
-METRICS = "metrics.json"  # what tables read, and what the workflow looks for
 TIMES = "times.json"  # of single views; like METRICS it differs from one run to the next
 
 

@@ -12,7 +12,7 @@ from texgs.config.dataset import Volume
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import read_json
 from texgs.core.keys import typed
-from texgs.core.names import natural_order
+from texgs.core.names import METRICS, SCENE, natural_order
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.progress import progress
 from texgs.fields.surfels.step_file import at_step, write_step
@@ -60,7 +60,7 @@ def make_series(
                 follow(series, name, entry, volume, order, device)
     seen = [shown_corners(open_grid(series.volume(step)), volume.tfs.values()) for step in steps]
     whole = replace(scene, series=series, frame=smallest_ball(np.concatenate(seen)))
-    return write_scene(folder / "scene.yaml", whole.at(start))
+    return write_scene(folder / SCENE, whole.at(start))
 
 
 def moments_of(files: Sequence[Path], settings: Volume) -> list[Moment]:
@@ -101,7 +101,7 @@ def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, v
 
 def settings_of(file: Path) -> Volume:
     """Return how the workflow has read and prepared a volume; plainly, where it was not the workflow."""
-    facts = file.with_name("metrics.json")
+    facts = file.with_name(METRICS)
     if not facts.is_file():
         return Volume()
     record = file.resolve().parents[2] / ".conf" / f"volume-{read_json(facts).get('config_sha')}.yaml"

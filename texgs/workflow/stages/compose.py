@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.config.views import Shading
+from texgs.core.names import SCENE
 from texgs.report.results import SceneResult
 from texgs.workflow.inputs import MODEL, has_scene, models_and_volume
 from texgs.workflow.stage import Outcome, Rule, Stage, read
@@ -51,7 +52,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     volume = volume_of(settings, inputs["volume"]) if "volume" in inputs else None
     framing = [tf for name, tf in volume.tfs.items() if name in settings.framing] if volume else []
     scene = Scene(models, volume=volume, frame=frame_of(open_grid(volume.file), framing) if volume else None)
-    write_scene(output / "scene.yaml", scene)
+    write_scene(output / SCENE, scene)
     composition = scene.open(torch_device(settings.fit.device))
     camera = orbit(AZIMUTH, POLAR, *scene.framed(composition).lens(settings.fov_y).square(settings.image))
     picture = frame(composition, camera, scene)
@@ -76,7 +77,7 @@ STAGE = Stage(
     rule=Rule(
         "compose",
         "{dataset}/scene/{fit}/compose",
-        ("scene.yaml", "scene.png"),
+        (SCENE, "scene.png"),
         target="scenes",
         gpu=("fit",),
         shown={"scene.png": "The basic models as one scene, rendered from their primitives."},

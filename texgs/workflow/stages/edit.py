@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.recipes import Edit
+from texgs.core.names import SCENE
 from texgs.edit.method import Method, method_of, methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import EditResult
@@ -72,7 +73,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     start = time.monotonic()
     edited = method.run(task)
     seconds = time.monotonic() - start  # of all methods alike: with what they read and write
-    write_scene(output / "scene.yaml", edited.scene)
+    write_scene(output / SCENE, edited.scene)
     result = EditResult(
         *(task.edit.name, method.name, edited.how, seconds, edited.lambda_s, dict(edited.notes)),
         *(method.follows, followed(task), *fallen(edited.losses), task.edit.compared),
@@ -125,7 +126,7 @@ def followed(task: Task[Any]) -> dict[str, str]:
 RULE = Rule(
     "edit",
     "{dataset}/scene/{fit}/edits/{edit}",
-    ("scene.yaml", "edit.png"),
+    (SCENE, "edit.png"),
     target="edits",
     gpu=("fit",),
     shown={"edit.png": SHOWN},

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from texgs.config.dataset import Volume
 from texgs.core.memory import MIB
+from texgs.core.names import SCENE
 from texgs.core.progress import progress
 from texgs.fields.kinds import kinds
 from texgs.report.results import StepsResult
@@ -115,7 +116,7 @@ STAGE = Stage(
     rule=Rule(
         "steps",
         "{dataset}/scene/{fit}/steps",
-        ("scene.yaml", "steps.png"),
+        (SCENE, "steps.png"),
         target="scenes",
         gpu=("fit",),
         shown={"steps.png": SHOWN + BELOW},

@@ -195,7 +195,7 @@ def turntable(
     """Write turntable.png, an animation of one turn under a headlight of so many frames."""
     from PIL.Image import fromarray
 
-    from texgs.core.light import Light
+    from texgs.core.light import HEADLIGHT
     from texgs.volume.cameras import orbit_path
     from texgs.volume.contact_sheet import write_animation
     from texgs.volume.render import render_views
@@ -205,7 +205,7 @@ def turntable(
     width, height = (max(1, round(scale * size)) for size in (lens.width, lens.height))
     around = orbit_path(count, 15.0, lens._replace(width=width, height=height))
     shot = [
-        View(camera, output / "turntable" / f"r_{index:04}.png", Light("headlight"))
+        View(camera, output / "turntable" / f"r_{index:04}.png", HEADLIGHT)
         for index, camera in enumerate(around)
     ]
     render_views(renderer, tf, shot, f"{title}: turntable")
