@@ -117,7 +117,7 @@ def representation(folder: Path) -> list[Step]:
             contact_sheet(folder / TF / "views/train"),
         ),
         Step(
-            "surfels", "flat 2D Gaussians, with\nspherical harmonics", rendered(scene, mode="discs", only=TF)
+            "surfels", "flat 2D Gaussians, placed\non what is visible", rendered(scene, mode="discs", only=TF)
         ),
         Step("shading", "normals and a material\nfor Blinn-Phong", rendered(scene, mode="normal", only=TF)),
         Step("texture", "a palette colour,\nand texels on surfels", rendered(scene, only=TF), arrow=""),

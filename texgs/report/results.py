@@ -185,7 +185,7 @@ class StepsResult(Result, section="time"):
     views: int  # of each step that was compared
     step_mib: float  # that a step adds
     compared: list[Comparison]  # some of the steps, by their names
-    step_seconds: float | None = None  # mean; not told where an interrupted job went on
+    step_seconds: float | None = None  # mean, with its volume; not told where an interrupted job went on
 
 
 @dataclass(frozen=True)
