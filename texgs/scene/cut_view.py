@@ -21,6 +21,7 @@ UNITS, OPAQUE = 3.0, 0.05  # a face is where so many opacity units behind a cut 
 RIM = 0.0125  # of the smaller side of the picture: how far around a face the slab goes on
 HIDDEN = 0.998  # alpha of a slab behind which models are not drawn, half a level of 255
 STEP = 0.5  # voxels between the samples of a slab
+COARSE = 4  # pixels each way in which faces are looked for at once
 
 
 def cut_view(
@@ -77,15 +78,12 @@ def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut:
 
 
 def face_weights(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> Tensor:
-    """Return how much of a face each pixel shows, [H, W] in [0, 1]; around faces it falls to 0 softly.
-
-    Faces are looked for at half of the resolution.
-    """
-    even = camera.crop(0, 0, camera.width + camera.width % 2, camera.height + camera.height % 2)
-    small = smaller(even, 2)
+    """Return how much of a face each pixel shows, [H, W] in [0, 1]; around faces it falls to 0 softly."""
+    multiple = camera.crop(0, 0, *(-(-size // COARSE) * COARSE for size in (camera.width, camera.height)))
+    small = smaller(multiple, COARSE)
     alpha = face_alpha(composed, small, scene, twin.with_step(1.0), range_of(scene.cuts, small))
     face = softly_grown((alpha / OPAQUE).clamp(max=1), ceil(RIM * min(small.height, small.width)))
-    whole = interpolate(face[None, None], scale_factor=2, mode="bilinear")[0, 0]
+    whole = interpolate(face[None, None], scale_factor=COARSE, mode="bilinear")[0, 0]
     return whole[: camera.height, : camera.width]
 
 
