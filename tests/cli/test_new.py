@@ -1,5 +1,6 @@
 """`texgs init` and `texgs new`: a project whose files compose, and data sets from volume files."""
 
+import h5py
 import numpy as np
 import pytest
 import yaml
@@ -176,6 +177,37 @@ def test_a_count_and_files_are_for_each_channel(conf, scan, capsys):
     assert [(tf.channel, tf.opacity[0][0]) for tf in tfs.values()] == [("a", 90), ("b", 91)]
     assert main(["new", str(path), "--force", "--tf", str(files[0])]) == 2
     assert "--tf: expected a file for each of the channels a, b, got 1\n" in capsys.readouterr().err
+
+
+def test_what_memory_does_not_hold_is_made_smaller(conf, tmp_path, monkeypatch, capsys):
+    values = np.random.default_rng(0).integers(0, 255, (16, 20, 24)).astype(np.uint8)
+    with h5py.File(tmp_path / "big.h5", "w") as file:
+        file["density"] = values
+    monkeypatch.setattr(new, "free_memory", lambda: 2 * values.nbytes)
+    assert main(["new", "big.h5", "--name", "fits"]) == 0
+    assert compose(("dataset=fits",)).dataset.volume.reduce == 1
+    assert "memory" not in capsys.readouterr().err
+    monkeypatch.setattr(new, "free_memory", lambda: 2 * values.nbytes // 8 - 1)
+    assert main(["new", "big.h5", "--name", "small"]) == 0
+    said = (
+        "small: its samples would take more than half of the memory that is free, so that each side is made 4"
+    )
+    assert said in capsys.readouterr().err
+    assert compose(("dataset=small",)).dataset.volume.reduce == 4
+    assert open_grid(tmp_path / "results/small/volume/volume.nrrd").dims == (6, 5, 4)
+    for words in (["reduce=1"], ["crop=[0,12,0,10,0,8]"]):
+        assert main(["new", "big.h5", "--name", "asked", "--force", *words]) == 0
+    assert compose(("dataset=asked",)).dataset.volume.reduce == 2, "of what is left"
+
+
+def test_channels_count_for_the_memory(conf, scan, monkeypatch):
+    image, taken = cells(conf.parent, scan, [{"label": name} for name in LABELS]), 3 * np.load(scan).nbytes
+    monkeypatch.setattr(new, "free_memory", lambda: 2 * taken)
+    assert main(["new", str(image), "--name", "whole"]) == 0
+    monkeypatch.setattr(new, "free_memory", lambda: 2 * taken - 1)
+    assert main(["new", str(image), "--name", "half"]) == 0
+    factors = [compose((f"dataset={name}",)).dataset.volume.reduce for name in ("whole", "half")]
+    assert factors == [1, 2]
 
 
 def test_channels_have_no_steps_in_time(conf, scan, capsys):

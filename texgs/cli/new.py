@@ -7,6 +7,7 @@ import re
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,14 +16,18 @@ from texgs.config.dataset_text import as_yaml, plain_tf, require_read
 from texgs.config.project import check_name
 from texgs.core.errors import ArgumentError, ConfigError, TexgsError
 from texgs.core.io import is_there, write_bytes
+from texgs.core.memory import free_memory
 
 if TYPE_CHECKING:
-    from texgs.config.dataset import BasicTF, Dataset
+    from texgs.config.dataset import BasicTF, Dataset, Volume
     from texgs.config.schema import Config
     from texgs.volume.axes import Channel
+    from texgs.volume.slabs import Source
     from texgs.volume.transfer import TransferFunction
 
 NO_NAME = re.compile(r"[^A-Za-z0-9_]+")  # what a name of a data set cannot have
+SHARE = 2  # samples take this part of the free memory at most
+LARGEST_SAMPLE = 4  # bytes of one in a prepared volume
 PROJECT = Path(__file__).parent / "project"  # what a new one has; `gitignore` gets a dot in front
 
 
@@ -78,9 +83,13 @@ def run(arguments: argparse.Namespace) -> int:
         is_own = (folder / f"{name}.yaml").exists()
         there, do = ("is there", "replace") if is_own else ("is a data set of texgs", "hide")
         raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
-    channels = channels_of(given)
+    field, keys = array_of(given.dataset.volume), changed(arguments.overrides)
+    channels = channels_of(given.dataset.volume, field)
+    if field and "reduce" not in keys:
+        given = reduced(given, field, len(channels))
+        keys += ["reduce"] if given.dataset.volume.reduce > 1 else []
     dataset = with_tfs(given, channels, arguments)
-    text = document(dataset, ["file", *changed(arguments.overrides)])
+    text = document(dataset, ["file", *keys])
     require_read(text, dataset)
     target = write_bytes(folder / f"{name}.yaml", text.encode())
     count, picture = len(dataset.basic_tfs), Path(given.results, name, "transfer", "transfer.png")
@@ -90,17 +99,41 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def channels_of(config: Config) -> dict[str, Channel | None]:
-    """Return what the file says of channels by their labels or numbers; of the one to read, by ""."""
+def array_of(volume: Volume) -> Source | None:
+    """Return the array in a file of arrays; nothing of it is read. None of other formats, and of mistakes."""
+    from texgs.volume.sources import holds_arrays
     from texgs.workflow.stages.volume import source
 
-    volume = config.dataset.volume
-    try:
-        field = source(replace(volume, channel=volume.channel or "0"), Path(volume.file or ""))
-    except TexgsError:  # it has no channels; what else is wrong with it is told when it is read
-        return {"": None}
-    if volume.channel or len(field.channels) == 1:
-        return {"": field.channel}
+    path = Path(volume.file or "")
+    for channel in (volume.channel or "0", volume.channel) if holds_arrays(path) else ():
+        try:
+            return source(replace(volume, channel=channel), path)
+        except TexgsError:  # it has no channels; what else is wrong with it is told when it is read
+            pass
+    return None
+
+
+def reduced(config: Config, field: Source, count: int) -> Config:
+    """Return a configuration with which so many channels take half of the free memory at most; tell it."""
+    dataset, volume = config.dataset, config.dataset.volume
+    bounds = volume.crop or [bound for size in field.dims for bound in (0, size)]
+    sides = [end - start for start, end in zip(bounds[::2], bounds[1::2], strict=True)]
+    size, factor = count * prod(sides) * min(field.dtype.itemsize, LARGEST_SAMPLE), 1
+    room = max(free_memory() // SHARE, 1)
+    while size > room * factor**3:
+        factor *= 2
+    if factor > 1:
+        sys.stderr.write(
+            f"{dataset.name}: its samples would take more than half of the memory that is free, so that each "
+            f"side is made {factor} times smaller; reduce=1 keeps all\n"
+        )
+    return replace(config, dataset=replace(dataset, volume=replace(volume, reduce=factor)))
+
+
+def channels_of(volume: Volume, field: Source | None) -> dict[str, Channel | None]:
+    """Return what the file says of channels by their labels or numbers; of the one to read, by ""."""
+    if field is None or volume.channel or len(field.channels) < 2:
+        return {"": None if field is None else field.channel}
     keys = [channel.label for channel in field.channels]
     if "" in keys or len({NO_NAME.sub("_", key) for key in keys}) < len(keys):
         keys = [str(number) for number in range(len(keys))]

@@ -96,17 +96,27 @@ def _suffix(path: Path) -> str:
     return "".join(suffixes[-2:] if suffixes[-1:] == [".gz"] else suffixes[-1:])
 
 
+def holds_arrays(path: Path) -> bool:
+    """Return whether a file is of a format of arrays, which are read as needed and may have channels."""
+    return _opener(path)[1] == IN_FILES
+
+
+def _opener(path: Path) -> tuple[Callable[..., Source] | None, tuple[str, ...]]:
+    """Return what opens a file or a folder, and the keys that it takes."""
+    suffix = _suffix(path)
+    if not path.is_dir():
+        return OPENERS.get(suffix), KEYS.get(suffix, ())
+    if is_zarr(path) or suffix == ".zarr":
+        return open_zarr, IN_FILES
+    return (open_tiff, ()) if tiffs_in(path) else (open_foreign, ("series", "time"))
+
+
 def _open(path: Path, spacing: Triple | None, origin: Triple | None, said: dict[str, Any]) -> Source:
     """Open a file by its suffix, or a folder of slices; `said` are keys that only some formats take."""
-    suffix = _suffix(path)
-    opener, takes = OPENERS.get(suffix), KEYS.get(suffix, ())
-    if path.is_dir():
-        opener, takes = (open_tiff, ()) if tiffs_in(path) else (open_foreign, ("series", "time"))
-        if is_zarr(path) or suffix == ".zarr":
-            opener, takes = open_zarr, IN_FILES
+    opener, takes = _opener(path)
     if opener is None:
         raise ArgumentError(
-            f"unknown suffix {suffix!r}; expected {', '.join(OPENERS)}, or a folder of slices or Zarr"
+            f"unknown suffix {_suffix(path)!r}; expected {', '.join(OPENERS)}, or a folder of slices or Zarr"
         )
     if unfit := [key for key in said if key not in takes]:
         raise ArgumentError(f"{', '.join(unfit)}: not for this format; leave them out")
