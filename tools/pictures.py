@@ -130,7 +130,7 @@ def viewer(run: Path) -> Image.Image:
         page.get_by_label("Opacity of the point").fill("0.1")
         page.get_by_label("Colours of a preset").select_option("Viridis")
         page.wait_for_timeout(10_000)  # until the whole frame is there
-        page.add_style_tag(content="#pace { display: none }")  # of this machine, and what else it does
+        page.locator("#pace").evaluate("pace => pace.hidden = true")  # of this machine, and what else it does
         page.screenshot(path=run / "viewer.png")
         server.terminate()
     return Image.open(run / "viewer.png")
