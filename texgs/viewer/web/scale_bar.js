@@ -21,7 +21,7 @@ export class ScaleBar {
     const length = round(LONGEST / pixels), right = clientWidth - MARGIN, left = right - length * pixels;
     const y = clientHeight - MARGIN;
     this.#line.setAttribute("d", path([[left, y - TICK], [left, y], [right, y], [right, y - TICK]]));
-    this.#words.setAttribute("x", (left + right) / 2);
+    this.#words.setAttribute("x", right);
     this.#words.setAttribute("y", y - TICK - 3);
     this.#words.textContent = `${Number(length.toPrecision(1))} ${scale ? "volume" : "world"} units`;
   }
