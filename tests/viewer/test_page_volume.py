@@ -170,7 +170,7 @@ def test_cuts_with_looks_have_faces_of_the_volume_over_the_models(page, scene, t
     hollow = replace(styled, volume=None)
     bare = frame(hollow.open(), CAMERA, hollow)
     faces = frame(styled.open(), CAMERA, styled, twin=Twin(styled))
-    assert got > max(32.0, closeness(bare, faces) + 3), "rims are half of the resolution, and in 8 bits"
+    assert got > max(32.0, closeness(bare, faces) + 3), "rims have a quarter of the resolution, and 8 bits"
 
 
 @pytest.mark.parametrize("mode", ["difference", "wipe"])

@@ -8,6 +8,7 @@ import { WINDOW_FRAGMENT } from "./volume_shaders.js";
 
 const UNITS = 3, OPAQUE = 0.05; // a face is where so many units of length behind a cut have at least this alpha
 const RIM = 0.0125; // of the smaller side of the picture
+const COARSE = 4; // pixels each way in which faces are looked for at once
 const ALPHA = 3; // a channel
 
 export class Faces {
@@ -25,9 +26,10 @@ export class Faces {
     this.#weights = [0, 1].map(() => new Target(gl, [gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE], gl.LINEAR));
   }
 
-  /** A texture of weights in [0, 1], with half of the pixels of a view. */
+  /** A texture of weights in [0, 1], with a quarter of the pixels of a view each way. */
   weights(view, scene, look) {
-    const size = view.size.map((side) => Math.ceil(side / 2)), focal = view.focal.map((x) => x / 2);
+    const size = view.size.map((side) => Math.ceil(side / COARSE));
+    const focal = view.focal.map((x) => x / COARSE);
     const radius = Math.ceil(RIM * Math.min(...size)), [one, other] = this.#weights;
     this.#volume.cast(this.#seen, { ...view, size, focal }, scene, look,
       { step: 1, reach: UNITS * this.#volume.unit });
