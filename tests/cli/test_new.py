@@ -183,11 +183,11 @@ def test_what_memory_does_not_hold_is_made_smaller(conf, tmp_path, monkeypatch, 
     values = np.random.default_rng(0).integers(0, 255, (16, 20, 24)).astype(np.uint8)
     with h5py.File(tmp_path / "big.h5", "w") as file:
         file["density"] = values
-    monkeypatch.setattr(new, "free_memory", lambda: 2 * values.nbytes)
+    monkeypatch.setattr("texgs.core.memory.free_memory", lambda: 2 * values.nbytes)
     assert main(["new", "big.h5", "--name", "fits"]) == 0
     assert compose(("dataset=fits",)).dataset.volume.reduce == 1
     assert "memory" not in capsys.readouterr().err
-    monkeypatch.setattr(new, "free_memory", lambda: 2 * values.nbytes // 8 - 1)
+    monkeypatch.setattr("texgs.core.memory.free_memory", lambda: 2 * values.nbytes // 8 - 1)
     assert main(["new", "big.h5", "--name", "small"]) == 0
     said = (
         "small: its samples would take more than half of the memory that is free, so that each side is made 4"
@@ -198,13 +198,15 @@ def test_what_memory_does_not_hold_is_made_smaller(conf, tmp_path, monkeypatch, 
     for words in (["reduce=1"], ["crop=[0,12,0,10,0,8]"]):
         assert main(["new", "big.h5", "--name", "asked", "--force", *words]) == 0
     assert compose(("dataset=asked",)).dataset.volume.reduce == 2, "of what is left"
+    assert main(["new", "big.h5", "--name", "asked", "--force", "crop=[0,12,0]"]) == 2
+    assert "crop: expected six integers x0, x1, y0, y1, z0, z1, got [0, 12, 0]" in capsys.readouterr().err
 
 
 def test_channels_count_for_the_memory(conf, scan, monkeypatch):
     image, taken = cells(conf.parent, scan, [{"label": name} for name in LABELS]), 3 * np.load(scan).nbytes
-    monkeypatch.setattr(new, "free_memory", lambda: 2 * taken)
+    monkeypatch.setattr("texgs.core.memory.free_memory", lambda: 2 * taken)
     assert main(["new", str(image), "--name", "whole"]) == 0
-    monkeypatch.setattr(new, "free_memory", lambda: 2 * taken - 1)
+    monkeypatch.setattr("texgs.core.memory.free_memory", lambda: 2 * taken - 1)
     assert main(["new", str(image), "--name", "half"]) == 0
     factors = [compose((f"dataset={name}",)).dataset.volume.reduce for name in ("whole", "half")]
     assert factors == [1, 2]

@@ -7,11 +7,12 @@ from texgs.report.results import (
     CutWay,
     PseResult,
     SheetResult,
+    StepsResult,
     TimingResult,
     ViewsResult,
     VolumeResult,
 )
-from texgs.report.scene_tables import cuts, datasets, edits, rendering
+from texgs.report.scene_tables import cuts, datasets, edits, rendering, steps
 from texgs.report.table import UNLIKE
 
 LATTICE = {"spacing": [1.0] * 3, "origin": [0.0] * 3, "minimum": 0.0, "maximum": 1.0, "voxels": 120}
@@ -53,6 +54,14 @@ def test_ways_to_cut_have_times_beside_a_frame_that_is_not_cut(tmp_path):
     assert (first["way"], first["face"], first["ms / not cut"]) == ("not cut", None, 1.0)
     assert (second["whole"], second["face, tenth"], second["band, tenth"]) == (38.0, 28.5, 26.5)
     assert second["ms / not cut"] == 1.5
+
+
+def test_steps_of_sweeps_are_not_among_those_of_data_sets(tmp_path):
+    result = StepsResult(20, 6, 0.5, [Comparison("a", 34.0, 0.9), Comparison("b", 36.0, 0.9)], 3.0)
+    metrics(tmp_path, "steps", result)
+    metrics(tmp_path, "steps", replace(result, step_mib=9.0), sweep="mine", variant="a")
+    (row,) = rows(steps(records(tmp_path)))
+    assert (row["PSNR"], row["PSNR of the worst step"], row["MiB / step"]) == (35.0, 34.0, 0.5)
 
 
 def test_data_sets_by_size_of_their_views(tmp_path):

@@ -1,10 +1,13 @@
 """A scene that is edited: changes, their history, what a pixel shows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from tests.fields.surfels.test_composition import CAMERA, ball
+from tests.scene.test_twin import LOW, sphere_volume
 from texgs.core.cuts import Box, Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
@@ -35,6 +38,17 @@ def masks():
 
 def half(tmp_path):
     return write_segment(tmp_path / "half", ball(1), masks()[0])
+
+
+def test_twins_of_two_volumes_are_kept_beside_each_other(session, tmp_path):
+    scenes = []
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        volume = sphere_volume(tmp_path / name, **dict.fromkeys(session.scene.models, LOW))
+        scenes.append(replace(session.scene, volume=volume))
+    twins = [session.twin_of(scene) for scene in scenes]
+    assert twins[0] is not twins[1]
+    assert [session.twin_of(scene) for scene in scenes] == twins, "a page may show another step than a film"
 
 
 def test_frames_are_those_of_a_scene_that_was_written_so(session, tmp_path):

@@ -69,6 +69,7 @@ def test_messages_are_read():
     [
         ("TF01", "opacity", 0.123456, "TF01 opacity 0.1235"),
         ("TF01", "opacity", 1000, "TF01 opacity 1000"),
+        ("", "time", 12345, "time 12345"),
         ("TF01", "palette", [1, 0.5, 0], "TF01 palette #ff8000"),
         ("TF01", "palette", "#00ff00", "TF01 palette #00ff00"),
         ("TF01/a", "visible", False, "TF01/a visible off"),

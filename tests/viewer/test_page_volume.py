@@ -297,7 +297,9 @@ def test_the_page_works_alone(chromium, source, capsys):
     assert closeness(before, after) < 40, "a new function is seen"
     words = page.locator("#functions textarea").input_value()
     assert list(json.loads(words.removeprefix("functions: "))) == ["TF03"]
-    page.get_by_role("button", name="Undo").click()
+    undo = page.get_by_role("button", name="Undo")
+    assert "functions TF03" in undo.get_attribute("title")
+    undo.click()
     assert np.array_equal(settled(page), before)
     assert page.locator("#functions").is_hidden()
     assert page.get_by_role("button", name="Make model").is_hidden(), "there is no server"

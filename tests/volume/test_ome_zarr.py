@@ -132,7 +132,7 @@ def test_the_finest_level_that_fits_half_of_the_memory_is_taken_or_else_the_last
     tmp_path, monkeypatch, free, level
 ):
     path = write_image(tmp_path / "v.zarr", LEVELS, axes_of("zyx"), SCALES)
-    monkeypatch.setattr("texgs.volume.ome_zarr.free_memory", lambda: free)
+    monkeypatch.setattr("texgs.core.memory.free_memory", lambda: free)
     source = open_source(path)
     np.testing.assert_array_equal(source.slices(0, source.dims[2]), LEVELS[level])
     told = "level s1 of s0, s1, by the memory that is free; dataset.volume.variable=s0 takes the finest"

@@ -1,6 +1,7 @@
 """A series from files to a scene of all steps: what comes of it, what is made only once, and mistakes."""
 
 from dataclasses import replace
+from pathlib import Path
 from shutil import rmtree
 
 import numpy as np
@@ -37,7 +38,7 @@ from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import ArraySource
 from texgs.volume.sources import open_source
-from texgs.workflow.series import make_series
+from texgs.workflow.series import make_series, settings_of
 
 CPU = torch.device("cpu")
 PLACES = [-0.06, 0.0, 0.06]  # of a ball, along x
@@ -145,6 +146,10 @@ def test_segments_textures_and_edits_of_one_step_hold_for_all(folder, fitted):
         "ball.safetensors",
         "ball-00000.safetensors",
     ]
+
+
+def test_a_volume_near_the_root_is_of_no_workflow():
+    assert settings_of(Path("/volume.nrrd")) == Volume()
 
 
 def test_a_copy_of_the_scene_has_all_steps(folder):

@@ -16,7 +16,7 @@ from texgs.config.dataset_text import as_yaml, plain_tf, require_read
 from texgs.config.project import check_name
 from texgs.core.errors import ArgumentError, ConfigError, TexgsError
 from texgs.core.io import is_there, write_bytes
-from texgs.core.memory import free_memory
+from texgs.core.memory import room_for_volume
 
 if TYPE_CHECKING:
     from texgs.config.dataset import BasicTF, Dataset, Volume
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from texgs.volume.transfer import TransferFunction
 
 NO_NAME = re.compile(r"[^A-Za-z0-9_]+")  # what a name of a data set cannot have
-SHARE = 2  # samples take this part of the free memory at most
 LARGEST_SAMPLE = 4  # bytes of one in a prepared volume
 PROJECT = Path(__file__).parent / "project"  # what a new one has; `gitignore` gets a dot in front
 
@@ -105,7 +104,9 @@ def array_of(volume: Volume) -> Source | None:
     from texgs.workflow.stages.volume import source
 
     path = Path(volume.file or "")
-    for channel in (volume.channel or "0", volume.channel) if holds_arrays(path) else ():
+    if not holds_arrays(path):
+        return None
+    for channel in (volume.channel or "0", volume.channel):
         try:
             return source(replace(volume, channel=channel), path)
         except TexgsError:  # it has no channels; what else is wrong with it is told when it is read
@@ -115,11 +116,12 @@ def array_of(volume: Volume) -> Source | None:
 
 def reduced(config: Config, field: Source, count: int) -> Config:
     """Return a configuration with which so many channels take half of the free memory at most; tell it."""
+    from texgs.volume.prepare import bounds_of
+
     dataset, volume = config.dataset, config.dataset.volume
-    bounds = volume.crop or [bound for size in field.dims for bound in (0, size)]
-    sides = [end - start for start, end in zip(bounds[::2], bounds[1::2], strict=True)]
-    size, factor = count * prod(sides) * min(field.dtype.itemsize, LARGEST_SAMPLE), 1
-    room = max(free_memory() // SHARE, 1)
+    samples = prod(end - start for start, end in bounds_of(field.dims, volume.crop))
+    size, factor = count * samples * min(field.dtype.itemsize, LARGEST_SAMPLE), 1
+    room = max(room_for_volume(), 1)
     while size > room * factor**3:
         factor *= 2
     if factor > 1:

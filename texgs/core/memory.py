@@ -51,6 +51,11 @@ def free_memory() -> int:
     return max(0, min(limits))
 
 
+def room_for_volume() -> int:
+    """Return the bytes that a volume may take, of which rays need all samples: half of what is free."""
+    return free_memory() // 2
+
+
 def container_limits() -> Iterator[int]:
     """Yield bytes that are left in each of the groups that this process is in, one inside of the other."""
     try:

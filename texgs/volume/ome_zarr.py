@@ -16,7 +16,7 @@ from zipfile import ZipFile
 import numpy as np
 
 from texgs.core.io import reading_as
-from texgs.core.memory import free_memory
+from texgs.core.memory import room_for_volume
 from texgs.core.names import is_number
 from texgs.volume.axes import Axis, Channel, along, nameless
 from texgs.volume.grid import Triple
@@ -24,7 +24,6 @@ from texgs.volume.layers import LayerSource, StoredArray, one_of
 
 METADATA = ("zarr.json", ".zgroup", ".zarray")  # files of a node: of format 3, and of format 2
 SHORT: dict[Any, str] = {"time": "t", "channel": "c"}  # names of axes, by types of OME-Zarr
-SHARE = 2  # the samples of a level that is chosen take this part of the free memory at most
 
 
 def is_zarr(folder: Path) -> bool:
@@ -117,7 +116,7 @@ def _channel(said: Mapping[str, Any]) -> Channel:
 
 def _fitting(levels: list[str], nodes: Mapping[str, Any]) -> tuple[str, str]:
     """Return the finest level that fits, or else the last one, and a note where it is not the finest."""
-    room = free_memory() // SHARE
+    room = room_for_volume()
     sizes = [prod(nodes[each].shape[-3:]) * nodes[each].dtype.itemsize for each in levels]
     name = next((each for each, size in zip(levels, sizes, strict=True) if size <= room), levels[-1])
     note = f"level {name} of {', '.join(levels)}, by the memory that is free"

@@ -84,7 +84,7 @@ def prepare_channels(
     if up not in UPRIGHT:
         raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up}")
     source, tallies = _first_of(sources), [_Tally(each.name) for each in sources]
-    bounds, axes = _bounds(source.dims, crop), UPRIGHT[up]
+    bounds, axes = bounds_of(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
     kept = "uint8" if source.dtype.kind == "b" else source.dtype.name
     dtype = np.dtype(kept if kept in WORDS else "float32")
@@ -167,7 +167,7 @@ class _Tally:
             )
 
 
-def _bounds(dims: Dims, crop: tuple[int, ...] | None) -> Bounds:
+def bounds_of(dims: Dims, crop: Sequence[int] | None) -> Bounds:
     """Return first sample and sample after the last, per axis."""
     if crop is None:
         return (0, dims[0]), (0, dims[1]), (0, dims[2])
