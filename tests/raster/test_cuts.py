@@ -122,6 +122,19 @@ def constant_range(scene, near, far):
     )
 
 
+def thin_range(scene, low=2.6, high=3.3, thickness=0.15):
+    """The scene with a thin range that goes deeper from left to right; most primitives are in few blocks."""
+    near = torch.linspace(low, high, scene.width).expand(scene.height, -1)
+    return replace(scene, depth_range=torch.stack([near, near + thickness]))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_thin_range_loses_no_fragment(device, drawn, seed):
+    scene = thin_range(drawn(random_scene(seed, n=100)))
+    check_images(scene, device)
+    assert 0.05 < float((scene.render(rasterize).alpha > 0).float().mean()) < 0.95
+
+
 @pytest.mark.parametrize("compared", [("color",), ("color", "depth", "median", "normal", "distortion")])
 def test_what_is_drawn_and_its_gradients_are_those_of_the_definition(device, drawn, compared):
     scene = with_range(drawn(random_scene(4)))

@@ -18,7 +18,7 @@ from texgs.volume.images import smaller
 
 SLAB = 30.0  # opacity units of the volume behind a face, which hide most of what is beyond
 UNITS, OPAQUE = 3.0, 0.05  # a face is where so many opacity units behind a cut have at least this alpha
-RIM = 0.0125  # of the smaller side of the picture: how far around a face the slab goes on
+RIM = 0.01  # of the smaller side of the picture: how far around a face the slab goes on
 HIDDEN = 0.998  # alpha of a slab behind which models are not drawn, half a level of 255
 STEP = 0.5  # voxels between the samples of a slab
 COARSE = 4  # pixels each way in which faces are looked for at once
@@ -65,32 +65,35 @@ def cut_view(
 
 def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Render:
     """Render a slab of the volume behind each face of a cut, over the models beyond it."""
-    near, behind = slab_of(cut, camera, SLAB * twin.opacity_unit).depth_range
-    behind = torch.lerp(near, behind, face_weights(composed, camera, scene, twin))
-    before = cut._replace(depth_range=torch.stack([near, behind]))
-    slab = twin.with_step(STEP).render(camera, scene, composed.palettes, before)
-    background = camera.viewmat.new_tensor(scene.background)
-    beyond = torch.stack([behind, torch.where(slab.alpha < HIDDEN, cut.depth_range[1], behind)])
-    models = composed.render(camera, scene.light, scene.edits, background=background, depth_range=beyond)
-    clear = 1 - slab.alpha[..., None]
-    color = slab.color + clear * (models.color - background)
-    return Render(color, slab.alpha + clear[..., 0] * models.alpha)
+    slab = slab_of(cut, slab_thickness(composed, camera, scene, twin))
+    seen = twin.with_step(STEP).cast(camera, scene, composed.palettes, slab).rgba
+    *color, alpha = seen.permute(2, 0, 1).contiguous()  # by channels, as models are rendered: faster
+    behind, far = slab.depth_range[1], cut.depth_range[1]
+    models = composed.render(
+        *(camera, scene.light, scene.edits),
+        background=camera.viewmat.new_tensor(scene.background),
+        depth_range=torch.stack([behind, torch.where(alpha < HIDDEN, far, behind)]),
+    )
+    clear = 1 - alpha
+    over = [front.addcmul(clear, back) for front, back in zip(color, models.color.unbind(-1), strict=True)]
+    return Render(torch.stack(over, dim=-1), alpha.addcmul(clear, models.alpha))
 
 
-def face_weights(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> Tensor:
-    """Return how much of a face each pixel shows, [H, W] in [0, 1]; around faces it falls to 0 softly."""
+def slab_thickness(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> Tensor:
+    """Return how thick the slab of each pixel is, [H, W] camera z; around faces it falls to 0 softly."""
     multiple = camera.crop(0, 0, *(-(-size // COARSE) * COARSE for size in (camera.width, camera.height)))
     small = smaller(multiple, COARSE)
     alpha = face_alpha(composed, small, scene, twin.with_step(1.0), range_of(scene.cuts, small))
     face = softly_grown((alpha / OPAQUE).clamp(max=1), ceil(RIM * min(small.height, small.width)))
-    whole = interpolate(face[None, None], scale_factor=COARSE, mode="bilinear")[0, 0]
-    return whole[: camera.height, : camera.width]
+    thickness = face * (SLAB * twin.opacity_unit) / small.ray_lengths()
+    thickness = interpolate(thickness[None, None], scale_factor=COARSE, mode="bilinear")[0, 0]
+    return thickness[: camera.height, : camera.width]
 
 
 def face_alpha(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Tensor:
     """Return alpha [H, W] of what rays meet soon behind a plane; there is a face from `OPAQUE` on."""
-    soon = slab_of(cut, camera, UNITS * twin.opacity_unit)
-    return twin.render(camera, scene, composed.palettes, soon).alpha
+    soon = slab_of(cut, UNITS * twin.opacity_unit / camera.ray_lengths())
+    return twin.cast(camera, scene, composed.palettes, soon).rgba[..., 3]
 
 
 def softly_grown(weights: Tensor, pixels: int) -> Tensor:
@@ -102,10 +105,9 @@ def softly_grown(weights: Tensor, pixels: int) -> Tensor:
     return avg_pool2d(grown, 2 * pixels + 1, 1, pixels, count_include_pad=False)[0, 0]
 
 
-def slab_of(cut: CutRange, camera: Camera, length: float) -> CutRange:
-    """Return what of a cut's rays lies within a length behind a face, world units; of other rays nothing."""
+def slab_of(cut: CutRange, thickness: Tensor) -> CutRange:
+    """Return what of a cut's rays lies within a thickness [H, W], camera z, behind a face; of others nothing."""
     near, far = cut.depth_range
-    thickness = length / camera.ray_lengths()  # as camera z
     behind = torch.where(cut.face >= 0, torch.minimum(near + thickness, far), near)
     return cut._replace(depth_range=torch.stack([near, behind]))
 

@@ -19,7 +19,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
 from texgs.raster.cuts import CutRange, cut_range
 from texgs.raster.shading import MATERIAL
-from texgs.volume.caster import Caster
+from texgs.volume.caster import Cast, Caster
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
 from texgs.volume.render import Appearance
@@ -84,9 +84,7 @@ class Twin:
     ) -> Render:
         """Return what a scene's visible models show of the volume, on the device that casts.
 
-        A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
-        and tint of light hold for the whole volume: those of the first visible model. A volume has no
-        segments and no looks. A tint costs a cast for each different channel.
+        A volume has no segments and no looks; see `cast` for what edits do to it.
 
         Args:
             camera: from where.
@@ -96,6 +94,26 @@ class Twin:
             functions: that take the place of the basic TFs of their names, or join them; they may overlap.
             outputs: `depth` and `median`, besides colour and alpha; none where no model is visible.
         """
+        seen = self.cast(camera, scene, palettes, cut, functions, outputs)
+        color, alpha = seen.rgba.split([3, 1], dim=-1)
+        behind = color.new_tensor(scene.background)
+        return Render(color + (1 - alpha) * behind, alpha[..., 0], seen.depth, seen.median)
+
+    def cast(
+        self,
+        camera: Camera,
+        scene: Scene,
+        palettes: Sequence[tuple[float, ...]],
+        cut: CutRange | None = None,
+        functions: Mapping[str, TransferFunction] | None = None,
+        outputs: Collection[str] = (),
+    ) -> Cast:
+        """Return the same before any background, with colours premultiplied.
+
+        A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
+        and tint of light hold for the whole volume: those of the first visible model. A tint costs a cast for
+        each different channel.
+        """
         shown, edits, functions = {}, list[PartEdit](), functions or {}
         for (name, model), palette in zip(scene.models.items(), palettes, strict=True):
             if model.edit.visible and model.edit.opacity > 0:
@@ -103,10 +121,8 @@ class Twin:
                 shown[name] = edited(tf, model.edit, palette)
                 edits.append(model.edit)
         shown |= {name: tf for name, tf in functions.items() if name not in scene.models}
-        behind = torch.tensor(scene.background, device=self._device)
         if not shown:
-            alpha = torch.zeros(camera.height, camera.width, device=self._device)
-            return Render(behind.expand(*alpha.shape, 3), alpha)
+            return Cast(torch.zeros(camera.height, camera.width, 4, device=self._device))
         edit = edits[0] if edits else PartEdit()
         look = self._volume.appearance
         look = replace(look, **{key: getattr(look, key) * getattr(edit, key) for key in MATERIAL})
@@ -120,10 +136,11 @@ class Twin:
                 faces=cut,
                 lit_faces=scene.cuts.faces == "shaded",
             )
-        cast = casts[edit.tint[0]]
-        color = torch.stack([casts[share].rgba[..., c] for c, share in enumerate(edit.tint)], dim=-1)
-        color += (1 - cast.rgba[..., 3:]) * behind
-        return Render(color, cast.rgba[..., 3], cast.depth, cast.median)
+        first = casts[edit.tint[0]]
+        for channel, share in enumerate(edit.tint[1:], start=1):
+            if share != edit.tint[0]:
+                first.rgba[..., channel] = casts[share].rgba[..., channel]
+        return first
 
     def _tf(self, name: str) -> TransferFunction:
         """Return the basic TF of a model."""

@@ -34,6 +34,7 @@ template <class F>
 struct Outline {
     Forms<F> forms;
     F log2_opacity, cut;  // of rho: beyond it alpha is below alpha_min
+    F reach;              // largest difference of depth between a fragment and the mean
     Bounds<F> bounds;
     Mask<F> visible;         // drawn at all
     Mask<F> clipped;         // the near plane may cut it
@@ -68,12 +69,6 @@ TEXGS_MATHS Forms<F> visible_forms(const SurfelProjection<F>& r, float low_pass)
     f.vy = select(edge_on, steep, f.vy);
     f.zc = select(edge_on, r.pose.p.z, f.zc);
     return f;
-}
-
-// Smallest depth of the plane where rho_surfel <= cut.
-template <class F>
-TEXGS_MATHS F nearest_depth(const SurfelProjection<F>& r, F cut) {
-    return r.pose.p.z - sqrt(cut * fma(r.a.z, r.a.z, r.b.z * r.b.z));
 }
 
 // Ellipse rho_surfel <= cut and disc rho_filter <= cut around (cx, cy), in pixels.
@@ -121,7 +116,8 @@ TEXGS_MATHS Outline<F> outline(const Surfel<F>& s, const SurfelProjection<F>& r,
     out.forms = visible_forms(r, o.low_pass);
     out.log2_opacity = log2(max(s.opacity, 1e-30f));
     out.cut = largest_rho(out.log2_opacity, log2(F(o.alpha_min)));
-    out.clipped = nearest_depth(r, out.cut) <= F(o.near_plane);
+    out.reach = sqrt(out.cut * fma(r.a.z, r.a.z, r.b.z * r.b.z));
+    out.clipped = r.pose.p.z - out.reach <= F(o.near_plane);
     out.bounds = bound(r, out.cut, cx, cy, o.low_pass);
     out.bounds.behind = out.bounds.behind & out.clipped;
     out.visible = is_visible(r.pose, s.opacity, cx, cy, o);
@@ -144,7 +140,7 @@ TEXGS_MATHS Outline<F> outline(const Gaussian<F>&, const GaussianProjection<F>& 
     out.bounds = {cx,           cy,    yy * inverse, -(xy * inverse),
                   xx * inverse, -1.0f, none,         {cx - sx, cy - sy, cx + sx, cy + sy}};
     out.visible = is_visible(r.pose, r.opacity, cx, cy, o) & (determinant < F(1e30f));
-    out.clipped = none, out.never_filtered = all;
+    out.clipped = none, out.never_filtered = all, out.reach = 0.0f;
     return out;
 }
 

@@ -7,7 +7,7 @@ import { Target } from "./target.js";
 import { WINDOW_FRAGMENT } from "./volume_shaders.js";
 
 const UNITS = 3, OPAQUE = 0.05; // a face is where so many units of length behind a cut have at least this alpha
-const RIM = 0.0125; // of the smaller side of the picture
+const RIM = 0.01; // of the smaller side of the picture
 const COARSE = 4; // pixels each way in which faces are looked for at once
 const ALPHA = 3; // a channel
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which blocks of which tiles a projected surfel reaches: exact tests of its ellipse and its low-pass disc against
-// the rectangles of pixel centres of all sixteen blocks of a tile at once.
+// the rectangles of pixel centres of all sixteen blocks of a tile at once, and of its depths against theirs.
 #include "isa.h"
 #include "kernels.h"
 #include "simd.h"
@@ -72,6 +72,18 @@ TEXGS_INLINE uint32_t block_mask(const Test& t, bool with_disc, const BlockCorne
     return mask;
 }
 
+// Blocks of a tile in which some depth counts that the surfel has.
+TEXGS_INLINE uint32_t depth_mask(const Raster& r, uint32_t tile, const Footprint& foot) {
+    const float* nearest = r.block_ranges + int64_t(tile) * 2 * kBlocks;
+    uint32_t mask = 0;
+    for (int p = 0; p < kParts; ++p) {
+        const vm counts = (load(nearest + p * kLanes) <= vf(foot.farthest)) &
+                          (vf(foot.nearest) <= load(nearest + kBlocks + p * kLanes));
+        mask |= bits(counts) << (p * kLanes);
+    }
+    return mask;
+}
+
 }  // namespace
 
 int64_t bin_surfels(const Raster& r, const uint32_t* order, int64_t begin, int64_t end, Candidate* out,
@@ -86,8 +98,9 @@ int64_t bin_surfels(const Raster& r, const uint32_t* order, int64_t begin, int64
         uint32_t rank = 0;
         for (int y = foot.y0; y < foot.y1; ++y) {
             for (int x = foot.x0; x < foot.x1; ++x) {
-                const uint32_t mask = block_mask(test, foot.disc >= 0, corners, float(x * kTile), float(y * kTile));
                 const uint32_t tile = static_cast<uint32_t>(y * r.tiles_x + x);
+                uint32_t mask = block_mask(test, foot.disc >= 0, corners, float(x * kTile), float(y * kTile));
+                if (r.block_ranges) mask &= depth_mask(r, tile, foot);
                 *next = {tile, id, rank, static_cast<uint16_t>(mask), foot.flags};
                 const uint32_t hit = mask != 0;  // no branch: misses are overwritten
                 next += hit, rank += hit, per_tile[tile] += hit;

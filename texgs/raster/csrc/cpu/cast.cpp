@@ -82,9 +82,9 @@ public:
 
     void cast(int x, int y) {
         const int64_t pixel = int64_t(y) * job_.view.width + x;
+        if (is_empty(pixel)) return;  // images start as zeros
         Sums sums;
         for (int a = 0; a < 3; ++a) sums.color[a] = 0.0f, sums.normal[a] = 0.0f;
-        if (is_empty(pixel)) return write(pixel, sums);
         const CastRay ray = cast_ray(lattice_, job_.view, x, y);
         Queue waiting;
         int32_t k, end;

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstring>
+#include <limits>
 
 #include "../slot.h"
 #include "../status.h"
@@ -39,6 +40,26 @@ void clear(void* memory, int64_t bytes) {
     parallel_for(bytes, int64_t(1) << 18, [&](int64_t begin, int64_t end, int) {
         std::memset(static_cast<char*>(memory) + begin, 0, static_cast<size_t>(end - begin));
     });
+}
+
+// The smallest and the largest depth that counts in each block of a tile: none does outside of the image, nor where
+// the range of a pixel is empty.
+void block_ranges(const Raster& r, int tile, float* nearest) {
+    float* farthest = nearest + kBlocks;
+    std::fill_n(nearest, kBlocks, std::numeric_limits<float>::infinity());
+    std::fill_n(farthest, kBlocks, -std::numeric_limits<float>::infinity());
+    const int width = r.camera.width, left = tile % r.tiles_x * kTile, top = tile / r.tiles_x * kTile;
+    const int columns = std::min(kTile, width - left), rows = std::min(kTile, r.camera.height - top);
+    for (int y = 0; y < rows; ++y) {
+        const float* near = r.camera.depth_range + int64_t(top + y) * width + left;
+        const float* far = near + int64_t(width) * r.camera.height;
+        for (int x = 0; x < columns; ++x) {
+            const int block = y / 4 * 4 + x / 4;
+            if (!(near[x] < far[x])) continue;
+            nearest[block] = std::min(nearest[block], near[x]);
+            farthest[block] = std::max(farthest[block], far[x]);
+        }
+    }
 }
 
 // Exclusive prefix sums of n counts, with the total at the end.
@@ -84,6 +105,17 @@ int64_t texgs_frame::project() {
         candidates += tiles;
     });
     return candidates;
+}
+
+// Finds the depths that count in each block, where there are ranges of them.
+void texgs_frame::bound_depths() {
+    if (!raster.camera.depth_range) return;
+    float* ranges = block_ranges_.ensure<float>(int64_t(tiles_of(raster)) * 2 * kBlocks);
+    parallel_for(tiles_of(raster), 16, [&](int64_t begin, int64_t end, int) {
+        for (int64_t tile = begin; tile < end; ++tile)
+            block_ranges(raster, static_cast<int>(tile), ranges + tile * 2 * kBlocks);
+    });
+    raster.block_ranges = ranges;
 }
 
 // A stable counting sort of the depth-ordered surfels into tiles. Each part of the order lists and counts its own
@@ -159,6 +191,7 @@ void texgs_frame::bin(const texgs_surfels& surfels, const texgs_camera& camera, 
     const int64_t candidates = project();
     int64_t visible = 0;
     const uint32_t* order = sort(visible);
+    bound_depths();
     bin_tiles(order, visible, candidates);
 }
 

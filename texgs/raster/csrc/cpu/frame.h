@@ -25,6 +25,7 @@ struct texgs_frame {
 
 private:
     int64_t project();
+    void bound_depths();
     void bin_tiles(const uint32_t* order, int64_t visible, int64_t most_candidates);
     const uint32_t* sort(int64_t& visible);
     template <class Kernel>
@@ -40,6 +41,6 @@ private:
 
     texgs::DepthSort sort_;
     texgs::Buffer records_, footprints_, normals_, keys_, candidates_, part_begin_, per_tile_, per_surfel_, tile_begin_,
-        pairs_, slot_begin_, scratch_, median_stop_, moments_, slots_, texel_parts_, zeros_;
+        pairs_, slot_begin_, block_ranges_, scratch_, median_stop_, moments_, slots_, texel_parts_, zeros_;
     std::vector<std::unique_ptr<texgs::BlockArena>> arenas_;
 };

@@ -38,6 +38,7 @@ struct alignas(64) Footprint {
     float cx, cy, disc;       // disc: squared radius, negative where the ellipse covers it
     uint16_t x0, y0, x1, y1;  // tiles, half open; empty where culled
     uint16_t flags;
+    float nearest, farthest;  // camera z of its fragments
 };
 
 // One surfel in one tile, with the mask of blocks it reaches and the place of its gradient.
@@ -81,6 +82,7 @@ struct Raster {
     float* normals;         // [N, 3] facing the camera
     uint32_t* depth_keys;   // [N] ordered as the depths; kCulled where invisible
 
+    const float* block_ranges;   // [tiles, 2, 16] smallest and largest depth that counts in a block; NULL: all do
     const uint32_t* tile_begin;  // [tiles + 1] into pairs
     const Pair* pairs;
     const uint32_t* slot_begin;  // [N + 1] slots of a surfel, in surfel order

@@ -41,16 +41,19 @@ RecordLanes record_lanes(const Centres& c, const Forms<vf>& f, vf log2_opacity, 
     return {c.x, c.y, f.ux, f.uy, f.u, f.vx, f.vy, f.v, f.wx, f.wy, log2_opacity, f.zc, depth};
 }
 
-// Their ellipses, discs and boxes.
+constexpr float kDepthError = 1e-3f;  // of the depth of a fragment, as a share of it
+
+// Their ellipses, discs, boxes and depths.
 struct BoundLanes {
-    Lanes cx, cy, ex, ey, xx, xy, yy, disc, x0, y0, x1, y1;
+    Lanes cx, cy, ex, ey, xx, xy, yy, disc, x0, y0, x1, y1, nearest, farthest;
     Box<float> box(int i) const { return {x0[i], y0[i], x1[i], y1[i]}; }
     void store(Footprint& out, int i, uint16_t flags) const {
-        out = {ex[i], ey[i], xx[i], xy[i], yy[i], cx[i], cy[i], disc[i], 0, 0, 0, 0, flags};
+        out = {ex[i], ey[i], xx[i], xy[i], yy[i], cx[i], cy[i], disc[i], 0, 0, 0, 0, flags, nearest[i], farthest[i]};
     }
 };
-BoundLanes bound_lanes(const Centres& c, const Bounds<vf>& b) {
-    return {c.x, c.y, b.ex, b.ey, b.xx, b.xy, b.yy, b.disc, b.box.x0, b.box.y0, b.box.x1, b.box.y1};
+BoundLanes bound_lanes(const Centres& c, const Bounds<vf>& b, vf depth, vf reach) {
+    const vf nearest = (depth - reach) * vf(1.0f - kDepthError), farthest = (depth + reach) * vf(1.0f + kDepthError);
+    return {c.x, c.y, b.ex, b.ey, b.xx, b.xy, b.yy, b.disc, b.box.x0, b.box.y0, b.box.x1, b.box.y1, nearest, farthest};
 }
 
 // The box of surfel i, which reaches behind the camera.
@@ -87,7 +90,7 @@ void project_lanes(const Raster& r, const View& view, float diagonal, int64_t fi
     const unsigned visible = bits(seen.visible), behind = bits(seen.bounds.behind), clipped = bits(seen.clipped);
     const unsigned filtered = bits(seen.clipped | ~seen.never_filtered);
     const RecordLanes records = record_lanes(c, seen.forms, seen.log2_opacity, q.pose.p.z);
-    const BoundLanes bounds = bound_lanes(c, seen.bounds);
+    const BoundLanes bounds = bound_lanes(c, seen.bounds, q.pose.p.z, seen.reach);
     // So few channels have one source.
     const float* few = r.surfels.base ? r.surfels.base : r.surfels.features;
     const float* colors = r.channels > kRecordChannels ? nullptr : few;
