@@ -13,9 +13,10 @@ from texgs.core.errors import ArgumentError
 from texgs.volume import slabs
 from texgs.volume.grid import Grid
 from texgs.volume.nrrd_file import WORDS, open_grid
-from texgs.volume.prepare import BINS, prepare, summarize
+from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
 from texgs.volume.sources import open_source
+from texgs.volume.summaries import BINS, summarize
 
 # World coordinates in those of the volume, written out by hand.
 WORLD = {

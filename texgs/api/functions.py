@@ -7,7 +7,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.prepare import Summary
+from texgs.volume.summaries import Summary
 from texgs.volume.transfer import TransferFunction
 
 if TYPE_CHECKING:

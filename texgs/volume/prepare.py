@@ -1,7 +1,6 @@
 """Stream any source into the one canonical file that everything else reads."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from math import inf, prod
 from pathlib import Path
 from shutil import disk_usage
@@ -15,29 +14,11 @@ from texgs.core.memory import GIB
 from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
 from texgs.volume.nrrd_file import WORDS, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
+from texgs.volume.summaries import Summary, summarize
 
 Bounds = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 Step = tuple[int, int, int]  # channel, and a slab: slices [start, stop)
 Progress = Callable[[Iterable[Step], int], Iterable[Step]]
-BINS = 256
-
-
-@dataclass(frozen=True)
-class Summary:
-    """Lattice, range and histogram of a prepared volume; plain numbers, ready for JSON."""
-
-    dims: Dims  # x, y, z
-    dtype: str
-    spacing: Triple
-    origin: Triple
-    minimum: float
-    maximum: float
-    histogram: tuple[int, ...]  # counts in 256 equal bins over [minimum, maximum]
-
-    @property
-    def voxels(self) -> int:
-        """Number of samples."""
-        return prod(self.dims)
 
 
 def prepare(source: Source, target: Path, **keys: Any) -> Summary:
@@ -241,25 +222,3 @@ def _write_permuted(
     for k, plane in enumerate(permuted_values(block, axes)):
         file.seek(offset + ((z + k) * dims[1] + y) * dims[0] * little.itemsize)
         file.write(np.ascontiguousarray(plane, dtype=little).data)
-
-
-def summarize(source: Source, minimum: float, maximum: float) -> Summary:
-    """Summarize a volume whose range is known; reads it once."""
-    counts = np.zeros(BINS, dtype=np.int64)
-    for start, stop in slab_bounds(source, 0, source.dims[2]):
-        counts += histogram(source.slices(start, stop), minimum, maximum)
-    lattice = (source.dims, source.dtype.name, source.spacing, source.origin)
-    return Summary(*lattice, minimum, maximum, tuple(counts.tolist()))
-
-
-def histogram(values: np.ndarray, minimum: float, maximum: float) -> np.ndarray:
-    """Return counts [256] in equal bins over [minimum, maximum]; the last bin includes its end."""
-    if values.dtype.kind in "iu" and values.dtype.itemsize <= 2:
-        # Counting every level first is ten times as fast.
-        info = np.iinfo(values.dtype)
-        counts = np.bincount(values.ravel().astype(np.intp) - info.min, minlength=info.max - info.min + 1)
-        levels = np.arange(info.min, info.max + 1)
-        return np.histogram(levels, BINS, (minimum, maximum), weights=counts)[0]
-    # There may be fewer than 256 numbers of the samples' type in their range, but not in [0, 1].
-    fractions = (values.astype(np.float64) - minimum) / (float(maximum) - float(minimum))
-    return np.histogram(fractions, BINS, (0, 1))[0]

@@ -20,8 +20,8 @@ from texgs.workflow.stage import Config, Outcome, Rule, Stage, plain, read
 from texgs.workflow.stages.settings import OfDataset
 
 if TYPE_CHECKING:
-    from texgs.volume.prepare import Summary
     from texgs.volume.slabs import Source
+    from texgs.volume.summaries import Summary
 
 TOLD = ("dims", "dtype", "spacing", "origin", "minimum", "maximum", "voxels")  # in metrics.json, too
 
