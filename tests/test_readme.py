@@ -216,7 +216,7 @@ def run(words):
 
 def test_the_readme_is_short_and_begins_with_two_commands():
     assert [command for _, _, command in COMMANDS[:2]] == ["make demo", "make test"]
-    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
 
 
 def test_what_is_not_run_is_on_a_page():

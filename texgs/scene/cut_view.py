@@ -106,7 +106,7 @@ def softly_grown(weights: Tensor, pixels: int) -> Tensor:
 
 
 def slab_of(cut: CutRange, thickness: Tensor) -> CutRange:
-    """Return what of a cut's rays is within a thickness [H, W], camera z, behind a face; nothing of others."""
+    """Return what of the rays lies within a thickness [H, W] behind a face, camera z; of others nothing."""
     near, far = cut.depth_range
     behind = torch.where(cut.face >= 0, torch.minimum(near + thickness, far), near)
     return cut._replace(depth_range=torch.stack([near, behind]))
