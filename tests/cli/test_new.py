@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from tests.volume.zarr_files import LABELS, all_axes, axes_of, write_image
-from texgs.cli import new
+from texgs.cli import new, new_tfs
 from texgs.cli.main import main
 from texgs.config.compose import compose, recompose
 from texgs.config.project import ROOT, groups, members
@@ -157,7 +157,7 @@ def test_channels_whose_labels_are_no_names_have_numbers(conf, scan, labels):
     ],
 )
 def test_functions_have_the_names_of_channels_as_far_as_these_are_names(labels, names):
-    assert new.tf_names(labels) == names
+    assert new_tfs.tf_names(labels) == names
 
 
 def test_a_count_and_files_are_for_each_channel(conf, scan, capsys):

@@ -1,0 +1,117 @@
+"""Transfer functions of a new data set: from files, or suggested for its channels or its histogram."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from texgs.config.project import check_name
+from texgs.core.errors import ArgumentError, ConfigError
+
+if TYPE_CHECKING:
+    from texgs.config.dataset import BasicTF, Dataset
+    from texgs.config.schema import Config
+    from texgs.volume.axes import Channel
+    from texgs.volume.transfer import TransferFunction
+
+NO_NAME = re.compile(r"[^A-Za-z0-9_]+")  # what a name of a data set or of a TF cannot have
+
+
+def with_tfs(config: Config, channels: dict[str, Channel | None], arguments: argparse.Namespace) -> Dataset:
+    """Read the volume, choose TFs of its channels, draw them, and return the data set."""
+    from texgs.config.dataset import BasicTF
+    from texgs.volume.summaries import read_summaries
+    from texgs.workflow.checks import check_basic_tfs, check_channels
+    from texgs.workflow.execution import ensure
+    from texgs.workflow.stage_table import STAGES
+
+    dataset = config.dataset
+    if len(channels) > 1:
+        dataset = replace(dataset, basic_tfs={key: BasicTF(channel=key) for key in channels})
+        check_channels(dataset)
+    ensure(STAGES["volume"], replace(config, dataset=dataset))
+    known = read_summaries(Path(config.results, dataset.name, "volume", "volume.nrrd"))
+    if len(channels) > 1:
+        listed = of_each(known, channels, arguments)
+    else:
+        basic = basic_tfs(dataset.name, known[""], channels[""], arguments.tf, arguments.count)
+        listed = {key: BasicTF(**tf.to_dict()) for key, tf in basic.items()}
+    dataset = replace(dataset, basic_tfs=listed)
+    ensure(STAGES["transfer"], replace(config, dataset=dataset))
+    check_basic_tfs(dataset)
+    return dataset
+
+
+def of_each(
+    known: Mapping[str, Any], channels: Mapping[str, Channel | None], arguments: argparse.Namespace
+) -> dict[str, BasicTF]:
+    """Return TFs of all channels, named by their labels: one of each, unless a count says otherwise."""
+    from texgs.config.dataset import BasicTF
+    from texgs.volume.suggest import COLORS, windowed
+
+    files = arguments.tf
+    if files and len(files) != len(channels):
+        raise ArgumentError(
+            f"--tf: expected a file for each of the channels {', '.join(channels)}, got {len(files)}"
+        )
+    listed, names = {}, tf_names(list(channels))
+    for number, (key, channel) in enumerate(channels.items()):
+        has_look = channel and windowed(channel, known[key]["minimum"], known[key]["maximum"])
+        count = arguments.count or (None if has_look else 1)
+        basic = basic_tfs(key, known[key], channel, files and files[number : number + 1], count)
+        for name, tf in basic.items():
+            if len(basic) == 1 and count and not files:
+                tf = tf.with_points(tf.opacity, [(tf.support[0], *COLORS[number % len(COLORS)])])
+            whole = names[number] if len(basic) == 1 else f"{names[number]}_{name}"
+            listed[whole] = BasicTF(**tf.to_dict(), channel=key)
+    return listed
+
+
+def tf_names(labels: list[str]) -> list[str]:
+    """Return names of TFs like the labels of channels, or with their numbers where these cannot be names."""
+    names = [NO_NAME.sub("_", label) for label in labels]
+    names = [name if name[:1].isalpha() else f"channel_{name}" for name in names]
+    try:
+        for name in names:
+            check_name("dataset.basic_tfs", name)
+    except ConfigError:
+        names = []
+    return names if len(set(names)) == len(labels) else [f"channel_{k}" for k in range(len(labels))]
+
+
+def basic_tfs(
+    of: str, summary: Mapping[str, Any], channel: Channel | None, files: list[Path] | None, count: int | None
+) -> dict[str, TransferFunction]:
+    """Return TFs from files, or suggested for a channel or from the histogram in a summary."""
+    import numpy as np
+
+    from texgs.volume.suggest import looks_like_labels, suggest
+    from texgs.volume.tf_files import read_tf
+    from texgs.volume.transfer import check_disjoint
+
+    low, high = summary["minimum"], summary["maximum"]
+    if not files:
+        histogram = np.array(summary["histogram"])
+        suggested = suggest(histogram, low, high, count, channel)
+        if looks_like_labels(histogram) and np.dtype(summary["dtype"]).kind == "f":
+            sys.stderr.write(
+                f"{of}: values are in {np.count_nonzero(histogram)} of {len(histogram)} "
+                f"parts of [{low:g}, {high:g}], and are taken for labels; if one of them stands for missing "
+                "samples, write NaN in its place and add nan_value=...\n"
+            )
+        return {name: tf.rounded(low, high) for name, tf in suggested.items()}
+    basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
+    check_disjoint(basic)
+    for path, tf in zip(files, basic.values(), strict=True):
+        first, last = tf.support
+        if last <= 1 < high:
+            raise ArgumentError(
+                f"{path}: expected values of the data, which go up to {high:g}, got a TF "
+                f"on [{first:g}, {last:g}]; rescale it to the data in ParaView first"
+            )
+    return basic
