@@ -6,7 +6,7 @@ from math import ceil
 
 import torch
 from torch import Tensor
-from torch.nn.functional import avg_pool2d, interpolate, max_pool2d
+from torch.nn.functional import interpolate, max_pool2d
 
 from texgs.core.camera import Camera
 from texgs.fields.field import Composed, Look
@@ -97,12 +97,16 @@ def face_alpha(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut
 
 
 def softly_grown(weights: Tensor, pixels: int) -> Tensor:
-    """Return weights [H, W] grown by so many pixels, along rows and columns, that then fall over as many."""
+    """Return weights [H, W] grown by so many pixels, along rows and columns, that then fall to 0 over as many."""
     grown = weights[None, None]
     for rows, columns in ((1, 0), (0, 1)):
-        reach = 2 * pixels * rows, 2 * pixels * columns
-        grown = max_pool2d(grown, (2 * reach[0] + 1, 2 * reach[1] + 1), 1, reach)
-    return avg_pool2d(grown, 2 * pixels + 1, 1, pixels, count_include_pad=False)[0, 0]
+        reached = [
+            max_pool2d(grown, (2 * rows * r + 1, 2 * columns * r + 1), 1, (rows * r, columns * r))
+            * ((2 * pixels + 1 - r) / (pixels + 1))
+            for r in range(pixels, 2 * pixels + 1)
+        ]
+        grown = torch.stack(reached).amax(dim=0)
+    return grown[0, 0]
 
 
 def slab_of(cut: CutRange, thickness: Tensor) -> CutRange:

@@ -4,7 +4,7 @@ import { makeProgram } from "./program.js";
 import { PRESENT_VERTEX } from "./shaders.js";
 import { bind } from "./surfel_pass.js";
 import { Target } from "./target.js";
-import { WINDOW_FRAGMENT } from "./volume_shaders.js";
+import { GROW_FRAGMENT } from "./volume_shaders.js";
 
 const UNITS = 3, OPAQUE = 0.05; // a face is where so many units of length behind a cut have at least this alpha
 const RIM = 0.01; // of the smaller side of the picture
@@ -21,7 +21,7 @@ export class Faces {
   constructor(gl, volume) {
     this.#gl = gl;
     this.#volume = volume;
-    this.#shaders = makeProgram(gl, PRESENT_VERTEX, WINDOW_FRAGMENT);
+    this.#shaders = makeProgram(gl, PRESENT_VERTEX, GROW_FRAGMENT);
     this.#seen = new Target(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT]);
     this.#weights = [0, 1].map(() => new Target(gl, [gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE], gl.LINEAR));
   }
@@ -30,26 +30,23 @@ export class Faces {
   weights(view, scene, look) {
     const size = view.size.map((side) => Math.ceil(side / COARSE));
     const focal = view.focal.map((x) => x / COARSE);
-    const radius = Math.ceil(RIM * Math.min(...size)), [one, other] = this.#weights;
+    const pixels = Math.ceil(RIM * Math.min(...size)), [one, other] = this.#weights;
     this.#volume.cast(this.#seen, { ...view, size, focal }, scene, look,
       { step: 1, reach: UNITS * this.#volume.unit });
-    this.#window(this.#seen, one, { channel: ALPHA, radius: 2 * radius, axis: [0, 1], gain: 1 / OPAQUE, isMean: 0 });
-    this.#window(one, other, { channel: 0, radius: 2 * radius, axis: [1, 0], gain: 1, isMean: 0 });
-    this.#window(other, one, { channel: 0, radius, axis: [0, 1], gain: 1, isMean: 1 });
-    this.#window(one, other, { channel: 0, radius, axis: [1, 0], gain: 1, isMean: 1 });
+    this.#grow(this.#seen, one, { channel: ALPHA, pixels, axis: [0, 1], gain: 1 / OPAQUE });
+    this.#grow(one, other, { channel: 0, pixels, axis: [1, 0], gain: 1 });
     return other.picture;
   }
 
-  #window(from, to, { channel, radius, axis, gain, isMean }) {
+  #grow(from, to, { channel, pixels, axis, gain }) {
     const gl = this.#gl, { program, uniforms } = this.#shaders;
     to.begin(from.size);
     gl.useProgram(program);
     bind(gl, 0, from.picture, uniforms.picture);
     gl.uniform1i(uniforms.channel, channel);
-    gl.uniform1i(uniforms.radius, radius);
+    gl.uniform1i(uniforms.pixels, pixels);
     gl.uniform2iv(uniforms.axis, axis);
     gl.uniform1f(uniforms.gain, gain);
-    gl.uniform1i(uniforms.is_mean, isMean);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     to.end();
   }

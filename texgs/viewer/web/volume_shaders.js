@@ -122,27 +122,24 @@ void main() {
 }
 `;
 
-// A row or a column of a window around a pixel: its largest value, or the mean of those inside of the picture.
-export const WINDOW_FRAGMENT = `#version 300 es
+// The largest value of a row or a column around a pixel; of values farther than `pixels` a share counts, falling to 0.
+export const GROW_FRAGMENT = `#version 300 es
 precision highp float;
 precision highp sampler2D;
 uniform sampler2D picture;
-uniform int channel, radius;
+uniform int channel, pixels;
 uniform ivec2 axis;
 uniform float gain;
-uniform bool is_mean;
 out vec4 shown;
 void main() {
   ivec2 middle = ivec2(gl_FragCoord.xy), size = textureSize(picture, 0);
-  float high = 0.0, sum = 0.0, count = 0.0;
-  for (int i = -radius; i <= radius; i++) {
+  float high = 0.0;
+  for (int i = -2 * pixels; i <= 2 * pixels; i++) {
     ivec2 at = middle + i * axis;
     if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
     float value = min(gain * texelFetch(picture, at, 0)[channel], 1.0);
-    high = max(high, value);
-    sum += value;
-    count += 1.0;
+    high = max(high, value * min(float(2 * pixels + 1 - abs(i)) / float(pixels + 1), 1.0));
   }
-  shown = vec4(is_mean ? sum / count : high);
+  shown = vec4(high);
 }
 `;
