@@ -55,6 +55,28 @@ def test_a_scene_without_looks_shows_its_twin(scene):
     assert not torch.equal(seen, whole)
 
 
+@pytest.mark.parametrize(
+    "word", ["low/part.visible=false", "low/part.palette=#ff0000", "high.ambient=0.2", "high.shininess=0.1"]
+)
+def test_edits_that_a_volume_cannot_show_stay_below_a_cut(scene, word, tmp_path):
+    session = Session(replace(scene, cuts=Cuts([Plane([1.0, 0.0, 0.0], 3.0)])))  # takes nothing away
+    mask = torch.arange(len(scene.models["low"].surfels()[0])) % 2 == 0
+    session.make_segment("low/part", mask, tmp_path / "part.safetensors", {})
+    before = session.frame(CAMERA).astype(float)
+    apply_all(session, [word])
+    whole = session.frame(CAMERA, scene=replace(session.scene, cuts=Cuts())).astype(float)
+    assert np.abs(whole - before).mean() > 0.5
+    assert np.abs(session.frame(CAMERA).astype(float) - whole).mean() < 0.05
+
+
+def test_what_all_parts_have_is_shown_by_the_volume(scene):
+    edits = replace(scene.models["low"].edit, ambient=0.5)
+    alike = {name: replace(entry, edit=edits) for name, entry in scene.models.items()}
+    assert replace(scene, models=alike).is_as_volume
+    hidden = replace(scene.models["high"], edit=replace(edits, visible=False, diffuse=0.0))
+    assert replace(scene, models={**alike, "high": hidden}).is_as_volume
+
+
 def test_a_look_lies_beyond_a_slab_of_the_volume(styled):
     """Behind faces there is the volume, away from them there are models only; between lies a rim."""
     twin, composed = Twin(styled), styled.open()

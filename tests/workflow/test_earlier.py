@@ -1,5 +1,7 @@
 """Which results of earlier runs tables show: not those of a fit that is another one now."""
 
+import shutil
+from os.path import relpath
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,7 +22,7 @@ def make(folder, identity, stage="texture", **made_from):
     work = result.claim(folder, identity)
     (work / "model.safetensors").write_text(str(identity))
     inputs = {name: result.fingerprint(path, Checksums()) for name, path in made_from.items()}
-    paths = {name: path.as_posix() for name, path in made_from.items()}
+    paths = {name: relpath(path, folder) for name, path in made_from.items()}
     write_json(work / result.METRICS, {"stage": stage, "inputs": inputs, "made_from": paths})
     result.publish(folder)
 
@@ -72,3 +74,19 @@ def test_an_edit_of_a_fit_that_is_gone_is_shown():
     for file in FIT.iterdir():
         file.unlink()
     assert str(EDIT) in shown({})[0]
+
+
+def test_a_copy_is_of_its_own_results():
+    """Whatever becomes of those that it was copied from."""
+    shutil.copytree("results", "kept")
+    make(FIT, {"settings": "b"})
+    assert not earlier("kept", Graph(), Checksums())[1]
+    copies = [Path("kept", *folder.parts[1:]) for folder in (FIT, EDIT)]
+    make(copies[0], {"settings": "b"})
+    assert [entry.what for entry in earlier("kept", Graph(), Checksums())[1]] == [str(copies[1])]
+
+
+def test_a_result_of_a_stage_that_is_gone_is_left_out_and_told():
+    make(Path("results/engine/projection"), {"settings": "p"}, "projection")
+    (entry,) = earlier("results", Graph(), Checksums())[1]
+    assert entry.why == "is of the stage projection, which is not there any more; remove the folder"

@@ -87,7 +87,7 @@ class Dataset:
     """A volume with its basic transfer functions, or a folder of views."""
 
     name: str = key(REQUIRED, "name of the data set, and of its folder below results/")
-    title: str = key("${.name}", "name of the data set in tables")
+    title: str = key("${.name}", "name of the data set in pictures of its transfer functions")
     source: str = key("", "who made the data, and its licence")
     stand_in: str = key("", "what the data stand in for, where the real ones are not public")
     image: int = key(800, "width and height of views", "pixels", least=1)

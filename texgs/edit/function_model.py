@@ -41,10 +41,15 @@ def models_of(
 
 
 def tried(scene: Scene, name: str) -> TransferFunction:
-    """Return the function of a name that a scene tries."""
+    """Return the function of a name that a scene tries, and whose model can take its place."""
     if name not in scene.functions:
         known = ", ".join(scene.functions) or "none"
         raise ArgumentError(f"functions: expected one that the scene tries ({known}), got {name}")
+    if scene.series is not None and name in scene.series.models:
+        raise ArgumentError(
+            f"functions: {name} has a model for each step of the series, which a model of one step cannot "
+            "take the place of; give the function another name"
+        )
     return scene.functions[name]
 
 

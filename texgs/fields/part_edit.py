@@ -41,6 +41,11 @@ class PartEdit:
             if not is_number(value) or not 0 <= value <= MOST:
                 raise ArgumentError(f"{each.name}: expected a factor from 0 to {MOST:g}, got {value!r}")
 
+    @property
+    def material(self) -> tuple[object, ...]:
+        """Return what is changed about how light is reflected."""
+        return (self.ambient, self.diffuse, self.specular, self.shininess, self.tint)
+
 
 def require_possible(edit: PartEdit, kind: str) -> None:
     """Require of a kind of field that it can show an edit, but for values that change nothing."""

@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
+from texgs.core.errors import ArgumentError
 from texgs.core.specifications import specifications
 
 if TYPE_CHECKING:
@@ -52,6 +53,11 @@ class Metric:
     tables: tuple[str, ...] = ()  # values that are numbers by name, which no table shows
     # From what each look of a scene follows, and its values, to measures that it has among these looks.
     among: Callable[[Sequence[tuple[str, Mapping[str, Any]]]], Sequence[Mapping[str, Any]]] | None = None
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of all its values."""
+        return [*(measure.name for measure in self.measures), *(self.notes or ()), *self.tables]
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,14 +165,25 @@ def metrics() -> dict[str, Metric]:
 
 
 def values_of(scene: MeasuredScene, chosen: Iterable[Metric] | None = None) -> dict[str, Any]:
-    """Measure all that can be measured of an edited scene, or what some metrics can."""
+    """Measure all that can be measured of an edited scene, or what some metrics can.
+
+    Raises:
+        ArgumentError: if a metric gives a value that it does not declare.
+    """
     import torch
 
+    chosen = [*(metrics().values() if chosen is None else chosen)]
     with torch.no_grad():
-        results = [metric.run(scene) for metric in (metrics().values() if chosen is None else chosen)]
+        results = [metric.run(scene) for metric in chosen]
         watchers = [each for each in results if isinstance(each, Watcher)]
         for view in scene.views() if watchers else ():
             for watcher in watchers:
                 watcher.see(view)
         told = [each.values() if isinstance(each, Watcher) else each for each in results]
+    for metric, values in zip(chosen, told, strict=True):
+        if unknown := [name for name in values if name not in metric.names]:
+            raise ArgumentError(
+                f"metric {metric.name}: expected values of {', '.join(metric.names)}, got {unknown[0]}; "
+                "give it a Measure"
+            )
     return {name: value for each in told for name, value in each.items()}

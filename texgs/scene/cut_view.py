@@ -36,9 +36,10 @@ def cut_view(
 ) -> Render:
     """Render one view of a scene with its edits, light and cuts.
 
-    Where there are cuts, a scene without looks shows its twin, which is exact; one with looks shows a slab of
-    the volume behind each face, over what the cuts leave of its models. Without a twin, and where more is
-    asked for than shaded colours, cuts leave models without faces.
+    Where there are cuts, a scene shows its twin, which is exact, if that can show all of its edits. With
+    looks, edited segments or several materials it shows a slab of the volume behind each face, over what the
+    cuts leave of its models. Without a twin, and where more is asked for than shaded colours, cuts leave
+    models without faces.
 
     Args:
         composed: the scene's models.
@@ -58,9 +59,9 @@ def cut_view(
             outputs=outputs,
             depth_range=None if cut is None else cut.depth_range,
         )
-    if scene.has_looks:
-        return slab_view(composed, camera, scene, twin, cut)
-    return twin.render(camera, scene, composed.palettes, cut)
+    if scene.is_as_volume:
+        return twin.render(camera, scene, composed.palettes, cut)
+    return slab_view(composed, camera, scene, twin, cut)
 
 
 def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Render:
@@ -97,7 +98,7 @@ def face_alpha(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut
 
 
 def softly_grown(weights: Tensor, pixels: int) -> Tensor:
-    """Return weights [H, W] grown by so many pixels, along rows and columns, that then fall to 0 over as many."""
+    """Return weights [H, W] grown by so many pixels, row and column; over as many more they fall to 0."""
     grown = weights[None, None]
     for rows, columns in ((1, 0), (0, 1)):
         reached = [

@@ -161,6 +161,14 @@ class Scene:
         textures += [segment.texture for model in self.models.values() for segment in model.segments.values()]
         return any(textures)
 
+    @property
+    def is_as_volume(self) -> bool:
+        """Return whether its volume can show all edits: no looks, no segments apart, and one material."""
+        models = self.models.values()
+        is_apart = any(part.edit != model.edit for model in models for part in model.segments.values())
+        materials = {model.edit.material for model in models if model.edit.visible and model.edit.opacity > 0}
+        return not (self.has_looks or is_apart or len(materials) > 1)
+
     def open(self, device: torch.device | str = "cpu", *, is_lean: bool = False) -> Composed:
         """Read and join the models.
 

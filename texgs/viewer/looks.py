@@ -103,6 +103,10 @@ class Looks:
                     output.parent.rmdir()
             raise
 
+    def forget(self, page: int) -> None:
+        """Remove the files of the previews of a page that is gone."""
+        self._scratch.remove(f"preview-{page}")
+
     def _raised(self, task: OrbitTask) -> OrbitTask:
         """Return the task with opacities for its look; those of the latest scene are not measured again."""
         asked, latest = (task.scene, task.edit.parts, task.settings.factor), self._latest
@@ -154,6 +158,10 @@ class ScratchFolders:
         self._counts[kind] += 1
         rmtree(self._parent / kind / f"{self._counts[kind] - kept}", ignore_errors=True)
         return self._parent / kind / f"{self._counts[kind]}"
+
+    def remove(self, kind: str) -> None:
+        """Remove all folders of a kind."""
+        rmtree(self._parent / kind, ignore_errors=True)
 
 
 class ThrottledPreview:

@@ -54,7 +54,7 @@ class Server:
         self._origins = Origins(opened.scene)
         self._beside = Beside(session, self._origins)
         self.frames = Frames(session, self._beside)
-        self._changing = asyncio.Lock()  # a change that reads files takes its time in another thread
+        self._changing = asyncio.Lock()  # jobs give what they have made in another thread
         self.work = Work(self.frames, self.edits, self._changing, self.tell_all, device, styles)
         self._choices = {
             "styles": self.work.styles.names,
@@ -106,7 +106,7 @@ class Server:
             await self._listen(socket, page)
         finally:
             del self._pages[page]
-            self.work.stop(page)
+            self.work.forget(page)
             for each in sending:
                 each.cancel()
             await asyncio.gather(*sending, return_exceptions=True)

@@ -83,7 +83,8 @@ class SharedEdits:
         files = [opened.file.resolve()] if opened.file else []
         self._own = {file: state_of(file) for file in files}  # replaced without a question, while they are so
         self.original = self._saved = session.scene
-        self._latest: tuple[object, ...] | None = None  # author and number of a step that may go on
+        # Author and number of a step that may go on, and the scene that it has made.
+        self._latest: tuple[tuple[object, ...] | None, Scene] = (None, session.scene)
 
     @property
     def scene(self) -> Scene:
@@ -137,7 +138,8 @@ class SharedEdits:
             session.remove_segment(asked.part)
         else:
             step = (author, asked.step, asked.part, asked.key) if asked.step else None
-            goes_on = step is not None and step == self._latest and session.undo()
+            is_latest = self._latest[0] == step and self._latest[1] is self.scene
+            goes_on = step is not None and is_latest and session.undo()
             try:
                 self._edit(asked)
             except Exception:
@@ -147,20 +149,22 @@ class SharedEdits:
             title = asked.title
         if title and self.scene is not before:
             session.name_step(title)
-        self._latest = step
+        self._latest = step, self.scene
 
     def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:
         """Write the file of a new segment, and add it."""
         file = new_part_file("segment", self._folder, Path(self.name).stem, part)
         self._session.make_segment(part, mask, file, facts)
         self._session.name_step(f"{part} new")
-        self._latest = None
 
-    def give_looks(self, looks: Mapping[str, NewLook], name: str) -> None:
-        """Give parts new looks, and back the palettes that these were made for."""
-        self._session.set_looks(looks)
-        self._session.name_step(f"{', '.join(looks)} {name}")
-        self._latest = None
+    def give_looks(self, looks: Mapping[str, NewLook], name: str) -> list[str]:
+        """Give parts new looks, and back the palettes these were made for; return parts that are gone."""
+        names = part_names(self.scene)
+        there = {part: look for part, look in looks.items() if part in names}
+        if there:
+            self._session.set_looks(there)
+            self._session.name_step(f"{', '.join(there)} {name}")
+        return [part for part in looks if part not in names]
 
     def give_model(self, name: str, model: Surfels, tf: TransferFunction, before: Path | None) -> Path | None:
         """Write a model and put it in the place of its function, or of the model in the file `before`.
@@ -174,7 +178,6 @@ class SharedEdits:
         file = write_model(new_part_file("model", self._folder, Path(self.name).stem, name), model)
         self._session.set_scene(with_model(self.scene, name, file, tf))
         self._session.name_step(f"{name} {'model' if before is None else 'finer model'}")
-        self._latest = None
         return file
 
     def path_of(self, name: str) -> Path:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import torch
 
 from texgs.config.kept_function import keep
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError, TexgsError, located
 from texgs.core.names import part_file, require_name
 from texgs.core.progress import watched
 from texgs.edit.function_model import models_of, overlap_of, tried
@@ -149,6 +149,11 @@ class Work:
         """Return whether something is being made."""
         return self._task is not None and not self._task.done()
 
+    def forget(self, page: Page) -> None:
+        """Stop the job of a page that is gone, and remove its previews."""
+        self.stop(page)
+        self._looks.forget(page.number)
+
     def stop(self, page: Page | None = None) -> None:
         """Stop the job that is at work, if there is one, and it is for this page or whichever."""
         if page is None or page is self._page:
@@ -203,41 +208,50 @@ class Work:
 
         start = monotonic()
         try:
-            edited = await self._jobs.run(partial(self._looks.make, scene, edit, output, show), watch)
+            try:
+                edited = await self._jobs.run(partial(self._looks.make, scene, edit, output, show), watch)
+            except Exception:
+                rmtree(output, ignore_errors=True)
+                raise
             looks = looks_of(edited.scene, edit.parts, scene)
-            async with self._changing:
-                await asyncio.to_thread(self._edits.give_looks, looks, name)
-        except Exception:
-            rmtree(output, ignore_errors=True)
-            raise
+            with located(f"textures are in {output}"):
+                async with self._changing:
+                    gone = await asyncio.to_thread(self._edits.give_looks, looks, name)
         finally:
             page.try_on(None)
         how = f"{name}: {edited.how}, {monotonic() - start:.0f} s."
-        page.tell(f"{how} Textures are in {output}; the scene is not saved yet.", level="info")
+        left = f" Not in the scene any more: {', '.join(gone)}." if gone else ""
+        page.tell(f"{how}{left} Textures are in {output}; the scene is not saved yet.", level="info")
 
     async def _fit(self, asked: Fit, page: Page, watch: Watch) -> None:
         """Put a first model in the place of its function, and then a finer one in the place of that."""
         scene, name, edits = self._edits.scene, asked.function, self._edits
         tf, start, loop = tried(scene, name), monotonic(), asyncio.get_running_loop()
+        given: list[Path] = []  # files of the first model and of the finer one
 
-        async def give(model: Surfels, before: Path | None) -> Path | None:
+        async def give(model: Surfels) -> None:
+            before = given[0] if given else None
             async with self._changing:
                 file = await asyncio.to_thread(edits.give_model, name, model, tf, before)
+            if file is None:
+                was = "first model" if given else "function"
+                raise ArgumentError(f"{name}: its {was} was changed meanwhile; make the model again")
             self._changed()
-            if file is not None:
-                what, more = ("finer model", "") if before else ("model", overlap_of(edits.scene, name))
-                took = f"{monotonic() - start:.0f} s; the scene is not saved yet."
-                page.tell(f"{name}: {what}, {took}{more}", level="info")
-            return file
+            what, more = ("finer model", "") if given else ("model", overlap_of(edits.scene, name))
+            took = f"{monotonic() - start:.0f} s; the scene is not saved yet."
+            page.tell(f"{name}: {what}, {took}{more}", level="info")
+            given.append(file)
 
         def work() -> None:
-            before = None
             for model in models_of(scene, name, self._device):
-                before = asyncio.run_coroutine_threadsafe(give(model, before), loop).result()
-                if before is None:
-                    break
+                asyncio.run_coroutine_threadsafe(give(model), loop).result()
 
-        await self._jobs.run(work, watch, is_urgent=True)
+        try:
+            await self._jobs.run(work, watch, is_urgent=True)
+        except Stopped as stopped:
+            if given:
+                raise Stopped(f"{name}: the finer model was cancelled; the first one stays.") from stopped
+            raise
 
     async def _keep(self, asked: Keep, page: Page, watch: Watch) -> None:
         """Write a function into the file of its data set, and tell its page what that means."""

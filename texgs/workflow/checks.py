@@ -31,6 +31,8 @@ def check_fit(config: Config) -> None:
 def check_edit(config: Config) -> None:
     """Require of an edit all that can be told without its scene and without weights."""
     if config.edit.method != NO_METHOD:
+        if config.tf is not None:
+            raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
         method = method_of(config.edit)
         require(config.fit.field, method.needs, f"edit {config.edit.name}", method.fields)
         for look in looks_of(config).values() or [None]:

@@ -151,8 +151,6 @@ def edited_scene(config: Config) -> dict[str, Path]:
     """Return the scene that an edit starts from, its models, their training views, and files of styles."""
     if config.edit.base == config.edit.name:
         raise ConfigError(f"edit.base: {config.edit.name} starts from itself; choose another base")
-    if config.tf is not None:
-        raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
     views = {f"{VIEWS}{name}": view_set(config, name)["views"] for name in tf_names(config)}
     method = method_of(config.edit)
     scene = scene_before(config)

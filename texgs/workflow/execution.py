@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from os.path import relpath
 from pathlib import Path
 
 from texgs.config.compose import compose
@@ -52,7 +53,9 @@ def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
         raise ArgumentError(f"settings of a {job.stage.name} job: {error}") from error
     identity = job.identity()
     inputs = job.inputs.items()
-    made_from = {name: path.as_posix() for name, path in inputs if path.name in result.recorded(path.parent)}
+    made_from = {
+        name: relpath(path, job.output) for name, path in inputs if path.name in result.recorded(path.parent)
+    }
     work = result.claim(job.output, identity, is_fresh=is_fresh)
     with run(
         tracking.uri,

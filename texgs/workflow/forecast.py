@@ -13,6 +13,7 @@ from typing import Any
 from texgs.config.schema import Config
 from texgs.workflow.experiments import Selection
 from texgs.workflow.job import Job
+from texgs.workflow.locate import source_file
 from texgs.workflow.sweep import as_sweep
 
 PROBE = "probe"  # the row of speeds.csv with the seconds of `probe` on the same machine
@@ -139,7 +140,6 @@ def source(config: Config) -> str:
     volume = config.dataset.volume
     if config.dataset.views_folder is not None:
         return str(Path(config.data_folder, config.dataset.views_folder))
-    if volume.generator is not None:
+    if (path := source_file(config)) is None:
         return f"generated: {volume.generator}"
-    path = Path(config.data_folder, volume.file or "")
     return str(path) if path.exists() else f"to be downloaded from {volume.url}"

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from os.path import normpath
 from pathlib import Path
 
 from texgs.config.project import Words
@@ -130,12 +131,16 @@ def earlier(
         if not is_complete(Path(folder), checksums):
             continue
         facts = read_json(file := Path(folder, METRICS))
+        if (stage := STAGES.get(facts["stage"])) is None:
+            why = f"is of the stage {facts['stage']}, which is not there any more; remove the folder"
+            outdated[LeftOut(folder, why)] = []
+            continue
         for name, path in facts.get("made_from", {}).items():  # not told by versions of texgs before this
-            source, was = Path(path), facts["inputs"][name]
+            source, was = Path(normpath(Path(folder, path))), facts["inputs"][name]
             is_other = source.is_file() and fingerprint(source, checksums) != was
             if is_other or (source.is_file() and of_run.is_replaced(source.parent.as_posix())):
                 why = f"comes from {source.parent}, which has been made anew since; run its job again"
-                outdated[LeftOut(folder, why)] = [STAGES[facts["stage"]].place]
+                outdated[LeftOut(folder, why)] = [stage.place]
                 break
         else:
             digests[file.as_posix()] = checksums.of(file)

@@ -29,7 +29,7 @@ def record(
 ) -> dict[str, Any]:
     """Return where and how the result of a job came about, from its settings and identity.
 
-    `made_from` names its inputs that are files of other results.
+    `made_from` names its inputs that are files of other results, from the folder of the job.
     """
     return {
         **facts(settings),

@@ -69,9 +69,13 @@ export class LookTool {
     return get("look").querySelector("input[name=style]:checked")?.value ?? "";
   }
 
+  get #hasPart() {
+    return get("look-part").selectedIndex >= 0;
+  }
+
   async #paint() {
     const turn = this.#painting, { camera, job, notices, renderer, state } = this.#page;
-    const isOver = () => turn !== this.#painting || get("look").hidden || job.isAtWork;
+    const isOver = () => turn !== this.#painting || get("look").hidden || job.isAtWork || !this.#hasPart;
     for (const label of get("look-styles").children) {
       if (isOver()) return;
       const style = label.querySelector("input").value, side = camera.wire(...renderer.size());
@@ -135,7 +139,7 @@ export class LookTool {
   /** Show on the part what is chosen, a picture or words; or nothing. */
   #preview(chosen = this.#style || get("look-words").value.trim()) {
     const { connection } = this.#page;
-    if (chosen) connection.send(this.#asked(true));
+    if (chosen && this.#hasPart) connection.send(this.#asked(true));
     else connection.send({ type: "cancel", preview: true }); // one may be on its way
     this.#show();
     this.paint();
@@ -162,11 +166,13 @@ export class LookTool {
     const all = able.length === models.length ? [new Option("the whole scene", ALL)] : [];
     select.replaceChildren(...all, ...parts.map((part) => new Option(part)));
     if ([...select.options].some((option) => option.value === value)) select.value = value;
+    else if (!get("look").hidden) select.selectedIndex = -1; // it is gone: another one has to be chosen
+    this.#show();
   }
 
   #show() {
     const { isAtWork } = this.#page.job, hasWords = get("look-words").value.trim() !== "";
-    const isReady = (hasWords || this.#style) && !isAtWork;
+    const isReady = (hasWords || this.#style) && this.#hasPart && !isAtWork;
     get("look-make").disabled = !isReady;
     for (const each of get("look").querySelectorAll("input, select")) each.disabled = isAtWork;
     get("look-note").textContent = this.#isTried && !isAtWork ? "A preview: nothing has changed yet." : "";

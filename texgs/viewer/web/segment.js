@@ -30,6 +30,12 @@ export class SegmentTool {
       if (event.key === "Escape") this.leave();
     });
     new ResizeObserver(() => this.#clear()).observe(canvas);
+    const { state } = page;
+    let { time } = state.scene;
+    state.addEventListener("change", () => { // clicks belong to one step in time, too
+      if (this.#model && state.scene.time !== time) this.#clear();
+      time = state.scene.time;
+    });
     get("segment").addEventListener("submit", (event) => {
       event.preventDefault();
       this.#make();

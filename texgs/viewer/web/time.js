@@ -27,6 +27,7 @@ export class TimeSlider {
     root.append(element("span", { className: "name" }, "Time"), this.#range, this.#name, this.#play);
     const show = () => {
       const { time } = state.scene;
+      if (this.#timer && state.future.length) this.stop(); // somebody took a step back
       if (!use.isBusy()) this.#range.value = times.indexOf(time);
       this.#name.textContent = time ?? "";
       this.#name.title = this.#range.ariaValueText = steps[time] ?? "";

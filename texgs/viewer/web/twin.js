@@ -8,6 +8,15 @@ export const OF_TWIN = ["volume", "difference", "wipe"]; // modes
 const SLAB = 30; // units of length behind a face, which hide most of what is beyond
 const STILL = 0.5, MOVING = 1; // voxels between samples
 
+/** Whether a volume can show all edits of models but looks, as `Scene.is_as_volume` has it. */
+function isAsVolume(models) {
+  const text = JSON.stringify, shown = models.filter(({ edit }) => edit.visible && edit.opacity > 0);
+  const isApart = models.some(({ edit, segments }) => segments.some((each) => text(each.edit) !== text(edit)));
+  const materials = shown.map(({ edit: { ambient, diffuse, specular, shininess, tint } }) =>
+    text([ambient, diffuse, specular, shininess, tint]));
+  return !isApart && new Set(materials).size <= 1;
+}
+
 /** A picture that nothing is shown beside. */
 export const alone = (picture) => ({ first: picture, second: picture, pair: "none" });
 
@@ -39,7 +48,7 @@ export class Twin {
     };
     const seen = () => {
       if (!look.planes.length) return models.draw();
-      if (!this.#hasLooks) return cast(this.target);
+      if (!this.#hasLooks && isAsVolume(scene.models)) return cast(this.target);
       const slab = { reach: SLAB * this.#volume.unit, weights: this.#faces.weights(view, shown, look) };
       models.draw(slab);
       return cast(models.target, { ...slab, isOver: true });
