@@ -1,5 +1,6 @@
 """A series from files to a scene of all steps: what comes of it, what is made only once, and mistakes."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from shutil import rmtree
@@ -38,6 +39,7 @@ from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import ArraySource
 from texgs.volume.sources import open_source
+from texgs.volume.summaries import read_summaries
 from texgs.workflow.series import make_series, settings_of
 
 CPU = torch.device("cpu")
@@ -124,6 +126,15 @@ def test_what_is_there_is_not_made_again_and_what_is_missing_is(folder, monkeypa
     assert {file: file.read_bytes() for file in (folder / "s").iterdir()} == files
 
 
+def test_a_file_that_has_changed_is_refused(folder):
+    made(folder)
+    file = folder / "step_10.nrrd"
+    prepare(ArraySource(blob((0.1, 0, 0))), file)
+    os.utime(file, (2**32, 2**32))  # clocks of file systems are coarse
+    with pytest.raises(ArgumentError, match=r"^step_10.nrrd: .* has changed since .*volume-00002.nrrd was"):
+        made(folder)
+
+
 def test_segments_textures_and_edits_of_one_step_hold_for_all(folder, fitted):
     scene = made(folder)
     session = Session(scene.at(2))
@@ -162,6 +173,9 @@ def test_a_copy_of_the_scene_has_all_steps(folder):
     assert centre(copy) == centre(read_scene(folder / "gone" / "scene.yaml").at(2))
     assert all(copy.at(time).volume.file.is_relative_to(folder / "elsewhere") for time in range(3))
     assert all(copy.at(time).volume.file.exists() for time in range(3))
+    for time in range(3):
+        summary = read_summaries(copy.at(time).volume.file)[""]
+        assert sum(summary["histogram"]) == 40 * 36 * 32
 
 
 def test_a_segment_that_was_made_before_the_series_holds_in_it(folder, fitted):

@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
     from texgs.fields.files import open_field
-    from texgs.scene.export import OF_CLOUDS, Export, export_model, export_scene
+    from texgs.scene.export import OF_CLOUDS, Export, export_model, export_scene, uncut
     from texgs.scene.scene_file import read_scene
 
     kind = kind_of(arguments)
@@ -79,10 +79,12 @@ def run(arguments: argparse.Namespace) -> int:
     if kind in OF_CLOUDS:
         shown = as_scene(arguments, scene)
         print(export_scene(arguments.to, shown, export))
-        print(BAKED + ("; its cuts are left out" if shown.cuts else ""), file=sys.stderr)
+        print(BAKED + uncut(shown), file=sys.stderr)
         return 0
     if scene is not None and arguments.model is None:
         print(export_scene(arguments.to, scene, export))
+        if scene.cuts:
+            print("Its cuts are left out", file=sys.stderr)
         return 0
     field = open_field(arguments.source) if scene is None else chosen(scene, arguments.model).open()[0]
     print(export_model(arguments.to, field, export))

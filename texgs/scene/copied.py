@@ -56,8 +56,11 @@ class Copies:
 
     def volume(self, file: Path) -> Path:
         """Return the copy of a volume, with what is known of its values beside it."""
-        target, summary = self.copy(file, "volume"), summary_file(file)
-        if summary.exists():
+        return self.with_summary(file, self.copy(file, "volume"))
+
+    def with_summary(self, file: Path, target: Path) -> Path:
+        """Return the copy of a volume, after its summary has been copied, too, if there is one."""
+        if (summary := summary_file(file)).exists():
             self.put(summary, summary_file(target))
         return target
 
@@ -67,7 +70,7 @@ class Copies:
         for step in range(len(series.steps)):
             for name in series.models:
                 self.put(series.model(name, step), copied.model(name, step))
-            self.put(series.volume(step), copied.volume(step))
+            self.with_summary(series.volume(step), self.put(series.volume(step), copied.volume(step)))
         write_series(copied)
         return copied
 

@@ -67,6 +67,11 @@ def require_export(field: Kind, kind: str) -> None:
         )
 
 
+def uncut(scene: Scene) -> str:
+    """Return what is to be told behind a file of a scene: no kind holds cuts."""
+    return "; its cuts are left out" if scene.cuts else ""
+
+
 def export_scene(path: Path, scene: Scene, export: Export) -> Path:
     """Export the visible models of a scene as one.
 

@@ -21,8 +21,9 @@ from texgs.core.names import part_file, require_name
 from texgs.core.progress import watched
 from texgs.edit.function_model import models_of, overlap_of, tried
 from texgs.fields.surfels.model import Surfels
+from texgs.scene.export import uncut
 from texgs.scene.parts import NewLook, entry_of, require_new, split
-from texgs.viewer.downloads import Downloads, require_kind
+from texgs.viewer.downloads import FILMS, PAGES, Downloads, require_kind
 from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks, looks_of, with_parts
 from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
@@ -262,4 +263,6 @@ class Work:
         """Write a file, and tell its page where it is."""
         scene, name = page.shown(asked.view), Path(self._edits.name).stem
         path = await self._jobs.run(partial(self.downloads.write, scene, asked, name), watch)
-        page.tell(f"{path.name}: {path.stat().st_size / 2**20:.1f} MiB", level="file", name=path.name)
+        left = "" if asked.kind in (*PAGES, *FILMS) else uncut(scene)
+        size = f"{path.stat().st_size / 2**20:.1f} MiB"
+        page.tell(f"{path.name}: {size}{left}", level="file", name=path.name)

@@ -24,6 +24,7 @@ from texgs.scene.twin import SceneVolume, volume_of
 from texgs.volume.framing import shown_corners, smallest_ball
 from texgs.volume.headers import NRRD
 from texgs.volume.nrrd_file import open_grid
+from texgs.volume.summaries import write_summaries
 from texgs.workflow.moments import Moment, in_time
 from texgs.workflow.stages.volume import prepared, source
 
@@ -39,8 +40,8 @@ def make_series(
     models are followed from, on and back. What an earlier call has left in the folder is not made again.
     Settings say how volumes are read; by default the workflow's record beside the scene's volume does.
 
-    The folder gets scene.yaml, series.json, and the volumes and models of steps. Files that are missing or on
-    another lattice are refused, and a folder of another series.
+    The folder gets scene.yaml, series.json, and the volumes and models of steps. Files that are missing, on
+    another lattice, or have changed since are refused, and a folder of another series.
     """
     volume = volume_of(scene)
     settings = settings or settings_of(volume.file)
@@ -90,7 +91,12 @@ def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, v
         with located(moment.name):
             if not target.exists():
                 own = settings if moment.time is None else replace(settings, time=moment.time)
-                prepared(settings, [source(own, moment.file)], target)
+                write_summaries(target, prepared(settings, [source(own, moment.file)], target), [""])
+            elif moment.file is not None and moment.file.stat().st_mtime > target.stat().st_mtime:
+                raise ArgumentError(
+                    f"{moment.file} has changed since {target} was made of it; remove {target.parent}, or "
+                    "choose another folder"
+                )
             other = open_grid(target)
             if other.dims != grid.dims or not np.allclose(other.spacing, grid.spacing):
                 raise ArgumentError(
