@@ -1,5 +1,6 @@
 """Models of functions that a scene tries, from the command line and in the viewer."""
 
+import threading
 from dataclasses import replace
 
 import pytest
@@ -18,6 +19,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.series_file import Series
 from texgs.scene.twin import Twin
 
 
@@ -105,6 +107,52 @@ async def test_the_viewer_adds_a_first_model_and_then_a_finer_one(browser, clien
     await browser.send(type="fit", function="old")
     while "expected one that the scene tries (low), got old" not in (await browser.next("notice"))["text"]:
         pass
+
+
+def held(monkeypatch, *before_each):
+    """Let the viewer wait for an event before each model that it makes."""
+
+    def models(scene, name, device):
+        for event in before_each:
+            event.wait(30)
+            yield ball(1)
+
+    monkeypatch.setattr("texgs.viewer.work.models_of", models)
+
+
+async def notice(browser, text):
+    while text not in (await browser.next("notice"))["text"]:
+        pass
+
+
+@on_page
+async def test_a_model_of_a_function_that_was_changed_is_not_added(browser, client, scene_file, monkeypatch):
+    held(monkeypatch, changed := threading.Event())
+    await browser.send(type="fit", function="new")
+    await browser.send(type="edit", part="", key="functions", value={})
+    await browser.past("functions")
+    changed.set()
+    await notice(browser, "new: its function was changed meanwhile; make the model again")
+    assert "new" not in client.server_side.edits.scene.models
+
+
+@on_page
+async def test_a_first_model_stays_where_the_finer_one_is_cancelled(browser, client, scene_file, monkeypatch):
+    (first := threading.Event()).set()
+    held(monkeypatch, first, cancelled := threading.Event())
+    await browser.send(type="fit", function="new")
+    await browser.past("new model")
+    await browser.send(type="cancel")
+    await browser.next("trial")
+    cancelled.set()
+    await notice(browser, "new: the finer model was cancelled; the first one stays.")
+
+
+def test_a_series_has_models_of_all_steps(scene_file):
+    scene = read_scene(scene_file)
+    series = Series(scene_file.with_name("series.json"), ["a", "b"], ["low"])
+    with pytest.raises(ArgumentError, match="low has a model for each step of the series"):
+        tried(replace(scene, series=series), "low")
 
 
 @on_page

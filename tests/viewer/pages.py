@@ -31,8 +31,12 @@ class Browser:
 
     async def next(self, kind):
         """The next message of a kind; a frame is its header and its picture."""
+        async with asyncio.timeout(WAIT):
+            return await self._next(kind)
+
+    async def _next(self, kind):
         while True:
-            message = await asyncio.wait_for(self.socket.receive(), WAIT)
+            message = await self.socket.receive()
             if message.type == WSMsgType.BINARY:
                 (length,) = struct.unpack_from("<I", message.data)
                 if kind == "frame":
@@ -46,8 +50,9 @@ class Browser:
 
     async def past(self, *steps):
         """The scene once these steps were made."""
-        while (news := await self.next("scene"))["past"] != [*steps]:
-            pass
+        async with asyncio.timeout(WAIT):
+            while (news := await self.next("scene"))["past"] != [*steps]:
+                pass
         return news
 
 

@@ -227,6 +227,18 @@ async def test_edits_of_one_movement_are_one_step(browser):
         assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == opacity
 
 
+@on_page
+async def test_a_movement_goes_on_from_its_own_step_only(browser, client):
+    """Others edit the same session, as Python beside a viewer in a notebook."""
+    move = {"type": "edit", "part": "", "key": "background", "step": 7}
+    await browser.send(**move, value=[1, 0, 0])
+    await browser.past("background #ff0000")
+    client.server_side.edits._session.set("TF01", "opacity", 0.5)
+    await browser.send(**move, value=[0, 0, 1])
+    news = await browser.past("background #ff0000", "", "background #0000ff")
+    assert news["scene"]["models"][0]["edit"]["opacity"] == 0.5
+
+
 @pytest.mark.parametrize(
     ("edit", "message"),
     [
