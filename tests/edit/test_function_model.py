@@ -129,6 +129,7 @@ async def notice(browser, text):
 async def test_a_model_of_a_function_that_was_changed_is_not_added(browser, client, scene_file, monkeypatch):
     held(monkeypatch, changed := threading.Event())
     await browser.send(type="fit", function="new")
+    await browser.next("job")  # it has begun
     await browser.send(type="edit", part="", key="functions", value={})
     await browser.past("functions")
     changed.set()
