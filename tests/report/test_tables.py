@@ -1,14 +1,21 @@
+from pathlib import Path
+
 import pytest
 
 from tests.report.written import lines, metrics, records
 from tests.study.studies import study
 from texgs.cli.main import main
-from texgs.report.metrics_files import LeftOut
+from texgs.core.checksum import Checksums
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json, write_json
+from texgs.core.names import METRICS
+from texgs.report.metrics_files import LeftOut, read_known, require_apart
 from texgs.report.results import EditResult, FitResult, SceneResult
 from texgs.report.sections import SECTIONS
 from texgs.report.tables import specs, tables_of
 from texgs.study.ballots import Ballot, Votes
 from texgs.study.votes import study_table
+from texgs.workflow.result import claim, fingerprint, publish
 from texgs.workflow.stage_table import STAGES
 
 TABLES = specs()
@@ -88,3 +95,45 @@ def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
     assert "Left out: data set wood: no file." in said.out
     assert "Left out: 1 metrics file: of another version of texgs" in said.err
     assert "## Table 1. Data sets" not in said.out, "tables without rows are not printed"
+
+
+def test_the_verb_reads_whole_results_of_a_folder_and_names_others(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["tables", "mine"]) == 2
+    assert "no metrics.json below mine" in capsys.readouterr().err
+    for name, psnr in (("views", None), ("fit", 40.0)):
+        folder = Path("mine", "scan", "TF01", name)
+        work = claim(folder, {"settings": name})
+        (work / "made.txt").write_text(name)
+        shown = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=psnr), "scan", "TF01")
+        facts = read_json(shown) | {"inputs": {}, "made_from": {}}
+        if name == "fit":
+            views = folder.with_name("views") / "made.txt"
+            facts |= {
+                "inputs": {"v": fingerprint(views, Checksums())},
+                "made_from": {"v": "../views/made.txt"},
+            }
+        write_json(work / METRICS, facts)
+        publish(folder)
+        shown.unlink()
+    assert main(["tables", "mine", "--output", "t"]) == 0
+    assert "40.00" in capsys.readouterr().out
+    work = claim(Path("mine/scan/TF01/views"), {"settings": "others"})
+    (work / "made.txt").write_text("others")
+    write_json(work / METRICS, read_json("mine/scan/TF01/views/metrics.json"))
+    publish(Path("mine/scan/TF01/views"))
+    assert main(["tables", "mine", "--output", "t"]) == 0
+    said = capsys.readouterr()
+    assert "40.00" not in said.out
+    assert "mine/scan/TF01/fit: comes from mine/scan/TF01/views, which has been made anew since" in said.err
+
+
+def test_results_of_two_folders_are_not_mixed(tmp_path):
+    paths = []
+    for root in ("one", "two"):
+        shown = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")
+        paths.append(tmp_path / root / "scan" / "TF01" / METRICS)
+        paths[-1].parent.mkdir(parents=True)
+        shown.rename(paths[-1])
+    with pytest.raises(ArgumentError, match=r"two/scan.*: expected results of one folder, got .*one/scan"):
+        require_apart(read_known(paths)[0])

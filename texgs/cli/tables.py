@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser, output: str = "results/tables") -> None:
     """Add where the numbers are, and where the tables or the report go."""
-    parser.add_argument("metrics", nargs="*", type=Path, help="metrics.json files (all below results/)")
+    parser.add_argument(
+        "metrics", nargs="*", type=Path, help="metrics.json files, or a folder of results (results/)"
+    )
     parser.add_argument("--missing", type=Path, help="JSON file of what was left out, with reasons")
     study = "key of a user study, with ballots in votes/ beside it"
     option(parser, "--study", Path("results/study/key.json"), study)
@@ -65,12 +67,25 @@ def run_report(arguments: argparse.Namespace) -> int:
 
 
 def records_of(arguments: argparse.Namespace, verb: str) -> tuple[list[Record[Any]], list[LeftOut]]:
-    """Read the metrics files that are given, by default all, and tell of those of other versions of texgs."""
-    from texgs.report.metrics_files import below, read_known
+    """Read the metrics files that are given, or those of a folder; tell of those that are left out."""
+    from texgs.core.checksum import Checksums
+    from texgs.report.metrics_files import LeftOut, read_known, require_apart
+    from texgs.workflow.graph import Graph, earlier
 
-    if not (paths := arguments.metrics or below("results")):
-        raise ArgumentError(f"{verb}: no metrics.json below results; run something first, such as make demo")
-    return read_known(paths)
+    paths, left_out = list[Path](), list[LeftOut]()
+    for each in arguments.metrics or [Path("results")]:
+        if each.is_file():
+            paths.append(each)
+            continue
+        files, outdated = earlier(str(each), Graph(), Checksums.load())
+        paths += map(Path, files)
+        left_out += [LeftOut(entry.what, entry.why, places) for entry, places in outdated.items()]
+    if not paths:
+        where = ", ".join(map(str, arguments.metrics)) or "results"
+        raise ArgumentError(f"{verb}: no metrics.json below {where}; run something first, such as make demo")
+    records, others = read_known(paths)
+    require_apart(records)
+    return records, [*left_out, *others]
 
 
 def given_tables(records: list[Record[Any]], votes: Votes | None) -> dict[str, Table]:

@@ -93,6 +93,19 @@ def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[Lef
     return records, [LeftOut(what, why, [])]
 
 
+def require_apart(records: Iterable[Record[Any]]) -> None:
+    """Require that no two results are of the same job in different folders: numbers of both would mix."""
+    known: dict[tuple[str, ...], Path] = {}
+    for record in records:
+        parts = record.path.parts
+        depth = parts[::-1].index(record.dataset) + 1 if record.dataset in parts else len(parts)
+        if (other := known.setdefault(parts[-depth:], record.path)) != record.path:
+            raise ArgumentError(
+                f"{record.path}: expected results of one folder, got those of the same job in {other}, too; "
+                "make tables of one folder at a time"
+            )
+
+
 def read_left_out(path: str | Path | None) -> list[LeftOut]:
     """Return what a file says was left out; nothing without a file."""
     if path is None or not Path(path).exists():

@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from texgs.config.compose import ONE_LIGHT
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import (
     DATA,
@@ -48,7 +49,7 @@ def datasets(records: Iterable[Record[Any]]) -> Table:
     )
     records = list(records)
     own = {record.dataset: record for record in of(VolumeResult, records)}
-    rendered: list[Record[Any]] = [*of(ViewsResult, records)]
+    rendered: list[Record[Any]] = [each for each in of(ViewsResult, records) if not is_of_sweep(each)]
     known = {record.dataset for record in rendered}
     given = [record for record in of(SheetResult, records) if record.dataset not in known]
     groups: dict[tuple[str, int, int, str], list[Record[Any]]] = defaultdict(list)
@@ -57,6 +58,12 @@ def datasets(records: Iterable[Record[Any]]) -> Table:
         groups[record.dataset, record.result.width, record.result.height, device].append(record)
     rows = [dataset_row(own.get(key[0]), group, key[3]) for key, group in groups.items()]
     return Table(caption, [*columns("datasets").values()], rows)
+
+
+def is_of_sweep(views: Record[Any]) -> bool:
+    """Return whether views are those of a variant of a sweep, which have a folder of their own."""
+    name = views.path.parent.name
+    return name.startswith("views-") and name != f"views{ONE_LIGHT}"
 
 
 def dataset_row(

@@ -127,6 +127,8 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     selection, planned = drawn(words, checksums)
     config, configs = compose(apart(words)[0]), selection.configs
     results = Path(config.results).as_posix()  # as the folders of the jobs have it
+    if results == ".":
+        raise ConfigError("results: expected a folder of its own, got the current one; choose another")
     others, outdated = earlier(results, planned, checksums)
     jobs = {folder: plain(job, results) for folder, job in planned.jobs.items()}
     note_results(planned.jobs.values(), [job["settings"] for job in jobs.values()])
