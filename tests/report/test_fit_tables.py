@@ -209,3 +209,12 @@ def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
     assert (first["basic scenes"], first["primitives"], first["texture MiB"]) == (2, 2000, 16.0)
     assert first["texture MiB (paper)"] == UNLIKE
     assert {row["data set"]: row for row in theirs}["wood"]["texture MiB"] == 114.5
+
+
+def test_no_mean_is_over_views_of_different_sizes(tmp_path):
+    for tf, pixels, psnr in (("TF01", 200, 40.0), ("TF02", 800, 20.0), ("TF03", 800, 30.0)):
+        result = FitResult(60.0, 9, psnr=psnr, width=pixels, height=pixels, train_views=92)
+        metrics(tmp_path, "texture", result, "scan", tf)
+    frame = fitting(records(tmp_path)).frame
+    assert sorted(frame["PSNR"]) == [25.0, 40.0]
+    assert sorted(frame["basic scenes"]) == [1, 2]

@@ -25,6 +25,7 @@ ALIKE = (
     "even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
 )
 DATA, LABEL = "data set", "recipe"  # titles of columns
+SEEN = "views"  # sizes and number, in rows: means are over fits of the same
 SCENES = Column("basic scenes", 0)
 Rows = Sequence[Mapping[str, Any]]
 
@@ -86,6 +87,7 @@ def cells(record: Record[Any], **more: Any) -> dict[str, Any]:
         LABEL: record.label,
         "rank": rank(record),
         "published": "" if record.stand_in else record.dataset,  # whose numbers stand beside
+        SEEN: tuple(getattr(record.result, key, 0) for key in ("width", "height", "train_views")),
         SOURCES: [record.path],
         **more,
     }
@@ -118,7 +120,7 @@ def beside_paper(
     titles = [column.title for column in columns.values()]
     theirs = paper(name, {"dataset": DATA, **keys}, dict(zip(columns, titles, strict=True)))
     theirs[SCENES.title] = [volumes()[dataset]["basic_scenes"] for dataset in theirs[DATA]]
-    ours = grouped(rows, (DATA, LABEL, *keys.values()), titles, is_sum)
+    ours = grouped(rows, (DATA, LABEL, SEEN, *keys.values()), titles, is_sum)
     if is_sum:
         counts = ours["published"].map(lambda name: volumes().get(name, {}).get("basic_scenes"))
         ours["alike"] &= ours[SCENES.title] == counts
