@@ -148,14 +148,14 @@ def test_tables_and_report_have_them(results, monkeypatch, capsys):
 def test_the_report_needs_no_other_file_and_takes_titles_as_text(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["report"]) == 2
-    assert "no metrics.json below results" in capsys.readouterr().err
+    assert "no whole results below results" in capsys.readouterr().err
     pse = [{"title": "a <b> edit", "psnr": 31.25, "ssim": 0.9}]
     record = {"stage": "pse", "dataset": "engine", "recipe": "quick", "variant": "", "seconds": 1.5}
     record |= {"versions": {"python": "3.11", "texgs": "1"}, "code_sha": "abc", "pictures": {}}
     numbers = {"pse": pse, "relight": [{"title": "light"}], "views": 6}
     (folder := tmp_path / "results" / "engine").mkdir(parents=True)
     (folder / "metrics.json").write_text(json.dumps({**record, "result": "PseResult", "numbers": numbers}))
-    assert main(["report"]) == 0
+    assert main(["report", str(folder / "metrics.json")]) == 0
     text = (tmp_path / "results" / "report.html").read_text()
     assert all(told in text for told in ("31.25", "a &lt;b&gt; edit", "not measured"))
     assert "http" not in text.replace("http-equiv", "")

@@ -100,7 +100,7 @@ def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
 def test_the_verb_reads_whole_results_of_a_folder_and_names_others(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["tables", "mine"]) == 2
-    assert "no metrics.json below mine" in capsys.readouterr().err
+    assert "no whole results below mine" in capsys.readouterr().err
     for name, psnr in (("views", None), ("fit", 40.0)):
         folder = Path("mine", "scan", "TF01", name)
         work = claim(folder, {"settings": name})

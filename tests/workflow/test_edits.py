@@ -81,7 +81,7 @@ def test_an_edit_reads_the_scene_of_its_base():
     assert files["scene"].parts[-3:] == ("edits", "lobe", "scene.yaml")
     assert files["views.TF02"].parts[-3:] == ("TF02", "views", "transforms_train.json")
     assert STAGES["edit_text"].output(config).parts[-2:] == ("edits", "crimson")
-    with pytest.raises(ConfigError, match="an edit is of a scene, with all basic TFs"):
+    with pytest.raises(ConfigError, match="leave out tf=TF01"):
         STAGES["edit_text"].inputs(compose(("dataset=engine", "edit=crimson", "tf=TF01")))
 
 

@@ -9,6 +9,7 @@ from texgs.config.project import ROOT
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.workflow.experiments import LeftOut, selected
 from texgs.workflow.locate import tf_names
+from texgs.workflow.plan import make
 from texgs.workflow.stage import fit_folder
 from texgs.workflow.stage_table import STAGES
 
@@ -199,3 +200,14 @@ def stages_of(config):
             for each in [replace(config, tf=name) for name in tf_names(config)] if stage.per_tf else [config]:
                 if stage.applies(each):
                     yield stage, each
+
+
+def test_edits_of_one_transfer_function_are_refused():
+    words = ("dataset=sphere", "fit=quick", "tf=TF01", "edits=[glass]")
+    with pytest.raises(ConfigError, match="tf: an edit is of a scene, with all basic TFs; leave out tf=TF01"):
+        make(words)
+
+
+def test_results_have_a_folder_of_their_own():
+    with pytest.raises(ConfigError, match="results: expected a folder of its own"):
+        make(("dataset=sphere", "fit=quick", "results=."))

@@ -82,7 +82,7 @@ def records_of(arguments: argparse.Namespace, verb: str) -> tuple[list[Record[An
         left_out += [LeftOut(entry.what, entry.why, places) for entry, places in outdated.items()]
     if not paths:
         where = ", ".join(map(str, arguments.metrics)) or "results"
-        raise ArgumentError(f"{verb}: no metrics.json below {where}; run something first, such as make demo")
+        raise ArgumentError(f"{verb}: no whole results below {where}; run something first, such as make demo")
     records, others = read_known(paths)
     require_apart(records)
     return records, [*left_out, *others]
