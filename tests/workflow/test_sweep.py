@@ -174,3 +174,8 @@ def test_a_file_with_a_variant_twice_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigError, match=r"conf/sweep/twice\.yaml:4: found duplicate key a"):
         compose(("sweep=twice",))
+
+
+def test_kinds_of_views_are_not_the_papers_sweep_over_their_number():
+    assert "sweep.name=kinds_of_views" in as_sweep(("dataset=sphere", "views=small,headlight"))
+    assert "sweep.name=frequency" in as_sweep(("dataset=sphere", "views.train.frequency=2,3"))

@@ -21,6 +21,7 @@ from texgs.edit.method import NO_METHOD
 OF_FITS = ("views", "fit", "device")  # groups of keys that change fits
 OF_EDITS = "edit"
 SEEDS = {"fit.seed": "seeds", "edit.seed": "edit_seeds"}  # keys of `sweep` with the values of others
+OF_NUMBERS, OF_KINDS = "views", "kinds_of_views"  # the paper's sweep over numbers, and views=ONE,OTHER
 ONLY_SEEDS = "seeds"  # name of a sweep over nothing else, and of its only variant
 ELSEWHERE = {  # keys whose values have a list of their own
     **{key: f"sweep.{listed}" for key, listed in SEEDS.items()},
@@ -61,6 +62,7 @@ def as_sweep(words: Words) -> Words:
     if chosen or not swept:
         return (*rest, *seeds)
     name = "-".join(key_of(word).rpartition(".")[2] for word in over) or ONLY_SEEDS
+    name = OF_KINDS if name == OF_NUMBERS else name
     listed = ",".join(map(quoted, over))
     return (*rest, *seeds, f"sweep.name={name}", f"sweep.over=[{listed}]")
 
