@@ -160,6 +160,16 @@ def test_cuts_without_looks_are_those_of_the_twin(page, scene, faces):
             assert compare(page, replace(scene, cuts=cuts, light=SIDE), mode=mode) > LEAST - 3
 
 
+def test_cuts_leave_materials_that_differ(page, scene):
+    """A volume has one: models with others are seen below faces, as in `texgs render`."""
+    name, entry = next(iter(scene.models.items()))
+    edited = replace(entry, edit=PartEdit(ambient=0.2, diffuse=0.1))
+    cut = replace(scene, models={**scene.models, name: edited}, cuts=CUTS, light=SIDE)
+    of_volume = frame(cut.open(), CAMERA, cut, "volume", Twin(cut))
+    assert closeness(of_volume, frame(cut.open(), CAMERA, cut, "shaded", Twin(cut))) < 35
+    assert compare(page, cut, mode="shaded") > 40
+
+
 def test_cuts_with_looks_have_faces_of_the_volume_over_the_models(page, scene, tmp_path):
     texture = write_texture(tmp_path / "look.safetensors", ball(1))
     models = {**scene.models, "low": replace(scene.models["low"], texture=texture)}
