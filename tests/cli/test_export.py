@@ -133,6 +133,15 @@ def test_a_mesh(scene, model, tmp_path, kind):
         assert vertices["red"].max() > 25
 
 
+def test_cuts_that_are_left_out_are_told(scene, tmp_path, capsys):
+    target = tmp_path / "x.ply"
+    assert export(scene, target) == 0
+    assert "cuts" not in capsys.readouterr().err
+    write_scene(scene, replace(read_scene(scene), cuts=Cuts(planes=[Plane([1.0, 0.0, 0.0])])))
+    assert export(scene, target) == 0
+    assert capsys.readouterr().err.strip() == f"{target}: its cuts are left out"
+
+
 @pytest.mark.parametrize("ending", READERS)
 def test_clouds_of_a_scene_and_of_its_models(scene, model, tmp_path, ending, capsys):
     cut = read_scene(scene)

@@ -137,3 +137,13 @@ def test_results_of_two_folders_are_not_mixed(tmp_path):
         shown.rename(paths[-1])
     with pytest.raises(ArgumentError, match=r"two/scan.*: expected results of one folder, got .*one/scan"):
         require_apart(read_known(paths)[0])
+
+
+def test_a_data_set_may_have_the_name_of_a_stage(tmp_path):
+    paths = []
+    for tf in ("TF01", "TF02"):
+        shown = metrics(tmp_path, "texture", FitResult(60.0, 9, psnr=40.0), "texture", tf)
+        paths.append(tmp_path / "results" / "texture" / tf / "texture" / METRICS)
+        paths[-1].parent.mkdir(parents=True)
+        shown.rename(paths[-1])
+    require_apart(read_known(paths)[0])

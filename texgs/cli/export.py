@@ -79,12 +79,12 @@ def run(arguments: argparse.Namespace) -> int:
     if kind in OF_CLOUDS:
         shown = as_scene(arguments, scene)
         print(export_scene(arguments.to, shown, export))
-        print(BAKED + uncut(shown), file=sys.stderr)
+        print("; ".join(filter(None, (BAKED, uncut(shown)))), file=sys.stderr)
         return 0
     if scene is not None and arguments.model is None:
         print(export_scene(arguments.to, scene, export))
-        if scene.cuts:
-            print("Its cuts are left out", file=sys.stderr)
+        if note := uncut(scene):
+            print(f"{arguments.to}: {note}", file=sys.stderr)
         return 0
     field = open_field(arguments.source) if scene is None else chosen(scene, arguments.model).open()[0]
     print(export_model(arguments.to, field, export))

@@ -98,11 +98,11 @@ def require_apart(records: Iterable[Record[Any]]) -> None:
     known: dict[tuple[str, ...], Path] = {}
     for record in records:
         parts = record.path.parts
-        depth = parts[::-1].index(record.dataset) + 1 if record.dataset in parts else len(parts)
-        if (other := known.setdefault(parts[-depth:], record.path)) != record.path:
+        place = parts[parts.index(record.dataset) :] if record.dataset in parts else parts
+        if (other := known.setdefault(place, record.path)) != record.path:
             raise ArgumentError(
                 f"{record.path}: expected results of one folder, got those of the same job in {other}, too; "
-                "make tables of one folder at a time"
+                "move one of them away, or give the files of one folder"
             )
 
 

@@ -25,7 +25,7 @@ ALIKE = (
     "even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
 )
 DATA, LABEL = "data set", "recipe"  # titles of columns
-SEEN = "views"  # sizes and number, in rows: means are over fits of the same
+SEEN = "seen"  # size and number of views, in rows: means are over fits of the same
 SCENES = Column("basic scenes", 0)
 Rows = Sequence[Mapping[str, Any]]
 

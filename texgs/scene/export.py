@@ -68,8 +68,8 @@ def require_export(field: Kind, kind: str) -> None:
 
 
 def uncut(scene: Scene) -> str:
-    """Return what is to be told behind a file of a scene: no kind holds cuts."""
-    return "; its cuts are left out" if scene.cuts else ""
+    """Return what is to be told of a file of a scene, if anything: no kind holds cuts."""
+    return "its cuts are left out" if scene.cuts else ""
 
 
 def export_scene(path: Path, scene: Scene, export: Export) -> Path:

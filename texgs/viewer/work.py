@@ -263,6 +263,6 @@ class Work:
         """Write a file, and tell its page where it is."""
         scene, name = page.shown(asked.view), Path(self._edits.name).stem
         path = await self._jobs.run(partial(self.downloads.write, scene, asked, name), watch)
-        left = "" if asked.kind in (*PAGES, *FILMS) else uncut(scene)
-        size = f"{path.stat().st_size / 2**20:.1f} MiB"
-        page.tell(f"{path.name}: {size}{left}", level="file", name=path.name)
+        told = [f"{path.stat().st_size / 2**20:.1f} MiB"]
+        told += [] if asked.kind in (*PAGES, *FILMS) else filter(None, [uncut(scene)])
+        page.tell(f"{path.name}: {', '.join(told)}", level="file", name=path.name)
