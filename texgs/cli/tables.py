@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.report.tables import tables_of
     from texgs.study.ballots import votes_beside
 
-    records, old = records_of(arguments, "tables")
+    records, old = records_of(arguments)
     for entry in old:
         print(f"Left out: {entry}", file=sys.stderr)
     given = given_tables(records, votes_beside(arguments.study))
@@ -58,7 +58,7 @@ def run_report(arguments: argparse.Namespace) -> int:
     from texgs.study.ballots import votes_beside
     from texgs.study.votes import shown
 
-    records, old = records_of(arguments, "report")
+    records, old = records_of(arguments)
     left_out, votes = [*read_left_out(arguments.missing), *old], votes_beside(arguments.study)
     given = given_tables(records, votes)
     more = {} if given["user_study"].is_empty else {"study": [shown(votes)]}
@@ -66,7 +66,7 @@ def run_report(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def records_of(arguments: argparse.Namespace, verb: str) -> tuple[list[Record[Any]], list[LeftOut]]:
+def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[LeftOut]]:
     """Read the metrics files that are given, or those of a folder; tell of those that are left out."""
     from texgs.core.checksum import Checksums
     from texgs.report.metrics_files import LeftOut, read_known, require_apart
@@ -82,7 +82,7 @@ def records_of(arguments: argparse.Namespace, verb: str) -> tuple[list[Record[An
         left_out += [LeftOut(entry.what, entry.why, places) for entry, places in outdated.items()]
     if not paths:
         where = ", ".join(map(str, arguments.metrics)) or "results"
-        raise ArgumentError(f"{verb}: no whole results below {where}; run something first, such as make demo")
+        raise ArgumentError(f"no whole results below {where}; run something first, such as make demo")
     records, others = read_known(paths)
     require_apart(records)
     return records, [*left_out, *others]
