@@ -108,7 +108,7 @@ def test_the_mean_alpha_is_that_of_what_is_seen(grid):
 
 def test_a_function_that_shows_nothing_is_told(small, grid):
     nothing = TransferFunction(((1e6, 0), (2e6, 1)), ((0, 1, 1, 1),))
-    with pytest.raises(ArgumentError, match="expected to see something of the volume, got nothing; raise"):
+    with pytest.raises(ArgumentError, match="expected to see enough of the volume, got little; raise"):
         list(now.fit_now(Caster(grid, LOOK), LOOK, nothing, LENS, "nothing"))
 
 

@@ -104,12 +104,20 @@ def restore(fit: ResumableFit, folder: Path) -> None:
         fit.restore(state)
 
 
+def noted_at(count: int, iteration: int, iterations: int) -> list[int]:
+    """Return the iterations of so many losses, the latest ones that a fit has noted until an iteration."""
+    last = iterations if iteration == iterations else iteration // CHECKED_EVERY * CHECKED_EVERY
+    number = -(-last // CHECKED_EVERY)
+    return [min((number - back) * CHECKED_EVERY, last) for back in reversed(range(count))]
+
+
 def _tell(fit: ResumableFit, n_told: int) -> int:
     """Tell who hears the losses from one on, with the PSNR of now at the last; return how many there are."""
     count = len(fit.losses)
     if count > n_told and has_curve_logger():
-        for index, loss in enumerate(fit.losses[n_told:], n_told + 1):
-            log_point({"loss": loss}, min(index * CHECKED_EVERY, fit.iterations))
+        places = noted_at(count, fit.iteration, fit.iterations)
+        for place, loss in [*zip(places, fit.losses, strict=True)][n_told:]:
+            log_point({"loss": loss}, place)
         if (psnr := fit.psnr()) is not None:
             log_point({"train_view_psnr": psnr}, fit.iteration)
     return count

@@ -83,13 +83,16 @@ def fit_now(
     """
     glances = [smaller(camera, GLANCE) for camera in icosphere(FREQUENCY, lens)[::HEADLIGHTS]]
     points = ends_of_rays(caster, look, tf, glances, seed)
+    if len(points.places) < LEAST:
+        raise ArgumentError("function: expected to see enough of the volume, got little; raise its opacity")
     effort = TRANSLUCENT if mean_alpha(caster, tf, glances[::HEADLIGHTS]) < MEAN_ALPHA else OPAQUE
     caster = caster.with_appearance(replace(look, step=effort.step))
     lit = lit_cameras(lens, seed)
     headlit = cast_views(caster, tf, lit[::HEADLIGHTS], f"{title}, headlit views")
     shading = ShadingModel(local_viewer=caster.local_viewer)
     factors = (look.ambient, look.diffuse, look.specular, look.shininess)
-    parameters = surfels_on(points, seed) | raw_material(*factors, kind=shading.material)
+    start = surfels_on(points, seed) | raw_material(*factors, kind=shading.material)
+    parameters = {name: x.to(caster.device) for name, x in start.items()}
     for number, images in enumerate(views_of_passes(caster, tf, headlit, lit, effort, title)):
         named = f"{title}, pass {number + 1}"
         model = Surfels(parameters, shading)
@@ -160,7 +163,7 @@ def ends_of_rays(
 ) -> Points:
     """Return where rays of random pixels lose some part of their light, another one in each view.
 
-    So there are as many ends on a layer as it shows, also behind others.
+    So there are as many ends on a layer as it shows, also behind others. They are on the CPU.
     """
     unlit = caster.with_appearance(replace(look, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
     generator = torch.Generator().manual_seed(seed)
@@ -170,10 +173,6 @@ def ends_of_rays(
         thick = thickened(tf, math.log(0.5) / math.log(left))  # half of its light is left where `left` was
         parts.append(ends_of(unlit, thick, camera, generator))
     points = Points(*map(torch.cat, zip(*parts, strict=True)))
-    if len(points.places) < LEAST:
-        raise ArgumentError(
-            "function: expected to see something of the volume, got nothing; raise its opacity"
-        )
     chosen = torch.randperm(len(points.places), generator=generator)[:SURFELS]
     ordered = chosen[z_order_of(points.places[chosen])]
     return Points(*(x[ordered] for x in points))
@@ -188,14 +187,13 @@ def thickened(tf: TransferFunction, factor: float) -> TransferFunction:
 def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: torch.Generator) -> Points:
     """Return where rays of random pixels of one view lose half of their light, as far as they do."""
     seen = caster.cast(tf, camera, HEADLIGHT, ("median", "normal"))
-    z: Tensor = seen.median  # type: ignore[assignment]
-    normals: Tensor = seen.normal  # type: ignore[assignment]
-    rows, columns = (seen.rgba[..., 3] > FAINT).nonzero(as_tuple=True)
+    z, normals, rgba = seen.median.cpu(), seen.normal.cpu(), seen.rgba.cpu()  # type: ignore[union-attr]
+    rows, columns = (rgba[..., 3] > FAINT).nonzero(as_tuple=True)
     some = torch.randperm(len(rows), generator=generator)[:PIXELS]
     rows, columns = rows[some], columns[some]
     ends = z[rows, columns] > 0
     at = rows[ends], columns[ends]
-    rgba = seen.rgba[at]
+    rgba = rgba[at]
     return Points(camera.unproject(z)[at], normals[at], (rgba[:, :3] / rgba[:, 3:]).clamp(0, 1))
 
 

@@ -184,9 +184,9 @@ def most_seen(
 @torch.no_grad()
 def shown(model: Surfels, images: Images) -> Tensor:
     """Sum the blending weights [N] of each surfel over all pixels of all views."""
-    total = torch.zeros(len(model))
+    total = torch.zeros(len(model), device=model.device)
     for camera, light in zip(images.cameras, images.lights, strict=True):
-        statistics = model.render(camera, light, outputs=("statistics",)).statistics
+        statistics = model.render(camera.to(model.device), light, outputs=("statistics",)).statistics
         total += statistics.weight_sum  # type: ignore[union-attr]
     return total
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn.functional import normalize
@@ -31,6 +32,7 @@ ROUNDS = 3  # through all views: a part of one would bend surfels towards the vi
 SLOWER = 0.3  # times the rates of surfels that start anywhere
 RATES = Rates(**{name: SLOWER * getattr(RATES_OF_SEEDS, name) for name in UNITS}, material=0.0)
 SHARE = 0.1  # of all surfels: so many of those that show least are planted where most is missing
+FEWEST = 4  # surfels to plant: of fewer the size is not known, see `surfels_at`
 HIDDEN = -12.0  # raw opacity of surfels where nothing is to be seen
 FARTHEST, STRETCH = 0.05, 2.0  # world units at which the ends of axes are carried; and how much they stretch
 
@@ -53,7 +55,7 @@ class Follower:
         if "ambient" not in key.parameters:
             raise ArgumentError(f"model: expected stage shading or texture, got {key.stage}; fit it further")
         self._shading, self._look, self._tf = key.shading, look, tf
-        self._texture = plain_texture(key)
+        self._texture = plain_texture(key.to("cpu"))
 
     def step(self, model: Surfels, before: Grid, after: Grid, title: str, seed: int = 0) -> Surfels:
         """Return the model of a step, whose volume is `after`, from that of a step beside it.
@@ -61,25 +63,24 @@ class Follower:
         Titles are those of progress bars. The seed is that of lights, planted surfels and the order of views:
         another one for each step. Volumes on different lattices are refused.
         """
-        if (after.dims, after.spacing) != (before.dims, before.spacing):
+        if after.dims != before.dims or not np.allclose(after.spacing, before.spacing):
             raise ArgumentError(
                 f"expected the samples of the other steps, {before.dims} with spacing {before.spacing}, got "
                 f"{after.dims} with {after.spacing}; resample the volume"
             )
-        p = model.parameters
+        p, device = model.to("cpu").parameters, model.device
         lens = lens_of(after, self._tf)
         if lens is None:
-            hidden = torch.full_like(p["opacities"], HIDDEN)
-            return replace(model, parameters={**p, "opacities": hidden})
+            hidden = torch.full_like(model.parameters["opacities"], HIDDEN)
+            return replace(model, parameters={**model.parameters, "opacities": hidden})
         plain = {name: x for name, x in p.items() if name not in TEXTURE}
         plain["colors"] = plain["colors"] + self._texture
         if lens_of(before, self._tf):
             plain = carried(plain, motion(before, after, self._tf))
-        fitted = self._fitted(
-            plain, Caster(after, replace(self._look, step=STEP), model.device), lens, title, seed
-        )
-        fitted["colors"] = fitted["colors"] - self._texture
-        return replace(model, parameters={**p, **fitted})
+        caster = Caster(after, replace(self._look, step=STEP), device)
+        fitted = self._fitted(plain, caster, lens, title, seed)
+        fitted["colors"] = fitted["colors"] - self._texture.to(device)
+        return replace(model, parameters={**model.parameters, **fitted})
 
     def _fitted(
         self, plain: Mapping[str, Tensor], caster: Caster, lens: Lens, title: str, seed: int
@@ -88,8 +89,8 @@ class Follower:
         images = cast_views(caster, self._tf, lit_cameras(lens, seed), f"{title}, views")
         glances = [smaller(camera, 2) for camera in images.cameras[::HEADLIGHTS]]
         points = ends_of_rays(caster, self._look, self._tf, glances, seed)
-        weights = shown(Surfels(plain, self._shading), images[::HEADLIGHTS])
-        model = Surfels(planted(plain, points, weights, seed), self._shading)
+        weights = shown(Surfels(plain, self._shading).to(caster.device), images[::HEADLIGHTS]).cpu()
+        model = Surfels(planted(plain, points, weights, seed), self._shading).to(caster.device)
         return refined(model, images, ROUNDS * len(images), RATES, seed, title)
 
 
@@ -149,6 +150,8 @@ def planted(
 
     n = len(weights)
     count = min(max(int(SHARE * n), int((weights <= 0).sum())), len(points.places))
+    if count < FEWEST:  # matter that is about to come or go
+        return {**parameters}
     least = weights.argsort()[:count]
     kept = torch.ones(n, dtype=torch.bool).index_fill_(0, least, False)
     distances, _ = cKDTree(parameters["means"][kept].numpy()).query(points.places.numpy())

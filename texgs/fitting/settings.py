@@ -52,7 +52,9 @@ class Densify:
         2e-4, "mean screen-space gradient, half image widths, that clones or splits", least=0
     )
     size: float = key(0.01, "scale, in extents, above which one is split, not cloned", least=0)
-    cap: int | None = key(30000, "surfels or Gaussians at most; null: as many as it takes", least=1)
+    cap: int | None = key(
+        30000, "surfels or Gaussians that density control adds to at most; null: no limit", least=1
+    )
     prune_opacity: float = key(0.005, "what has less opacity is removed", least=0)
     prune_size: float = key(0.1, "what has a larger scale, in extents, is removed", least=0)
     prune_size_from: int = key(0, "iteration after which what is too large is removed", least=0)
@@ -64,7 +66,9 @@ class Phase:
     """One run of the loop."""
 
     iterations: int = key(0, "iterations, each of one view", least=0)
-    sh_degree: int = key(3, "degree of the spherical harmonics, in the phase without shading", least=0)
+    sh_degree: int = key(
+        3, "degree of the spherical harmonics, in the phase without shading", least=0, most=3
+    )
     sh_every: int = key(1000, "iterations between degrees", least=1)
     turns_normals: bool = key(True, "shading has gradients into normals; in the release it has none")
     rates: Rates = key(Rates, "learning rates")
@@ -83,7 +87,7 @@ class Seeds:
         "auto", "where seeds are; auto: points of the views if there are any, else visible", choices=SEEDS
     )
     count: int = key(10000, "number of seeds; given points are taken as they are", least=1)
-    opacity: float = key(0.1, "opacity of each seed", least=0)
+    opacity: float = key(0.1, "opacity of each seed", above=0, below=1)
     half_size: float | None = key(
         None,
         "half the side of the cube of seeds, in halves of the data's longest side; default the data's box",

@@ -34,7 +34,7 @@ class Options:
     reference; at least 1e-6 for gradients of the median depth: fainter fragments vanish in float32."""
     transmittance_min: float = 1e-4
     """A pixel ends before the fragment that would leave less light than this."""
-    near: float = 0.2
+    near: float = 0.01
     """What is not farther than this camera z is skipped: surfels and 3D Gaussians by their mean, fragments of
     surfels by their intersection (the low-pass filter may still draw them). World units."""
     far: float = 100.0

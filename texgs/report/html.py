@@ -86,12 +86,14 @@ def loss_figures(records: Sequence[Record[Any]]) -> list[Figure]:
 
 def curves(phases: Sequence[Record[FitResult]]) -> Image.Image:
     """Draw losses over iterations, a curve for each phase of each basic TF."""
+    from texgs.fitting.checkpoint import noted_at
+
     figure = new_figure(8, 3.2, 120)
     axes = figure.subplots()
     axes.set(xlabel="iterations", ylabel="loss of one view")
     for phase in phases:
         losses, total = phase.result.losses, phase.result.iterations
-        steps = [total * (index + 1) / len(losses) for index in range(len(losses))]
+        steps = noted_at(len(losses), total, total)
         axes.semilogy(steps, losses, label=words(f"{phase.tf} {phase.label} {phase.stage}"))
     axes.legend(fontsize=7)
     return as_picture(figure)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.core.errors import ArgumentError
+from texgs.fields.part_edit import PartEdit
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 
 Entry = SceneModel | SceneSegment
@@ -58,6 +59,9 @@ def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
     return replace(scene, models={**scene.models, model: entry})
 
 
+HIGHLIGHTS = ("specular", "shininess", "tint")  # values of a `PartEdit` that are of a material
+
+
 @dataclass(frozen=True)
 class NewLook:
     """What a new look changes about a part."""
@@ -69,11 +73,13 @@ class NewLook:
 def with_looks(scene: Scene, looks: Mapping[str, NewLook]) -> Scene:
     """Return the scene with new looks of some of its parts.
 
-    Their palettes go back to the fitted ones, which texels were made for.
+    Their palettes go back to the fitted ones, which texels were made for. Where a part had another look
+    already, its highlights go back, too: they may be those of the material that this look was.
     """
     for part, look in looks.items():
         entry = entry_of(scene, part)
-        edit = replace(entry.edit, **{"palette": None, **look.edit})
+        taken_back = ("palette", *HIGHLIGHTS) if entry.texture else ("palette",)
+        edit = replace(entry.edit, **{key: getattr(PartEdit, key) for key in taken_back} | {**look.edit})
         scene = replaced(scene, part, replace(entry, texture=look.texture, edit=edit))
     return scene
 

@@ -78,7 +78,7 @@ class Caster:
         self._diagonal = 2 * hypot(*self._half)
         self._voxel = min(2 * side / (size - 1) for side, size in zip(self._half, grid.dims, strict=True))
         # With the number of the GPU, whichever is the current one later.
-        self._device = torch.empty(0, device=device).device
+        self.device = torch.empty(0, device=device).device
         self._channels = dict[int, tuple[native.Struct, Tensor]]()  # that were shown, of all copies
         self._prepared = list[Prepared]()  # the last, of all copies
         if not grid.others:
@@ -118,10 +118,10 @@ class Caster:
         require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
         self._check(camera)
         _, prepared, _kept = self._prepare([tf] if isinstance(tf, TransferFunction) else [*tf])
-        matrices = [x.float().to(self._device).contiguous() for x in (camera.viewmat, camera.K)]
+        matrices = [x.float().to(self.device).contiguous() for x in (camera.viewmat, camera.K)]
         shapes = {"rgba": (height, width, 4), "normal": (height, width, 3)}
         seen = {
-            name: torch.empty(shapes.get(name, (height, width)), device=self._device)
+            name: torch.empty(shapes.get(name, (height, width)), device=self.device)
             for name in ("rgba", *outputs)
         }
         look = self._appearance
@@ -133,7 +133,7 @@ class Caster:
             **self._cut(camera, depth_range, faces),
             unlit_faces=not lit_faces,
         )
-        native.call("texgs_cast", *prepared, view, device=self._device)
+        native.call("texgs_cast", *prepared, view, device=self.device)
         return Cast(**seen)
 
     def _cut(self, camera: Camera, depth_range: Tensor | None, faces: CutRange | None) -> dict[str, Any]:
@@ -145,7 +145,7 @@ class Caster:
         if faces is not None:
             check.shape("faces.face", faces.face, size)
             cut |= {"face": faces.face, "planes": faces.normals}
-        on_device = {name: x.to(self._device).contiguous() for name, x in cut.items()}
+        on_device = {name: x.to(self.device).contiguous() for name, x in cut.items()}
         return {**on_device, "n_planes": len(faces.normals) if faces else 0}
 
     def _check(self, camera: Camera) -> None:
@@ -171,10 +171,10 @@ class Caster:
     def _shown(self, tf: TransferFunction) -> tuple[native.Struct, native.Struct, Tensor]:
         """Return a function's channel, the function, and how far bricks are from one that it shows."""
         volume, extremes = self._channel(tf.channel)
-        points = points_of(tf).to(self._device)
+        points = points_of(tf).to(self.device)
         transfer = NativeTransfer(len(points), points)
-        distance = torch.zeros(len(extremes) + PADDING, dtype=torch.uint8, device=self._device)
-        native.call("texgs_volume_distance", volume, extremes, transfer, distance, device=self._device)
+        distance = torch.zeros(len(extremes) + PADDING, dtype=torch.uint8, device=self.device)
+        native.call("texgs_volume_distance", volume, extremes, transfer, distance, device=self.device)
         return volume, transfer, distance
 
     def _channel(self, number: int) -> tuple[native.Struct, Tensor]:
@@ -185,14 +185,14 @@ class Caster:
             kind = "uint8" if values.dtype == bool else values.dtype.name
             if kind not in TYPES:
                 raise ArgumentError(f"volume: expected samples of {', '.join(TYPES)} or bool, got {kind}")
-            samples = bytes_of(values).to(self._device)
+            samples = bytes_of(values).to(self.device)
             volume = NativeVolume(samples, TYPES.index(kind), grid.dims, tuple(self._half))
-            count_bricks = native.function(native.library(self._device.type), "texgs_volume_bricks")
+            count_bricks = native.function(native.library(self.device.type), "texgs_volume_bricks")
             bricks = count_bricks(volume, (c_int32 * 3)())
             require_memory(8 * bricks, "a volume's bricks", "crop it, or reduce it by dataset.volume.reduce")
-            extremes = torch.empty(bricks, 2, device=self._device)
-            missing = torch.zeros(1, dtype=torch.int64, device=self._device)
-            native.call("texgs_volume_extremes", volume, extremes, missing, device=self._device)
+            extremes = torch.empty(bricks, 2, device=self.device)
+            missing = torch.zeros(1, dtype=torch.int64, device=self.device)
+            native.call("texgs_volume_extremes", volume, extremes, missing, device=self.device)
             self._channels[number] = volume, extremes
         return self._channels[number]
 

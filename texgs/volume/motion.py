@@ -77,7 +77,8 @@ def shown_image(grid: Grid, tf: TransferFunction, low: np.ndarray, high: np.ndar
     ranges = shown_values(tf)
     least, most = float(ranges[0][0]), float(ranges[-1][1])
     box = tuple(slice(*ends) for ends in zip(low[::-1], high[::-1], strict=True))
-    values = np.nan_to_num(grid.values[box].astype(np.float32), nan=least, posinf=most, neginf=least)
+    shown = grid.channel(tf.channel).values[box].astype(np.float32)
+    values = np.nan_to_num(shown, nan=least, posinf=most, neginf=least)
     image = sitk.GetImageFromArray(((values - least) / (most - least)).clip(-BELOW, 1))
     image.SetOrigin(low.astype(float).tolist())
     blocks = [-(-size // MOST) for size in image.GetSize()]

@@ -19,7 +19,7 @@ from texgs.fields.surfels.step_file import at_step, write_step
 from texgs.fitting.series import Follower
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
-from texgs.scene.series_file import Series, read_series, write_series
+from texgs.scene.series_file import MOST, Series, read_series, write_series
 from texgs.scene.twin import SceneVolume, volume_of
 from texgs.volume.framing import shown_corners, smallest_ball
 from texgs.volume.headers import NRRD
@@ -30,7 +30,12 @@ from texgs.workflow.stages.volume import prepared, source
 
 
 def make_series(
-    scene: Scene, files: Sequence[Path], folder: Path, device: torch.device, settings: Volume | None = None
+    scene: Scene,
+    files: Sequence[Path],
+    folder: Path,
+    device: torch.device,
+    settings: Volume | None = None,
+    seed: int = 0,
 ) -> Path:
     """Follow the models of a scene through a series of volumes, and write a scene of all steps.
 
@@ -58,7 +63,7 @@ def make_series(
     for name, entry in scene.models.items():
         with located(f"models.{name}"):
             for order in (range(start, len(moments)), range(start, -1, -1)):
-                follow(series, name, entry, volume, order, device)
+                follow(series, name, entry, volume, order, device, seed)
     seen = [shown_corners(open_grid(series.volume(step)), volume.tfs.values()) for step in steps]
     whole = replace(scene, series=series, frame=smallest_ball(np.concatenate(seen)))
     return write_scene(folder / SCENE, whole.at(start))
@@ -92,7 +97,7 @@ def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, v
             if not target.exists():
                 own = settings if moment.time is None else replace(settings, time=moment.time)
                 write_summaries(target, prepared(settings, [source(own, moment.file)], target), [""])
-            elif moment.file is not None and moment.file.stat().st_mtime > target.stat().st_mtime:
+            elif moment.file is not None and changed_at(moment.file) > target.stat().st_mtime:
                 raise ArgumentError(
                     f"{moment.file} has changed since {target} was made of it; remove {target.parent}, or "
                     "choose another folder"
@@ -103,6 +108,12 @@ def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, v
                     f"expected {grid.dims} samples with spacing {grid.spacing} as of the scene's volume, got "
                     f"{other.dims} with {other.spacing}; resample the file"
                 )
+
+
+def changed_at(path: Path) -> float:
+    """Return when a file, or the latest one below a folder, was changed, in seconds."""
+    files = [path, *path.rglob("*")] if path.is_dir() else [path]
+    return max(each.stat().st_mtime for each in files)
 
 
 def settings_of(file: Path) -> Volume:
@@ -117,7 +128,13 @@ def settings_of(file: Path) -> Volume:
 
 
 def follow(
-    series: Series, name: str, entry: SceneModel, volume: SceneVolume, order: range, device: torch.device
+    series: Series,
+    name: str,
+    entry: SceneModel,
+    volume: SceneVolume,
+    order: range,
+    device: torch.device,
+    seed: int,
 ) -> None:
     """Make the files of a model's steps that are missing, in an order that begins with its own step."""
     key = replace(entry, texture=None, segments={}, step=None).surfels()[0]
@@ -128,6 +145,8 @@ def follow(
             if step != order[0]:
                 follower = follower or Follower(key.to(device), volume.appearance, volume.tfs[name])
                 grids = [open_grid(series.volume(each)) for each in (before, step)]
-                model = follower.step(model.to(device), grids[0], grids[1], f"{name}, step {step}", step)
+                drawn = seed * MOST + step  # another one for each
+                title = f"{name}, step {step}"
+                model = follower.step(model.to(device), grids[0], grids[1], title, drawn)
             write_step(file, key, model.to("cpu"), {"file": series.steps[step]})
         model, before = at_step(key, file), step

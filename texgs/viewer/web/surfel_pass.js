@@ -9,7 +9,7 @@ import { Target } from "./target.js";
 
 const BEYOND = 1e9; // a depth that nothing has
 
-export const NEAR = 0.2; // camera z, world units, as the rasterizer has it
+export const NEAR = 0.01; // camera z, world units, as the rasterizer has it
 
 export class SurfelPass {
   /**

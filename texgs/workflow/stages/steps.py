@@ -55,7 +55,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     device, is_whole = torch_device(settings.fit.device), not (output / "series.json").exists()
     files = [path for name, path in inputs.items() if name.startswith(STEP)]
     start = time.monotonic()
-    file = make_series(read_scene(inputs["scene"]), files, output, device, settings.volume)
+    file = make_series(read_scene(inputs["scene"]), files, output, device, settings.volume, settings.fit.seed)
     seconds = time.monotonic() - start
     scene = read_scene(file)
     steps, lens = len(scene.timeline.steps), settings.views.lens(scene.frame)
