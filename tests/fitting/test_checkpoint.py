@@ -116,3 +116,12 @@ def test_curves_are_told_while_a_fit_runs_and_change_no_bit(tmp_path):
     assert list(quality) == [150, 200, 210]
     assert 5 < quality[150] <= quality[210] + 1 < 60
     assert_same(fits[1].parameters, fits[0].parameters)
+
+
+@pytest.mark.parametrize(
+    ("count", "iteration", "places"),
+    [(3, 3010, [2900, 3000, 3010]), (2, 450, [300, 400]), (1, 100, [100]), (2, 200, [100, 200])],
+)
+def test_losses_are_of_the_latest_iterations_that_were_looked_at(count, iteration, places):
+    """The stages of a fit that note none may come first."""
+    assert checkpoint.noted_at(count, iteration, 3010 if iteration > 200 else 200) == places

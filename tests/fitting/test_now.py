@@ -15,7 +15,9 @@ from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT
 from texgs.fitting import now
 from texgs.volume.caster import Caster
+from texgs.volume.framing import frame_of
 from texgs.volume.generate import sphere
+from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 
 LENS = Lens(3.0, 30.0, 64, 64)
@@ -116,3 +118,17 @@ def test_the_same_seed_gives_the_same_model(small, grid):
     tf, caster = of_range(HIGH, grid), Caster(grid, LOOK)
     one, other = (next(now.fit_now(caster, LOOK, tf, LENS, "sphere", seed=3)) for _ in range(2))
     assert all(torch.equal(x, other.parameters[name]) for name, x in one.parameters.items())
+
+
+def test_a_speck_whose_camera_is_close_is_seen_by_its_model(small):
+    """A frame around a ball of radius 0.03 is 0.13 away, nearer than the near plane of 2DGS."""
+    places = torch.linspace(-0.5, 0.5, 101)
+    square = sum(x.square() for x in torch.meshgrid(places, places, places, indexing="ij"))
+    grid = Grid((-square / (2 * 0.012**2)).exp().numpy(), (1.0, 1.0, 1.0))
+    tf = TransferFunction(((0.3, 0), (0.6, 0.9), (1, 0.9)), ((0, 1, 0.5, 0), (1, 1, 0.5, 0)))
+    caster, lens = Caster(grid, LOOK), frame_of(grid, [tf]).lens(width=64, height=64)
+    assert lens.radius < 0.2
+    model = next(iter(now.fit_now(caster, LOOK, tf, lens, "speck")))
+    camera = orbit(17, 23, *lens)
+    truth = caster.cast(tf, camera, HEADLIGHT).rgba[..., 3]
+    assert float(model.render(camera).alpha.mean()) > 0.8 * float(truth.mean()) > 0.05

@@ -133,3 +133,22 @@ def test_other_lattices_and_models_without_shading_are_refused(key):
     early = replace(model, parameters={**p, "sh": torch.zeros(len(model), 1, 3)})
     with pytest.raises(ArgumentError, match="expected stage shading or texture, got surfels"):
         Follower(early, LOOK, TF)
+
+
+def test_matter_that_is_about_to_go_or_come_does_not_end_a_series(key):
+    """Of a peak just within what the function shows, a view sees hardly a pixel."""
+    model, before = key
+    faint = blob((0, 0, 0), scale=0.203)
+    follower = Follower(model, LOOK, TF)
+    almost = follower.step(model, before, faint, "ball", 1)
+    assert float(almost.render(orbit(17, 23, 3.0, 30.0, 64, 64)).alpha.mean()) < 0.02
+    back = follower.step(almost, faint, before, "ball", 2)
+    assert psnr(back, before) > psnr(almost, before) + 2
+
+
+def test_spacings_that_differ_by_rounding_are_the_same(key):
+    model, before = key
+    after = blob(WAY)
+    rounded = replace(after, spacing=tuple(step * (1 + 1e-9) for step in after.spacing))
+    one, other = (Follower(model, LOOK, TF).step(model, before, each, "b", 3) for each in (after, rounded))
+    torch.testing.assert_close(one.parameters["means"], other.parameters["means"], atol=1e-3, rtol=0)

@@ -11,6 +11,7 @@ from tests.scene.test_twin import LOW, sphere_volume
 from texgs.core.cuts import Box, Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.changes import apply_all
@@ -195,6 +196,17 @@ def test_several_looks_are_one_step(session, tmp_path):
     with pytest.raises(ArgumentError, match="expected a texture of this model"):
         session.set_looks({name: NewLook(file) for name, file in files.items()})
     assert session.scene.models["left"].texture is None
+
+
+def test_a_look_takes_the_highlights_of_the_one_before_back(session, tmp_path):
+    (name, *_), files = session.scene.models, [write_texture(tmp_path / f"t{k}", ball(1)) for k in (1, 2)]
+    session.set(name, "specular", 3.0)
+    session.set(name, "opacity", 0.5)
+    session.set_looks({name: NewLook(files[0])})
+    assert session.scene.models[name].edit.specular == 3.0  # the user's own
+    session.set_looks({name: NewLook(files[1], {"specular": 9.0, "tint": (1.0, 0.8, 0.3)})})
+    session.set_looks({name: NewLook(files[0])})
+    assert session.scene.models[name].edit == PartEdit(opacity=0.5)
 
 
 def test_a_segment_that_is_renamed_keeps_its_place_and_edits(session, tmp_path):

@@ -1,5 +1,7 @@
 """Registered motion against volumes that were moved by a known one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -69,3 +71,12 @@ def test_missing_samples_do_not_spread():
     moves = motion(before, after, TF)
     assert bool(moves.displacements.isfinite().all())
     assert float(moves.at(torch.tensor([[0.15, 0, 0]]))[0, 0]) == pytest.approx(0.04, abs=0.01)
+
+
+def test_the_channel_of_the_function_moves():
+    still, way = blob((0, 0, 0)), (0.08, 0, 0)
+    before = replace(still, others=(still.values,))
+    after = replace(still, others=(blob(way).values,))
+    moves = motion(before, after, replace(TF, channel=1))
+    assert float(moves.at(torch.tensor([[0.12, 0.0, 0.0]]))[0, 0]) > 0.06
+    assert float(motion(before, after, TF).displacements.abs().max()) < 1e-5

@@ -322,6 +322,19 @@ def test_folders_of_slices_are_steps(folder):
     )  # of a shell, in any order
 
 
+def test_slices_that_have_changed_are_refused(folder):
+    """A folder does not change with what is in its files."""
+    names = ["visit_1", "visit_2", "visit_3"]
+    for name, place in zip(names, PLACES, strict=True):
+        write_dicom(folder / name, place)
+    prepare(open_source(folder / names[1]), folder / "volume.nrrd")
+    files = [folder / name for name in names]
+    make_series(read_scene("scene.yaml"), files, folder / "s", CPU)
+    os.utime(next(files[2].iterdir()), (2**32, 2**32))
+    with pytest.raises(ArgumentError, match=r"visit_3 has changed since .*volume-00002.nrrd was"):
+        make_series(read_scene("scene.yaml"), files, folder / "s", CPU)
+
+
 def test_slices_in_folders_of_folders(folder):
     for visit, place in zip((2, 10, 18), PLACES, strict=True):
         write_dicom(folder / f"visit_{visit}" / "ct", place)

@@ -3,7 +3,6 @@
 import torch
 from torch import Tensor
 
-from texgs.core.errors import FitError
 from texgs.core.geometry import quats_to_matrices
 from texgs.fields.optimizer import Optimizer
 from texgs.fitting.settings import Densify
@@ -64,13 +63,7 @@ class DensityControl:
         clones = {name: x[chosen & ~is_split] for name, x in rows.items()}
         children = self._children({name: x[is_split] for name, x in rows.items()}, generator)
         added = {name: torch.cat([clones[name], children[name]]) for name in rows}
-        kept = alive & ~is_split
-        if n and not len(added["means"]) and not bool(kept.any()):
-            raise FitError(
-                f"iteration {iteration}: density control would remove all of {n}; lower "
-                "densify.prune_opacity, or raise densify.prune_size"
-            )
-        optimizer.edit_rows(n, kept, added)
+        optimizer.edit_rows(n, alive & ~is_split, added)
         self._clear(len(optimizer.parameters["means"]), largest.device)
 
     def _chosen(self, alive: Tensor) -> Tensor:
