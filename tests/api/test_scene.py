@@ -269,3 +269,57 @@ def test_interface_lists_what_it_has():
     assert {"Volume", "open", "Scene"} <= set(texgs.__all__)
     with pytest.raises(AttributeError, match="has no attribute 'opne'"):
         texgs.opne  # noqa: B018
+
+
+# ---- Numbers of NumPy, steps and options --------------------------------------
+
+
+def test_numbers_of_numpy_are_numbers(scene, tmp_path):
+    part = scene["TF01"]
+    part.opacity, part.specular, part.shininess = np.float64(0.5), np.float32(0.25), np.int64(2)
+    part.palette = np.array([0.1, 0.2, 0.3])
+    scene.light = np.array([10, 20])
+    scene.background = (np.float32(0.5), np.float64(0.5), 1)
+    again = texgs.open(scene.save(tmp_path / "copy"))
+    edit = again.session.scene.models["TF01"].edit
+    assert (edit.opacity, edit.specular, edit.shininess, edit.palette) == (0.5, 0.25, 2, (0.1, 0.2, 0.3))
+    assert again.light == Light("directional", 10.0, 20.0)
+    assert again.background == (0.5, 0.5, 1.0)
+
+
+def test_words_are_one_step_or_none(scene):
+    scene.edit("TF01.opacity=0.7", "light=10,20", "background=#000000")
+    assert len(scene.session.past) == 1
+    scene.undo()
+    assert (scene["TF01"].opacity, scene.light, scene.background) == (
+        1.0,
+        Light("headlight"),
+        (1.0, 1.0, 1.0),
+    )
+    with pytest.raises(ArgumentError, match=r"TF01\.opacity=-3: "):
+        scene.edit("TF01.specular=0.5", "TF01.opacity=-3")
+    assert scene["TF01"].specular == 1.0
+    assert scene.redo()  # a word that is wrong takes nothing from the history
+    assert scene["TF01"].opacity == 0.7
+    scene.edit()
+    assert len(scene.session.past) == 1
+
+
+@pytest.mark.parametrize(
+    ("file", "options", "message"),
+    [
+        ("a.html", {"size": 1}, "options of html: no such key 'size'; expected steps, volume"),
+        ("a.html", {"volume": 1.0}, "volume: expected the volume that the scene was made from, got none"),
+        ("a.ply", {"voxels": 1}, "options of 3dgs: no such key 'voxels', did you mean voxel?"),
+    ],
+)
+def test_options_of_exports_are_checked(scene, tmp_path, file, options, message):
+    with pytest.raises(ArgumentError) as error:
+        scene.export(tmp_path / file, **options)
+    assert message in str(error.value)
+    assert not (tmp_path / file).exists()
+
+
+def test_a_picture_that_is_none_is_told(scene):
+    with pytest.raises(ArgumentError, match=r"picture: expected a name, .* got \[4, 4, 3\] of float64"):
+        scene.style(np.zeros((4, 4, 3)))

@@ -183,7 +183,7 @@ def test_at_the_end_of_a_cell_there_are_facts_and_a_picture():
 
 
 def test_functions_and_light_are_checked():
-    with pytest.raises(ArgumentError, match="spacign: only for files; leave them out"):
+    with pytest.raises(ArgumentError, match="spacign: only for files of some formats; leave them out"):
         texgs.Volume(field(8, 8, 8), spacign=2)
     volume = texgs.Volume(field(8, 8, 8))
     with pytest.raises(ArgumentError, match="count: expected at least 1, got 0"):
@@ -196,3 +196,73 @@ def test_functions_and_light_are_checked():
         volume.render(RED, light="sun")
     with pytest.raises(ArgumentError, match="width: expected at least 1 pixel, got 0"):
         volume.render(RED, width=0)
+
+
+def test_masked_samples_are_missing():
+    values = np.ma.masked_greater(field(5, 6, 7), 0.9)
+    values.data[values.mask] = 9.96921e36  # netCDF's fill value
+    with pytest.raises(ArgumentError, match=r"expected finite samples, got \d+ that are NaN or infinite"):
+        texgs.Volume(values)
+    kept = texgs.Volume(values, nan_value=np.float64(-1)).grid.values
+    assert np.array_equal(kept, values.filled(-1))
+    whole = np.ma.masked_array(field(5, 6, 7))  # nothing is masked
+    assert np.array_equal(texgs.Volume(whole).grid.values, whole.data)
+
+
+def test_image_data_that_are_a_part_of_others_keep_their_place():
+    image = pyvista.ImageData(dimensions=(5, 6, 7), spacing=(1, 2, 3), origin=(10, 20, 30), offset=(5, 5, 5))
+    image.point_data["a"] = field(7, 6, 5).ravel()
+    volume = texgs.Volume(image)
+    assert volume.grid.origin == (15, 30, 45)
+
+
+@pytest.mark.parametrize(
+    ("data", "keys", "message"),
+    [
+        (field(4, 4, 4), {"spacing": 2}, "spacing: expected three numbers x, y, z, got 2"),
+        (field(4, 4, 4), {"nan_value": "0"}, "nan_value: expected a finite float32, got 0"),
+        ([[1, 2], [3]], {}, r"data: expected an array \[Z, Y, X\], got list"),
+        (
+            1e9 + field(4, 4, 4).astype(float) / 1e3,
+            {},
+            "expected samples that differ as float32, got all near",
+        ),
+        (np.ones((4, 4, 4)), {}, "expected a field that varies, but every sample is 1"),
+    ],
+)
+def test_mistakes_are_told_in_a_sentence(data, keys, message):
+    with pytest.raises(ArgumentError, match=message):
+        texgs.Volume(data, **keys)
+
+
+def test_a_volume_is_cropped_and_reduced():
+    values = field(8, 8, 8)
+    volume = texgs.Volume(values, crop=(0, 8, 0, 8, 2, 6), reduce=2)
+    wanted = values[2:6].reshape(2, 2, 4, 2, 4, 2).mean(axis=(1, 3, 5))
+    assert np.allclose(volume.grid.values, wanted)
+    assert np.array_equal(
+        texgs.Volume(values, reduce=2, method="sample").grid.values, values[1::2, 1::2, 1::2]
+    )
+
+
+def test_a_folder_holds_one_volume(tmp_path):
+    one = texgs.Volume(field(4, 5, 6), folder=tmp_path)
+    again = texgs.Volume(field(4, 5, 6), folder=tmp_path)
+    assert np.array_equal(one.grid.values, again.grid.values)
+    for other, keys in ((field(4, 5, 7), {}), (one.file, {"up": "+z"})):
+        with pytest.raises(
+            ArgumentError, match=r"folder: expected one without another volume, got .*volume.nrrd"
+        ):
+            texgs.Volume(other, folder=tmp_path, **keys)
+    assert np.array_equal(open_grid(one.file).values, field(4, 5, 6))
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["volume.json", "volume.nrrd"]
+
+
+def test_what_a_file_leaves_open_is_told(tmp_path):
+    image = pyvista.ImageData(dimensions=(5, 6, 7))
+    image.point_data["p"], image.point_data["q"] = field(7, 6, 5).ravel(), 2 * field(7, 6, 5).ravel()
+    image.save(tmp_path / "two.vti")
+    with pytest.warns(UserWarning, match=r"^data: array .; variable chooses another \(.\)$"):
+        texgs.Volume(tmp_path / "two.vti")
+    volume = texgs.Volume(tmp_path / "two.vti", variable="q")
+    assert np.array_equal(volume.grid.values, 2 * field(7, 6, 5))

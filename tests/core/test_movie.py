@@ -76,3 +76,17 @@ def test_a_higher_rate_factor_makes_a_smaller_film(tmp_path):
     noise = np.random.default_rng(0).integers(0, 256, (2, 64, 64, 3), dtype=np.uint8)
     fine, coarse = (write_frames(tmp_path / f"{crf}.mp4", noise, crf=crf) for crf in (18, 35))
     assert coarse.stat().st_size < 0.5 * fine.stat().st_size
+
+
+def test_pictures_of_a_film_that_is_interrupted_are_gone(tmp_path):
+    """The same command starts again."""
+
+    def broken():
+        yield np.zeros((4, 4, 3), np.uint8)
+        raise KeyboardInterrupt
+
+    (tmp_path / "film").mkdir()
+    (tmp_path / "film" / "notes.txt").write_text("mine")
+    with pytest.raises(KeyboardInterrupt):
+        write_frames(tmp_path / "film", broken())
+    assert [file.name for file in (tmp_path / "film").iterdir()] == ["notes.txt"]

@@ -102,7 +102,7 @@ def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, cap
     assert checked(Path("ball.yaml"), other) == "", "of other models"
     write_scene("other.yaml", other)
     assert main(["render", "other.yaml", "--caption"]) == 2
-    assert "--caption: expected a check of other.yaml; run texgs check" in capsys.readouterr().err
+    assert "run texgs check other.yaml first" in capsys.readouterr().err
     for file, more, message in (
         ("ball.yaml", ["--views", "18"], "views: expected at least 19, got 18"),
         ("old.yaml", [], "old.yaml: volume: expected the volume that the scene was made from, got none"),

@@ -4,6 +4,7 @@ import nibabel
 import nrrd
 import numpy as np
 import pytest
+import pyvista
 import tifffile
 
 from tests.volume.volume_files import (
@@ -277,3 +278,58 @@ def test_whole_file_compression_is_told_from_the_suffix(tmp_path):
     WRITERS["plain.nii"](tmp_path / "plain.nii", sample_values())
     (tmp_path / "V.NII.GZ").write_bytes(gzip.compress((tmp_path / "plain.nii").read_bytes()))
     assert_holds(tmp_path / "V.NII.GZ", sample_values())
+
+
+def test_a_vti_file_of_several_arrays(tmp_path):
+    image, path = pyvista.ImageData(dimensions=(3, 4, 5)), tmp_path / "v.vti"
+    values = np.arange(60.0)
+    image.point_data["velocity"] = np.stack([values] * 3, axis=1)
+    image.point_data["p"], image.point_data["q"] = values, -values
+    image.point_data.active_vectors_name = "velocity"
+    image.save(path)
+    source = open_source(path)
+    assert source.note == "array p; dataset.volume.variable chooses another (q)"
+    assert source.slices(0, 5).ravel().tolist() == values.tolist()
+    chosen = open_source(path, variable="q")
+    assert (chosen.note, chosen.slices(0, 5)[4, 3, 2]) == ("", -59)
+    with pytest.raises(ArgumentError, match=r"variable: expected one of p, q, got velocity"):
+        open_source(path, variable="velocity")
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        {"imagej": True, "resolution": (2, 4), "metadata": {"spacing": 3.0, "unit": "um", "axes": "ZYX"}},
+        {
+            "ome": True,
+            "metadata": {
+                "axes": "ZYX",
+                **{"PhysicalSizeX": 500, "PhysicalSizeXUnit": "nm"},
+                **{"PhysicalSizeY": 0.25, "PhysicalSizeZ": 3.0},
+            },
+        },
+    ],
+)
+def test_the_spacing_that_microscopes_write_into_tiff(tmp_path, written):
+    values = np.arange(60, dtype=np.uint16).reshape(5, 4, 3)
+    tifffile.imwrite(tmp_path / "a.tif", values, photometric="minisblack", **written)
+    source = open_source(tmp_path / "a.tif")
+    x, y, z = source.spacing
+    assert (y / x, z / x) == pytest.approx((0.5, 6.0))
+    assert source.note == ""
+    np.testing.assert_array_equal(source.slices(0, 5), values)
+    assert open_source(tmp_path / "a.tif", spacing=(1.0, 1.0, 2.0)).spacing == (1, 1, 2)
+
+
+def test_a_tiff_without_spacing_says_so(tmp_path):
+    values = np.arange(60, dtype=np.uint16).reshape(5, 4, 3)
+    tifffile.imwrite(tmp_path / "a.tif", values, photometric="minisblack")
+    assert open_source(tmp_path / "a.tif").note.startswith("TIFF tells no spacing")
+    assert open_source(tmp_path / "a.tif", spacing=(1.0, 1.0, 2.0)).note == ""
+
+
+@pytest.mark.parametrize("endian", ["Little", ">", "BIG"])
+def test_byte_orders_have_two_names(tmp_path, endian):
+    (tmp_path / "a.raw").write_bytes(bytes(16))
+    with pytest.raises(ArgumentError, match="endian: expected little or big, got"):
+        open_source(tmp_path / "a.raw", dims=(2, 2, 2), dtype="uint16", endian=endian)

@@ -186,3 +186,30 @@ def test_a_file_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path
     with pytest.raises(ArgumentError, match=r"expected an HDF5 or NetCDF file"):
         open_source(path)
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("told", [{"positive": "down", "units": "m"}, {"units": "hPa"}])
+def test_what_counts_downwards_is_turned_upwards(tmp_path, told):
+    """The surface, at depth 0, is the top; north stays north."""
+    values = np.zeros((6, 8, 10), np.float32)
+    values[0, 7, 9] = 1.0  # at the surface, north and east
+    with netcdf_file(tmp_path / "sea.nc", "w") as file:
+        for name, size in {"depth": 6, "lat": 8, "lon": 10}.items():
+            file.createDimension(name, size)
+            axis = file.createVariable(name, "f8", (name,))
+            axis[:], axis.units = np.arange(size), "m"
+        for key, value in told.items():
+            setattr(file.variables["depth"], key, value)
+        file.createVariable("t", "f4", ("depth", "lat", "lon"))[:] = values
+    source = open_source(tmp_path / "sea.nc")
+    assert np.argwhere(source.slices(0, 6) > 0).tolist() == [[5, 7, 9]]
+    if "positive" in told:
+        assert source.origin == (0.0, 0.0, -5.0)
+
+
+def test_integers_that_are_said_to_have_no_sign(tmp_path):
+    values = np.arange(120, dtype=np.uint8).reshape(4, 5, 6) + 100
+    path = write_netcdf(tmp_path / "v.nc", {"t": values.view(np.int8)}, _Unsigned="true")
+    source = open_source(path)
+    assert source.dtype == np.uint8
+    np.testing.assert_array_equal(source.slices(0, 4), values)

@@ -31,7 +31,7 @@ def grid_of(data: Any, spacing: Sequence[float] | None, origin: Sequence[float] 
     if hasattr(data, "GetDirectionMatrix"):
         values, steps, first = of_image_data(data)
     else:
-        values, steps, first = np.asarray(data), (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+        values, steps, first = of_array(data), (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
     return Grid(values, said[0] or steps, said[1] or first)
 
 
@@ -39,10 +39,23 @@ def three(name: str, numbers: Sequence[float] | None) -> Triple | None:
     """Return three numbers as floats; None where there are none."""
     if numbers is None:
         return None
-    if len(numbers) != 3:
-        raise ArgumentError(f"{name}: expected three numbers x, y, z, got {list(numbers)}")
-    x, y, z = map(float, numbers)
+    try:
+        x, y, z = map(float, numbers)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{name}: expected three numbers x, y, z, got {numbers!r:.100}") from None
     return x, y, z
+
+
+def of_array(data: Any) -> np.ndarray:
+    """Return samples of anything that is an array; NaN where its mask says that there is none."""
+    if np.ma.isMaskedArray(data) and np.ma.is_masked(data):
+        return np.ma.filled(data.astype(np.result_type(data.dtype, np.float32)), np.nan)
+    try:
+        return np.asarray(data)
+    except ValueError as error:
+        raise ArgumentError(
+            f"data: expected an array [Z, Y, X], got {type(data).__name__} ({error})"
+        ) from error
 
 
 def of_image_data(image: Any) -> tuple[np.ndarray, Triple, Triple]:
@@ -63,7 +76,9 @@ def of_image_data(image: Any) -> tuple[np.ndarray, Triple, Triple]:
         )
     values = np.asarray(image.point_data[name])
     x, y, z = (int(size) for size in image.dimensions)
-    return values.reshape(z, y, x, *values.shape[1:]), tuple(image.spacing), tuple(image.origin)
+    first = [0.0, 0.0, 0.0]
+    image.TransformIndexToPhysicalPoint(list(image.extent[::2]), first)
+    return values.reshape(z, y, x, *values.shape[1:]), tuple(image.spacing), (first[0], first[1], first[2])
 
 
 def of_data_array(array: Any, spacing: Triple | None, origin: Triple | None) -> Grid:

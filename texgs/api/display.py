@@ -87,6 +87,13 @@ def picture_of(pixels: np.ndarray) -> Image:
     return fromarray(pixels)
 
 
+def plain(value: Any) -> Any:
+    """Return numbers and arrays of NumPy as those of Python, also in a list; all else as it is."""
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
 def inline(picture: Image, alt: str) -> str:
     """Return an element of HTML that holds a picture."""
     file = BytesIO()

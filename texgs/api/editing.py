@@ -8,9 +8,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Self
 
+import numpy as np
 import torch
 
-from texgs.api.display import camera_of, picture_of
+from texgs.api.display import camera_of, picture_of, plain
 from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
@@ -23,7 +24,6 @@ from texgs.scene.scene_file import light_of
 from texgs.scene.session import Session
 
 if TYPE_CHECKING:
-    import numpy as np
     from PIL.Image import Image
 
     from texgs.api.live import Viewer
@@ -71,7 +71,7 @@ class Editing:
 
     @light.setter
     def light(self, value: Light | str | Sequence[float]) -> None:
-        self.session.set_light(light_of(value))
+        self.session.set_light(light_of(plain(value)))
         self.changed(f"light {value}")
 
     @property
@@ -81,7 +81,7 @@ class Editing:
 
     @background.setter
     def background(self, value: str | Sequence[float]) -> None:
-        self.session.set_background(value)
+        self.session.set_background(plain(value))
         self.changed(f"background {value}")
 
     @property
@@ -91,11 +91,14 @@ class Editing:
 
     @time.setter
     def time(self, step: int) -> None:
-        self.session.set_of_scene("time", step)
+        self.session.set_of_scene("time", plain(step))
         self.changed(f"time {step}")
 
     def edit(self, *words: str) -> Self:
-        """Make the changes that words ask for, as `texgs edit` has them, such as "cut=x,0.1"; return self."""
+        """Make the changes that words ask for, as `texgs edit` has them, such as "cut=x,0.1"; return self.
+
+        They are one step. Where a word is wrong, none of them counts.
+        """
         apply_all(self.session, words)
         return self.changed(" ".join(words))
 
@@ -227,10 +230,19 @@ class Editing:
         """Return the name or the file of a picture."""
         if isinstance(picture, str | Path):
             return str(picture)
-        image = picture if hasattr(picture, "save") else picture_of(picture)
+        image = picture if hasattr(picture, "save") else self._painted(picture)
         file = self._new_folder("picture") / "style.png"
         image.save(file)
         return str(file)
+
+    @staticmethod
+    def _painted(pixels: Any) -> Image:
+        """Return an array as a picture."""
+        values = np.asarray(pixels)
+        if values.dtype != np.uint8 or values.ndim != 3 or values.shape[2] not in (3, 4):
+            expected = "a name, a file, a picture of Pillow or an array [H, W, 3] of uint8"
+            raise ArgumentError(f"picture: expected {expected}, got {list(values.shape)} of {values.dtype}")
+        return picture_of(values)
 
     def _new_folder(self, kind: str) -> Path:
         """Return a new folder for files of the scene."""

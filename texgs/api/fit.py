@@ -125,6 +125,11 @@ def configuration(
     from texgs.volume.transfer import check_disjoint
 
     check_disjoint(functions)
+    if taken := [word for word in words if word.lstrip("+~").startswith(("dataset", "results"))]:
+        raise ArgumentError(
+            f"overrides: expected keys of views, fit and metric, got {', '.join(taken)}; leave them out: the "
+            "volume and folder= say these"
+        )
     for name in (volume.name, *functions):
         check_name("name", name)
     few = (f"views.test.count={TEST_VIEWS}", f"views.relit={TEST_VIEWS}", "views.turntable=1")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from texgs.core.interrupts import interrupts_between_items
 from texgs.core.names import EXPORTS
 from texgs.scene.copied import write_copy
 from texgs.scene.frame import Mode
+from texgs.scene.scene_file import known
 from texgs.scene.session import Session
 
 if TYPE_CHECKING:
@@ -134,12 +136,15 @@ class Scene(Editing):
         Args:
             path: its ending says what: .html, .ply, .usdc, .usda, .glb, .spz, .vtp.
             kind: what, where an ending has several; default 3dgs for .ply.
-            **options: of `texgs.scene.export.Export`; of .html, `steps`, see `show`.
+            **options: of `texgs.scene.export.Export`; of .html, `steps`, see `show`, and `volume`, MB of the
+                page for the volume.
 
         Raises:
-            ArgumentError: if the ending is unknown or another kind's, or the scene cannot be written so.
+            ArgumentError: if the ending is unknown or another kind's, an option is, or the scene cannot be
+                written so.
         """
         from texgs.scene.export import OF_MODELS, Export, export_scene
+        from texgs.viewer.page_volume import page_volume
         from texgs.viewer.standalone import write_page
 
         path, scene = Path(path), self.session.scene
@@ -151,8 +156,12 @@ class Scene(Editing):
             endings = dict.fromkeys(ending for each in able.values() for ending in each)
             expected = " or ".join(able.get(chosen, endings))
             raise ArgumentError(f"path: expected a file that ends in {expected}, got {path}")
+        takes = ["steps", "volume"] if chosen == "html" else [each.name for each in fields(Export)[1:]]
+        known(options, takes, f"options of {chosen}")
         if chosen == "html":
-            write_page(path, scene, path.stem, **options)
+            size = options.pop("volume", None)
+            volume = None if size is None else page_volume(scene, size)
+            write_page(path, scene, path.stem, volume=volume, **options)
             return path
         return export_scene(path, scene, Export(chosen, **options))
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from filecmp import cmp
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from texgs.api.arrays import grid_of, three
-from texgs.api.display import camera_of, inline, picture_of
+from texgs.api.display import camera_of, inline, picture_of, plain
 from texgs.api.functions import AnyFunctions, Functions, named
 from texgs.core.errors import ArgumentError
 from texgs.fields.part_edit import color
@@ -20,15 +21,14 @@ from texgs.scene.scene import WHITE
 from texgs.scene.scene_file import light_of
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
-from texgs.volume.grid import Grid
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
 from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
-from texgs.volume.slabs import ArraySource
+from texgs.volume.slabs import ArraySource, Source
 from texgs.volume.sources import open_source
 from texgs.volume.suggest import suggest
-from texgs.volume.summaries import write_summaries
+from texgs.volume.summaries import Summary, write_summaries
 
 if TYPE_CHECKING:
     import pyvista
@@ -51,9 +51,12 @@ class Volume:
         spacing: distance of samples along x, y, z; default that of the data, else 1.
         origin: position of the first sample, x, y, z; default that of the data, else 0.
         up: axis of the data that becomes +y of the world: "+y", "-y", "+z", ...
+        crop: x0, x1, y0, y1, z0, z1 in samples of the data, half open; default all.
+        reduce: one sample for every block of reduce^3.
+        method: "mean" of a block, or "sample", its middle, for labels.
         nan_value: takes the place of samples that are not finite, which are refused without it.
         name: of the volume, in titles.
-        folder: for the file; default one that is gone with the object.
+        folder: for the file, of this volume alone; default one that is gone with the object.
         **keys: what only some formats take, such as `dims` and `dtype` of raw samples, see
             `texgs.volume.sources.open_source`.
 
@@ -69,6 +72,9 @@ class Volume:
         spacing: Sequence[float] | None = None,
         origin: Sequence[float] | None = None,
         up: str = "+y",
+        crop: Sequence[int] | None = None,
+        reduce: int = 1,
+        method: str = "mean",
         nan_value: float | None = None,
         name: str = "data",
         folder: str | Path | None = None,
@@ -81,11 +87,15 @@ class Volume:
             steps, first = three("spacing", spacing), three("origin", origin)
             source = open_source(data, spacing=steps, origin=first, **keys)
         elif keys:
-            raise ArgumentError(f"{', '.join(keys)}: only for files; leave them out")
+            raise ArgumentError(f"{', '.join(keys)}: only for files of some formats; leave them out")
         else:
             source = ArraySource(grid_of(data, spacing, origin), name)
+        if source.note:
+            warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
         self._channel = source.channel
-        self.summary = prepare(source, self.file, up=up, nan_value=nan_value)
+        keys = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": plain(nan_value)}
+        self.summary = self._prepared(source, keys)
+        self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         write_summaries(self.file, [self.summary], [""])
 
     @classmethod
@@ -98,10 +108,19 @@ class Volume:
         """Return the file, volume.nrrd, which ParaView opens, too."""
         return self.folder / "volume.nrrd"
 
-    @cached_property
-    def grid(self) -> Grid:
-        """Return the samples [Z, Y, X] with spacing and origin, +y up."""
-        return open_grid(self.file)
+    def _prepared(self, source: Source, keys: dict[str, Any]) -> Summary:
+        """Write the file; one of another volume, or that the data are in, is left alone."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=".volume-", dir=self.folder) as scratch:
+            made = Path(scratch, self.file.name)
+            summary = prepare(source, made, **keys)
+            if self.file.exists() and not cmp(made, self.file, shallow=False):
+                raise ArgumentError(
+                    f"folder: expected one without another volume, got {self.file}; choose another folder, "
+                    "or remove that file"
+                )
+            made.replace(self.file)
+        return summary
 
     def suggest(self, count: int | None = None) -> Functions:
         """Return basic transfer functions by name: `count` of the histogram, what shows, or a channel's."""

@@ -98,11 +98,12 @@ def basic_tfs(
     if not files:
         histogram = np.array(summary["histogram"])
         suggested = suggest(histogram, low, high, count, channel)
-        if looks_like_labels(histogram) and np.dtype(summary["dtype"]).kind == "f":
+        if looks_like_labels(histogram):
             sys.stderr.write(
-                f"{of}: values are in {np.count_nonzero(histogram)} of {len(histogram)} "
-                f"parts of [{low:g}, {high:g}], and are taken for labels; if one of them stands for missing "
-                "samples, write NaN in its place and add nan_value=...\n"
+                f"{of}: values are in {np.count_nonzero(histogram)} of {len(histogram)} parts of [{low:g}, "
+                f"{high:g}], and are taken for labels. Between two of them rays see those in between, as "
+                "thin shells. If one stands for missing samples, write NaN in its place and add "
+                "nan_value=...\n"
             )
         return {name: tf.rounded(low, high) for name, tf in suggested.items()}
     basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}

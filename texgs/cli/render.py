@@ -91,11 +91,19 @@ def run(arguments: argparse.Namespace) -> int:
         frames = (shows(camera, scene=shown) for camera, shown in shots)
     words = checked(arguments.scene, scene)
     if arguments.caption:
-        if not words:
-            raise ArgumentError(f"--caption: expected a check of {arguments.scene}; run texgs check first")
+        require_checked(arguments.scene, words)
         frames = (with_caption(each, words) for each in frames)
     print(write_frames(output, frames, arguments.fps, comment=words))
     return 0
+
+
+def require_checked(scene: Path, words: str) -> None:
+    """Require that `texgs check` has found something of a scene."""
+    if not words:
+        raise ArgumentError(
+            f"--caption: expected {scene.stem}-check.json here or beside the scene, of its models as they are; "
+            f"run texgs check {scene} first"
+        )
 
 
 def compared(

@@ -27,7 +27,7 @@ class Volume:
         "number or UID of the series to read of a folder of DICOM slices; all: those alike are steps in time",
     )
     variable: str | None = key(
-        None, "array to read, by its path in the file, where Zarr, HDF5 or NetCDF has several"
+        None, "array to read, by its path in the file, where Zarr, HDF5, NetCDF or VTK has several"
     )
     channel: str | None = key(None, "label or number of the channel to read, from 0, where there are several")
     time: int = key(0, "step to read or make, from 0, where there are several", least=0)

@@ -50,8 +50,7 @@ def write_frames(
     if first is None:
         raise ArgumentError(f"{path}: expected at least one frame, got none")
     if path.suffix == "":
-        for number, frame in enumerate(chain([first], left)):
-            write_atomic(path / f"{number:04}.png", partial(save_png, frame=frame, comment=comment))
+        _write_pictures(path, chain([first], left), comment)
     elif path.suffix == ".png":
         if next(left, None) is not None:
             raise ArgumentError(f"{path}: expected one frame, got several; use .gif, .mp4 or a folder")
@@ -60,6 +59,19 @@ def write_frames(
         write = _write_gif if path.suffix == ".gif" else partial(_write_mp4, crf=crf)
         write_atomic(path, lambda file: write(file, first, left, fps, comment))
     return path
+
+
+def _write_pictures(folder: Path, frames: Iterable[np.ndarray], comment: str) -> None:
+    """Write numbered pictures into a folder: all, or none."""
+    written: list[Path] = []
+    try:
+        for number, frame in enumerate(frames):
+            written.append(folder / f"{number:04}.png")
+            write_atomic(written[-1], partial(save_png, frame=frame, comment=comment))
+    except BaseException:
+        for file in written:
+            file.unlink(missing_ok=True)
+        raise
 
 
 def save_png(file: IO[bytes], frame: np.ndarray, comment: str) -> None:

@@ -32,10 +32,12 @@ def apply_all(session: Session, words: Sequence[str]) -> None:
     """Make the changes that words ask for, see `texgs edit --help`; an error names its word.
 
     Numbers of planes are those of the scene as it is now: these planes are replaced first, then taken back.
+    All are one step; none is made where one cannot be.
     """
-    for word in sorted(words, key=_turn):
-        with located(word):
-            _apply(session, word)
+    with session.one_step():
+        for word in sorted(words, key=_turn):
+            with located(word):
+                _apply(session, word)
 
 
 def _turn(word: str) -> int:

@@ -2,7 +2,8 @@
 
 import sys
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self, TypeVar
@@ -196,6 +197,18 @@ class Session:
         names = {each: name if each == segment else each for each in entry.segments}
         renamed = replace(entry, segments={names[each]: value for each, value in entry.segments.items()})
         self._push(replaced(self.scene, model, renamed))
+
+    @contextmanager
+    def one_step(self) -> Iterator[None]:
+        """Let all changes within the block be one step; none where one of them fails."""
+        past, future = self._past, [*self._future]
+        try:
+            yield
+        except BaseException:
+            self._past, self._future = past, future
+            raise
+        if self.scene is not past[-1][0]:
+            self._past = [*past[-MOST_STEPS:], (self.scene, "")]
 
     def name_step(self, title: str) -> None:
         """Give the latest step a title."""

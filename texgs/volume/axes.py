@@ -13,6 +13,7 @@ UNEVEN = 0.01  # of the mean distance: coordinates are often rounded to float32
 COMPONENTS = (2, 3, 4)  # sizes of a last axis without a name that is none of space
 POWERS = {"nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3}
 METRES = {unit: 10.0**n for prefix, n in POWERS.items() for unit in (f"{prefix}meter", f"{prefix[:1]}m")}
+PRESSURES = ("Pa", "hPa", "kPa", "mbar", "millibar", "dbar", "decibar", "bar")
 METRES |= {"um": 1e-6, "µm": 1e-6, "angstrom": 1e-10}
 
 
@@ -53,15 +54,26 @@ def nameless(shape: Sequence[int]) -> list[Axis]:
 
 
 def along(name: str, size: int, scale: Any = None) -> Axis:
-    """Return an axis with its coordinates, where there is an array of them, and their unit."""
+    """Return an axis with its coordinates, where there is an array of them, and their unit.
+
+    Coordinates that count downwards, as depth and pressure do, are those of the axis upwards with the other
+    sign.
+    """
     if size < 2 or getattr(scale, "shape", ()) != (size,):
         return Axis(name, size)
     places = np.array(scale[:], np.float64)
-    unit = getattr(scale, "units", b"") or getattr(scale, "attrs", {}).get("units", "")  # of SciPy, of others
-    unit = unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit)
+    unit, positive = told(scale, "units"), told(scale, "positive")
+    if positive.lower() == "down" or (unit in PRESSURES and not positive):
+        places = -places
     step = float(places[-1] - places[0]) / (size - 1)
     is_even = bool(np.abs(np.diff(places) - step).max() <= UNEVEN * abs(step))
     return Axis(name, size, unit, float(places[0]), step, is_even)
+
+
+def told(scale: Any, name: str) -> str:
+    """Return an attribute of coordinates as text, whichever library reads them; empty where there is none."""
+    value = getattr(scale, name, b"") or getattr(scale, "attrs", {}).get(name, "")  # of SciPy, of others
+    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
 
 
 def picked(axes: Sequence[Axis], channel: str | None, time: int | None) -> list[int | slice]:

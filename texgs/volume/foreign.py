@@ -31,20 +31,25 @@ COMPLAINT = re.compile(r"error|fail|cannot|corrupt|unexpected", re.IGNORECASE)
 
 
 def open_foreign(
-    path: Path, spacing: Triple | None, origin: Triple | None, series: str | None = None, time: int = 0
+    path: Path,
+    spacing: Triple | None,
+    origin: Triple | None,
+    series: str | None = None,
+    time: int = 0,
+    variable: str | None = None,
 ) -> Source:
     """Open image data with its axes along the closest ones of space, so that nothing is mirrored.
 
     Samples that are stored as in memory are read on demand, all others as a whole. Spacing and origin replace
-    those of the file; `series` is the number or UID of one of several in a folder of DICOM slices, and `time`
-    the step of one that has several volumes.
+    those of the file; `series` is the number or UID of one of several in a folder of DICOM slices, `time` the
+    step of one that has several volumes, and `variable` the name of a point array of VTK's image data.
     """
-    suffix = path.suffix.lower()
+    suffix, keys = path.suffix.lower(), {"series": series, "time": time, "variable": variable}
     with reading_as(_kind(path)):
         if suffix == ".vti":
             _check_end(path)
         stored = stored_samples(path) if suffix in (*NRRD, *METAIMAGE) else None
-        reply, values = _ask(path, {"series": series, "time": time}, is_header_only=stored is not None)
+        reply, values = _ask(path, keys, is_header_only=stored is not None)
         nx, ny, nz = reply["dims"]
         dims, axes = (nx, ny, nz), closest(np.array(reply["directions"]))
         dx, dy, dz = spacing or (reply["spacing"][axis] for axis, _ in axes)
@@ -157,11 +162,13 @@ def image_of(
     if path.suffix.lower() in BY_VTK:
         from texgs.volume.vtk_image import read_vtk
 
-        return read_vtk(path)
+        return read_vtk(path, keys["variable"])
     from texgs.volume.dicom import read_dicom
     from texgs.volume.itk_image import read_itk
 
-    return read_dicom(path, **keys) if path.is_dir() else read_itk(path, is_header_only)
+    if path.is_dir():
+        return read_dicom(path, keys["series"], keys["time"])
+    return read_itk(path, is_header_only)
 
 
 if __name__ == "__main__":

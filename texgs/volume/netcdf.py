@@ -12,7 +12,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.volume.axes import along, nameless
 from texgs.volume.grid import Triple
-from texgs.volume.layers import CODED, LayerSource, StoredArray, one_of
+from texgs.volume.layers import CODED, UNSIGNED, LayerSource, StoredArray, one_of
 
 CLASSIC = (b"CDF\x01", b"CDF\x02")  # the latter with offsets of 64 bits
 NO_COORDINATES = b"This is a netCDF dimension but not a netCDF variable"  # begins the NAME of such a scale
@@ -47,7 +47,7 @@ def _classic(path: Path, variable: str | None) -> StoredArray:
     field = file.variables[name]
     sizes = zip(field.dimensions, field.shape, strict=True)
     axes = [along(axis, n, file.variables.get(axis)) for axis, n in sizes]
-    attributes = {key: getattr(field, key, "") for key in CODED}
+    attributes = {key: getattr(field, key, "") for key in (*CODED, UNSIGNED)}
     dtype, chunks = field.data.dtype, [1] * len(axes)
     return StoredArray(lambda at: np.array(file.variables[name][at]), dtype, axes, chunks, attributes)
 

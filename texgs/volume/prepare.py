@@ -11,6 +11,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 from texgs.core.memory import GIB
+from texgs.core.names import is_number
 from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
 from texgs.volume.nrrd_file import WORDS, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
@@ -60,7 +61,7 @@ def prepare_channels(
             channel is constant or unlike the first in lattice or type, fewer than two samples are left along
             an axis, or there is too little space on the disk. Nothing is written then.
     """
-    if nan_value is not None and not abs(nan_value) <= np.finfo(np.float32).max:
+    if nan_value is not None and not (is_number(nan_value) and abs(nan_value) <= np.finfo(np.float32).max):
         raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
     if up not in UPRIGHT:
         raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up}")
@@ -112,11 +113,13 @@ class _Tally:
     def __init__(self, name: str) -> None:
         self.name = name
         self.minimum, self.maximum = inf, -inf
+        self.varies, self.sample = False, None  # before samples become those of the file
         self.n_bad = 0
         self.first: tuple[int, ...] = ()  # x, y, z of the first bad sample, in the source
 
     def finite(self, slab: np.ndarray, start: tuple[int, int, int], nan_value: float | None) -> np.ndarray:
         """Return the slab with NaN and infinity replaced; count them where no value was chosen."""
+        self.see(slab)
         if slab.dtype.kind != "f":
             return slab
         bad = ~np.isfinite(slab)
@@ -127,6 +130,11 @@ class _Tally:
             place = np.unravel_index(bad.argmax(), bad.shape)
             self.first = self.first or tuple(int(p) + s for p, s in zip(place[::-1], start, strict=True))
         return np.where(bad, np.float32(nan_value or 0.0), slab)
+
+    def see(self, slab: np.ndarray) -> None:
+        """Note whether samples differ, as they are in the source."""
+        self.sample = slab.flat[0] if self.sample is None else self.sample
+        self.varies = self.varies or bool((slab != self.sample).any())
 
     def extend(self, block: np.ndarray) -> np.ndarray:
         """Widen the range by a block, and return it."""
@@ -140,6 +148,11 @@ class _Tally:
             raise ArgumentError(
                 f"{self.name}: expected finite samples, got {self.n_bad} that are NaN or infinite, the first "
                 f"at (x, y, z) = {self.first}; set nan_value to replace them"
+            )
+        if self.minimum == self.maximum and self.varies:
+            raise ArgumentError(
+                f"{self.name}: expected samples that differ as float32, got all near {self.minimum:g}; "
+                "subtract an offset, or scale them"
             )
         if self.minimum == self.maximum:
             raise ArgumentError(

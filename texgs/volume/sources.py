@@ -45,8 +45,8 @@ def open_source(
 
     Formats: .raw, .bin, .dat (plain samples, described by the arguments); .npy (an array [Z, Y, X]); .tif,
     .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs in natural order; a folder of
-    DICOM slices; .nrrd, .nhdr; .mhd, .mha; .nii, .nii.gz; .mrc; .gipl; .slc; .vti and .vtk (image data, first
-    point array); .nc, .nc4 (NetCDF); .h5, .hdf5; a folder of Zarr, or its .zip, .ozx; .txt, .txt.gz (a line
+    DICOM slices; .nrrd, .nhdr; .mhd, .mha; .nii, .nii.gz; .mrc; .gipl; .slc; .vti and .vtk (image data, point
+    arrays); .nc, .nc4 (NetCDF); .h5, .hdf5; a folder of Zarr, or its .zip, .ozx; .txt, .txt.gz (a line
     per sample). x is the fastest axis throughout, unless an array has axes with the names x, y, z.
     Axes are permuted and flipped to the closest ones of physical space where the format tells about it:
     R, A, S of NIfTI; L, P, S of DICOM. They are not resampled where they are oblique.
@@ -136,6 +136,8 @@ def _open_raw(
     if dims is None or dtype is None:
         missing = " and ".join(key for key, value in (("dims", dims), ("dtype", dtype)) if value is None)
         raise ArgumentError(f"plain samples have no header; set {missing}, and endian and skip where needed")
+    if endian not in ("little", "big"):
+        raise ArgumentError(f"endian: expected little or big, got {endian!r}")
     try:
         stored = np.dtype(dtype).newbyteorder("<" if endian == "little" else ">")
     except TypeError as error:
@@ -216,4 +218,5 @@ KEYS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5", ".zip", ".ozx"), IN_FILES),
     **dict.fromkeys((".txt", ".txt.gz"), ("dims", "column")),
     **dict.fromkeys((".nii", ".nii.gz"), ("time",)),
+    **dict.fromkeys((".vti", ".vtk"), ("variable",)),
 }

@@ -12,6 +12,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
 from texgs.core.names import SLICES, natural_order
+from texgs.volume.axes import METRES
 from texgs.volume.grid import ONES, ZEROS, Grid, Triple, dims_of, require_room
 from texgs.volume.slabs import ArraySource, RawSource, Source
 
@@ -61,33 +62,62 @@ def open_tiff(path: Path, spacing: Triple | None, origin: Triple | None) -> Sour
     """Open a TIFF file with a page per z slice, or a folder of single TIFFs in natural order.
 
     Pages of one file that follow one another uncompressed are read as they are, others on demand; of a folder
-    only the first file is opened now. TIFF says nothing dependable about the lattice: spacing is 1 unless
-    given.
+    only the first file is opened now. Spacing is what ImageJ or OME has written, else 1.
     """
     import tifffile
 
     files = tiffs_in(path) if path.is_dir() else [path]
-    lattice = (spacing or ONES, origin or ZEROS)
     what = f"TIFF files, but {files[0].name} is none" if path.is_dir() else "a TIFF file"
     with reading_as(what), complaints_raised(), tifffile.TiffFile(files[0]) as tiff:
-        shape, dtype = _page_type(tiff.pages[0])
-        if path.is_dir():
-            if len(tiff.pages) != 1:
-                raise ArgumentError(f"expected one page per file, got {len(tiff.pages)} in {files[0].name}")
-            return PageSource(path, [(file, 0) for file in files], shape, dtype, lattice)
-        series = tiff.series[0]
-        for axis, size in zip(series.axes, series.shape, strict=False):
-            if axis in "CS" and size > 1:
-                raise ArgumentError(f"expected a scalar volume, got {size} components per sample")
-        if len(tiff.series) == 1 and series.ndim > 2:
-            dims = dims_of(series.shape)
-            if series.dataoffset is not None:
-                stored = dtype.newbyteorder(tiff.byteorder)
-                return RawSource(path, dims, stored, series.dataoffset, *lattice)
-            if len(tiff.pages) != dims[2]:
-                require_room(dims, dtype)
-                return ArraySource(Grid(series.asarray(), *lattice), path.name)
-        return PageSource(path, [(path, page) for page in range(len(tiff.pages))], shape, dtype, lattice)
+        known = spacing or spacing_of(tiff)
+        source = _source(tiff, path, files, (known or ONES, origin or ZEROS))
+    source.note = (
+        "" if known else "TIFF tells no spacing, so that samples are 1 apart; dataset.volume.spacing sets it"
+    )
+    return source
+
+
+def _source(tiff: Any, path: Path, files: list[Path], lattice: tuple[Triple, Triple]) -> Source:
+    """Return the source of an open file, or of a folder of which it is the first."""
+    shape, dtype = _page_type(tiff.pages[0])
+    if path.is_dir():
+        if len(tiff.pages) != 1:
+            raise ArgumentError(f"expected one page per file, got {len(tiff.pages)} in {files[0].name}")
+        return PageSource(path, [(file, 0) for file in files], shape, dtype, lattice)
+    series = tiff.series[0]
+    for axis, size in zip(series.axes, series.shape, strict=False):
+        if axis in "CS" and size > 1:
+            raise ArgumentError(f"expected a scalar volume, got {size} components per sample")
+    if len(tiff.series) == 1 and series.ndim > 2:
+        dims = dims_of(series.shape)
+        if series.dataoffset is not None:
+            stored = dtype.newbyteorder(tiff.byteorder)
+            return RawSource(path, dims, stored, series.dataoffset, *lattice)
+        if len(tiff.pages) != dims[2]:
+            require_room(dims, dtype)
+            return ArraySource(Grid(series.asarray(), *lattice), path.name)
+    return PageSource(path, [(path, page) for page in range(len(tiff.pages))], shape, dtype, lattice)
+
+
+def spacing_of(tiff: Any) -> Triple | None:
+    """Return the spacing x, y, z, in the unit of x, that OME or ImageJ has written into a file; else None."""
+    import tifffile
+
+    if tiff.is_ome:
+        images = tifffile.xml2dict(tiff.ome_metadata)["OME"]["Image"]
+        pixels = (images[0] if isinstance(images, list) else images)["Pixels"]
+        units = [METRES.get(pixels.get(f"PhysicalSize{axis}Unit", "µm"), 0.0) for axis in "XYZ"]
+        x, y, z = (
+            float(pixels.get(f"PhysicalSize{axis}", 0)) * unit
+            for axis, unit in zip("XYZ", units, strict=True)
+        )
+        return (x / units[0], y / units[0], z / units[0]) if min(x, y, z) > 0 else None
+    depth = (tiff.imagej_metadata or {}).get("spacing")
+    tags = [tiff.pages[0].tags.get(name) for name in ("XResolution", "YResolution")]
+    if not depth or not all(tag and tag.value[0] for tag in tags):
+        return None
+    dx, dy = (tag.value[1] / tag.value[0] for tag in tags)  # pixels in a unit
+    return dx, dy, float(depth)
 
 
 def tiffs_in(folder: Path) -> list[Path]:

@@ -13,8 +13,8 @@ from texgs.core.errors import ArgumentError
 from texgs.volume.grid import dims_of, require_room
 
 
-def read_vtk(path: Path) -> tuple[dict[str, Any], np.ndarray]:
-    """Read lattice and samples [Z, Y, X]: the scalars, or else the first point array."""
+def read_vtk(path: Path, variable: str | None = None) -> tuple[dict[str, Any], np.ndarray]:
+    """Read lattice and samples [Z, Y, X] of a point array: the one named, the scalars, or the first."""
     window = vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(window)
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
@@ -29,11 +29,8 @@ def read_vtk(path: Path) -> tuple[dict[str, Any], np.ndarray]:
         raise ArgumentError(f"expected image data (structured points), got {kind}; resample it to an image")
     if not image.point_data:
         raise ArgumentError("expected point data, found none; convert cell data to point data")
-    values = image.point_data.active_scalars
-    if values is None:
-        values = image.point_data[image.point_data.keys()[0]]
-    if values.ndim > 1:
-        raise ArgumentError(f"expected a scalar volume, got {values.shape[1]} components per sample")
+    name, note = chosen(image.point_data, variable)
+    values = image.point_data[name]
     shape = image.dimensions[::-1]
     if values.size != np.prod(shape, dtype=np.int64):
         raise ArgumentError(f"expected image data of {list(shape)}, got {values.size} values; is it damaged?")
@@ -45,8 +42,24 @@ def read_vtk(path: Path) -> tuple[dict[str, Any], np.ndarray]:
         "spacing": image.spacing,
         "origin": first,
         "directions": image.direction_matrix.T.tolist(),
+        "note": note,
     }
     return lattice, np.asarray(values).reshape(shape)
+
+
+def chosen(arrays: Any, variable: str | None) -> tuple[str, str]:
+    """Return the name of the scalar array of points to take, and what to tell the user of others."""
+    names = [name for name, values in arrays.items() if values.ndim == 1]
+    if not names:
+        sizes = ", ".join(f"{values.shape[1]} components per sample" for values in arrays.values())
+        raise ArgumentError(f"expected a scalar volume, got {sizes}")
+    if variable is not None and variable not in names:
+        raise ArgumentError(f"dataset.volume.variable: expected one of {', '.join(names)}, got {variable}")
+    active = arrays.active_scalars_name
+    name = variable or (active if active in names else names[0])
+    is_open = len(names) > 1 and variable is None
+    others = ", ".join(each for each in names if each != name)
+    return name, f"array {name}; dataset.volume.variable chooses another ({others})" if is_open else ""
 
 
 def check_claim(reader: Any) -> None:
