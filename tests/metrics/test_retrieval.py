@@ -122,3 +122,9 @@ def test_an_edited_scene_tells_its_distances_to_all_pictures(scenes, deep, monke
     assert all(0 < x < 5 for far in measured.values() for x in far.values())
     monkeypatch.undo()
     assert retrieval.run(subject(*given, weights=MISSING)) == {}
+
+
+def test_looks_that_are_alike_have_the_last_place():
+    """A method that did the same for every picture would else be the best of all."""
+    far = {"far_by_colors": dict.fromkeys("abc", 1.5)}
+    assert retrieval.named([(picture, far) for picture in "abc"]) == [{"place_by_colors": 3}] * 3

@@ -26,7 +26,8 @@ def named(looks: Sequence[tuple[str, Mapping[str, Any]]]) -> list[dict[str, int]
     """Return the place of the picture that each look of a scene follows, 1 for the nearest, by measures.
 
     A picture that is near to all looks says little about one, so the mean over the looks is taken from the
-    distances to it. It takes two looks at least, that were compared with the same pictures.
+    distances to it. It takes two looks at least, that were compared with the same pictures. Pictures
+    that are as near have the last place of them all: looks that are alike say nothing.
 
     Args:
         looks: the picture of each, and what was measured of it. One without distances, or of another picture
@@ -45,7 +46,7 @@ def named(looks: Sequence[tuple[str, Mapping[str, Any]]]) -> list[dict[str, int]
         table = np.array([[*far[at].values()] for at in compared])
         for at, row in zip(compared, table - table.mean(0), strict=True):
             if (followed := looks[at][0]) in pictures:
-                places[at][f"place_by_{kind}"] = int((row < row[pictures.index(followed)]).sum()) + 1
+                places[at][f"place_by_{kind}"] = int((row <= row[pictures.index(followed)]).sum())
     return places
 
 
