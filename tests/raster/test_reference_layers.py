@@ -67,7 +67,7 @@ def test_two_layers():
     features = torch.tensor([[1.0, 0.0], [0.0, 1.0]]).double()
     image = rasterize(**layers, features=features, outputs=OUTPUTS)
     w_front, w_back = front, (1 - front) * back
-    m_front, m_back = (100 / 99.8 * (1 - 0.2 / z) for z in (2, 4))
+    m_front, m_back = (100 / 99.99 * (1 - 0.01 / z) for z in (2, 4))
     at = (12, 15)
     torch.testing.assert_close(image.color[at], torch.tensor([w_back, w_front]).double())
     torch.testing.assert_close(image.alpha[at].item(), w_front + w_back)
@@ -94,7 +94,7 @@ def test_pixel_ends_before_the_fragment_that_takes_the_last_light():
 
 @BOTH
 def test_what_is_too_near_or_too_weak_is_skipped(outputs):
-    means, opacities = [[0, 0, 0.2], [0, 0, -2], [0, 0, 2], [0, 0, 2]], [0.9, 0.9, 0.0, 0.003]
+    means, opacities = [[0, 0, 0.01], [0, 0, -2], [0, 0, 2], [0, 0, 2]], [0.9, 0.9, 0.0, 0.003]
     primitives = view(means=means, scales=[SCALES[outputs]] * 4, opacities=opacities)
     image = rasterize(**primitives, features=torch.ones(4, 1).double(), outputs=outputs)
     assert image.alpha.count_nonzero() == 0
