@@ -62,6 +62,8 @@ def test_a_view_beside_its_volume(results, tmp_path, monkeypatch, capsys):
     assert width > 2 * height
     film = [*size, "--path", "orbit", "--frames", "2", "--output", "film.gif"]
     assert main(["render", str(path), "--compare", *film]) == 0
+    target = ["--target", "-0.1", "-.05", "0.2"]  # as viewer and pages print it
+    assert main(["render", str(path), *target, *size, "--output", "target.png"]) == 0
     for words, message in (
         (["--mode", "normal"], "--compare: expected --mode shaded, got normal"),
         (["--gain", "17"], "--gain: expected 1 to 16, got 17"),

@@ -218,9 +218,11 @@ def png(size=(32, 24), mode="RGB"):
     [
         (500, "the GPU is full", b"", "got HTTP Error 500: the GPU is full;"),
         (404, "Not Found", b"", "got HTTP Error 404: Not Found;"),
+        (503, "Busy", b'{"error": "out of memory"}', 'got HTTP Error 503: Busy, {"error": "out of memory"};'),
+        (200, "OK", b'{"error": "out of memory"}', 'got {"error": "out of memory"};'),
         (200, "OK", b"<html>", "got Expecting value: line 1 column 1"),
-        (200, "OK", b"[]", "got list indices must be integers or slices, not str;"),
-        (200, "OK", b"{}", "got a header without 'image';"),
+        (200, "OK", b"[]", r"got \[\];"),
+        (200, "OK", b"{}", "got {};"),
         (
             200,
             "OK",

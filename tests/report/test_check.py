@@ -13,6 +13,7 @@ from PIL import Image
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
 from texgs.cli.main import main
+from texgs.core.cuts import Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.fields.surfels.model_file import write_model
@@ -77,6 +78,15 @@ def test_a_check_tells_what_its_views_have(scene, tmp_path):
     assert result.object_psnr["worst"] == min(each["object_psnr"] for each in views)
     assert f"At least {min(psnr) - 0.05:.1f} dB from direct volume rendering in 95 of 100" in result.sentence
     assert (tmp_path / "worst.png").stat().st_size > 5000
+
+
+def test_a_cut_changes_nothing_about_a_check(scene, tmp_path):
+    """Where it is cut the scene shows its volume, which is no model of it."""
+    cut = replace(scene, cuts=Cuts([Plane((0.0, 0.0, 1.0), 0.0)]))
+    assert cut.shows_volume
+    twin, composition = Twin(scene), scene.open()
+    one, other = (check(x, composition, twin, LENS, 19, 7, tmp_path / "c.json") for x in (scene, cut))
+    assert one == other
 
 
 def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, capsys):

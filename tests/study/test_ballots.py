@@ -63,7 +63,11 @@ def test_an_incomplete_ballot_is_refused(tmp_path, lines, message):
 
 def test_a_ballot_of_another_study_one_that_is_there_twice_and_other_files_are_refused(tmp_path):
     paths = [ballot(tmp_path, file="one.csv"), ballot(tmp_path, file="two.csv")]
-    with pytest.raises(ArgumentError, match=r"two\.csv: expected another ballot than .*one\.csv, got the sa"):
+    assert len(read_votes(STUDY, paths).ballots) == 1, "a download that was saved again"
+    paths.append(ballot(tmp_path, ["1,A,1", "1,B,2", "1,C,3", *LINES[3:]], file="x.csv"))
+    with pytest.raises(
+        ArgumentError, match=r"x\.csv: expected another ballot than .*two\.csv, got other answ"
+    ):
         read_votes(STUDY, paths)
     ballot(tmp_path, study="ffff", file="other.csv")
     both = paths[0].read_text() + ballot(tmp_path, name="bb").read_text().partition("\n")[2]

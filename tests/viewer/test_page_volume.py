@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -31,7 +32,7 @@ from texgs.scene.cut_view import beside
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene, write_scene
-from texgs.scene.twin import SceneVolume, Twin
+from texgs.scene.twin import SceneVolume, Twin, range_of
 from texgs.viewer.description import describe
 from texgs.viewer.downloads import Downloads, exports_of
 from texgs.viewer.frames import shown as shown_beside
@@ -207,6 +208,16 @@ def test_depths_of_the_volume_are_those_of_the_caster(page, scene):
         words = [view_of(CAMERA), described(page, scene), mode, [column, row]]
         assert page.evaluate(DEPTH, words) == pytest.approx(float(expected.depth[row, column]), abs=5e-3)
         assert page.evaluate(DEPTH, [*words[:3], [0, 0]]) is None, "the background"
+
+
+def test_a_point_of_a_face_is_of_the_volume(page, scene):
+    """What is behind it may be far away, or nothing."""
+    cut = replace(scene, cuts=CUTS)
+    seen = Twin(cut).render(CAMERA, cut, scene.open().palettes, range_of(CUTS, CAMERA), outputs=("depth",))
+    face = torch.where(range_of(CUTS, CAMERA).face >= 0, seen.alpha, 0.0)
+    row, column = divmod(int(face.argmax()), CAMERA.width)
+    words = [view_of(CAMERA), described(page, cut), "shaded", [column, row]]
+    assert page.evaluate(DEPTH, words) == pytest.approx(float(seen.depth[row, column]), abs=5e-3)
 
 
 def test_moving_pictures_have_longer_steps(page, scene):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.api.display import MB, LivePage, Page, camera_of, picture_of
 from texgs.api.editing import Editing
 from texgs.core.check import torch_device
+from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
 from texgs.core.names import EXPORTS
@@ -110,13 +111,13 @@ class Scene(Editing):
     def psnr(self, views: int = 12, width: int = 400) -> float:
         """Return the mean PSNR in dB beside direct volume rendering, over views of the path of test views.
 
-        Both have the scene's light and edits. Looks and segments are not of the volume: they count as
-        differences.
+        Both have the scene's light and edits, without cuts. Looks and segments are not of the volume: they
+        count as differences.
         """
         from texgs.metrics.quality import compare
         from texgs.volume.cameras import spiral
 
-        scene = self.session.scene
+        scene = replace(self.session.scene, cuts=NO_CUTS)
         lens = scene.framed(self.session.composition).lens(width=width, height=width)
         pairs = (self.session.beside(camera, scene) for camera in spiral(views, lens))
         return fmean(compare(*pair)["psnr"] for pair in pairs)

@@ -17,6 +17,7 @@ from texgs.core.names import close
 from texgs.core.process import collect_rarely, keep_freed_memory, waiting
 from texgs.workflow.stage_table import STAGES
 
+NEGATIVE = re.compile(r"-\d+|-\d*\.\d+")  # as argparse knows it
 NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`.
 # Verbs in the module of another have `add_VERB_arguments` and `run_VERB` there; those of stages share one.
@@ -92,10 +93,19 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def joined(words: Sequence[str]) -> list[str]:
-    """Join options with negative numbers to one word: argparse takes --view -90,20 for two options."""
+    """Join options with several negative numbers to one word: argparse takes --view -90,20 for two options.
+
+    It knows a single one, of which an option may have several, as --target -1 0 -1.
+    """
     made: list[str] = []
     for word in words:
-        if NUMBERS.fullmatch(word) and made and made[-1].startswith("--") and "=" not in made[-1]:
+        if (
+            NUMBERS.fullmatch(word)
+            and not NEGATIVE.fullmatch(word)
+            and made
+            and made[-1].startswith("--")
+            and "=" not in made[-1]
+        ):
             made[-1] += f"={word}"
         else:
             made.append(word)

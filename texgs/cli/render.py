@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -131,6 +132,8 @@ def compared(
     print(", ".join(in_words(mean(measured))))
     if is_fitted:
         print(what_changed(edits))
+    elif session.scene.shows_volume:
+        print("The cut scene shows its volume itself: take cuts back to compare its models.", file=sys.stderr)
 
 
 def pair_of(

@@ -6,6 +6,7 @@ from base64 import b64decode, b64encode
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Self
+from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
 import numpy as np
@@ -24,6 +25,7 @@ from texgs.models.instruction import require_instruction
 
 NAMES = {"steps": "num_inference_steps", "image_scale": "image_guidance_scale", "negative": "negative_prompt"}
 MULTIPLE = 16  # pixels: what sides of images are multiples of, for autoencoders and patches of transformers
+SAID = 200  # bytes of a reply that is none, in a message
 TIMEOUT = 600.0  # seconds in which nothing comes from a server
 
 
@@ -100,6 +102,20 @@ class ImagePipeline(EachAlone):
         return interpolate(planes, sides, mode="bicubic", antialias=True)[0].permute(1, 2, 0)
 
 
+def image_of(request: Request) -> Any:
+    """Return the image in a server's reply; what it says instead is the error."""
+    try:
+        with urlopen(request, timeout=TIMEOUT) as reply:
+            body = reply.read()
+    except HTTPError as error:
+        words = error.read(SAID).decode(errors="replace")
+        raise ValueError(f"{error}, {words}" if words else str(error)) from error
+    found = json.loads(body)
+    if not isinstance(found, dict) or "image" not in found:
+        raise ValueError(body[:SAID].decode(errors="replace"))
+    return found["image"]
+
+
 class Endpoint(EachAlone):
     """A server at an address, which gets one request for each view, as docs/extend.md describes it."""
 
@@ -112,8 +128,7 @@ class Endpoint(EachAlone):
         advice = "does the server run there, and reply as docs/extend.md says?"
         with reading_as('{"image": a PNG in base64}', advice, f"{self.name}: "):
             request = Request(self.name, body, {"Content-Type": "application/json"})
-            with urlopen(request, timeout=TIMEOUT) as reply:
-                content = BytesIO(b64decode(json.load(reply)["image"], validate=True))
+            content = BytesIO(b64decode(image_of(request), validate=True))
             with Image.open(content, formats=("PNG",)) as edited:
                 wanted, got = (f"{x.mode} of {x.width} x {x.height}" for x in (shown, edited))
                 if wanted != got:

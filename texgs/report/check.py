@@ -11,6 +11,7 @@ import numpy as np
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.checksum import combined, sha256
+from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
 from texgs.core.figures import write_grid
 from texgs.core.io import read_json, write_json
@@ -80,7 +81,8 @@ def checksum_of(scene: Scene) -> str:
 def shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str, Camera, Scene]]:
     """Yield independent views with a title, from anywhere on a sphere, with lights and edits at random.
 
-    Opacities and palettes that are not edited are those of the scene. A seed gives the same again.
+    They are not cut: a cut scene may show its volume itself. Opacities and palettes that are not edited are
+    those of the scene. A seed gives the same again.
     """
     random = Random(seed)
 
@@ -100,7 +102,7 @@ def shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str
             models[name] = replace(model, edit=edit)
         lit = light.kind if light == HEADLIGHT else f"light {light.azimuth:.0f}°, {light.polar:.0f}°"
         title = f"camera {azimuth:.0f}°, {polar:.0f}°\n{lit}"
-        yield title, orbit(azimuth, polar, *lens), replace(scene, models=models, light=light)
+        yield title, orbit(azimuth, polar, *lens), replace(scene, models=models, light=light, cuts=NO_CUTS)
 
 
 def told(values: Sequence[float]) -> dict[str, float]:

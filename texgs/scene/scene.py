@@ -169,6 +169,11 @@ class Scene:
         materials = {model.edit.material for model in models if model.edit.visible and model.edit.opacity > 0}
         return not (self.has_looks or is_apart or len(materials) > 1)
 
+    @property
+    def shows_volume(self) -> bool:
+        """Return whether frames show its volume in place of its models, which are cut."""
+        return bool(self.cuts) and self.volume is not None and self.is_as_volume
+
     def open(self, device: torch.device | str = "cpu", *, is_lean: bool = False) -> Composed:
         """Read and join the models.
 

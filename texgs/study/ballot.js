@@ -12,7 +12,7 @@ let shown = 0;
 function recalled() {
   try {
     const kept = JSON.parse(localStorage.getItem(`ballot-${study}`));
-    if (kept && kept.ballot) return kept;
+    if (kept && kept.ballot && !kept.isSaved) return kept; // who opens the page after a ballot was saved, has a new one
   } catch { /* a browser that keeps nothing for files */ }
   const random = crypto.getRandomValues(new Uint8Array(6));
   return { ballot: [...random].map((byte) => byte.toString(16).padStart(2, "0")).join(""), ranks: {} };
@@ -95,7 +95,9 @@ function saveBallot() {
   link.download = `ballot-${answers.ballot}.csv`;
   link.href = URL.createObjectURL(new Blob([csv()], { type: "text/csv" }));
   link.click();
-  status.textContent = `Saved as ${link.download}, where this browser puts downloads. Please send this file to the person who gave you this page.`;
+  answers.isSaved = true;
+  keep();
+  status.textContent = `Saved as ${link.download}, where this browser puts downloads. Please send this file to the person who gave you this page. For a ballot of somebody else, open the page again.`;
 }
 
 for (const question of questions) {

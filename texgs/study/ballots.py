@@ -35,14 +35,17 @@ def read_votes(study: Study, paths: Iterable[str | Path]) -> Votes:
     """Read the ballots of a study, in the order of their ids.
 
     Raises:
-        ArgumentError: naming the file that is no complete ballot of this study, or that is there twice.
+        ArgumentError: naming the file that is no complete ballot of this study, or one of another file with
+            other answers.
     """
     by_id: dict[str, tuple[Path, Ballot]] = {}
     for path in sorted(map(Path, paths)):
         ballot = read_ballot(study, path)
-        if ballot.ballot in by_id:
-            first, _ = by_id[ballot.ballot]
-            raise ArgumentError(f"{path}: expected another ballot than {first}, got the same one; keep one")
+        first, same = by_id.get(ballot.ballot, (path, ballot))
+        if ballot != same:
+            raise ArgumentError(
+                f"{path}: expected another ballot than {first}, got other answers of the same one; keep one"
+            )
         by_id[ballot.ballot] = (path, ballot)
     return Votes(study, [by_id[name][1] for name in sorted(by_id)])
 

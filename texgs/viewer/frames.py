@@ -139,12 +139,15 @@ class Beside:
     def frame(self, view: View, scene: Scene, scale: float) -> tuple[np.ndarray, dict[str, float]]:
         """Return a frame [H, W, 3], uint8, and at rest how close scene and volume are in it.
 
+        Nothing is told of a cut scene that shows its volume itself.
+
         A training view is in the middle of the frame, has its own light, and knows no cuts.
         """
         camera = view.camera.camera(scale)
         if scene.volume is not None:
             image, truth = self._session.beside(camera, scene)
-            return shown(view, image.color, truth.color), {} if view.moving else compare(image, truth)
+            says_nothing = view.moving or scene.shows_volume
+            return shown(view, image.color, truth.color), {} if says_nothing else compare(image, truth)
         if view.mode == "wipe":
             raise ArgumentError("wipe: expected a scene that names its volume; make it by texgs compose")
         nearest = self._origins.nearest(camera, scene)

@@ -101,14 +101,15 @@ class SharedEdits:
         return self.scene == self._saved
 
     def shown(self, view: View, trial: Mapping[str, NewLook] | None = None) -> Scene:
-        """Return what a view shows: the scene now, as it was opened, or one model alone.
+        """Return what a view shows: the scene now, as it was opened, at its step, or one model alone.
 
         The scene as it is now has the looks of a trial, as far as it has such parts.
         """
         if view.only:
             return isolated(self.scene, view.only)
         if view.before:
-            return self.original
+            time = self.scene.time
+            return self.original if time is None else self.original.at(time)
         names, looks = part_names(self.scene), trial or {}
         return with_looks(self.scene, {part: looks[part] for part in names if part in looks})
 

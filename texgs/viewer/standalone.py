@@ -23,7 +23,7 @@ from texgs.fields.surfels.compact import STEP, compact_tensors
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
-from texgs.scene.twin import Twin, twin_of
+from texgs.scene.twin import Twin
 from texgs.viewer.description import describe, presets
 from texgs.viewer.origins import Origins
 from texgs.viewer.page_steps import PageSteps, page_steps
@@ -92,7 +92,7 @@ def scene_page(
     if volume is not None:
         description |= {"volume": volume.describe(scene), "presets": presets()}
         description["transfer"] = Origins(scene).transfer
-        twin = twin_of(scene)
+        twin = Twin(scene)  # which refuses a volume that cannot be shown as the models
     picture = poster(scene, composed, description["views"][0], description["fov_y"], twin)
     html = page_of(description, surfels, picture, checked, volume, moved)
     return ScenePage(html, len(composed), picture, moved)

@@ -2,6 +2,7 @@
 
 /** @param {ScenePage} page - with link and notices */
 export function copyLinkBy(button, page) {
+  button.hidden = location.protocol === "about:"; // within another page it has no address of its own
   button.onclick = async () => {
     try {
       await navigator.clipboard.writeText(page.link); // missing where the page came without encryption

@@ -3,7 +3,7 @@
 import { at } from "./functions.js";
 
 export const SIZE = 4096; // entries, sixteen for each code of a sample
-const MOST = 64; // extinction of what is opaque
+const MOST = 20; // extinction of what is opaque; of more, sums in single precision would lose what is faint
 const clamp = (x) => Math.min(1, Math.max(0, x));
 
 /**

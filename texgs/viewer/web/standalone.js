@@ -64,8 +64,14 @@ class StandalonePage extends ScenePage {
 
   /** Save a picture of the view, by default in the pixels of the screen. */
   async #save(how) {
-    const canvas = await this.renderer.still(this.camera, this.state.scene, { ...this.shown, ...how });
-    canvas.toBlob((blob) => download(blob, `${this.state.scene.name}.png`));
+    try {
+      const canvas = await this.renderer.still(this.camera, this.state.scene, { ...this.shown, ...how });
+      const blob = await new Promise((done) => canvas.toBlob(done));
+      if (!blob) throw new Error("This browser cannot make a picture of this size.");
+      download(blob, `${this.state.scene.name}.png`);
+    } catch (error) {
+      this.notices.tell(error.message, "error");
+    }
   }
 }
 

@@ -61,7 +61,9 @@ export class TransferPicture {
   /** A value, and how much of the volume has about it; the range where there is none. */
   words(value) {
     if (value === undefined) return `${short(this.range[0])} to ${short(this.range[1])}`;
-    const { minimum, maximum, histogram } = this.#volume, sum = histogram.reduce((a, b) => a + b, 0);
+    const { minimum, maximum, histogram } = this.#volume;
+    if (!histogram.length) return short(value);
+    const sum = histogram.reduce((a, b) => a + b, 0);
     const bin = Math.floor((value - minimum) / (maximum - minimum) * histogram.length);
     const count = histogram[value === maximum ? histogram.length - 1 : bin];
     return `${short(value)}: ${count ? `${short(100 * count / sum)} % of the volume` : "not in the volume"}`;

@@ -84,7 +84,7 @@ export class WebglRenderer {
    *   slow frames are coarser; `gain` of a difference, and the part of the width before the line of a `wipe`.
    */
   draw(camera, scene, { before = false, ...shown } = {}) {
-    this._wanted = { view: this._view(camera), scene: before ? this._original : scene, shown };
+    this._wanted = { view: this._view(camera), scene: before ? this._before(scene) : scene, shown };
     this._ask();
   }
 
@@ -116,9 +116,10 @@ export class WebglRenderer {
 
   /** The point [3] that a pixel shows; null for the background. */
   pointAt(camera, scene, { before, mode }, [x, y]) {
-    const view = this._view(camera), pixel = [x, y].map((side) => side + 0.5), shown = before ? this._original : scene;
-    const look = lookOf(shown), isVolume = this._twin && mode === "volume";
-    if (isVolume) this._twin.drawDepths(viewOf(view), shown, look);
+    const view = this._view(camera), pixel = [x, y].map((side) => side + 0.5), shown = before ? this._before(scene) : scene;
+    const look = lookOf(shown), isCut = look.planes.length > 0 && (mode === "shaded" || OF_TWIN.includes(mode));
+    const isVolume = this._hasTwin(shown) && (mode === "volume" || isCut);
+    if (isVolume) this._twin.drawDepths(viewOf(view), mode === "volume" ? shown : { ...shown, functions: {} }, look);
     else this._blend(viewOf(view), shown, look, "depth");
     const depth = (isVolume ? this._twin : this._pass).target.depthAt(x, y);
     return depth && camera.unproject(pixel, depth, view.width, view.height);
@@ -126,7 +127,7 @@ export class WebglRenderer {
 
   /** The same picture as a canvas of its own; of another size, or without its background, if need be. */
   async still(camera, scene, { before, ...how }) {
-    const view = this._view(camera), shown = before ? this._original : scene;
+    const view = this._view(camera), shown = before ? this._before(scene) : scene;
     return this.at(shown.time, () => this._still(view, shown, how));
   }
 
@@ -236,11 +237,20 @@ export class WebglRenderer {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
+  /** The scene as it was opened, at the step that another shows. */
+  _before({ time }) {
+    return { ...this._original, time };
+  }
+
+  /** Whether the volume of a scene is there: that of other steps is not in the page. */
+  _hasTwin(scene) {
+    return this._twin && scene.time === this._original.time;
+  }
+
   /** The picture of a mode, or two and how they are shown. */
   _pictures(view, scene, mode, moving) {
     const look = lookOf(scene), draw = (slab) => this._blend(view, scene, look, mode, slab);
-    const isThere = this._twin && scene.time === this._original.time; // of others, the page has no volume
-    if (!isThere || (mode !== "shaded" && !OF_TWIN.includes(mode))) return alone(draw());
+    if (!this._hasTwin(scene) || (mode !== "shaded" && !OF_TWIN.includes(mode))) return alone(draw());
     return this._twin.pictures(view, scene, look, { mode, moving }, { draw, target: this._pass.target });
   }
 
