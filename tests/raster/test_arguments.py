@@ -113,6 +113,8 @@ def test_wrong_sizes_cameras_and_outputs():
     refused(r"width, height: expected whole numbers, got 5\.0", width=5.0)
     refused(r"viewmat\[.*did you transpose\?", viewmat=scene.viewmat.T)
     refused(r"K\[.*did you transpose\?", K=scene.K.T)
+    stretched = torch.cat([2 * scene.viewmat[:3], scene.viewmat[3:]])
+    refused("viewmat: expected a rotation and a shift, got axes .*; normalise them", viewmat=stretched)
     for fx, fy in ((0.0, 9.0), (-10.0, 9.0), (9.0, -1.0)):
         message = rf"K: expected focal lengths above 0, got .*= {min(fx, fy)}"
         refused(message, K=torch.diag(torch.tensor([fx, fy, 1.0])))

@@ -1,5 +1,6 @@
 """Images, gradients, statistics and adjoint are the same bits in every run and for any number of threads."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
@@ -110,3 +111,19 @@ def test_voxels(degree):
     native.release_memory()
     native.peak_memory(reset=True)
     assert native.peak_memory() == 0
+
+
+def test_two_threads_may_go_back_through_one_graph():
+    """They change what the library keeps of it: one after the other."""
+    scene = random_scene(2, n=400, width=64, height=48)
+    leaf = scene.means.clone().requires_grad_()
+    render = replace(scene, means=leaf).render(rasterize, ("depth",))
+    losses = render.color.sum(), render.depth.sum()
+    expected = [torch.autograd.grad(loss, leaf, retain_graph=True)[0] for loss in losses]
+
+    def same(number):
+        runs = (torch.autograd.grad(losses[number], leaf, retain_graph=True)[0] for _ in range(20))
+        return all(torch.equal(gradient, expected[number]) for gradient in runs)
+
+    with ThreadPoolExecutor(2) as pool:
+        assert all(pool.map(same, (0, 1)))

@@ -17,6 +17,8 @@ from tests.raster.agreement import (
     true_images,
 )
 from tests.raster.scenes import HARD_CASES, few, gaussians, textured
+from texgs.core.camera import intrinsics, look_at
+from texgs.raster import reference
 from texgs.raster.api import rasterize
 from texgs.raster.types import DEFAULT_OPTIONS, Options
 
@@ -31,6 +33,23 @@ def check(scene, device, name, options=DEFAULT_OPTIONS):
     """Compare all images of a scene that the definition is sure of."""
     compared = set(IMAGES) - AMBIGUOUS.get(name, set())
     check_images(scene, device, options, dict.fromkeys(compared, TOLERANCE.get(name, 1e-4)), -1)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_large_surfels_that_reach_behind_the_camera(seed):
+    """The near plane is so close against their extent that rounding may put what crosses it behind."""
+    generator = torch.Generator().manual_seed(seed)
+    extent = 1e5
+    means = extent * torch.randn(40, 3, generator=generator)
+    quats, scales = torch.randn(40, 4, generator=generator), extent * torch.rand(40, 2, generator=generator)
+    viewmat = look_at(extent * torch.randn(3, generator=generator), torch.zeros(3))
+    for each in zip(means, quats, scales, strict=True):
+        geometry = [x[None] for x in each] + [torch.tensor([0.9])]
+        camera, features = (viewmat, intrinsics(40.0, 32, 32)), torch.ones(1, 1)
+        seen = rasterize(*geometry, *camera, 32, 32, features=features).alpha
+        exact = [x.double() for x in (*geometry, *camera, features)]
+        truth = reference.rasterize(*exact[:6], 32, 32, features=exact[6]).alpha
+        assert float(((seen - truth).abs() > 0.02).float().mean()) < 0.02
 
 
 def check_learning(scene, device, name, compared, options=DEFAULT_OPTIONS):

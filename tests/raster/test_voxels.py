@@ -221,6 +221,16 @@ def test_rays_and_marches_that_are_refused():
     refuses(ShapeError, r"rays: expected \[N, 6\], .*; did you transpose", render_rays, grid, rays.T)
     refuses(ArgumentError, "rays: expected float32, got float64", render_rays, grid, rays.double())
     refuses(ArgumentError, "rays: not differentiable", render_rays, grid, rays.clone().requires_grad_())
+    samples = Samples(grid, March(), rays, keep=False)
+    gradient = RowGradient(grid), torch.ones(len(rays), 3)
+    refuses(
+        ArgumentError,
+        "samples: expected those that were kept",
+        samples.add_gradient,
+        gradient[1],
+        None,
+        gradient[0],
+    )
     refuses(ArgumentError, r"step: expected 0\.1 to 8 spacings", render_rays, grid, rays, March(step=0.01))
     opaque = March(transmittance_min=1)
     refuses(ArgumentError, "transmittance_min: expected 0 to 1", render_rays, grid, rays, opaque)

@@ -104,6 +104,14 @@ def test_a_voxel_is_a_length():
             fuse(show(ball()), VIEWS, voxel)
 
 
+@pytest.mark.parametrize(("views", "voxel"), [(VIEWS[:1], VOXEL), (VIEWS, 10.0)])
+def test_views_and_voxels_that_leave_no_surface_are_told(views, voxel):
+    with pytest.raises(
+        ArgumentError, match=f"mesh: expected cells of {voxel:g} near a surface that several vie"
+    ):
+        fuse(show(ball()), views, voxel)
+
+
 def test_renders_without_depth_are_refused():
     with pytest.raises(ArgumentError, match="show: expected renders with median or depth"):
         fuse(lambda camera: sample("surfels").render(camera), VIEWS, VOXEL)

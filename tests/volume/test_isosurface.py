@@ -106,3 +106,11 @@ def test_large_volumes_are_looked_at_with_a_stride(monkeypatch):
     points, _ = visible_voxels(ramp(), NARROW, 10_000, seed=0)
     assert len(points) == 12 * 12, "every second sample along each axis: x = 12"
     np.testing.assert_array_equal(points, visible_voxels(ramp(), NARROW, 10_000, seed=0)[0])
+
+
+def test_missing_samples_are_clear():
+    values = ball().values.clip(0, 1).astype(np.float32)
+    points = TransferFunction([(0.4, 1.0), (1.0, 1.0)], WHITE)
+    whole = surface_of(Grid(values, (2.0, 2.0, 2.0)), points, 0.5)
+    values[0, 0, 0] = np.nan
+    assert np.array_equal(surface_of(Grid(values, (2.0, 2.0, 2.0)), points, 0.5).vertices, whole.vertices)

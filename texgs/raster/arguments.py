@@ -17,6 +17,7 @@ MAX_CHANNELS = 32
 TEXTURE_CHANNELS = 3
 MOST_TEXELS = 2**24  # of one surfel: the library counts them in 32-bit floats
 MAX_SIDE = 2**20 - 16  # pixels; the library counts tiles of 16 of them in 16 bits
+SKEWED = 1e-3  # by which axes of a camera may differ from a rotation's
 ROUNDING = 1e-4  # of a matrix that was inverted or multiplied
 BYTES_PER_SURFEL = 512  # records, footprints, sorting, a few tiles: what no scene stays below
 AXES = {
@@ -66,7 +67,8 @@ def surfel_tensors(
         check_texture(texture, sizes["N"])
     if features is not None:
         channels("features", sizes["C"], MAX_CHANNELS - (0 if texture is None else TEXTURE_CHANNELS))
-    native.require_memory(BYTES_PER_SURFEL * sizes["N"], tensors.means.device)
+    n = sizes["N"]
+    native.require_memory(BYTES_PER_SURFEL * n, tensors.means.device, f"{n} surfels", "choose fewer")
     return SurfelTensors._make(None if x is None else x.contiguous() for x in tensors)
 
 
@@ -153,7 +155,8 @@ def view(
     if options.check_finite:
         check.finite(**surfels._asdict(), **{name: x for name, (x, _) in constant.items()})
     planes = surfels.channels + 3 * len(wanted) + 2
-    native.require_memory(4 * planes * width * height, surfels.means.device)
+    n_bytes = 4 * planes * width * height
+    native.require_memory(n_bytes, surfels.means.device, "the images", "choose smaller ones")
     matrices = (viewmat.detach().contiguous(), K.detach().contiguous())
     layout = (None, None) if texture is None else (texture.sizes, texture.offsets)
     rest = (None if x is None else x.detach().contiguous() for x in (background, *layout, depth_range))
@@ -177,3 +180,8 @@ def pinhole(viewmat: Tensor, K: Tensor) -> None:
         errors = [abs(x - wanted) for x, wanted in zip(row, (0, 0, 0, 1), strict=True) if isfinite(x)]
         if max(errors, default=0) > ROUNDING:
             raise ArgumentError(f"{name}: expected 0, 0, 0, 1, got {row}; did you transpose?")
+    axes = viewmat[:3, :3].float()
+    if float((axes @ axes.T - torch.eye(3)).abs().max()) > SKEWED:
+        raise ArgumentError(
+            f"viewmat: expected a rotation and a shift, got axes {axes.tolist()}; normalise them"
+        )

@@ -146,5 +146,6 @@ class RasterizeFunction(torch.autograd.Function):
         dense = (None if grad is None else grad.contiguous() for grad in grads)
         results = native.gradients(surfels, ctx.needs_input_grad[2:])
         structures = (*ctx.view.structures(surfels), Image(*images), Image(*dense), Gradients(*results))
-        native.call("texgs_backward", ctx.frame.pointer, *structures, device=surfels.means.device)
+        with ctx.frame.lock:
+            native.call("texgs_backward", ctx.frame.pointer, *structures, device=surfels.means.device)
         return None, None, *results

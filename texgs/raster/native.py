@@ -14,6 +14,7 @@ from contextlib import nullcontext
 from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
+from threading import Lock
 from typing import Any, cast
 
 import torch
@@ -68,10 +69,13 @@ def gradients(tensors: Iterable[Tensor | None], wanted: Iterable[bool]) -> list[
 
 
 class Handle:
-    """Owns what the library keeps between calls: the address of `pointer` is where it writes it."""
+    """Owns what the library keeps between calls: the address of `pointer` is where it writes it.
+
+    A call that changes it holds the lock: two threads may go back through one graph.
+    """
 
     def __init__(self, release: str, device: torch.device) -> None:
-        self.pointer = c_void_p()
+        self.pointer, self.lock = c_void_p(), Lock()
         weakref.finalize(self, function(library(device.type), release), self.pointer)
 
 
@@ -206,14 +210,14 @@ def call(name: str, *arguments, device: torch.device) -> None:
     _require_success(function(lib, name)(*map(plain, arguments), stream), lib, device)
 
 
-def require_memory(n_bytes: int, device: torch.device) -> None:
-    """Raise OutOfMemoryError, naming `n_bytes`, where less memory than that is left."""
+def require_memory(n_bytes: int, device: torch.device, what: str, advice: str) -> None:
+    """Raise OutOfMemoryError, naming `n_bytes`, where less memory than that is left for something."""
     lib = library(device.type)
     with torch.cuda.device(device) if device.type == "cuda" else nullcontext():
         status = function(lib, "texgs_require_memory")(n_bytes)
     _require_success(status, lib, device)
     if device.type == "cpu":  # the C library hands out more than there is
-        memory.require_memory(n_bytes, "texgs.raster: the images", "choose smaller ones")
+        memory.require_memory(n_bytes, f"texgs.raster: {what}", advice)
 
 
 def _require_success(status: int, lib: ctypes.CDLL, device: torch.device) -> None:

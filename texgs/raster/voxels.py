@@ -105,8 +105,11 @@ class Samples:
         self.call("texgs_grid_mark", weights)
 
     def call(self, name: str, *arguments: Tensor | None) -> None:
-        """Call a function of the library for the samples."""
-        native.call(name, self.handle.pointer, *self._structures(), *arguments, device=self.rays.device)
+        """Call a function of the library for the samples, which were kept."""
+        if not self.handle.pointer:
+            raise ArgumentError("samples: expected those that were kept, got none; march with keep=True")
+        with self.handle.lock:
+            native.call(name, self.handle.pointer, *self._structures(), *arguments, device=self.rays.device)
 
     def _structures(self) -> tuple[native.Struct, native.Struct]:
         """Return the grid and the march as the library takes them."""

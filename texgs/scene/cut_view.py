@@ -47,7 +47,7 @@ def cut_view(
         scene: whose edits, light, background and cuts count.
         twin: of the scene's volume.
         look: see `Composed`.
-        background: [3] behind models; white by default, for a factor black.
+        background: [3] behind models; white by default, for a factor black; behind a twin the scene's.
         outputs: besides colour and alpha.
     """
     cut = range_of(scene.cuts, camera) if scene.cuts else None

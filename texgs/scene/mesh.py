@@ -77,7 +77,7 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
         voxel: edge of the lattice's cells, world units.
 
     Raises:
-        ArgumentError: if the voxel is no length, or no view sees a surface.
+        ArgumentError: if the voxel is no length, or too large for what is there, or no view sees a surface.
         OutOfMemoryError: if there are too many voxels.
     """
     if not LEAST_VOXEL <= voxel < inf:
@@ -94,6 +94,11 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
     for view in progress(views, title="fuse", unit="view"):
         fuse_view(lattice, view)
     mesh = largest_clusters(zero_surface(lattice))
+    if not len(mesh.triangles):
+        raise ArgumentError(
+            f"mesh: expected cells of {voxel:g} near a surface that several views see, got none; choose a "
+            "smaller voxel, or more views"
+        )
     return Mesh(mesh.vertices, mesh.triangles, colors_at(lattice, mesh.vertices))
 
 

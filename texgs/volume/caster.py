@@ -116,7 +116,7 @@ class Caster:
         """
         height, width = camera.height, camera.width
         require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
-        self._check(camera)
+        self._check(camera, outputs)
         _, prepared, _kept = self._prepare([tf] if isinstance(tf, TransferFunction) else [*tf])
         matrices = [x.float().to(self.device).contiguous() for x in (camera.viewmat, camera.K)]
         shapes = {"rgba": (height, width, 4), "normal": (height, width, 3)}
@@ -148,8 +148,12 @@ class Caster:
         on_device = {name: x.to(self.device).contiguous() for name, x in cut.items()}
         return {**on_device, "n_planes": len(faces.normals) if faces else 0}
 
-    def _check(self, camera: Camera) -> None:
-        """Refuse cameras and steps that the library would take for others."""
+    def _check(self, camera: Camera, outputs: Collection[str]) -> None:
+        """Refuse cameras, outputs and steps that the library would take for others, or not take."""
+        if isinstance(outputs, str) or not {*outputs} <= {*OUTPUTS}:
+            raise ArgumentError(f"outputs: expected some of {', '.join(OUTPUTS)}, got {outputs!r}")
+        check.constant(viewmat=camera.viewmat, K=camera.K)
+        check.finite(viewmat=camera.viewmat, K=camera.K)
         pinhole(camera.viewmat.cpu(), camera.K.cpu())
         samples = self._diagonal / (self._appearance.step * self._voxel)
         if samples > MOST_SAMPLES:
@@ -159,6 +163,8 @@ class Caster:
 
     def _prepare(self, tfs: list[TransferFunction]) -> Prepared:
         """Return channels with their functions for the library, and how far bricks are from what shows."""
+        if not tfs:
+            raise ArgumentError("tf: expected at least one transfer function, got none")
         prepared = self._prepared[0] if self._prepared else None  # another thread may prepare another one
         if prepared is None or prepared[0] != tfs:
             count, kept = len(tfs), [*map(self._shown, tfs)]  # arrays of the library do not keep tensors

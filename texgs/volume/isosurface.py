@@ -52,7 +52,7 @@ def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
     box, where what is opaque ends there.
     """
     grid = grid.channel(tf.channel)
-    least, most = float(grid.values.min()), float(grid.values.max())
+    least, most = float(np.nanmin(grid.values)), float(np.nanmax(grid.values))  # what is missing is clear
     span = max(most - least, 1e-30)
     require_memory(BYTES * grid.values.size, "the surface of the volume", "prepare it with reduce=2")
     # In a shell of samples so low that the surface ends at the outermost of the volume.
@@ -64,7 +64,7 @@ def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
         for values, slab in zip(grid.values, signed, strict=True):
             above = values - np.float32(low) if low > least else span
             below = np.float32(high) - values if high < most else span
-            np.maximum(slab, np.minimum(above, below), out=slab)
+            np.fmax(slab, np.minimum(above, below), out=slab)
     if not (signed > 0).any():
         raise ArgumentError(
             f"mesh.opacity: expected a transfer function that is as opaque as {opacity:g} somewhere in the "

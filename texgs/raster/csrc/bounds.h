@@ -161,7 +161,7 @@ TEXGS_MATHS void include_clipped(const View& view, float x, float y, const Plane
     const float corner[4][2] = {{-side, -side}, {side, -side}, {side, side}, {-side, side}};
     const auto depth = [&](float u, float v) { return s.p.z + u * s.a.z + v * s.b.z; };
     const auto include_point = [&](float u, float v) {
-        const float z = depth(u, v);
+        const float z = ::fmaxf(depth(u, v), near_plane);  // rounding may bring the crossing to either side of 0
         include(box, view.fx * (s.p.x + u * s.a.x + v * s.b.x) / z + x,
                 view.fy * (s.p.y + u * s.a.y + v * s.b.y) / z + y);
     };

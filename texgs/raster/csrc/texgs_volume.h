@@ -30,7 +30,7 @@ typedef enum {
 typedef struct {
     const void* values; /* [z, y, x]; NaN is transparent, with all cells that it is a corner of */
     int32_t type;       /* a texgs_sample_type */
-    int32_t size[3];    /* samples along x, y, z, at least 2; a slice has less than 2^28 bytes */
+    int32_t size[3];    /* samples along x, y, z, at least 2 */
     float half[3];      /* half the box's sides, world units */
 } texgs_volume;
 
