@@ -35,21 +35,23 @@ def check(scene, device, name, options=DEFAULT_OPTIONS):
     check_images(scene, device, options, dict.fromkeys(compared, TOLERANCE.get(name, 1e-4)), -1)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", [8498, 5278, 6557, 4261, 7550])
 def test_large_surfels_that_reach_behind_the_camera(seed):
     """The near plane is so close against their extent that rounding may put what crosses it behind."""
     generator = torch.Generator().manual_seed(seed)
-    extent = 1e5
-    means = extent * torch.randn(40, 3, generator=generator)
-    quats, scales = torch.randn(40, 4, generator=generator), extent * torch.rand(40, 2, generator=generator)
-    viewmat = look_at(extent * torch.randn(3, generator=generator), torch.zeros(3))
-    for each in zip(means, quats, scales, strict=True):
-        geometry = [x[None] for x in each] + [torch.tensor([0.9])]
-        camera, features = (viewmat, intrinsics(40.0, 32, 32)), torch.ones(1, 1)
-        seen = rasterize(*geometry, *camera, 32, 32, features=features).alpha
-        exact = [x.double() for x in (*geometry, *camera, features)]
-        truth = reference.rasterize(*exact[:6], 32, 32, features=exact[6]).alpha
-        assert float(((seen - truth).abs() > 0.02).float().mean()) < 0.02
+    extent = 10 ** (4 * torch.rand(1, generator=generator).item() + 1)
+    means, quats = (torch.randn(1, n, generator=generator) for n in (3, 4))
+    means, scales = extent * means, extent * 10 ** (torch.rand(1, 2, generator=generator) * 3 - 1.5)
+    opacities = torch.rand(1, generator=generator).clamp_min(0.01)
+    width, height = (int(torch.randint(1, 70, (1,), generator=generator)) for _ in range(2))
+    position = torch.randn(3, generator=generator) * extent * torch.rand(1, generator=generator) * 2
+    K = intrinsics(20 + 120 * torch.rand(1, generator=generator).item(), width, height)
+    tensors = means, quats, scales, opacities, look_at(position, torch.zeros(3)), K
+    seen = rasterize(*tensors, width, height, features=torch.ones(1, 1)).alpha
+    exact = (x.double() for x in tensors)
+    truth = reference.rasterize(*exact, width, height, features=torch.ones(1, 1).double()).alpha
+    assert float(truth.mean()) > 0.02
+    assert float(((seen - truth).abs() > 0.02).float().mean()) < 0.02
 
 
 def check_learning(scene, device, name, compared, options=DEFAULT_OPTIONS):
