@@ -93,8 +93,8 @@ class Volume:
         if source.note:
             warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
         self._channel = source.channel
-        keys = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": plain(nan_value)}
-        self.summary = self._prepared(source, keys)
+        how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": plain(nan_value)}
+        self.summary = self._prepared(source, how)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         write_summaries(self.file, [self.summary], [""])
 
@@ -108,12 +108,12 @@ class Volume:
         """Return the file, volume.nrrd, which ParaView opens, too."""
         return self.folder / "volume.nrrd"
 
-    def _prepared(self, source: Source, keys: dict[str, Any]) -> Summary:
+    def _prepared(self, source: Source, how: dict[str, Any]) -> Summary:
         """Write the file; one of another volume, or that the data are in, is left alone."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=".volume-", dir=self.folder) as scratch:
             made = Path(scratch, self.file.name)
-            summary = prepare(source, made, **keys)
+            summary = prepare(source, made, **how)
             if self.file.exists() and not cmp(made, self.file, shallow=False):
                 raise ArgumentError(
                     f"folder: expected one without another volume, got {self.file}; choose another folder, "

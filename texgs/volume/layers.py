@@ -17,7 +17,6 @@ from texgs.volume.slabs import SLAB_BYTES, Source, step_note
 SHARE = 4  # one layer takes this part of the free memory at most
 LISTED = 8  # arrays in a message
 CODED = ("scale_factor", "add_offset", "_FillValue", "missing_value")  # attributes of CF: samples to decode
-
 UNSIGNED = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
 
 
@@ -61,11 +60,10 @@ class LayerSource(Source):
         numbers = {name: np.ravel(stored.attributes.get(name, "")) for name in CODED}
         self._coded = {k: v[0] for k, v in numbers.items() if v.size == 1 and v.dtype.kind in "iuf"}
         spacing, origin, remark = lattice((x, y, z), *given)
-        is_unsigned = np.ravel(stored.attributes.get(UNSIGNED, "")).astype(str)[0].lower() == "true"
-        self._type = np.dtype(
-            f"u{stored.dtype.itemsize}" if is_unsigned else stored.dtype
-        )  # of what is stored
-        dtype = np.dtype(np.float32) if self._coded else self._type
+        unsigned = np.ravel(stored.attributes.get(UNSIGNED, "")).astype(str)[0].lower() == "true"
+        self._is_unsigned = unsigned and stored.dtype.kind == "i"
+        kept = np.dtype(f"u{stored.dtype.itemsize}") if self._is_unsigned else stored.dtype
+        dtype = np.dtype(np.float32) if self._coded else kept
         super().__init__(path.name, (x.size, y.size, z.size), dtype, spacing, origin)
         for axis, index in zip(stored.axes, self._index, strict=True):
             if axis.kind == "time":
@@ -104,7 +102,7 @@ class LayerSource(Source):
     def _decoded(self, values: np.ndarray) -> np.ndarray:
         """Return samples of the source's type: packed ones by scale and offset, NaN for missing ones."""
         missing = [values == self._coded[name] for name in CODED[2:] if name in self._coded]
-        values = values.view(self._type) if self._type.kind == "u" else values
+        values = values.view(values.dtype.str.replace("i", "u")) if self._is_unsigned else values
         scale, offset = (self._coded.get(name) for name in CODED[:2])
         if scale is not None or offset is not None:
             values = values * np.float64(1 if scale is None else scale) + (offset or 0)
