@@ -45,9 +45,17 @@ def test_device_without_a_library():
 
 
 def test_out_of_memory_on_a_gpu_tells_of_what_torch_keeps(monkeypatch):
-    refuses(OutOfMemoryError, r"needs \d+ bytes more$", native.require_memory, 2**60, torch.device("cpu"))
+    refuses(
+        OutOfMemoryError,
+        r"needs \d+ bytes more$",
+        native.require_memory,
+        2**60,
+        torch.device("cpu"),
+        "x",
+        "y",
+    )
     library = native.library()
     monkeypatch.setattr(native, "library", lambda device_type: library)
     monkeypatch.setattr(torch.cuda, "device", lambda device: nullcontext())
     with pytest.raises(OutOfMemoryError, match=r"bytes more; torch\.cuda\.empty_cache\(\)"):
-        native.require_memory(2**60, torch.device("cuda"))
+        native.require_memory(2**60, torch.device("cuda"), "images", "choose smaller ones")

@@ -1,7 +1,7 @@
 """Checks of what the rasterizer is called with; what passes comes out dense."""
 
 from collections.abc import Collection, Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite
 from operator import index
 
 import torch
@@ -181,7 +181,7 @@ def pinhole(viewmat: Tensor, K: Tensor) -> None:
         if max(errors, default=0) > ROUNDING:
             raise ArgumentError(f"{name}: expected 0, 0, 0, 1, got {row}; did you transpose?")
     axes = viewmat[:3, :3].float()
-    if float((axes @ axes.T - torch.eye(3)).abs().max()) > SKEWED:
+    if SKEWED < float((axes @ axes.T - torch.eye(3)).abs().max()) < inf:
         raise ArgumentError(
             f"viewmat: expected a rotation and a shift, got axes {axes.tolist()}; normalise them"
         )
