@@ -65,6 +65,7 @@ def test_the_sdist_holds_the_workflow(sdist):
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
     assert {"Snakefile", "conf/config.yaml", "workflow/rules/stages.smk", "pyproject.toml"} <= names
+    assert "benchmarks/results/index.csv" in names
     assert {f"workflow/profiles/{name}/profile.yaml" for name in ("local", "slurm")} <= names
 
 
