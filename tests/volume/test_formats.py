@@ -299,7 +299,7 @@ def test_a_vti_file_of_several_arrays(tmp_path):
 @pytest.mark.parametrize(
     "written",
     [
-        {"imagej": True, "resolution": (2, 4), "metadata": {"spacing": 3.0, "unit": "um", "axes": "ZYX"}},
+        {"imagej": True, "resolution": (2, 4), "metadata": {"spacing": -3.0, "unit": "um", "axes": "ZYX"}},
         {
             "ome": True,
             "metadata": {

@@ -87,10 +87,10 @@ def picture_of(pixels: np.ndarray) -> Image:
     return fromarray(pixels)
 
 
-def plain(value: Any) -> Any:
+def as_python(value: Any) -> Any:
     """Return numbers and arrays of NumPy as those of Python, also in a list; all else as it is."""
     if isinstance(value, list | tuple):
-        return [plain(each) for each in value]
+        return [as_python(each) for each in value]
     return value.tolist() if hasattr(value, "tolist") else value
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import torch
 
-from texgs.api.display import camera_of, picture_of, plain
+from texgs.api.display import as_python, camera_of, picture_of
 from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
@@ -71,7 +71,7 @@ class Editing:
 
     @light.setter
     def light(self, value: Light | str | Sequence[float]) -> None:
-        self.session.set_light(light_of(plain(value)))
+        self.session.set_light(light_of(as_python(value)))
         self.changed(f"light {value}")
 
     @property
@@ -81,7 +81,7 @@ class Editing:
 
     @background.setter
     def background(self, value: str | Sequence[float]) -> None:
-        self.session.set_background(plain(value))
+        self.session.set_background(as_python(value))
         self.changed(f"background {value}")
 
     @property
@@ -91,7 +91,7 @@ class Editing:
 
     @time.setter
     def time(self, step: int) -> None:
-        self.session.set_of_scene("time", plain(step))
+        self.session.set_of_scene("time", as_python(step))
         self.changed(f"time {step}")
 
     def edit(self, *words: str) -> Self:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
-from texgs.api.display import plain
+from texgs.api.display import as_python
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.parts import entry_of
 
@@ -29,7 +29,7 @@ class Value(Generic[T]):
         if value is None:
             part.scene.session.reset(part.name, self._key)
         else:
-            part.scene.session.set(part.name, self._key, plain(value))
+            part.scene.session.set(part.name, self._key, as_python(value))
         part.scene.changed(f"{part.name} {self._key} {'as fitted' if value is None else value}")
 
 

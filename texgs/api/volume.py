@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from texgs.api.arrays import grid_of, three
-from texgs.api.display import camera_of, inline, picture_of, plain
+from texgs.api.display import as_python, camera_of, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
 from texgs.core.errors import ArgumentError
 from texgs.fields.part_edit import color
@@ -93,7 +93,7 @@ class Volume:
         if source.note:
             warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
         self._channel = source.channel
-        how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": plain(nan_value)}
+        how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": as_python(nan_value)}
         self.summary = self._prepared(source, how)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         write_summaries(self.file, [self.summary], [""])

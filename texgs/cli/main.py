@@ -17,8 +17,7 @@ from texgs.core.names import close
 from texgs.core.process import collect_rarely, keep_freed_memory, waiting
 from texgs.workflow.stage_table import STAGES
 
-NEGATIVE = re.compile(r"-\d+|-\d*\.\d+")  # as argparse knows it
-NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
+NUMBERS = re.compile(r"(?!-(\d+|\d*\.\d+)$)-[\d.][-\d.,eE]*")  # such as -90,20; argparse knows -90
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`.
 # Verbs in the module of another have `add_VERB_arguments` and `run_VERB` there; those of stages share one.
 SHARED = {
@@ -99,13 +98,7 @@ def joined(words: Sequence[str]) -> list[str]:
     """
     made: list[str] = []
     for word in words:
-        if (
-            NUMBERS.fullmatch(word)
-            and not NEGATIVE.fullmatch(word)
-            and made
-            and made[-1].startswith("--")
-            and "=" not in made[-1]
-        ):
+        if NUMBERS.fullmatch(word) and made and made[-1].startswith("--") and "=" not in made[-1]:
             made[-1] += f"={word}"
         else:
             made.append(word)

@@ -13,8 +13,8 @@ UNEVEN = 0.01  # of the mean distance: coordinates are often rounded to float32
 COMPONENTS = (2, 3, 4)  # sizes of a last axis without a name that is none of space
 POWERS = {"nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3}
 METRES = {unit: 10.0**n for prefix, n in POWERS.items() for unit in (f"{prefix}meter", f"{prefix[:1]}m")}
-PRESSURES = ("Pa", "hPa", "kPa", "mbar", "millibar", "dbar", "decibar", "bar")
 METRES |= {"um": 1e-6, "µm": 1e-6, "angstrom": 1e-10}
+PRESSURES = ("Pa", "hPa", "kPa", "mbar", "millibar", "dbar", "decibar", "bar")
 
 
 @dataclass(frozen=True)

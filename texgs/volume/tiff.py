@@ -104,8 +104,8 @@ def spacing_of(tiff: Any) -> Triple | None:
     import tifffile
 
     if tiff.is_ome:
-        images = tifffile.xml2dict(tiff.ome_metadata)["OME"]["Image"]
-        pixels = (images[0] if isinstance(images, list) else images)["Pixels"]
+        images = tifffile.xml2dict(tiff.ome_metadata).get("OME", {}).get("Image", {})  # or in another file
+        pixels = (images[0] if isinstance(images, list) else images).get("Pixels", {})
         units = [METRES.get(pixels.get(f"PhysicalSize{axis}Unit", "µm"), 0.0) for axis in "XYZ"]
         x, y, z = (
             float(pixels.get(f"PhysicalSize{axis}", 0)) * unit
@@ -117,7 +117,7 @@ def spacing_of(tiff: Any) -> Triple | None:
     if not depth or not all(tag and tag.value[0] for tag in tags):
         return None
     dx, dy = (tag.value[1] / tag.value[0] for tag in tags)  # pixels in a unit
-    return dx, dy, float(depth)
+    return dx, dy, abs(float(depth))  # below 0 for slices from the top down, by ImageJ
 
 
 def tiffs_in(folder: Path) -> list[Path]:
