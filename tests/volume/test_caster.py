@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 import torch
 from hypothesis import given
+from hypothesis import strategies as st
+from numpy.lib.stride_tricks import sliding_window_view
 
 from tests.volume.functions import functions
 from tests.volume.march import march, shade
@@ -17,7 +19,7 @@ from texgs.core.light import HEADLIGHT, Light
 from texgs.volume.caster import OUTPUTS, TYPES, Cast, Caster, points_of
 from texgs.volume.grid import Grid
 from texgs.volume.render import Appearance
-from texgs.volume.transfer import TransferFunction
+from texgs.volume.transfer import TransferFunction, left_limit, right_limit
 
 
 def render(grid, tf, camera, light=HEADLIGHT, **appearance):
@@ -170,6 +172,40 @@ def test_it_is_what_marching_in_torch_sees(step, light, spacing, device):
     assert not planes.depth[expected.alpha == 0].any()
 
 
+@pytest.mark.parametrize("dtype", TYPES)
+@given(tf=functions(), dims=st.tuples(*[st.integers(2, 10)] * 3), seed=st.integers(0, 99))
+def test_cells_are_those_with_a_value_that_shows(tf, dims, seed, dtype):
+    """Opacity at the extremes of a cell, at each point between them, and just below points, is above 0."""
+    values = np.random.default_rng(seed).integers(-9, 10, dims).astype(np.float32)
+    if dtype.startswith("u"):
+        values = values.clip(0)
+    caster = Caster(Grid(values.astype(dtype)), Appearance())
+    *_, distance, words = caster._shown(tf)
+    bits = (words.numpy().view(np.uint32)[..., None] >> np.arange(32, dtype=np.uint32) & 1).reshape(-1, 4, 4, 4)
+    corners = sliding_window_view(values, (2, 2, 2)).reshape(*(size - 1 for size in dims), 8)
+    bricks = [-(-(size - 1) // 4) for size in dims]
+    expected = np.zeros([4 * count for count in bricks], bool)
+    expected[tuple(slice(size - 1) for size in dims)] = [
+        [[shows_between(tf, cell.min(), cell.max()) for cell in row] for row in plane] for plane in corners
+    ]
+    of_bricks = expected.reshape(bricks[0], 4, bricks[1], 4, bricks[2], 4).transpose(0, 2, 4, 1, 3, 5)
+    of_bricks = of_bricks.reshape(-1, 4, 4, 4)
+    assert (bits == of_bricks).all()
+    assert not of_bricks[distance.numpy()[: len(bits)] > 0].any()
+
+
+def shows_between(tf, low, high):
+    """Return whether a function has an opacity above 0 for some value from low to high."""
+    ends = [value for value, _ in tf.opacity if low <= value <= high]
+    at = np.array(sorted({low, high, *ends}), dtype=np.float64)
+    before = at[(at > low) & (at > tf.opacity[0][0]) & (at <= tf.opacity[-1][0])]
+    between = (at[1:] + at[:-1]) / 2
+    inside = np.concatenate([at, between])
+    inside = inside[(inside >= tf.opacity[0][0]) & (inside <= tf.opacity[-1][0])]
+    table = np.float64(np.float32(tf.opacity))  # the library has single precision
+    return any((right_limit(table, inside) > 0).ravel()) or any((left_limit(table, before) > 0).ravel())
+
+
 @pytest.mark.parametrize("tf", [STEPS, *map(wavy, (8, 9, 16, 17, 150))])
 def test_functions_of_any_points_and_steps_are_what_marching_sees(tf, device):
     grid, camera, look = ball(24), orbit(-60, 20, 2.5, 30, 30, 25), Appearance()
@@ -305,7 +341,7 @@ from texgs.core.memory import peak_memory
 from texgs.volume.render import Appearance
 from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
-from texgs.volume.transfer import TransferFunction
+from texgs.volume.transfer import TransferFunction, left_limit, right_limit
 
 tf = TransferFunction(((0, 0), (100, 0.5)), ((0, 1, 1, 1),))
 camera, light = orbit(-60, 20, 2, 34, 60, 60), Light("headlight")

@@ -238,9 +238,10 @@ def test_the_library_refuses_channels_that_do_not_fit_together():
     values, points = torch.zeros(2, 2, 2), torch.tensor([[0.0, 0, 1, 1, 1], [1, 1, 1, 1, 1]])
     volume = NativeVolume(values, 8, (2, 2, 2), (0.5, 0.5, 0.5))
     longer = NativeVolume(torch.zeros(3, 2, 2), 8, (2, 2, 3), (0.5, 0.5, 0.5))
-    transfer, distance, view = NativeTransfer(2, points), torch.zeros(4, dtype=torch.uint8), NativeView()
+    transfer, view = NativeTransfer(2, points), NativeView()
+    distance, cells = torch.zeros(4, dtype=torch.uint8), torch.zeros(1, 2, dtype=torch.int32)
     for volumes, message in (([volume] * 17, "1 to 16"), ([volume, longer], "one lattice and type")):
         n = len(volumes)
         arrays = (NativeVolume * n)(*volumes), (NativeTransfer * n)(*[transfer] * n)
         with pytest.raises(ArgumentError, match=message):
-            native.call("texgs_cast", *arrays, n, distance, view, device=torch.device("cpu"))
+            native.call("texgs_cast", *arrays, n, distance, cells, view, device=torch.device("cpu"))

@@ -24,7 +24,7 @@ from texgs.core import memory
 from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError
 from texgs.core.native_sources import SUFFIX, built_from, library_sources
 
-ABI_VERSION = 5
+ABI_VERSION = 6
 FOLDER = Path(__file__).parent / "_native"
 CSRC = Path(__file__).parent / "csrc"
 INSTALL = "install texgs again (pip install .)"

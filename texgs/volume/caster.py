@@ -3,7 +3,8 @@
 Values are trilinear, in single precision; colours and opacities are exact between the points of a transfer
 function and at them. Gradients are central differences, one voxel to both sides. Lights and viewer are
 distant: the directions to them are the same for all points of one view. Nothing of the volume is copied on a
-CPU: bricks of 4 x 4 x 4 cells are known by their extremes, and rays leap over those in which nothing shows.
+CPU: bricks of 4 x 4 x 4 cells are known by their extremes, and rays leap over those in which nothing shows;
+in others, cells in which nothing shows are passed by.
 
 The result has the same bits for any number of threads.
 """
@@ -13,6 +14,7 @@ from collections.abc import Collection, Sequence
 from copy import copy
 from ctypes import c_int32, c_int64
 from dataclasses import dataclass
+from functools import reduce
 from math import hypot, inf
 from typing import Any, Self
 
@@ -51,7 +53,8 @@ NativeView = native.struct(
 native.declare("texgs_volume_bricks", NativeVolume, "p", result=c_int64, stream=False)
 native.declare("texgs_volume_extremes", NativeVolume, "pp")
 native.declare("texgs_volume_distance", NativeVolume, "p", NativeTransfer, "p")
-native.declare("texgs_cast", NativeVolume, NativeTransfer, "ip", NativeView)
+native.declare("texgs_volume_cells", NativeVolume, "p", NativeTransfer, "p")
+native.declare("texgs_cast", NativeVolume, NativeTransfer, "ipp", NativeView)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,26 +165,29 @@ class Caster:
             )
 
     def _prepare(self, tfs: list[TransferFunction]) -> Prepared:
-        """Return channels with their functions for the library, and how far bricks are from what shows."""
+        """Return channels with their functions for the library, and where something shows."""
         if not tfs:
             raise ArgumentError("tf: expected at least one transfer function, got none")
         prepared = self._prepared[0] if self._prepared else None  # another thread may prepare another one
         if prepared is None or prepared[0] != tfs:
             count, kept = len(tfs), [*map(self._shown, tfs)]  # arrays of the library do not keep tensors
-            volumes, transfers, distances = zip(*kept, strict=True)
+            volumes, transfers, distances, cells = zip(*kept, strict=True)
             arrays = (NativeVolume * count)(*volumes), (NativeTransfer * count)(*transfers)
-            prepared = tfs, (*arrays, count, torch.stack(distances).amin(dim=0)), kept
+            nearest, in_any = torch.stack(distances).amin(dim=0), reduce(torch.bitwise_or, cells)
+            prepared = tfs, (*arrays, count, nearest, in_any), kept
             self._prepared[:] = [prepared]
         return prepared
 
-    def _shown(self, tf: TransferFunction) -> tuple[native.Struct, native.Struct, Tensor]:
-        """Return a function's channel, the function, and how far bricks are from one that it shows."""
+    def _shown(self, tf: TransferFunction) -> tuple[native.Struct, native.Struct, Tensor, Tensor]:
+        """Return a function's channel, the function, how far bricks are from one that it shows, and cells."""
         volume, extremes = self._channel(tf.channel)
         points = points_of(tf).to(self.device)
         transfer = NativeTransfer(len(points), points)
         distance = torch.zeros(len(extremes) + PADDING, dtype=torch.uint8, device=self.device)
         native.call("texgs_volume_distance", volume, extremes, transfer, distance, device=self.device)
-        return volume, transfer, distance
+        cells = torch.empty(len(extremes), 2, dtype=torch.int32, device=self.device)
+        native.call("texgs_volume_cells", volume, distance, transfer, cells, device=self.device)
+        return volume, transfer, distance, cells
 
     def _channel(self, number: int) -> tuple[native.Struct, Tensor]:
         """Return a channel for the library, and the extremes of its bricks [bricks, 2]."""
@@ -195,7 +201,7 @@ class Caster:
             volume = NativeVolume(samples, TYPES.index(kind), grid.dims, tuple(self._half))
             count_bricks = native.function(native.library(self.device.type), "texgs_volume_bricks")
             bricks = count_bricks(volume, (c_int32 * 3)())
-            require_memory(8 * bricks, "a volume's bricks", "crop it, or reduce it by dataset.volume.reduce")
+            require_memory(17 * bricks, "a volume's bricks", "crop it, or reduce it by dataset.volume.reduce")
             extremes = torch.empty(bricks, 2, device=self.device)
             missing = torch.zeros(1, dtype=torch.int64, device=self.device)
             native.call("texgs_volume_extremes", volume, extremes, missing, device=self.device)

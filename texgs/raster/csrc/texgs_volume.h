@@ -51,6 +51,10 @@ TEXGS_API int32_t texgs_volume_extremes(const texgs_volume*, float* extremes, in
  * many bricks along the axis along which it is farthest, 0 there, at most 255. */
 TEXGS_API int32_t texgs_volume_distance(const texgs_volume*, const float* extremes, const texgs_transfer*,
                                         uint8_t* distance, void* stream);
+/* In which cells of the bricks at distance 0 something may show, cells [bricks, 2]: cell (x, y, z) of a brick is bit
+ * 16 (z % 2) + 4 y + x of its word z / 2. Those of other bricks, and behind the volume, are 0. */
+TEXGS_API int32_t texgs_volume_cells(const texgs_volume*, const uint8_t* distance, const texgs_transfer*,
+                                     uint32_t* cells, void* stream);
 
 /* A view, and how it is lit: Blinn-Phong with a distant viewer and a distant white light. A sample k of a ray is at
  * (k + 0.5) steps from where the ray enters the box. Rays end where less than 1e-3 of the light is left. */
@@ -77,9 +81,10 @@ typedef struct {
 } texgs_cast_view;
 
 /* Volumes [n] of one lattice and type, each with its transfer function, show together what all of them show: where
- * several do, extinctions add up, and colours are means that these weigh. distance: the least of theirs. */
+ * several do, extinctions add up, and colours are means that these weigh. distance: the least of theirs; cells: those
+ * of any of them. */
 TEXGS_API int32_t texgs_cast(const texgs_volume*, const texgs_transfer*, int32_t n, const uint8_t* distance,
-                             const texgs_cast_view*, void* stream);
+                             const uint32_t* cells, const texgs_cast_view*, void* stream);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every back end knows of a volume and its bricks, and what the C interface refuses before any work.
 #pragma once
+#include <cmath>
+
 #include "both.h"
 #include "status.h"
 #include "texgs_volume.h"
@@ -16,7 +18,7 @@ inline void check_volume(const texgs_volume& volume) {
         require(volume.half[a] > 0.0f && volume.half[a] < 1e30f, "volume: expected sides above 0");
         bricks *= (volume.size[a] + TEXGS_BRICK - 2) / TEXGS_BRICK;
     }
-    require(bricks < (int64_t(1) << 31) - 4, "volume: expected fewer samples");
+    require(bricks < int64_t(1) << 30, "volume: expected fewer samples");
 }
 
 inline void check_points(const texgs_transfer& transfer) {
@@ -47,18 +49,60 @@ inline int64_t count_bricks(const texgs_volume& volume, int32_t size[3]) {
     return int64_t(size[0]) * size[1] * size[2];
 }
 
-// Whether a transfer function shows anything of values from low to high.
+// Whether a transfer function shows anything of values from low to high: opacities are at least 0.
 TEXGS_MATHS bool shows(const texgs_transfer& transfer, float low, float high) {
     for (int i = 0; i + 1 < transfer.n; ++i) {
         const float *p = transfer.points + 5 * i, *q = p + 5;
-        const float from = low > p[0] ? low : p[0], to = high < q[0] ? high : q[0];
-        if (from > to) continue;
-        const float width = q[0] - p[0], start = width > 0.0f ? p[1] : q[1], rise = q[1] - start;
-        const float divisor = width > 0.0f ? width : 1.0f;  // not its inverse, which may be infinite
-        if (start + rise * ((from - p[0]) / divisor) > 0.0f || start + rise * ((to - p[0]) / divisor) > 0.0f)
-            return true;
+        if (low > q[0] || high < p[0]) continue;
+        const float start = q[0] > p[0] ? p[1] : q[1], end = q[1];
+        if (start > 0.0f && (end > 0.0f || low < q[0])) return true;
+        if (end > 0.0f && high > p[0]) return true;
     }
     return false;
+}
+
+// The extremes of values; those of NaN are infinite.
+struct Extremes {
+    float low = INFINITY, high = -INFINITY;
+
+    TEXGS_MATHS void add(Extremes others) {
+        low = others.low < low ? others.low : low;
+        high = others.high > high ? others.high : high;
+    }
+};
+
+// In which cells of a word, half a brick, something may show.
+template <class T>
+TEXGS_MATHS uint32_t shown_cells(const texgs_volume& volume, const texgs_transfer& transfer, int64_t word) {
+    int32_t first[3];
+    int64_t brick = word / 2;
+    for (int a = 0; a < 3; ++a) {
+        const int32_t along = (volume.size[a] + TEXGS_BRICK - 2) / TEXGS_BRICK;
+        first[a] = TEXGS_BRICK * static_cast<int32_t>(brick % along);
+        brick /= along;
+    }
+    first[2] += TEXGS_BRICK / 2 * static_cast<int32_t>(word % 2);
+    const int64_t row = volume.size[0], slice = row * volume.size[1];
+    const int32_t end = first[0] + TEXGS_BRICK < volume.size[0] - 1 ? TEXGS_BRICK : volume.size[0] - 1 - first[0];
+    uint32_t cells = 0;
+    for (int32_t i = 0; i < 8; ++i) {
+        const int32_t y = first[1] + i % 4, z = first[2] + i / 4;
+        if (y > volume.size[1] - 2 || z > volume.size[2] - 2) continue;
+        const T* from = static_cast<const T*>(volume.values) + z * slice + y * row + first[0];
+        Extremes before;
+        for (int32_t x = 0; x <= end; ++x, ++from) {
+            Extremes face;
+            const int64_t corners[4] = {0, row, slice, slice + row};
+            for (const int64_t corner : corners) {
+                const float value = static_cast<float>(from[corner]);
+                face.add({value, value});
+            }
+            before.add(face);
+            if (x && shows(transfer, before.low, before.high)) cells |= uint32_t(1) << (4 * i + x - 1);
+            before = face;
+        }
+    }
+    return cells;
 }
 
 }  // namespace texgs

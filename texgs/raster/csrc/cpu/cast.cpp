@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays through a volume. Samples in bricks where something may show wait until there are some vectors of them; so do
+// Rays through a volume. Samples in cells where something may show wait until there are some vectors of them; so do
 // those among them that show something, which are shaded: no lane is empty but at the end of a ray.
 #include "simd.h"
 
@@ -127,17 +127,15 @@ private:
         return job_.distance[row * lattice_.bricks[0] + brick[0]];
     }
 
-    // Whether samples are in bricks in which something shows.
+    // Whether samples are in cells in which something may show.
     vm are_visible(const CastRay& ray, vf k) const {
-        vi brick[3];
-        for (int a = 0; a < 3; ++a) {
-            const vf place = max(fma(k + vf(0.5f), ray.step[a], ray.entry[a]), 0.0f);
-            const float last = static_cast<float>(lattice_.bricks[a] - 1);
-            brick[a] = truncate(min(place * vf(1.0f / float(TEXGS_BRICK)), last));
-        }
-        const vi row = brick[2] * splat(lattice_.bricks[1]) + brick[1];
-        const vi distance = gather_bytes(job_.distance, row * splat(lattice_.bricks[0]) + brick[0]) & splat(255);
-        return to_float(distance) < vf(0.5f);
+        vf corner[3], inside[3];
+        locate(ray, k, corner, inside);
+        const vi x = truncate(corner[0]), y = truncate(corner[1]), z = truncate(corner[2]);
+        const vi row = (z >> 2) * splat(lattice_.bricks[1]) + (y >> 2), half = (z >> 1) & splat(1);
+        const vi brick = row * splat(lattice_.bricks[0]) + (x >> 2);
+        const vi words = gather(reinterpret_cast<const int32_t*>(job_.cells), brick * splat(2) + half);
+        return is_set(words, (z & splat(1)) * splat(16) + (y & splat(3)) * splat(4) + (x & splat(3)));
     }
 
     // Cells of samples and the places in them.

@@ -71,6 +71,17 @@ constexpr RowExtremes kRowExtremes[] = {
     row_extremes<float>,    row_extremes<double>,
 };
 
+template <class T>
+void set_cells(const texgs_volume& volume, const texgs_transfer& transfer, int64_t brick, uint32_t* cells) {
+    for (int half = 0; half < 2; ++half) cells[2 * brick + half] = shown_cells<T>(volume, transfer, 2 * brick + half);
+}
+
+using SetCells = void (*)(const texgs_volume&, const texgs_transfer&, int64_t, uint32_t*);
+constexpr SetCells kSetCells[] = {
+    set_cells<uint8_t>, set_cells<int8_t>,   set_cells<uint16_t>, set_cells<int16_t>, set_cells<uint32_t>,
+    set_cells<int32_t>, set_cells<uint64_t>, set_cells<int64_t>,  set_cells<float>,   set_cells<double>,
+};
+
 // Points as arrays, see CastTable.
 struct Table {
     std::vector<float> numbers;
@@ -192,8 +203,22 @@ int32_t texgs_volume_distance(const texgs_volume* volume, const float* extremes,
     });
 }
 
+int32_t texgs_volume_cells(const texgs_volume* volume, const uint8_t* distance, const texgs_transfer* transfer,
+                           uint32_t* cells, void*) {
+    return guarded([&] {
+        check_volume(*volume);
+        check_transfer(*transfer);
+        int32_t size[3];
+        parallel_for(count_bricks(*volume, size), 64, [&](int64_t begin, int64_t end, int) {
+            std::fill(cells + 2 * begin, cells + 2 * end, 0u);
+            for (int64_t i = begin; i < end; ++i)
+                if (!distance[i]) kSetCells[volume->type](*volume, *transfer, i, cells);
+        });
+    });
+}
+
 int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, int32_t n, const uint8_t* distance,
-                   const texgs_cast_view* view, void*) {
+                   const uint32_t* cells, const texgs_cast_view* view, void*) {
     return guarded([&] {
         check_channels(volume, transfer, n);
         for (int c = 0; c < n; ++c) check_transfer(transfer[c]);
@@ -204,7 +229,7 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, i
         const Shown shown(distance, size);
         if (!shown.any()) return;
         const std::vector<Table> tables(transfer, transfer + n);
-        CastJob job{*volume, *view, n, {}, distance, {}, {}};
+        CastJob job{*volume, *view, n, {}, distance, cells, {}, {}};
         for (int c = 0; c < n; ++c) job.channels[c] = {volume[c].values, tables[c].view};
         for (int a = 0; a < 3; ++a) {
             job.lower[a] = static_cast<float>(kBrick * shown.lower[a]);

@@ -58,6 +58,14 @@ __global__ __launch_bounds__(kThreads) void shown_kernel(const texgs_transfer tr
         shown[i] = shows(transfer, extremes[2 * i], extremes[2 * i + 1]) ? 0 : 255;
 }
 
+template <class T>
+__global__ __launch_bounds__(kThreads) void cells_kernel(const texgs_volume volume, const uint8_t* distance,
+                                                         const texgs_transfer transfer, int64_t words,
+                                                         uint32_t* cells) {
+    const int64_t i = thread_index();
+    if (i < words) cells[i] = distance[i / 2] ? 0 : shown_cells<T>(volume, transfer, i);
+}
+
 // -- Rays --------------------------------------------------------------------------------------------------------
 
 template <class T>
@@ -84,6 +92,12 @@ struct Spot {
             cell[a] = static_cast<int>(fminf(floorf(place), lattice.last[a] - 1.0f));
             inside[a] = place - static_cast<float>(cell[a]);
         }
+    }
+    // Whether the cell is one of those chosen of a brick.
+    __device__ bool is_among(const uint32_t* cells, const int (&brick)[3]) const {
+        const int x = cell[0] - TEXGS_BRICK * brick[0], y = cell[1] - TEXGS_BRICK * brick[1],
+                  z = cell[2] - TEXGS_BRICK * brick[2];
+        return cells[z / 2] >> (16 * (z % 2) + 4 * y + x) & 1;
     }
     template <class T>
     __device__ float value(const Samples<T>& s) const {
@@ -133,8 +147,8 @@ struct Channels {
 // kMost: 1, which needs no memory for values of channels, or TEXGS_CHANNELS.
 template <class T, int kMost>
 __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volume, const Channels channels,
-                                                        const uint8_t* distance, const texgs_cast_view view,
-                                                        int tiles) {
+                                                        const uint8_t* distance, const uint32_t* cells,
+                                                        const texgs_cast_view view, int tiles) {
     const int x = static_cast<int>(blockIdx.x) % tiles * kTileX + static_cast<int>(threadIdx.x) % kTileX;
     const int y = static_cast<int>(blockIdx.x) / tiles * kTileY + static_cast<int>(threadIdx.x) / kTileX;
     if (x >= view.width || y >= view.height) return;
@@ -154,12 +168,17 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
             const int own = static_cast<int>(fmaxf(place[a], 0.0f)) / TEXGS_BRICK;
             brick[a] = own < lattice.bricks[a] ? own : lattice.bricks[a] - 1;
         }
-        const int64_t row = int64_t(brick[2]) * lattice.bricks[1] + brick[1];
-        if (const int far = distance[row * lattice.bricks[0] + brick[0]]) {
+        const int64_t row = int64_t(brick[2]) * lattice.bricks[1] + brick[1],
+                      at_brick = row * lattice.bricks[0] + brick[0];
+        if (const int far = distance[at_brick]) {
             k = leap(ray, k, place, brick, far);
             continue;
         }
         const Spot spot(lattice, ray, k);
+        if (!spot.is_among(cells + 2 * at_brick, brick)) {
+            ++k;
+            continue;
+        }
         const float at = static_cast<float>(k), z = ray.near + (at + 0.5f) * ray.z;
         const float lengths = view.step / view.opacity_unit * share(ray, at);
         float value[kMost], through[kMost], all = 0.0f;
@@ -266,8 +285,22 @@ int32_t texgs_volume_distance(const texgs_volume* volume, const float* extremes,
     });
 }
 
+int32_t texgs_volume_cells(const texgs_volume* volume, const uint8_t* distance, const texgs_transfer* transfer,
+                           uint32_t* cells, void* on) {
+    return on_device_of(cells, on, [&](cudaStream_t stream) {
+        check_volume(*volume);
+        check_points(*transfer);
+        int32_t size[3];
+        const int64_t words = 2 * count_bricks(*volume, size);
+        with_type(*volume, [&](auto sample) {
+            launch(cells_kernel<decltype(sample)>, blocks_for(words, kThreads), kThreads, stream, *volume, distance,
+                   *transfer, words, cells);
+        });
+    });
+}
+
 int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, int32_t n, const uint8_t* distance,
-                   const texgs_cast_view* view, void* on) {
+                   const uint32_t* cells, const texgs_cast_view* view, void* on) {
     return on_device_of(view->rgba, on, [&](cudaStream_t stream) {
         check_channels(volume, transfer, n);
         check_cast(*view);
@@ -278,7 +311,7 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, i
         with_type(*volume, [&](auto sample) {
             const auto kernel =
                 n == 1 ? cast_kernel<decltype(sample), 1> : cast_kernel<decltype(sample), TEXGS_CHANNELS>;
-            launch(kernel, int64_t(tiles) * rows, kThreads, stream, *volume, channels, distance, *view, tiles);
+            launch(kernel, int64_t(tiles) * rows, kThreads, stream, *volume, channels, distance, cells, *view, tiles);
         });
     });
 }
