@@ -181,7 +181,9 @@ def test_cells_are_those_with_a_value_that_shows(tf, dims, seed, dtype):
         values = values.clip(0)
     caster = Caster(Grid(values.astype(dtype)), Appearance())
     *_, distance, words = caster._shown(tf)
-    bits = (words.numpy().view(np.uint32)[..., None] >> np.arange(32, dtype=np.uint32) & 1).reshape(-1, 4, 4, 4)
+    bits = (words.numpy().view(np.uint32)[..., None] >> np.arange(32, dtype=np.uint32) & 1).reshape(
+        -1, 4, 4, 4
+    )
     corners = sliding_window_view(values, (2, 2, 2)).reshape(*(size - 1 for size in dims), 8)
     bricks = [-(-(size - 1) // 4) for size in dims]
     expected = np.zeros([4 * count for count in bricks], bool)

@@ -1,5 +1,6 @@
 """Volume rendering behind one interface, and the views of a volume as files that are made only once."""
 
+import json
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
-from texgs.core.io import read_json, write_json
+from texgs.core.io import read_json, write_bytes
 from texgs.core.light import Light
 from texgs.core.names import is_number
 from texgs.core.progress import progress
@@ -62,7 +63,10 @@ def directions(camera: Camera, light: Light) -> tuple[NDArray[np.float64], NDArr
 
 
 class Times:
-    """Times of all views in a JSON file above them, written after each, so that a killed run keeps them."""
+    """Times of all views in a JSON file above them, written after each, so that a killed run keeps them.
+
+    The file is one line, which is many times as fast as `write_json`.
+    """
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -74,7 +78,7 @@ class Times:
         name = view.path.relative_to(self._path.parent).as_posix()
         self._views[name] = {"ms": milliseconds, "is_first": self._is_first}
         self._is_first = False
-        write_json(self._path, self._views)
+        write_bytes(self._path, json.dumps(self._views).encode())
 
     @property
     def first(self) -> list[float]:
