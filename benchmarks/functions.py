@@ -64,7 +64,7 @@ async def dragged(file: Path, folder: Path) -> dict[str, object]:
     low, high = float(np.nanmin(grid.values)), float(np.nanmax(grid.values))
     times: dict[str, list[float]] = {"frame": [], "frame_cpu": [], "cast": [], "whole": []}
     closeness = []
-    twin = Twin(opened.scene).with_step(STEPS["volume"])
+    twin = Twin(opened.scene).with_step(STEPS["volume"], by_cell=False)
     for number, tf in enumerate(islice(functions(random, low, high), 4 * COUNT)):
         small, large = (view(number, size, size == MOVING) for size in (MOVING, WHOLE))
         message = {"type": "edit", "part": "", "key": "functions", "value": {NAME: tf.to_dict()}, "step": 1}

@@ -180,7 +180,7 @@ def test_cells_are_those_with_a_value_that_shows(tf, dims, seed, dtype):
     if dtype.startswith("u"):
         values = values.clip(0)
     caster = Caster(Grid(values.astype(dtype)), Appearance())
-    *_, distance, words = caster._shown(tf)
+    *_, distance, words = caster._shown(tf, by_cell=True)
     bits = (words.numpy().view(np.uint32)[..., None] >> np.arange(32, dtype=np.uint32) & 1).reshape(
         -1, 4, 4, 4
     )
@@ -194,6 +194,17 @@ def test_cells_are_those_with_a_value_that_shows(tf, dims, seed, dtype):
     of_bricks = of_bricks.reshape(-1, 4, 4, 4)
     assert (bits == of_bricks).all()
     assert not of_bricks[distance.numpy()[: len(bits)] > 0].any()
+
+
+def test_cells_change_nothing_but_the_order_of_sums(device):
+    camera = orbit(-60, 20, 2.5, 30, 80, 70)
+    for grid, tf in ((ball(40), SHELLS), (ball(7), STEPS), next((grid, SPECK) for grid, *_ in specks())):
+        caster = Caster(grid, Appearance(), device)
+        by_brick, by_cell = (
+            caster.cast(tf, camera, HEADLIGHT, OUTPUTS, by_cell=know) for know in (False, True)
+        )
+        for one, other in zip(vars(by_brick).values(), vars(by_cell).values(), strict=True):
+            torch.testing.assert_close(one, other, atol=1e-4, rtol=0)
 
 
 def shows_between(tf, low, high):

@@ -259,7 +259,7 @@ class Session:
         composition = self.composition_of(scene)
         twin = self.twin_of(scene) if needs_twin(scene, mode) else None
         if twin is not None and step is not None:
-            twin = twin.with_step(step)
+            twin = twin.with_step(step, by_cell=False)  # of something that moves, perhaps its function
         return frame(composition, camera, scene, mode, twin, transparent=transparent)
 
     def point_at(self, camera: Camera, mode: str, scene: Scene, pixel: tuple[int, int]) -> list[float] | None:

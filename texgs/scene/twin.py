@@ -56,15 +56,16 @@ class Twin:
     """
 
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
-        self._volume, self._device = volume_of(scene), torch.device(device)
+        self._volume, self._device, self._by_cell = volume_of(scene), torch.device(device), True
         with located("volume"):
             self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
         for name in scene.models:
             self._tf(name)
 
-    def with_step(self, step: float) -> Twin:
-        """Return a twin with another distance of samples, in voxels; nothing is read again."""
+    def with_step(self, step: float, *, by_cell: bool = True) -> Twin:
+        """Return a twin with another distance of samples, in voxels; `by_cell`: see `Caster.cast`."""
         other = copy(self)
+        other._by_cell = by_cell
         other._volume = replace(self._volume, appearance=replace(self._volume.appearance, step=step))
         return other
 
@@ -135,6 +136,7 @@ class Twin:
                 depth_range=None if cut is None else cut.depth_range,
                 faces=cut,
                 lit_faces=scene.cuts.faces == "shaded",
+                by_cell=self._by_cell,
             )
         first = casts[edit.tint[0]]
         for channel, share in enumerate(edit.tint[1:], start=1):

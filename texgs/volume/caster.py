@@ -40,7 +40,7 @@ OUTPUTS = ("depth", "median", "normal")
 BYTES = 64  # of memory for a pixel
 LEAST_WIDTH = torch.finfo(torch.float32).tiny  # of a transfer function, in data values
 MOST_SAMPLES = 2**24  # along a ray; their numbers are floats
-Prepared = tuple[list[TransferFunction], Any, Any]  # arguments of the library for them, and what these need
+Prepared = tuple[Any, Any, Any]  # functions, arguments of the library for them, and what these need
 PADDING = 3  # bytes behind the distances of bricks, which are loaded as words
 NativeVolume = native.struct("texgs_volume", "p values, i type, 3i size, 3f half")
 NativeTransfer = native.struct("texgs_transfer", "i n, p points")
@@ -107,6 +107,7 @@ class Caster:
         depth_range: Tensor | None = None,  # [2, H, W] camera z
         faces: CutRange | None = None,
         lit_faces: bool = True,
+        by_cell: bool = True,
     ) -> Cast:
         """Cast a view, with what else is wanted of OUTPUTS, in one pass; without gradients and skew.
 
@@ -116,11 +117,15 @@ class Caster:
         Samples stay where they are without a depth range, and count for what of their step lies in it: two
         parts of a ray join. Over an opacity unit behind the faces of a cut, normals are those of its planes,
         as even matter has none; or, where faces are not to be lit, colours are those of the function.
+
+        Cells in which nothing shows are found once for each function, and save a fifth of every cast; not
+        `by_cell`, only bricks are, which suits a function that is shown in one small picture.
         """
         height, width = camera.height, camera.width
         require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
         self._check(camera, outputs)
-        _, prepared, _kept = self._prepare([tf] if isinstance(tf, TransferFunction) else [*tf])
+        tfs = [tf] if isinstance(tf, TransferFunction) else [*tf]
+        _, prepared, _kept = self._prepare(tfs, by_cell)
         matrices = [x.float().to(self.device).contiguous() for x in (camera.viewmat, camera.K)]
         shapes = {"rgba": (height, width, 4), "normal": (height, width, 3)}
         seen = {
@@ -164,29 +169,37 @@ class Caster:
                 f"step: expected at most {MOST_SAMPLES} samples on a ray, got {samples:.3g}; raise it"
             )
 
-    def _prepare(self, tfs: list[TransferFunction]) -> Prepared:
+    def _prepare(self, tfs: list[TransferFunction], by_cell: bool) -> Prepared:
         """Return channels with their functions for the library, and where something shows."""
         if not tfs:
             raise ArgumentError("tf: expected at least one transfer function, got none")
         prepared = self._prepared[0] if self._prepared else None  # another thread may prepare another one
-        if prepared is None or prepared[0] != tfs:
-            count, kept = len(tfs), [*map(self._shown, tfs)]  # arrays of the library do not keep tensors
+        if prepared is None or prepared[0] != (tfs, by_cell):
+            count, kept = (
+                len(tfs),
+                [self._shown(tf, by_cell) for tf in tfs],
+            )  # arrays of the library do not keep tensors
             volumes, transfers, distances, cells = zip(*kept, strict=True)
             arrays = (NativeVolume * count)(*volumes), (NativeTransfer * count)(*transfers)
-            nearest, in_any = torch.stack(distances).amin(dim=0), reduce(torch.bitwise_or, cells)
-            prepared = tfs, (*arrays, count, nearest, in_any), kept
+            nearest = torch.stack(distances).amin(dim=0)
+            in_any = reduce(torch.bitwise_or, cells) if by_cell else None
+            prepared = (tfs, by_cell), (*arrays, count, nearest, in_any), kept
             self._prepared[:] = [prepared]
         return prepared
 
-    def _shown(self, tf: TransferFunction) -> tuple[native.Struct, native.Struct, Tensor, Tensor]:
+    def _shown(
+        self, tf: TransferFunction, by_cell: bool
+    ) -> tuple[native.Struct, native.Struct, Tensor, Tensor | None]:
         """Return a function's channel, the function, how far bricks are from one that it shows, and cells."""
         volume, extremes = self._channel(tf.channel)
         points = points_of(tf).to(self.device)
         transfer = NativeTransfer(len(points), points)
         distance = torch.zeros(len(extremes) + PADDING, dtype=torch.uint8, device=self.device)
         native.call("texgs_volume_distance", volume, extremes, transfer, distance, device=self.device)
-        cells = torch.empty(len(extremes), 2, dtype=torch.int32, device=self.device)
-        native.call("texgs_volume_cells", volume, distance, transfer, cells, device=self.device)
+        cells = None
+        if by_cell:
+            cells = torch.empty(len(extremes), 2, dtype=torch.int32, device=self.device)
+            native.call("texgs_volume_cells", volume, distance, transfer, cells, device=self.device)
         return volume, transfer, distance, cells
 
     def _channel(self, number: int) -> tuple[native.Struct, Tensor]:

@@ -82,7 +82,7 @@ typedef struct {
 
 /* Volumes [n] of one lattice and type, each with its transfer function, show together what all of them show: where
  * several do, extinctions add up, and colours are means that these weigh. distance: the least of theirs; cells: those
- * of any of them. */
+ * of any of them, or NULL where these are not known. */
 TEXGS_API int32_t texgs_cast(const texgs_volume*, const texgs_transfer*, int32_t n, const uint8_t* distance,
                              const uint32_t* cells, const texgs_cast_view*, void* stream);
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every back end knows of a volume and its bricks, and what the C interface refuses before any work.
 #pragma once
-#include <cmath>
-
 #include "both.h"
 #include "status.h"
 #include "texgs_volume.h"
@@ -59,50 +57,6 @@ TEXGS_MATHS bool shows(const texgs_transfer& transfer, float low, float high) {
         if (end > 0.0f && high > p[0]) return true;
     }
     return false;
-}
-
-// The extremes of values; those of NaN are infinite.
-struct Extremes {
-    float low = INFINITY, high = -INFINITY;
-
-    TEXGS_MATHS void add(Extremes others) {
-        low = others.low < low ? others.low : low;
-        high = others.high > high ? others.high : high;
-    }
-};
-
-// In which cells of a word, half a brick, something may show.
-template <class T>
-TEXGS_MATHS uint32_t shown_cells(const texgs_volume& volume, const texgs_transfer& transfer, int64_t word) {
-    int32_t first[3];
-    int64_t brick = word / 2;
-    for (int a = 0; a < 3; ++a) {
-        const int32_t along = (volume.size[a] + TEXGS_BRICK - 2) / TEXGS_BRICK;
-        first[a] = TEXGS_BRICK * static_cast<int32_t>(brick % along);
-        brick /= along;
-    }
-    first[2] += TEXGS_BRICK / 2 * static_cast<int32_t>(word % 2);
-    const int64_t row = volume.size[0], slice = row * volume.size[1];
-    const int32_t end = first[0] + TEXGS_BRICK < volume.size[0] - 1 ? TEXGS_BRICK : volume.size[0] - 1 - first[0];
-    uint32_t cells = 0;
-    for (int32_t i = 0; i < 8; ++i) {
-        const int32_t y = first[1] + i % 4, z = first[2] + i / 4;
-        if (y > volume.size[1] - 2 || z > volume.size[2] - 2) continue;
-        const T* from = static_cast<const T*>(volume.values) + z * slice + y * row + first[0];
-        Extremes before;
-        for (int32_t x = 0; x <= end; ++x, ++from) {
-            Extremes face;
-            const int64_t corners[4] = {0, row, slice, slice + row};
-            for (const int64_t corner : corners) {
-                const float value = static_cast<float>(from[corner]);
-                face.add({value, value});
-            }
-            before.add(face);
-            if (x && shows(transfer, before.low, before.high)) cells |= uint32_t(1) << (4 * i + x - 1);
-            before = face;
-        }
-    }
-    return cells;
 }
 
 }  // namespace texgs

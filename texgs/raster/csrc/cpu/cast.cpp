@@ -127,13 +127,14 @@ private:
         return job_.distance[row * lattice_.bricks[0] + brick[0]];
     }
 
-    // Whether samples are in cells in which something may show.
+    // Whether samples are in cells in which something may show; where these are not known, in bricks.
     vm are_visible(const CastRay& ray, vf k) const {
         vf corner[3], inside[3];
         locate(ray, k, corner, inside);
         const vi x = truncate(corner[0]), y = truncate(corner[1]), z = truncate(corner[2]);
         const vi row = (z >> 2) * splat(lattice_.bricks[1]) + (y >> 2), half = (z >> 1) & splat(1);
         const vi brick = row * splat(lattice_.bricks[0]) + (x >> 2);
+        if (!job_.cells) return to_float(gather_bytes(job_.distance, brick) & splat(255)) < vf(0.5f);
         const vi words = gather(reinterpret_cast<const int32_t*>(job_.cells), brick * splat(2) + half);
         return is_set(words, (z & splat(1)) * splat(16) + (y & splat(3)) * splat(4) + (x & splat(3)));
     }

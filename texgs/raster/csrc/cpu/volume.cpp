@@ -71,12 +71,76 @@ constexpr RowExtremes kRowExtremes[] = {
     row_extremes<float>,    row_extremes<double>,
 };
 
-template <class T>
-void set_cells(const texgs_volume& volume, const texgs_transfer& transfer, int64_t brick, uint32_t* cells) {
-    for (int half = 0; half < 2; ++half) cells[2 * brick + half] = shown_cells<T>(volume, transfer, 2 * brick + half);
+// Values that a transfer function shows, ends included.
+struct Range {
+    float low, high;
+};
+
+// The fewest ranges, so that `shows` holds of values that reach into one of them.
+std::vector<Range> shown_ranges(const texgs_transfer& transfer) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    std::vector<Range> ranges;
+    for (int i = 0; i + 1 < transfer.n; ++i) {
+        const float *p = transfer.points + 5 * i, *q = p + 5;
+        const float start = q[0] > p[0] ? p[1] : q[1], end = q[1];
+        if (!(start > 0.0f || end > 0.0f)) continue;
+        const Range range{start > 0.0f ? p[0] : std::nextafter(p[0], kInfinity),
+                          end > 0.0f ? q[0] : std::nextafter(q[0], -kInfinity)};
+        if (!ranges.empty() && range.low <= ranges.back().high)
+            ranges.back().high = range.high;
+        else
+            ranges.push_back(range);
+    }
+    return ranges;
 }
 
-using SetCells = void (*)(const texgs_volume&, const texgs_transfer&, int64_t, uint32_t*);
+// The smaller and the larger ones of neighbouring values: n values from and n values `away` behind these.
+struct Extremes {
+    float low[5 * 20], high[5 * 20];
+
+    void merge(const Extremes& from, int to, int first, int away, int n) {
+        for (int i = 0; i < n; ++i) {
+            const float *l = from.low + first + i, *h = from.high + first + i;
+            low[to + i] = l[away] < l[0] ? l[away] : l[0];
+            high[to + i] = h[away] > h[0] ? h[away] : h[0];
+        }
+    }
+};
+
+// Sets a bit for each cell of a brick in which something may show.
+template <class T>
+void set_cells(const texgs_volume& volume, const std::vector<Range>& ranges, const int32_t (&brick)[3],
+               uint32_t (&words)[2]) {
+    int64_t at[3][kBrick + 1];
+    int cells[3];
+    for (int a = 0; a < 3; ++a) {
+        cells[a] = std::min(kBrick, volume.size[a] - 1 - kBrick * brick[a]);
+        for (int i = 0; i <= kBrick; ++i) at[a][i] = kBrick * brick[a] + std::min(i, cells[a]);
+    }
+    Extremes x, y, z;
+    for (int k = 0; k <= kBrick; ++k)
+        for (int j = 0; j <= kBrick; ++j) {
+            const T* row =
+                static_cast<const T*>(volume.values) + (at[2][k] * volume.size[1] + at[1][j]) * volume.size[0];
+            float value[kBrick + 1];
+            for (int i = 0; i <= kBrick; ++i) value[i] = static_cast<float>(row[at[0][i]]);
+            for (int i = 0; i < kBrick; ++i) {
+                x.low[20 * k + 4 * j + i] = std::min(value[i], value[i + 1]);
+                x.high[20 * k + 4 * j + i] = std::max(value[i], value[i + 1]);
+            }
+        }
+    for (int k = 0; k <= kBrick; ++k) y.merge(x, 16 * k, 20 * k, kBrick, 16);
+    z.merge(y, 0, 0, 16, 64);
+    uint8_t shown[64] = {};
+    for (const Range& range : ranges)
+        for (int i = 0; i < 64; ++i) shown[i] |= (z.low[i] <= range.high) & (z.high[i] >= range.low);
+    for (int i = 0; i < 64; ++i) {
+        const bool is_inside = i % 4 < cells[0] && i / 4 % 4 < cells[1] && i / 16 < cells[2];
+        words[i / 32] |= uint32_t(is_inside && shown[i]) << i % 32;
+    }
+}
+
+using SetCells = void (*)(const texgs_volume&, const std::vector<Range>&, const int32_t (&)[3], uint32_t (&)[2]);
 constexpr SetCells kSetCells[] = {
     set_cells<uint8_t>, set_cells<int8_t>,   set_cells<uint16_t>, set_cells<int16_t>, set_cells<uint32_t>,
     set_cells<int32_t>, set_cells<uint64_t>, set_cells<int64_t>,  set_cells<float>,   set_cells<double>,
@@ -208,11 +272,16 @@ int32_t texgs_volume_cells(const texgs_volume* volume, const uint8_t* distance, 
     return guarded([&] {
         check_volume(*volume);
         check_transfer(*transfer);
+        const std::vector<Range> ranges = shown_ranges(*transfer);
         int32_t size[3];
         parallel_for(count_bricks(*volume, size), 64, [&](int64_t begin, int64_t end, int) {
-            std::fill(cells + 2 * begin, cells + 2 * end, 0u);
-            for (int64_t i = begin; i < end; ++i)
-                if (!distance[i]) kSetCells[volume->type](*volume, *transfer, i, cells);
+            for (int64_t i = begin; i < end; ++i) {
+                uint32_t words[2] = {};
+                const int32_t row = static_cast<int32_t>(i / size[0]);
+                const int32_t brick[3] = {static_cast<int32_t>(i % size[0]), row % size[1], row / size[1]};
+                if (!distance[i]) kSetCells[volume->type](*volume, ranges, brick, words);
+                cells[2 * i] = words[0], cells[2 * i + 1] = words[1];
+            }
         });
     });
 }

@@ -26,7 +26,7 @@ struct CastJob {
     int32_t n;
     CastChannel channels[TEXGS_CHANNELS];
     const uint8_t* distance;   // [bricks]
-    const uint32_t* cells;     // [bricks, 2]
+    const uint32_t* cells;     // [bricks, 2], or NULL
     float lower[3], upper[3];  // corners of a box that holds all bricks in which something shows, in samples
 };
 

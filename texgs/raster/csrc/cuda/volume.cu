@@ -58,6 +58,34 @@ __global__ __launch_bounds__(kThreads) void shown_kernel(const texgs_transfer tr
         shown[i] = shows(transfer, extremes[2 * i], extremes[2 * i + 1]) ? 0 : 255;
 }
 
+// In which cells of a word, half a brick, something may show.
+template <class T>
+__device__ uint32_t shown_cells(const texgs_volume& volume, const texgs_transfer& transfer, int64_t word) {
+    int first[3];
+    int64_t brick = word / 2;
+    for (int a = 0; a < 3; ++a) {
+        const int along = (volume.size[a] + TEXGS_BRICK - 2) / TEXGS_BRICK;
+        first[a] = TEXGS_BRICK * static_cast<int>(brick % along);
+        brick /= along;
+    }
+    first[2] += TEXGS_BRICK / 2 * static_cast<int>(word % 2);
+    const int64_t row = volume.size[0], slice = row * volume.size[1];
+    uint32_t cells = 0;
+    for (int cell = 0; cell < 32; ++cell) {
+        const int x = first[0] + cell % 4, y = first[1] + cell / 4 % 4, z = first[2] + cell / 16;
+        if (x > volume.size[0] - 2 || y > volume.size[1] - 2 || z > volume.size[2] - 2) continue;
+        const T* corner = static_cast<const T*>(volume.values) + z * slice + y * row + x;
+        float low = INFINITY, high = -INFINITY;
+        for (int i = 0; i < 8; ++i) {
+            const float value = static_cast<float>(corner[(i & 1) + (i >> 1 & 1) * row + (i >> 2) * slice]);
+            low = value < low ? value : low;
+            high = value > high ? value : high;
+        }
+        if (shows(transfer, low, high)) cells |= uint32_t(1) << cell;
+    }
+    return cells;
+}
+
 template <class T>
 __global__ __launch_bounds__(kThreads) void cells_kernel(const texgs_volume volume, const uint8_t* distance,
                                                          const texgs_transfer transfer, int64_t words,
@@ -175,7 +203,7 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
             continue;
         }
         const Spot spot(lattice, ray, k);
-        if (!spot.is_among(cells + 2 * at_brick, brick)) {
+        if (cells && !spot.is_among(cells + 2 * at_brick, brick)) {
             ++k;
             continue;
         }
