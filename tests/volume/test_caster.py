@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -176,6 +176,7 @@ def test_it_is_what_marching_in_torch_sees(step, light, spacing, device):
 @given(tf=functions(), dims=st.tuples(*[st.integers(2, 10)] * 3), seed=st.integers(0, 99))
 def test_cells_are_those_with_a_value_that_shows(tf, dims, seed, dtype):
     """Opacity at the extremes of a cell, at each point between them, and just below points, is above 0."""
+    assume(not any(0 < alpha < 1e-37 for _, alpha in tf.opacity))  # some processors take these for 0
     values = np.random.default_rng(seed).integers(-9, 10, dims).astype(np.float32)
     if dtype.startswith("u"):
         values = values.clip(0)

@@ -38,6 +38,7 @@ from texgs.volume.transfer import TransferFunction, left_limit, right_limit
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64")
 OUTPUTS = ("depth", "median", "normal")
 BYTES = 64  # of memory for a pixel
+PREPARED = 2  # functions that are kept ready: of pictures that are compared
 LEAST_WIDTH = torch.finfo(torch.float32).tiny  # of a transfer function, in data values
 MOST_SAMPLES = 2**24  # along a ray; their numbers are floats
 Prepared = tuple[Any, Any, Any]  # functions, arguments of the library for them, and what these need
@@ -83,7 +84,7 @@ class Caster:
         # With the number of the GPU, whichever is the current one later.
         self.device = torch.empty(0, device=device).device
         self._channels = dict[int, tuple[native.Struct, Tensor]]()  # that were shown, of all copies
-        self._prepared = list[Prepared]()  # the last, of all copies
+        self._prepared = list[Prepared]()  # the last PREPARED, of all copies
         if not grid.others:
             self._channel(0)
 
@@ -173,18 +174,16 @@ class Caster:
         """Return channels with their functions for the library, and where something shows."""
         if not tfs:
             raise ArgumentError("tf: expected at least one transfer function, got none")
-        prepared = self._prepared[0] if self._prepared else None  # another thread may prepare another one
-        if prepared is None or prepared[0] != (tfs, by_cell):
-            count, kept = (
-                len(tfs),
-                [self._shown(tf, by_cell) for tf in tfs],
-            )  # arrays of the library do not keep tensors
+        key, last = (tfs, by_cell), [*self._prepared]  # another thread may prepare others
+        prepared = next((each for each in last if each[0] == key), None)
+        if prepared is None:
+            kept = [self._shown(tf, by_cell) for tf in tfs]  # arrays of the library do not keep tensors
             volumes, transfers, distances, cells = zip(*kept, strict=True)
-            arrays = (NativeVolume * count)(*volumes), (NativeTransfer * count)(*transfers)
+            arrays = (NativeVolume * len(tfs))(*volumes), (NativeTransfer * len(tfs))(*transfers)
             nearest = torch.stack(distances).amin(dim=0)
             in_any = reduce(torch.bitwise_or, cells) if by_cell else None
-            prepared = (tfs, by_cell), (*arrays, count, nearest, in_any), kept
-            self._prepared[:] = [prepared]
+            prepared = key, (*arrays, len(tfs), nearest, in_any), kept
+            self._prepared[:] = [prepared, *last[: PREPARED - 1]]
         return prepared
 
     def _shown(
