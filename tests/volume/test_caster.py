@@ -175,7 +175,7 @@ def test_it_is_what_marching_in_torch_sees(step, light, spacing, device):
 @pytest.mark.parametrize("dtype", TYPES)
 @given(tf=functions(), dims=st.tuples(*[st.integers(2, 10)] * 3), seed=st.integers(0, 99))
 def test_cells_are_those_with_a_value_that_shows(tf, dims, seed, dtype):
-    """Opacity at the extremes of a cell, at each point between them, and just below points, is above 0."""
+    """Opacity at the extremes of a cell, between and just below them, is above 0: bricks are told so too."""
     assume(not any(0 < alpha < 1e-37 for _, alpha in tf.opacity))  # some processors take these for 0
     values = np.random.default_rng(seed).integers(-9, 10, dims).astype(np.float32)
     if dtype.startswith("u"):
@@ -209,10 +209,10 @@ def test_cells_change_nothing_but_the_order_of_sums(device):
 
 
 def shows_between(tf, low, high):
-    """Return whether a function has an opacity above 0 for some value from low to high."""
+    """Return whether a function has an opacity above 0 for some value from just below low to high."""
     ends = [value for value, _ in tf.opacity if low <= value <= high]
     at = np.array(sorted({low, high, *ends}), dtype=np.float64)
-    before = at[(at > low) & (at > tf.opacity[0][0]) & (at <= tf.opacity[-1][0])]
+    before = at[(at > tf.opacity[0][0]) & (at <= tf.opacity[-1][0])]
     between = (at[1:] + at[:-1]) / 2
     inside = np.concatenate([at, between])
     inside = inside[(inside >= tf.opacity[0][0]) & (inside <= tf.opacity[-1][0])]
