@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What volume.cpp hands to the kernels of an instruction set, and the table of those kernels.
+// What volume.cpp hands to the kernels of an instruction set, the table of those kernels, and what it shares with
+// bricks.cpp.
 #pragma once
 #include <cstdint>
 
@@ -14,6 +15,9 @@ struct CastTable {
     int32_t n, length;
     const float *value, *per_width, *opacity, *color[3];
 };
+
+// Refuses transfer functions whose values do not ascend.
+void check_transfer(const texgs_transfer&);
 
 struct CastChannel {
     const void* values;
