@@ -38,10 +38,10 @@ from texgs.volume.transfer import TransferFunction, left_limit, right_limit
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64")
 OUTPUTS = ("depth", "median", "normal")
 BYTES = 64  # of memory for a pixel
-PREPARED = 2  # functions that are kept ready: of pictures that are compared
+PREPARED = 2  # sets of functions that are kept ready: two pictures that are compared take turns
 LEAST_WIDTH = torch.finfo(torch.float32).tiny  # of a transfer function, in data values
 MOST_SAMPLES = 2**24  # along a ray; their numbers are floats
-Prepared = tuple[Any, Any, Any]  # functions, arguments of the library for them, and what these need
+Prepared = tuple[Any, Any, Any]  # functions and by_cell, the arguments of the library, what these need
 PADDING = 3  # bytes behind the distances of bricks, which are loaded as words
 NativeVolume = native.struct("texgs_volume", "p values, i type, 3i size, 3f half")
 NativeTransfer = native.struct("texgs_transfer", "i n, p points")
@@ -119,8 +119,8 @@ class Caster:
         parts of a ray join. Over an opacity unit behind the faces of a cut, normals are those of its planes,
         as even matter has none; or, where faces are not to be lit, colours are those of the function.
 
-        Cells in which nothing shows are found once for each function, and save a fifth of every cast; not
-        `by_cell`, only bricks are, which suits a function that is shown in one small picture.
+        By cell, rays pass by all cells in which nothing shows, which are found once a function. Otherwise
+        they know bricks only: faster for a function that is shown in one small picture.
         """
         height, width = camera.height, camera.width
         require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
