@@ -80,7 +80,7 @@ def test_eight_jobs_and_then_the_server_dies(server, tmp_path, warnings, capfd):
     assert time.monotonic() - start < 10
     [line] = warnings()
     assert "is incomplete" in line
-    assert "Connection refused" in line
+    assert "Connection refused" in line or "Connection reset" in line  # by a socket that is not closed yet
     assert capfd.readouterr() == ("", "")
 
 
