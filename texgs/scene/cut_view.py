@@ -68,16 +68,21 @@ def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut:
     """Render a slab of the volume behind each face of a cut, over the models beyond it."""
     slab = slab_of(cut, slab_thickness(composed, camera, scene, twin))
     seen = twin.with_step(STEP).cast(camera, scene, composed.palettes, slab).rgba
-    *color, alpha = seen.permute(2, 0, 1).contiguous()  # by channels, as models are rendered: faster
     behind, far = slab.depth_range[1], cut.depth_range[1]
     models = composed.render(
         *(camera, scene.light, scene.edits),
         background=camera.viewmat.new_tensor(scene.background),
-        depth_range=torch.stack([behind, torch.where(alpha < HIDDEN, far, behind)]),
+        depth_range=torch.stack([behind, torch.where(seen[..., 3] < HIDDEN, far, behind)]),
     )
-    clear = 1 - alpha
-    over = [front.addcmul(clear, back) for front, back in zip(color, models.color.unbind(-1), strict=True)]
-    return Render(torch.stack(over, dim=-1), alpha.addcmul(clear, models.alpha))
+    return over(seen, models)
+
+
+def over(front: Tensor, behind: Render) -> Render:
+    """Return premultiplied RGBA [H, W, 4] over a render, in whose place it is written."""
+    clear = 1 - front[..., 3]
+    for seen, back in zip(front.unbind(-1), (*behind.color.unbind(-1), behind.alpha), strict=True):
+        torch.addcmul(seen, clear, back, out=back)  # by channels, which is faster than all at once
+    return behind
 
 
 def slab_thickness(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> Tensor:

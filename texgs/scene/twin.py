@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -179,7 +180,8 @@ def range_of(cuts: Cuts, camera: Camera) -> CutRange:
     return cut_range(normals, offsets[:, 0], camera)
 
 
-def edited(tf: TransferFunction, edit: PartEdit, palette: Sequence[float]) -> TransferFunction:
+@lru_cache(maxsize=32)  # frames of a moving camera ask for the same
+def edited(tf: TransferFunction, edit: PartEdit, palette: tuple[float, ...]) -> TransferFunction:
     """Return a basic TF with an edit's colour and opacity, cut off at 0 and 1 at every value."""
     opacity = clipped([(value, alpha * edit.opacity) for value, alpha in tf.opacity])
     if edit.palette is None:

@@ -1,6 +1,7 @@
 """Transfer functions whose ranges overlap, as one that shows all of them: for exploring, before a fit."""
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -32,8 +33,14 @@ def overlays(functions: Mapping[str, TransferFunction]) -> list[TransferFunction
     """Return for each channel the function that shows what those of the channel show together."""
     channels = dict.fromkeys(tf.channel for tf in functions.values())
     return [
-        overlay({name: tf for name, tf in functions.items() if tf.channel == channel}) for channel in channels
+        _overlay(tuple(each for each in functions.items() if each[1].channel == channel))
+        for channel in channels
     ]
+
+
+@lru_cache(maxsize=8)  # frames of a moving camera ask for the same
+def _overlay(functions: tuple[tuple[str, TransferFunction], ...]) -> TransferFunction:
+    return overlay(dict(functions))
 
 
 def places(functions: list[TransferFunction]) -> Array:
