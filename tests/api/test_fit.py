@@ -139,7 +139,8 @@ def test_models_in_seconds(ball, monkeypatch, tmp_path):
     ("change", "error", "words"),
     [
         ({"volume": np.zeros((3, 3, 3))}, ArgumentError, "volume: expected a texgs.Volume, got ndarray"),
-        ({"recipe": "quik"}, ConfigError, "quik"),
+        ({"recipe": "quik"}, ArgumentError, "recipe: expected one of now, .*, got quik, did you mean quick?"),
+        ({"seed": -1}, ArgumentError, "seed: expected a whole number from 0 on, got -1"),
         ({"size": 8}, ArgumentError, "size: expected at least 16 pixels, got 8"),
         ({"overrides": ["views.trian=3"]}, ConfigError, "views.trian: no such key"),
         ({"functions": [TFS["inner"], TFS["inner"]]}, ArgumentError, "TF01 and TF02"),

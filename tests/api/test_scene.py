@@ -76,6 +76,12 @@ def test_light_background_and_cuts(scene):
 def test_slips_are_sentences(scene, tmp_path):
     with pytest.raises(AttributeError):
         scene["TF01"].opactiy = 0.5
+    with pytest.raises(AttributeError):
+        scene.lihgt = "headlight"
+    with pytest.raises(ArgumentError, match=r"expected a model of the scene \(TF01, TF02\), got 0"):
+        scene[0]
+    with pytest.raises(ArgumentError, match=r"words: expected text such as 'light=30,40', got \(\['light"):
+        scene.edit(["light=30,40"])
     with pytest.raises(ArgumentError, match=r"models.TF01.opacity: expected a factor from 0"):
         scene["TF01"].opacity = -1
     with pytest.raises(ArgumentError, match=r"expected a model of the scene \(TF01, TF02\), got TF03"):
@@ -108,6 +114,7 @@ def test_slips_are_sentences(scene, tmp_path):
 def test_a_look_that_was_saved_and_undone_is_gone(tmp_path):
     scene = texgs.open(write_balls(tmp_path))
     scene.style("glass", recipe="preview", parts="TF01").save(tmp_path)
+    assert repr(scene).endswith("a look\n  TF02: as fitted")
     before = pixels(scene)
     scene.style("dots", recipe="preview", parts="TF01").save(tmp_path)
     assert not np.array_equal(pixels(scene), before)

@@ -186,8 +186,17 @@ def test_functions_and_light_are_checked():
     with pytest.raises(ArgumentError, match="spacign: only for files of some formats; leave them out"):
         texgs.Volume(field(8, 8, 8), spacign=2)
     volume = texgs.Volume(field(8, 8, 8))
-    with pytest.raises(ArgumentError, match="count: expected at least 1, got 0"):
+    with pytest.raises(ArgumentError, match="count: expected a whole number from 1 on, got 0"):
         volume.suggest(0)
+    with pytest.raises(ArgumentError, match="count: expected a whole number from 1 on, got '2'"):
+        volume.suggest("2")
+    for keys, message in (
+        ({"reduce": 0}, "reduce: expected a whole number from 1 on, got 0"),
+        ({"reduce": 1.5}, "reduce: expected a whole number from 1 on, got 1.5"),
+        ({"method": "max"}, "method: expected one of mean, sample, got 'max'"),
+    ):
+        with pytest.raises(ArgumentError, match=message):
+            texgs.Volume(field(8, 8, 8), **keys)
     with pytest.raises(ArgumentError, match="functions: expected at least one transfer function, got none"):
         volume.render([])
     with pytest.raises(ArgumentError, match=r"TF01: expected a texgs.TransferFunction, got str"):

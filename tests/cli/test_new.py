@@ -1,6 +1,7 @@
 """`texgs init` and `texgs new`: a project whose files compose, and data sets from volume files."""
 
 import h5py
+import nibabel
 import numpy as np
 import pytest
 import yaml
@@ -12,6 +13,7 @@ from texgs.config.compose import compose, recompose
 from texgs.config.project import ROOT, groups, members
 from texgs.core.io import write_json
 from texgs.volume.nrrd_file import open_grid
+from texgs.volume.sources import tells_superior
 from texgs.volume.suggest import COLORS
 from texgs.volume.transfer import TransferFunction
 
@@ -244,6 +246,17 @@ def test_a_data_set_is_only_replaced_where_that_is_asked_for_and_that_of_texgs_n
     assert compose(("dataset=engine",)).dataset.volume.file == str(scan)
 
 
+def test_z_of_nifti_points_up_and_keys_may_have_their_whole_name(conf, scan):
+    nifti = conf.parent / "head.nii.gz"
+    nibabel.save(nibabel.Nifti1Image(np.load(scan), np.eye(4)), nifti)
+    assert main(["new", str(nifti), "dataset.volume.reduce=2"]) == 0
+    assert main(["new", str(nifti), "--name", "lying", "up=+y"]) == 0
+    volumes = {name: compose((f"dataset={name}",)).dataset.volume for name in ("head", "lying")}
+    assert (volumes["head"].up, volumes["head"].reduce) == ("+z", 2)
+    assert (volumes["lying"].up, volumes["lying"].reduce) == ("+y", 1)
+    assert tells_superior(conf.parent), "a folder is of DICOM where no format says otherwise"
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -260,6 +273,7 @@ def test_mistakes_write_nothing(conf, scan, capsys, words, message):
     (line,) = capsys.readouterr().err.splitlines()
     assert message in line
     assert not conf.exists()
+    assert not [*conf.parent.glob("results/*")], "nothing of a volume that cannot be read stays"
 
 
 @pytest.mark.parametrize(

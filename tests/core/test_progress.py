@@ -38,15 +38,34 @@ def test_log_file_gets_a_line_every_five_seconds_and_a_last_one(clock, log):
     assert len(lines) == 5  # at 5, 10, 15, 20 s and the end
 
 
-def test_a_notebook_gets_a_bar_that_goes_when_it_is_done(monkeypatch, capsys):
+class Place:
+    """Stands for what shows an output of a cell and changes it."""
+
+    def __init__(self, all_places):
+        self.lines = []
+        all_places.append(self)
+
+    def display(self, data, raw):
+        assert not self.lines
+        self.update(data, raw)
+
+    def update(self, data, raw):
+        assert raw
+        self.lines.append(data["text/plain"])
+
+
+def test_a_notebook_gets_a_bar_in_an_output_of_its_own_that_is_empty_when_it_is_done(monkeypatch, capsys):
+    places = []
     monkeypatch.setitem(sys.modules, "ipykernel.kernelapp", sys)
     monkeypatch.setattr(module, "find_spec", lambda name: None)
-    assert list(progress(range(3), title="views", unit="view")) == [0, 1, 2]
-    said, faults = capsys.readouterr()
-    assert "views:   0%" in said
-    assert said.endswith("\r")
-    assert not faults, "a notebook shows them in red"
-    assert "took" not in said
+    monkeypatch.setattr("IPython.display.DisplayHandle", lambda: Place(places))
+    for title in ("views", "steps"):
+        assert list(progress(range(3), title=title, unit="view")) == [0, 1, 2]
+    views, steps = places
+    assert "views:   0%" in views.lines[0]
+    assert "steps:   0%" in steps.lines[0]
+    assert views.lines[-1] == steps.lines[-1] == ""
+    assert capsys.readouterr() == ("", ""), "each piece of a stream is a line of its own in a file"
 
 
 def test_slow_items_and_long_times(clock, log):

@@ -1,16 +1,20 @@
 """A metric is one file: the stage's measures, all tables and sweeps have it, and metrics.json keeps it."""
 
+import math
+import re
 import shutil
 from pathlib import Path
 
 import pytest
+import torch
 
 import texgs.metrics.edits
 from tests.metrics.test_edit_metrics import scenes, subject  # noqa: F401
 from tests.report.written import metrics as write_metrics
 from tests.report.written import records, rows
+from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.specifications import specifications
-from texgs.metrics.metric import metrics, values_of
+from texgs.metrics.metric import Measure, Metric, metrics, require_declared, values_of
 from texgs.report.edit_tables import looks, text_driven
 from texgs.report.results import EditMeasures, EditResult
 from texgs.report.sweep_table import sweep
@@ -46,6 +50,29 @@ def test_a_metric_of_one_file_is_measured_and_has_its_columns(tmp_path, scenes):
     for table in (looks(records(folder)), text_driven(records(folder)), sweep(records(folder), "mine")):
         assert rows(table)[0]["mean brightness"] == values["brightness"]
         assert f"{values['brightness']:.3f}" in table.markdown()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (0.5, "metric redness: expected values by their names, got float"),
+        ({"bleu": 1}, "metric redness: expected values of redness, got bleu; give it a Measure"),
+        ({"redness": torch.tensor(0.5)}, "redness: expected a finite float or int, or None, got Tensor"),
+        ({"redness": math.nan}, "redness: expected a finite float or int, or None, got nan"),
+        ({"redness": "quite red"}, "redness: expected a finite float or int, or None, got str"),
+    ],
+)
+def test_what_a_metric_gives_is_what_it_declares(given, message):
+    with pytest.raises(ArgumentError, match=re.escape(message)):
+        require_declared(Metric("redness", (Measure("redness", "share of red", 2),), print), given)
+
+
+def test_two_metrics_have_no_value_of_one_name(toy, monkeypatch):
+    taken = Metric("redness", (Measure("brightness", "share of red", 2),), print)
+    known = specifications("texgs.metrics.edits", "METRIC")
+    monkeypatch.setattr("texgs.metrics.metric.specifications", lambda *names: {**known, "redness": taken})
+    with pytest.raises(ConfigError, match=r"brightness and redness: .* got brightness of both; rename one"):
+        metrics()
 
 
 def test_columns_and_names_are_stated_once():

@@ -161,6 +161,21 @@ def test_vti_axes_become_those_of_space(tmp_path):
     assert_holds(tmp_path / "v.vti", turned, (SPACING[2], SPACING[0], SPACING[1]))
 
 
+@pytest.mark.parametrize(
+    ("numbers", "missing"), [((8, 9, 10), ""), ((2, 4, 8), "s4.tif and s8.tif"), ((0, 5), "")]
+)
+def test_a_stack_of_slices_with_a_gap_is_refused(tmp_path, numbers, missing):
+    for number in numbers:
+        tifffile.imwrite(tmp_path / f"s{number}.tif", np.full((4, 5), number, np.uint8))
+    if not missing:
+        assert open_source(tmp_path).dims == (5, 4, len(numbers))
+        return
+    with pytest.raises(
+        ArgumentError, match=f"{missing}: expected numbers 2 apart, as of other slices, got 4"
+    ):
+        open_source(tmp_path)
+
+
 def test_a_compressed_tiff_that_cannot_be_read_says_so_at_once(tmp_path, monkeypatch):
     tifffile.imwrite(tmp_path / "v.tif", sample_values("uint8"), compression="zlib")
     monkeypatch.setattr("texgs.volume.tiff.READABLE", (1,))

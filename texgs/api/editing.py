@@ -39,6 +39,8 @@ class Editing:
         kept: what has to stay as long as the scene, such as folders of its files.
     """
 
+    __slots__ = ("__weakref__", "_count", "_kept", "_scratch", "_viewer", "session")  # a slip is an error
+
     def __init__(self, session: Session, *kept: Any) -> None:
         self.session = session
         self._scratch = TemporaryDirectory(prefix="texgs-")
@@ -54,7 +56,7 @@ class Editing:
 
     def __getitem__(self, name: str) -> Part:
         """Return a part; another name is an ArgumentError that lists those that there are."""
-        return Part(self, name)
+        return Part(self, str(name))
 
     def __iter__(self) -> Iterator[str]:
         """Yield the names of all parts."""
@@ -99,6 +101,8 @@ class Editing:
 
         They are one step. Where a word is wrong, none of them counts.
         """
+        if not all(isinstance(word, str) for word in words):
+            raise ArgumentError(f"words: expected text such as 'light=30,40', got {words!r:.100}")
         apply_all(self.session, words)
         return self.changed(" ".join(words))
 
@@ -127,7 +131,7 @@ class Editing:
     def style(
         self, picture: str | Path | Image | np.ndarray, parts: Sequence[str] = (), **settings: Any
     ) -> Self:
-        """Give parts the style of a picture, and return self.
+        """Give parts the style of a picture, and return self; their palettes go back to the fitted ones.
 
         Args:
             picture: a picture that texgs paints (strokes, glass, ...), a file, or an image.
@@ -142,6 +146,8 @@ class Editing:
 
     def instruct(self, instruction: str, parts: Sequence[str] = (), **settings: Any) -> Self:
         """Change the look of parts by an instruction such as "make it gold", and return self.
+
+        Their palettes go back to the fitted ones.
 
         Args:
             instruction: for InstructPix2Pix; or, with `guidance="filters"`, of words that filters know.
@@ -210,7 +216,7 @@ class Editing:
         """Give parts a new look by a method of editing with values of its settings."""
         from texgs.config.recipes import Edit
         from texgs.edit.method import method_of
-        from texgs.edit.task import orbit_task, parts_of
+        from texgs.edit.task import edited_by, orbit_task, parts_of
         from texgs.scene.parts import look_of
 
         before, device = self.session.scene, self.session.composition.device
@@ -221,7 +227,7 @@ class Editing:
             raise ArgumentError(str(error)) from error
         method_of(edit).of(edit).check()
         task = replace(orbit_task(before, edit, self._new_folder(method), device), draws=False)
-        after = method_of(edit).run(task).scene
+        after = edited_by(method_of(edit), task).scene
         names = parts_of(before, edit.parts)
         self.session.set_looks({name: look_of(after, name, before) for name in names})
         return self.changed(f"{', '.join(names)} {next(iter(values.values()))}")

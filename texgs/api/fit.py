@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from filecmp import cmp
+from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ from texgs.core.check import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
 from texgs.core.io import copy_atomic
-from texgs.core.names import SCENE, file_name
+from texgs.core.names import SCENE, close, file_name
 from texgs.scene.session import Session
 from texgs.volume.summaries import write_summaries
 from texgs.volume.transfer import TransferFunction
@@ -58,10 +59,18 @@ def fit(
     Raises:
         ArgumentError: if functions overlap, a key or a recipe is unknown, or nothing is visible.
     """
+    from texgs.config.project import members
+
     if not isinstance(volume, Volume):
         raise ArgumentError(f"volume: expected a texgs.Volume, got {type(volume).__name__}")
     if size < LEAST:
         raise ArgumentError(f"size: expected at least {LEAST} pixels, got {size}")
+    if not isinstance(seed, Integral) or not 0 <= seed < 2**63:
+        raise ArgumentError(f"seed: expected a whole number from 0 on, got {seed!r}")
+    recipes = [NOW, *members("fit")]
+    if recipe not in recipes:
+        known, hint = ", ".join(recipes), close(recipe, recipes)
+        raise ArgumentError(f"recipe: expected one of {known}, got {recipe}{hint}")
     if recipe == NOW and overrides:
         raise ArgumentError(f"overrides: not for the recipe {NOW}; leave them out")
     torch_device(device)

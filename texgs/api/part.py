@@ -56,6 +56,8 @@ class Part:
 
     def __repr__(self) -> str:
         """Return the name, and what is edited."""
-        edit = entry_of(self.scene.session.scene, self.name).edit
-        changed = [f"{key}={value}" for key, value in vars(edit).items() if value != getattr(PartEdit(), key)]
+        entry = entry_of(self.scene.session.scene, self.name)
+        edits, fitted = vars(entry.edit), vars(PartEdit())
+        changed = [f"{key}={value}" for key, value in edits.items() if value != fitted[key]]
+        changed += ["a look"] if getattr(entry, "texture", None) else []
         return f"{self.name}: {', '.join(changed) or 'as fitted'}"

@@ -35,6 +35,8 @@ class Scene(Editing):
     `texgs.fit` and `texgs.open`.
     """
 
+    __slots__ = ()
+
     # ---- Pictures and films ---------------------------------------------------
 
     def render(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.cli.options import add_device, add_lens, lens_of, option
 from texgs.core.errors import ArgumentError, located
 from texgs.core.lens import Lens
-from texgs.core.names import SCENES, new_part_file, require_name
+from texgs.core.names import METRICS, SCENES, new_part_file, require_name
 
 if TYPE_CHECKING:
     import torch
@@ -226,3 +226,7 @@ def require_scene(output: Path) -> None:
     """Require the path of a scene file, so that no file of another kind is replaced."""
     if output.suffix not in SCENES or output.is_dir():
         raise ArgumentError(f"--output: expected a file that ends in .yaml, got {output}")
+    if output.exists() and (output.parent / METRICS).exists():
+        raise ArgumentError(
+            f"--output: {output} is a result of the workflow, whose next run writes it anew; choose another"
+        )

@@ -62,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Make a data set of the volume, with all its channels, and say what comes next."""
     from texgs.config.project import members, own_folder, shown
+    from texgs.volume.sources import tells_superior
     from texgs.volume.tf_files import read_tf
     from texgs.workflow.locate import series_files
 
@@ -70,7 +71,10 @@ def run(arguments: argparse.Namespace) -> int:
     for path in arguments.tf or ():
         read_tf(path)  # a mistake in it is told before the volume is read
     name = arguments.name or NO_NAME.sub("_", arguments.file.name.split(".")[0])
-    given = configuration(name, arguments.file, arguments.overrides)
+    overrides = [word.removeprefix("dataset.volume.") for word in arguments.overrides]
+    if "up" not in changed(overrides) and tells_superior(arguments.file):
+        overrides.append("up=+z")
+    given = configuration(name, arguments.file, overrides)
     given = replace(given, dataset=replace(given.dataset, series=[*map(absolute, arguments.series)]))
     series_files(given)
     folder = own_folder() / "dataset"
@@ -79,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
         is_own = (folder / f"{name}.yaml").exists()
         there, do = ("is there", "replace") if is_own else ("is a data set of texgs", "hide")
         raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
-    field, keys = array_of(given.dataset.volume), changed(arguments.overrides)
+    field, keys = array_of(given.dataset.volume), changed(overrides)
     channels = channels_of(given.dataset.volume, field)
     if field and "reduce" not in keys:
         given = reduced(given, field, len(channels))
@@ -90,7 +94,8 @@ def run(arguments: argparse.Namespace) -> int:
     target = write_bytes(folder / f"{name}.yaml", text.encode())
     count, picture = len(dataset.basic_tfs), Path(given.results, name, "transfer", "transfer.png")
     of = f" of the channels {', '.join(channels)}" if dataset.channels else ""
-    print(f"{shown(target)}: {count} transfer functions{of} to edit; {picture} shows them")
+    functions = "transfer function" if count == 1 else "transfer functions"
+    print(f"{shown(target)}: {count} {functions}{of} to edit; {picture} shows them")
     print(f"then: texgs run dataset={name} fit=quick")
     return 0
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.project import check_name
-from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.errors import ArgumentError, ConfigError, TexgsError
 
 if TYPE_CHECKING:
     from texgs.config.dataset import BasicTF, Dataset
@@ -28,14 +28,20 @@ def with_tfs(config: Config, channels: dict[str, Channel | None], arguments: arg
     from texgs.volume.summaries import read_summaries
     from texgs.workflow.checks import check_basic_tfs, check_channels
     from texgs.workflow.execution import ensure
+    from texgs.workflow.result import forget
     from texgs.workflow.stage_table import STAGES
 
     dataset = config.dataset
     if len(channels) > 1:
         dataset = replace(dataset, basic_tfs={key: BasicTF(channel=key) for key in channels})
         check_channels(dataset)
-    ensure(STAGES["volume"], replace(config, dataset=dataset))
-    known = read_summaries(Path(config.results, dataset.name, "volume", "volume.nrrd"))
+    output = Path(config.results, dataset.name, "volume")
+    try:
+        ensure(STAGES["volume"], replace(config, dataset=dataset))
+    except TexgsError:
+        forget(output)
+        raise
+    known = read_summaries(output / "volume.nrrd")
     if len(channels) > 1:
         listed = of_each(known, channels, arguments)
     else:

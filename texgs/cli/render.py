@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -119,6 +118,11 @@ def compared(
     if not 1 <= arguments.gain <= MOST_GAIN:
         raise ArgumentError(f"--gain: expected 1 to {MOST_GAIN:g}, got {arguments.gain:g}")
     is_fitted = arguments.compare == "fitted"
+    if session.scene.shows_volume and not is_fitted:
+        raise ArgumentError(
+            "--compare: expected a scene of models, got a cut one that shows its volume; take cuts back "
+            "by texgs edit, or --compare fitted"
+        )
     pair = pair_of(arguments, session, is_fitted)
     measured, edits = defaultdict[str, list[float]](list), []
     for camera, shown in shots:
@@ -132,8 +136,6 @@ def compared(
     print(", ".join(in_words(mean(measured))))
     if is_fitted:
         print(what_changed(edits))
-    elif session.scene.shows_volume:
-        print("The cut scene shows its volume itself: take cuts back to compare its models.", file=sys.stderr)
 
 
 def pair_of(
@@ -168,6 +170,8 @@ def frames_of(arguments: argparse.Namespace) -> int:
     """Return how many frames to render."""
     count = PATHS[arguments.path] if arguments.frames is None else arguments.frames
     if arguments.seconds is not None:
+        if not arguments.seconds > 0:
+            raise ArgumentError(f"--seconds: expected more than 0, got {arguments.seconds:g}")
         count = arguments.seconds * arguments.fps
     if not 1 <= count <= MOST_FRAMES:
         bound = "at least 1" if count < 1 else f"at most {MOST_FRAMES}"

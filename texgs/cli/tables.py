@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser, output: str = "results/tables") -> None:
     """Add where the numbers are, and where the tables or the report go."""
     parser.add_argument(
-        "metrics", nargs="*", type=Path, help="metrics.json files, or a folder of results (results/)"
+        "metrics", nargs="*", type=given_path, help="metrics.json files, or a folder of results (results/)"
     )
     parser.add_argument("--missing", type=Path, help="JSON file of what was left out, with reasons")
     study = "key of a user study, with ballots in votes/ beside it"
@@ -64,6 +64,11 @@ def run_report(arguments: argparse.Namespace) -> int:
     more = {} if given["user_study"].is_empty else {"study": [shown(votes)]}
     print(write_report(arguments.output, records, left_out, given, more))
     return 0
+
+
+def given_path(word: str) -> Path:
+    """Return the path of a file or folder, which may have the key of results in front, as in other verbs."""
+    return Path(word.removeprefix("results="))
 
 
 def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[LeftOut]]:

@@ -6,6 +6,7 @@ from typing import Any
 from texgs.core.keys import REQUIRED, key
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+LARGEST = 16384  # pixels of a side of a view
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ class Dataset:
     title: str = key("${.name}", "name of the data set in pictures of its transfer functions")
     source: str = key("", "who made the data, and its licence")
     stand_in: str = key("", "what the data stand in for, where the real ones are not public")
-    image: int = key(800, "width and height of views", "pixels", least=1)
+    image: int = key(800, "width and height of views", "pixels", least=1, most=LARGEST)
     volume: Volume = key(Volume, "where the scalar field comes from")
     series: list[str] = key(
         [], "files of the steps of a series in time, such as step_*.nrrd; volume.file is one of them"

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from texgs.config.dataset import LARGEST
 from texgs.core.keys import key
 from texgs.core.lens import Frame, Lens
 
@@ -44,8 +45,8 @@ class ViewKeys:
     name: str = key("views", "name of the folder of the views; a sweep over views has several")
     train: CameraPath = key(CameraPath, "training views")
     test: CameraPath = key(CameraPath, "test views")
-    width: int = key("${dataset.image}", "width of views", "pixels", least=1)
-    height: int = key("${dataset.image}", "height of views", "pixels", least=1)
+    width: int = key("${dataset.image}", "width of views", "pixels", least=1, most=LARGEST)
+    height: int = key("${dataset.image}", "height of views", "pixels", least=1, most=LARGEST)
     fov_y: float = key(LENS.fov_y, "vertical field of view", "degrees", above=0, below=180)
     radius: float | None = key(
         None,

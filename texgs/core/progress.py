@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from importlib.util import find_spec
+from io import StringIO
 from operator import length_hint
 from time import monotonic
 from typing import Any, TypeVar
@@ -83,16 +84,38 @@ def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> I
     is_notebook = "ipykernel.kernelapp" in sys.modules  # others talk to kernels
     if not (is_notebook or sys.stderr.isatty()):
         return _lines(iterable, total, title, unit)
-    if is_notebook and find_spec("ipywidgets"):
+    look: dict[str, Any] = {"dynamic_ncols": True}
+    if not is_notebook:
+        from tqdm import tqdm  # slow to import
+    elif find_spec("ipywidgets"):
         from tqdm.notebook import tqdm
     else:
-        from tqdm import tqdm  # slow to import
-
-    look: dict[str, Any] = {"dynamic_ncols": True}
-    if is_notebook:  # a cell keeps no long list, and shows what goes to stderr as a fault
-        look |= {"leave": False, "file": sys.stdout}
+        tqdm, look = cell_bar(), {"file": StringIO()}
+    if is_notebook:  # a cell keeps no long list
+        look |= {"leave": False}
     bar: Iterable[T] = tqdm(iterable, desc=title, total=total, unit=unit, **look)
     return bar
+
+
+def cell_bar() -> Any:
+    """Return a bar for notebooks without widgets: one output of a cell, which changes, also in files."""
+    from IPython.display import DisplayHandle
+    from tqdm import tqdm
+
+    class Bar(tqdm):  # type: ignore[misc]
+        """Shows its line in a place of its own, where others print one below the other."""
+
+        cell: Any = None  # of `display`
+
+        def display(self, msg: str | None = None, pos: int | None = None) -> None:
+            line = {"text/plain": str(self) if msg is None else msg}
+            if self.cell is None:
+                self.cell = DisplayHandle()  # type: ignore[no-untyped-call]
+                self.cell.display(line, raw=True)
+            else:
+                self.cell.update(line, raw=True)
+
+    return Bar
 
 
 def _lines(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterator[T]:

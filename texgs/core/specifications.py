@@ -3,7 +3,10 @@
 import pkgutil
 from functools import cache
 from importlib import import_module
+from types import ModuleType
 from typing import Any
+
+from texgs.core.errors import ConfigError
 
 
 @cache
@@ -12,8 +15,26 @@ def specifications(package: str, attribute: str) -> dict[str, Any]:
 
     The modules are imported, so they must stay light: what they run imports the rest when it is called. A
     module without the name, such as METHOD, is a helper of others.
+
+    Raises:
+        ConfigError: naming the module that cannot be imported, or whose specification has another's name.
     """
-    folder = import_module(package).__path__
-    modules = (import_module(f"{package}.{entry.name}") for entry in pkgutil.iter_modules(folder))
-    defined = [getattr(module, attribute) for module in modules if hasattr(module, attribute)]
-    return {specification.name: specification for specification in defined}
+    defined, modules = dict[str, Any](), dict[str, str]()
+    for entry in pkgutil.iter_modules(import_module(package).__path__):
+        module = f"{package}.{entry.name}"
+        specification = getattr(imported(module), attribute, None)
+        if specification is None:
+            continue
+        name = specification.name
+        if name in defined:
+            raise ConfigError(f"{module}: {attribute} has the name {name} of {modules[name]}; choose another")
+        defined[name], modules[name] = specification, module
+    return defined
+
+
+def imported(name: str) -> ModuleType:
+    """Import a module; what is wrong with it becomes one sentence."""
+    try:
+        return import_module(name)
+    except (ImportError, NameError, SyntaxError, TypeError) as error:
+        raise ConfigError(f"{name}: {type(error).__name__} where it is imported: {error}") from error

@@ -8,13 +8,15 @@ of its values.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from texgs.core.errors import ConfigError
 from texgs.core.keys import typed
+from texgs.core.names import close
 from texgs.core.specifications import specifications
-from texgs.fields.kinds import kinds
+from texgs.fields.kinds import ALL, kinds
 
 if TYPE_CHECKING:
     from texgs.edit.style_picture import StylePicture
@@ -78,6 +80,11 @@ class Method(Generic[Settings]):
 
     def __post_init__(self) -> None:
         self.settings.node = f"edit.{self.name}"
+        if plain := [each.name for each in fields(self.settings) if "help" not in each.metadata]:
+            raise ConfigError(f"method {self.name}: {plain[0]}: expected key(DEFAULT, HELP), got no key()")
+        if unknown := sorted(self.needs - ALL):
+            hint = close(unknown[0], ALL)
+            raise ConfigError(f"method {self.name}: needs: {unknown[0]} is nothing that fields can do{hint}")
 
     @property
     def stage(self) -> str:

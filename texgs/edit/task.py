@@ -10,11 +10,11 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera, orbit
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.lens import Lens
 from texgs.core.names import part_file
 from texgs.edit.keys import EditKeys
-from texgs.edit.method import method_of
+from texgs.edit.method import Method, method_of
 from texgs.fields.field import Field
 from texgs.fields.kinds import kinds
 from texgs.fields.surfels.model import Surfels
@@ -163,6 +163,14 @@ class EditedScene:
     lambda_s: float | None = None  # share of NNFM against CLIP
     notes: Mapping[str, Any] = field(default_factory=dict)  # what else there is to tell: no table reads it
     losses: Mapping[str, Mapping[str, Sequence[float]]] = field(default_factory=dict)  # by part and term
+
+
+def edited_by(method: Method[Any], task: Task[Any]) -> EditedScene:
+    """Return what a method makes of a task, and require that it is a scene."""
+    edited = method.run(task)
+    if not isinstance(edited, EditedScene):
+        raise ConfigError(f"method {method.name}: expected an EditedScene, got {type(edited).__name__}")
+    return edited
 
 
 @dataclass(frozen=True, eq=False)

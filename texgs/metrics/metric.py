@@ -13,7 +13,8 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.names import is_number
 from texgs.core.specifications import specifications
 
 if TYPE_CHECKING:
@@ -159,8 +160,15 @@ class MeasuredScene:
 
 
 def metrics() -> dict[str, Metric]:
-    """Return all metrics of edits by name, in the order of their columns."""
-    defined = specifications("texgs.metrics.edits", "METRIC")
+    """Return all metrics of edits by name, in the order of their columns; no two have a value of one name."""
+    defined, owners = specifications("texgs.metrics.edits", "METRIC"), dict[str, str]()
+    for metric in defined.values():
+        for name in metric.names:
+            if owners.setdefault(name, metric.name) != metric.name:
+                raise ConfigError(
+                    f"metrics {owners[name]} and {metric.name}: expected values of names of their own, got "
+                    f"{name} of both; rename one"
+                )
     return dict(sorted(defined.items(), key=lambda item: (item[1].order, item[0])))
 
 
@@ -181,9 +189,21 @@ def values_of(scene: MeasuredScene, chosen: Iterable[Metric] | None = None) -> d
                 watcher.see(view)
         told = [each.values() if isinstance(each, Watcher) else each for each in results]
     for metric, values in zip(chosen, told, strict=True):
-        if unknown := [name for name in values if name not in metric.names]:
-            raise ArgumentError(
-                f"metric {metric.name}: expected values of {', '.join(metric.names)}, got {unknown[0]}; "
-                "give it a Measure"
-            )
+        require_declared(metric, values)
     return {name: value for each in told for name, value in each.items()}
+
+
+def require_declared(metric: Metric, values: Any) -> None:
+    """Require that a metric gives what it declares: numbers where its columns have digits, or None."""
+    where = f"metric {metric.name}"
+    if not isinstance(values, Mapping):
+        raise ArgumentError(f"{where}: expected values by their names, got {type(values).__name__}")
+    if unknown := [name for name in values if name not in metric.names]:
+        raise ArgumentError(
+            f"{where}: expected values of {', '.join(metric.names)}, got {unknown[0]}; give it a Measure"
+        )
+    for name in (measure.name for measure in metric.measures if measure.digits is not None):
+        value = values.get(name)
+        if value is not None and not is_number(value):
+            kind = f"{value}" if isinstance(value, float) else type(value).__name__
+            raise ArgumentError(f"{where}: {name}: expected a finite float or int, or None, got {kind}")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from math import inf, prod
+from numbers import Integral
 from pathlib import Path
 from shutil import disk_usage
 from typing import Any, BinaryIO
@@ -61,10 +62,7 @@ def prepare_channels(
             channel is constant or unlike the first in lattice or type, fewer than two samples are left along
             an axis, or there is too little space on the disk. Nothing is written then.
     """
-    if nan_value is not None and not (is_number(nan_value) and abs(nan_value) <= np.finfo(np.float32).max):
-        raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
-    if up not in UPRIGHT:
-        raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up}")
+    _check_keys(nan_value, reduce, method, up)
     source, tallies = _first_of(sources), [_Tally(each.name) for each in sources]
     bounds, axes = bounds_of(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
@@ -171,6 +169,18 @@ def bounds_of(dims: Dims, crop: Sequence[int] | None) -> Bounds:
         if not 0 <= low < high <= size:
             raise ArgumentError(f"crop: expected 0 <= {axis}0 < {axis}1 <= {size}, got {low} and {high}")
     return (crop[0], crop[1]), (crop[2], crop[3]), (crop[4], crop[5])
+
+
+def _check_keys(nan_value: float | None, reduce: int, method: str, up: str) -> None:
+    """Refuse what is out of range."""
+    if nan_value is not None and not (is_number(nan_value) and abs(nan_value) <= np.finfo(np.float32).max):
+        raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
+    if not isinstance(reduce, Integral) or reduce < 1:
+        raise ArgumentError(f"reduce: expected a whole number from 1 on, got {reduce!r}")
+    if method not in REDUCERS:
+        raise ArgumentError(f"method: expected one of {', '.join(REDUCERS)}, got {method!r}")
+    if up not in UPRIGHT:
+        raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up}")
 
 
 def _reduced_lattice(source: Source, bounds: Bounds, reduce: int) -> tuple[Dims, Triple, Triple]:

@@ -101,6 +101,12 @@ def holds_arrays(path: Path) -> bool:
     return _opener(path)[1] == IN_FILES
 
 
+def tells_superior(path: Path) -> bool:
+    """Return whether z points to the head by a volume's format: of NIfTI, and of a folder of DICOM."""
+    opener, _ = _opener(path)
+    return opener is _open_nifti or (path.is_dir() and opener is open_foreign)
+
+
 def _opener(path: Path) -> tuple[Callable[..., Source] | None, tuple[str, ...]]:
     """Return what opens a file or a folder, and the keys that it takes."""
     suffix = _suffix(path)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,8 +53,8 @@ def suggest(
     `count` functions, fewer where there are fewer values; by default what shows, at most 5. Of a channel with
     a window it is one by default, see `windowed`.
     """
-    if count is not None and count < 1:
-        raise ArgumentError(f"count: expected at least 1, got {count}")
+    if count is not None and (not isinstance(count, Integral) or count < 1):
+        raise ArgumentError(f"count: expected a whole number from 1 on, got {count!r}")
     if count is None and channel and (shown := windowed(channel, minimum, maximum)):
         return {"TF01": shown}
     counts = np.asarray(histogram, dtype=np.float64)

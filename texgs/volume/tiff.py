@@ -1,9 +1,11 @@
 """TIFF files with a page per slice, and folders of single TIFFs, as sources."""
 
 import logging
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +85,7 @@ def _source(tiff: Any, path: Path, files: list[Path], lattice: tuple[Triple, Tri
     if path.is_dir():
         if len(tiff.pages) != 1:
             raise ArgumentError(f"expected one page per file, got {len(tiff.pages)} in {files[0].name}")
+        require_all_slices(files)
         return PageSource(path, [(file, 0) for file in files], shape, dtype, lattice)
     series = tiff.series[0]
     for axis, size in zip(series.axes, series.shape, strict=False):
@@ -123,6 +126,20 @@ def spacing_of(tiff: Any) -> Triple | None:
 def tiffs_in(folder: Path) -> list[Path]:
     """Return the TIFF files of a folder in natural order: slice9 comes before slice10."""
     return sorted((file for file in folder.iterdir() if file.suffix.lower() in SLICES), key=natural_order)
+
+
+def require_all_slices(files: list[Path]) -> None:
+    """Require that the numbers in the names of slices, which are in order, have no gap."""
+    numbers = [int(digits[-1]) for file in files if (digits := re.findall(r"\d+", file.stem))]
+    steps = [after - before for before, after in pairwise(numbers)]
+    if len(numbers) < len(files) or not steps or min(steps) < 1:
+        return  # names that do not count slices
+    for before, after, step in zip(files, files[1:], steps, strict=False):
+        if step != min(steps):
+            raise ArgumentError(
+                f"{before.name} and {after.name}: expected numbers {min(steps)} apart, as of other slices, "
+                f"got {step}: some are missing; add them, or rename the files if these are all"
+            )
 
 
 def _page_type(page: Any) -> tuple[tuple[int, int], np.dtype]:

@@ -13,7 +13,7 @@ import json
 import shutil
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +49,14 @@ def alone(output: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
+
+
+def forget(output: Path) -> None:
+    """Remove what a job has left that cannot succeed, and the folder around it if that is empty."""
+    shutil.rmtree(work_folder(output), ignore_errors=True)
+    output.with_name(f".{output.name}.lock").unlink(missing_ok=True)
+    with suppress(OSError):
+        output.parent.rmdir()
 
 
 def run_alone(results: str) -> FileLock:

@@ -51,7 +51,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     It reads `scene`, and for each model `views.MODEL`, the transforms_train.json of its views.
     """
     from texgs.core.check import torch_device
-    from texgs.edit.task import Task
+    from texgs.edit.task import Task, edited_by
     from texgs.report.before_after import write_before_and_after, write_convergence
     from texgs.scene.scene_file import read_scene, write_scene
 
@@ -71,7 +71,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         settings.followed,
     )
     start = time.monotonic()
-    edited = method.run(task)
+    edited = edited_by(method, task)
     seconds = time.monotonic() - start  # of all methods alike: with what they read and write
     write_scene(output / SCENE, edited.scene)
     result = EditResult(

@@ -1,0 +1,34 @@
+"""What is wrong with a method of one's own is told in a sentence."""
+
+from dataclasses import dataclass, replace
+
+import pytest
+
+from tests.toys.fade import METHOD
+from texgs.core.errors import ConfigError
+from texgs.edit.method import MethodKeys
+from texgs.edit.task import edited_by
+
+
+@dataclass(frozen=True)
+class Plain(MethodKeys):
+    """A key that says nothing of itself."""
+
+    levels: int = 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"needs": frozenset({"texure"})}, "fade: needs: texure is nothing .* can do, did you mean texture?"),
+        ({"settings": Plain}, r"method fade: levels: expected key\(DEFAULT, HELP\), got no key\(\)"),
+    ],
+)
+def test_what_a_method_says_of_itself_is_checked(changes, message):
+    with pytest.raises(ConfigError, match=message):
+        replace(METHOD, **changes)
+
+
+def test_what_a_method_returns_is_checked():
+    with pytest.raises(ConfigError, match="method fade: expected an EditedScene, got str"):
+        edited_by(replace(METHOD, run=str), 1)
