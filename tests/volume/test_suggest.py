@@ -40,6 +40,9 @@ def check(basic, low, high):
     return basic
 
 
+LITTLE_NOISE = np.repeat([-1000, 50, 1200], [50_000, 30_000, 5000]) + RNG.normal(0, 8, 85_000).round()
+
+
 def numbers_at(basic, value):
     """Numbers of the functions in which a value is at least half as opaque as it gets."""
     tfs = enumerate(basic.values(), start=1)
@@ -52,6 +55,7 @@ def numbers_at(basic, value):
         (CT, {-1000: [], 40: [1], 1200: [2]}),
         (np.append(CT, RNG.normal(2600, 30, 3000)), {40: [1], 1200: [2], 2600: [3]}),
         (np.append(CT, np.full(5000, 2000)), {40: [1], 1200: [2], 2000: [3]}),
+        (LITTLE_NOISE, {-1000: [], 50: [1], 1200: [2]}),
         (np.append(AIR, RNG.normal(-60, 10, 2000)), {-60: []}),
         (np.append(AIR, RNG.normal(-60, 10, 60_000)), {-60: [1], 0: [], 100: [2]}),
         (np.repeat([0, 1, 2, 7], [900, 50, 10, 2]), {0: [], 1: [1], 2: [2], 7: [3]}),
@@ -61,6 +65,7 @@ def numbers_at(basic, value):
         "air, tissue, bone",
         "rare dense",
         "saturated",
+        "little noise in few bins",
         "noise below air",
         "material below air",
         "labels",

@@ -104,7 +104,7 @@ def basic_tfs(
     if not files:
         histogram = np.array(summary["histogram"])
         suggested = suggest(histogram, low, high, count, channel)
-        if looks_like_labels(histogram):
+        if looks_like_labels(histogram, high - low):
             sys.stderr.write(
                 f"{of}: values are in {np.count_nonzero(histogram)} of {len(histogram)} parts of [{low:g}, "
                 f"{high:g}], and are taken for labels. Between two of them rays see those in between, as "

@@ -47,7 +47,7 @@ def suggest(
     The background, the most frequent value and what is around it, is left out. What remains is cut at the
     valleys of the smoothed log histogram; where it has too few, as in simulations whose histogram only
     falls, at thresholds of least variance (Otsu 1979) on the log histogram. Where values are in at most 32
-    of the bins they are taken for labels, the lowest for background. Higher values are more opaque.
+    of the bins, apart, they are taken for labels, the lowest for background. Higher values are more opaque.
 
     The histogram counts voxels in equal bins over [minimum, maximum]; two of them are not 0. There are
     `count` functions, fewer where there are fewer values; by default what shows, at most 5. Of a channel with
@@ -60,7 +60,7 @@ def suggest(
     counts = np.asarray(histogram, dtype=np.float64)
     values = minimum + (np.arange(len(counts)) + 0.5) * (maximum - minimum) / len(counts)
     present = counts > 0
-    if looks_like_labels(counts):
+    if looks_like_labels(counts, maximum - minimum):
         values, counts = values[present], counts[present]
         # Every value but the lowest is a class; too many are grouped with their neighbours.
         classes = _divided([(1, len(counts))], np.sqrt(counts), count or MOST)
@@ -84,9 +84,15 @@ def windowed(channel: Channel, low: float, high: float) -> TransferFunction | No
     return TransferFunction(tuple(points), ((values.tolist()[0], *channel.color),))
 
 
-def looks_like_labels(counts: Array) -> bool:
-    """Return whether so few bins of a histogram hold voxels that the values are taken for labels."""
-    return int(np.count_nonzero(counts)) <= FEW
+def looks_like_labels(counts: Array, extent: float) -> bool:
+    """Return whether few bins of a histogram hold voxels, as of labels; the extent is from first to last.
+
+    Most of them stand alone: neighbours are noise, but where a bin is a step of whole numbers.
+    """
+    present = counts > 0
+    groups = int(present[0]) + int(np.count_nonzero(present[1:] & ~present[:-1]))
+    is_step = 0.5 < extent / len(counts) <= 1
+    return int(present.sum()) <= FEW and (is_step or 2 * groups >= int(present.sum()))
 
 
 def _materials(counts: Array, count: int | None) -> list[Class]:
