@@ -44,13 +44,15 @@ def kernel(tmp_path, monkeypatch):
 
 
 def run(kernel, code, until=None):
-    """Run a cell, interrupt it once when it shows a text, and return its error and what it has shown."""
+    """Run a cell, interrupt it once when a bar shows a text, and return its error and what it has printed."""
     manager, client = kernel
-    shown = []
+    shown, bars = [], []
 
     def hear(message):
-        shown.append(message["content"].get("text", ""))
-        if until and until in shown[-1] and until not in "".join(shown[:-1]):
+        said = message["content"]
+        shown.append(said.get("text", ""))
+        bars.append(said.get("data", {}).get("text/plain", ""))
+        if until and until in bars[-1] and until not in "".join(bars[:-1]):
             manager.interrupt_kernel()
 
     reply = client.execute_interactive(code, output_hook=hear, timeout=SECONDS)["content"]

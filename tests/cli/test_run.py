@@ -120,6 +120,7 @@ def test_a_run_that_is_interrupted_says_that_it_goes_on(tmp_path):
     assert process.returncode == 130
     assert err.splitlines()[-1] == "texgs run: interrupted; the same command goes on where it stopped"
     assert "Traceback" not in err
+    assert "Error in rule" not in err, "jobs that were interrupted have no fault"
 
 
 def test_a_user_without_a_home_folder_is_told_so(monkeypatch):

@@ -6,6 +6,7 @@ options and targets of snakemake, such as --dry-run or results/report.html.
 """
 
 import argparse
+import logging
 import re
 import shlex
 import signal
@@ -41,6 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     def note(_signal: int, _frame: FrameType | None) -> None:
         interruptions.append(True)
+        logging.getLogger("snakemake.logging").setLevel(logging.CRITICAL)  # jobs that end now have no fault
         raise KeyboardInterrupt  # snakemake ends its jobs, and then itself as if one had failed
 
     before = signal.signal(signal.SIGINT, note)
