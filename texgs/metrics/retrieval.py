@@ -74,9 +74,10 @@ def likeness(image: Tensor, where: Tensor, vgg: Vgg) -> Likeness:
     """Describe an image [3, h, w] in [0, 1] where it shows an object [h, w] bool, in one pixel at least."""
     own = image[:, where]
     whole = torch.where(where, image, own.mean(1)[:, None, None])
-    counts = torch.histogramdd(own.T.cpu(), [BINS] * 3, range=[0.0, 1.0] * 3).hist.flatten()
+    red, green, blue = (BINS * own).long().clamp(0, BINS - 1)
+    counts = torch.bincount((BINS * red + green) * BINS + blue, minlength=BINS**3)
     colors, pattern = (described(each, where, vgg) for each in (whole, contrast(whole, where)))
-    return Likeness(colors, pattern, (counts / counts.sum()).to(image.device))
+    return Likeness(colors, pattern, counts / counts.sum())
 
 
 def described(image: Tensor, where: Tensor, vgg: Vgg) -> Tensor:
@@ -93,20 +94,29 @@ def described(image: Tensor, where: Tensor, vgg: Vgg) -> Tensor:
 
 def contrast(image: Tensor, where: Tensor) -> Tensor:
     """Return an image [3, h, w] in grey, around each pixel of the object with one mean and contrast."""
-    from kornia.filters import gaussian_blur2d
-
-    sigma = AROUND * max(image.shape[1:])
-    size = 2 * round(3 * sigma) // 2 * 2 + 1
-
-    def around(x: Tensor) -> Tensor:
-        return gaussian_blur2d(x[None, None], (size, size), (sigma, sigma), "constant")[0, 0]
-
+    height, width = where.shape
+    sigma = AROUND * max(height, width)
+    down, along = (smoothing(size, sigma).to(image) for size in (height, width))
     mask = where.to(image)
     grey = torch.einsum("chw,c->hw", image, image.new_tensor(LUMINANCE)) * mask
-    share = around(mask).clamp_min(1e-3)
-    mean = around(grey) / share
-    deviation = (around(grey.square()) / share - mean.square()).clamp_min(0).sqrt()
+    share, mean, square = down @ torch.stack([mask, grey, grey.square()]) @ along
+    share = share.clamp_min(1e-3)
+    mean = mean / share
+    deviation = (square / share - mean.square()).clamp_min(0).sqrt()
     return (0.5 + 0.2 * mask * (grey - mean) / (deviation + LEAST)).clamp(0, 1).expand(3, -1, -1)
+
+
+def smoothing(size: int, sigma: float) -> Tensor:
+    """Return the matrix [size, size] that smooths rows by a Gaussian; outside of them is nothing.
+
+    With kernels as wide as here it takes a twentieth of the time of a convolution.
+    """
+    from kornia.filters import get_gaussian_kernel1d
+
+    reach = round(3 * sigma)
+    kernel = F.pad(get_gaussian_kernel1d(2 * reach + 1, sigma)[0], (size, size))
+    at = torch.arange(size)
+    return kernel[at - at[:, None] + reach + size]
 
 
 def known(device: torch.device | str = "cpu") -> Likeness:
