@@ -78,7 +78,7 @@ def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut:
 
 
 def over(front: Tensor, behind: Render) -> Render:
-    """Return premultiplied RGBA [H, W, 4] over a render, in whose place it is written."""
+    """Lay premultiplied RGBA [H, W, 4] over a render, whose tensors it changes, and return that."""
     clear = 1 - front[..., 3]
     for seen, back in zip(front.unbind(-1), (*behind.color.unbind(-1), behind.alpha), strict=True):
         torch.addcmul(seen, clear, back, out=back)  # by channels, which is faster than all at once

@@ -85,9 +85,10 @@ def windowed(channel: Channel, low: float, high: float) -> TransferFunction | No
 
 
 def looks_like_labels(counts: Array, extent: float) -> bool:
-    """Return whether few bins of a histogram hold voxels, as of labels; the extent is from first to last.
+    """Return whether values are taken for labels: few bins of their histogram hold any, most of them alone.
 
-    Most of them stand alone: neighbours are noise, but where a bin is a step of whole numbers.
+    Bins of noise have neighbours. Where a bin is one whole number wide, those of labels may have some, too.
+    The extent is that of all bins, in units of the data.
     """
     present = counts > 0
     groups = int(present[0]) + int(np.count_nonzero(present[1:] & ~present[:-1]))

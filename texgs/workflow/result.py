@@ -54,8 +54,8 @@ def alone(output: Path) -> Iterator[None]:
 def forget(output: Path) -> None:
     """Remove what a job has left that cannot succeed, and the folder around it if that is empty."""
     shutil.rmtree(work_folder(output), ignore_errors=True)
-    output.with_name(f".{output.name}.lock").unlink(missing_ok=True)
-    with suppress(OSError):
+    with suppress(OSError):  # where nothing may be removed, it stays
+        output.with_name(f".{output.name}.lock").unlink(missing_ok=True)
         output.parent.rmdir()
 
 
