@@ -13,7 +13,7 @@ from snakemake.api import SnakemakeApi
 from snakemake.cli import parse_config
 
 from tests.workflow.project import TINY
-from texgs.cli.run import WORD, file_errors, overrides, snakemake
+from texgs.cli.run import WORD, overrides, snakemake, told_errors
 from texgs.core.errors import ArgumentError
 
 TEXGS = [sys.executable, "-m", "texgs.cli.main"]
@@ -77,7 +77,8 @@ def test_a_dry_run_with_words_anywhere(tmp_path):
     [
         (["nonsense=1"], 2, "texgs: nonsense: no such key"),
         (["--bogus"], 2, "unrecognized arguments: --bogus"),
-        (["nosuchtarget"], 1, "nosuchtarget"),
+        (["reprot"], 2, "texgs run: reprot: no such target, did you mean report?"),
+        (["nosuchthing"], 2, "texgs run: nosuchthing: no such target; expected all, tables, report, "),
         (["dataset", "engine"], 2, "dataset: expected dataset=engine in one word, got dataset alone"),
         (["datset=engine"], 2, "datset: no such key, did you mean dataset?"),
     ],
@@ -133,7 +134,7 @@ def test_a_user_without_a_home_folder_is_told_so(monkeypatch):
 
 def test_a_full_temporary_folder_is_named():
     told = r"the temporary folder: the run cannot work there \(No space left on device\); make room"
-    with pytest.raises(ArgumentError, match=told), file_errors():
+    with pytest.raises(ArgumentError, match=told), told_errors():
         SnakemakeApi.print_exception(None, OSError(errno.ENOSPC, "No space left on device"))
 
 

@@ -20,6 +20,7 @@ from types import FrameType
 
 from texgs.cli.options import Parser
 from texgs.core.errors import ArgumentError
+from texgs.core.names import close
 
 INTERRUPTED = ": interrupted; "  # of `texgs.cli.main`: the end of a run says so by itself
 # Hydra's words: key=value, +key=value to add a key, ~key to take one away. Paths of targets have a slash.
@@ -81,18 +82,25 @@ def snakemake(words: Sequence[str]) -> bool:
     options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
     if options.cores is None and options.jobs is None:
         options.cores = parse_cores("all")
-    with file_errors():
+    with told_errors(given.targets):
         return bool(args_to_api(options, parser))
 
 
 @contextmanager
-def file_errors() -> Iterator[None]:
-    """Raise one sentence for a place that snakemake cannot use, which it would print with a traceback."""
+def told_errors(targets: Sequence[str] = ()) -> Iterator[None]:
+    """Raise one sentence for a place that snakemake cannot use, or a target that it does not know.
+
+    It would print the one with a traceback, the other without the targets that there are.
+    """
     from snakemake.api import SnakemakeApi
+    from snakemake.exceptions import MissingRuleException
 
     troubles, printed = list[OSError](), SnakemakeApi.print_exception
 
     def note(api: SnakemakeApi, error: Exception) -> None:
+        unknown = targets if isinstance(error, MissingRuleException) else ()
+        for target in (each for each in unknown if f" {each} " in str(error)):
+            raise ArgumentError(no_target(target)) from error
         if isinstance(error, OSError) and error.strerror:
             troubles.append(error)
         else:
@@ -108,6 +116,17 @@ def file_errors() -> Iterator[None]:
         raise ArgumentError(
             f"{place}: the run cannot work there ({error.strerror}); make room, or choose another folder"
         ) from error
+
+
+def no_target(word: str) -> str:
+    """Return that a word is no target, with the name that is most like it, or all of them."""
+    from texgs.workflow.stage_table import RULES
+
+    names = dict.fromkeys(
+        ("all", "tables", "report", *(each.target for each in RULES.values() if each.target))
+    )
+    hint = close(word, names) or f"; expected {', '.join(names)} or a file that the run makes"
+    return f"{word}: no such target{hint}"
 
 
 def require_pairs(words: Sequence[str]) -> None:
