@@ -13,7 +13,7 @@ from PIL import Image
 import texgs
 from tests.scene.balls import ball_models, write_balls
 from texgs.cli.main import main
-from texgs.core.errors import ArgumentError, DeviceError
+from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.core.image import read_rgba
 from texgs.core.light import Light
 from texgs.fields.surfels.step_file import write_step
@@ -98,6 +98,16 @@ def test_slips_are_sentences(scene, tmp_path):
         scene.style("glass", recipe="preview", parts="TF03")
     with pytest.raises(ArgumentError, match=r"width: expected a whole number of pixels, got 8\.5"):
         scene.render(width=8.5)
+    with pytest.raises(ArgumentError, match="width: expected a number, got '200'"):
+        scene.render(width="200")
+    with pytest.raises(ArgumentError, match="azimuth: expected a number, got '30'"):
+        scene.render("30")
+    with pytest.raises(ShapeError, match=r"target: expected \[3\], got \[2\]"):
+        scene.render(target=(0, 0))
+    with pytest.raises(ArgumentError, match=r"target\.y: expected a number, got 'a'"):
+        scene.render(target=(0, "a", 0))
+    with pytest.raises(ArgumentError, match="light: expected a polar angle from -90 to 90 degrees, got 400"):
+        scene.light = 30, 400
     with pytest.raises(DeviceError, match="device: expected cpu or cuda, got gpu"):
         texgs.open(scene.session.save(tmp_path / "s.yaml"), device="gpu")
     with pytest.raises(ArgumentError, match="what: expected one of view, test"):

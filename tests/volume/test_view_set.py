@@ -143,6 +143,7 @@ def test_directions_of_lights():
         (lambda d: d["frames"][0].update(transform_matrix=np.diag([1, 1, -1, 1]).tolist()), "mirrored"),
         (lambda d: d["frames"][0]["transform_matrix"][0].__setitem__(3, float("nan")), "not finite"),
         (lambda d: d["frames"][1].update(light={"kind": "lamp"}), r"frame 1 \(r_0001\): light: .*lamp"),
+        (lambda d: d["frames"][1]["light"].update(polar=400), r"frame 1 .*: light: .* degrees, got 400"),
         (lambda d: d["frames"][1]["light"].pop("polar"), r"frame 1 .*expected the key polar, found kind"),
         (lambda d: d.update(w=13), "expected 13 x 8 pixels as w and h say, got 12 x 8"),
         (lambda d: d.pop("w"), "expected the key w, found camera_angle_x, h"),

@@ -25,7 +25,7 @@ class LightKeys:
 
     kind: str = key("headlight", "kind of light", choices=("headlight", "directional", "random"))
     azimuth: float = key(0.0, "azimuth of a directional light", "degrees")
-    polar: float = key(0.0, "polar angle of a directional light", "degrees")
+    polar: float = key(0.0, "polar angle of a directional light", "degrees", least=-90, most=90)
 
 
 @dataclass(frozen=True)

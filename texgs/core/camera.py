@@ -11,6 +11,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError
+from texgs.core.names import require_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +150,7 @@ def orbit(
     Angles are in degrees: for azimuth and polar see `orbit_direction`, the field of view is vertical. The
     poles are as good as any other place.
     """
+    require_numbers(azimuth=azimuth, polar=polar, radius=radius)
     if not isfinite(azimuth):
         raise ArgumentError(f"azimuth: expected degrees, got {azimuth}")
     if not abs(polar) <= 90:
@@ -158,6 +160,8 @@ def orbit(
     a, p = radians(azimuth), radians(polar)
     # The tangent towards growing polar angle: the projected +y where that exists, and defined at the poles.
     up = torch.tensor([-cos(a) * sin(p), cos(p), sin(a) * sin(p)], dtype=torch.float64)
+    require_numbers(**dict(zip(("target.x", "target.y", "target.z"), target, strict=False)))
     middle = torch.tensor(tuple(target), dtype=torch.float64)
+    check.shape("target", middle, "3")
     viewmat = look_at(middle + radius * orbit_direction(azimuth, polar), middle, up)
     return Camera(viewmat.float(), intrinsics(fov_y, width, height), width, height)

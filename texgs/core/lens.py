@@ -8,6 +8,7 @@ from typing import NamedTuple, Self
 from texgs.core.cuts import FAR
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import REQUIRED, key
+from texgs.core.names import require_numbers
 
 ORIGIN = (0.0, 0.0, 0.0)
 FILLED = 0.9  # of the smaller side of an image, by what is framed
@@ -52,6 +53,7 @@ class Frame:
 
         The silhouette of a ball of radius r at distance d is a disc whose tangent is r / sqrt(d^2 - r^2).
         """
+        require_numbers(fov_y=fov_y, width=width, height=height)
         if not 0 < fov_y < 180:
             raise ArgumentError(f"fov_y: expected degrees between 0 and 180, got {fov_y}")
         tangent = FILLED * tan(radians(0.5 * fov_y)) * min(1.0, max(width, 1) / max(height, 1))

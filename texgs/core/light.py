@@ -21,6 +21,8 @@ class Light:
     def __post_init__(self) -> None:
         if self.kind not in ("headlight", "directional"):
             raise ArgumentError(f"light: expected headlight or directional, got {self.kind!r}")
+        if not abs(self.polar) <= 90:
+            raise ArgumentError(f"light: expected a polar angle from -90 to 90 degrees, got {self.polar:g}")
 
     def direction(self, camera: Camera) -> Tensor:
         """Return the unit vector [3], float64, from the origin to the light or headlight."""

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from itertools import count
 from math import isfinite
 from pathlib import Path
+from typing import SupportsFloat
 from unicodedata import category
 
 from texgs.core.errors import ArgumentError
@@ -94,3 +95,10 @@ def is_number(value: object) -> bool:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) <= LARGEST and isfinite(value)
+
+
+def require_numbers(**values: object) -> None:
+    """Require numbers, also those of NumPy, by the names of arguments; text is none."""
+    for name, value in values.items():
+        if not isinstance(value, SupportsFloat):
+            raise ArgumentError(f"{name}: expected a number, got {value!r:.100}")
