@@ -7,6 +7,7 @@ import pytest
 import torch
 from plyfile import PlyData
 
+import texgs
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.ply_files import vertices
 from tests.fields.surfels.samples import sample
@@ -208,6 +209,18 @@ def test_a_mistake_writes_nothing(scene, tmp_path, monkeypatch, capsys, words, m
     assert main(["export", str(scene), *words]) == 2
     assert message in capsys.readouterr().err
     assert not list(tmp_path.glob("x.*"))
+
+
+def test_what_a_scene_reads_is_not_replaced(model, tmp_path, capsys):
+    ply = tmp_path / "model.ply"
+    assert [export(model, ply) for _ in range(2)] == [0, 0], "its own file before"
+    before, scene = ply.read_bytes(), write_scene(tmp_path / "of_ply.yaml", Scene({"A": SceneModel(ply)}))
+    for source, words in ((ply, ()), (scene, ()), (scene, ("--model", "A"))):
+        assert export(source, ply, *words) == 2
+        assert "model.ply: expected a new file, got one that the scene reads" in capsys.readouterr().err
+    with pytest.raises(ArgumentError, match="got one that the scene reads; choose another"):
+        texgs.open(ply).export(ply)
+    assert ply.read_bytes() == before
 
 
 def sphere_of_gaussians(n=600):

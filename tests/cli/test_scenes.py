@@ -205,6 +205,15 @@ def test_a_picture_is_not_replaced_by_a_scene(scene, tmp_path, capsys):
     assert picture.read_bytes() == before
 
 
+def test_only_a_scene_is_replaced_by_an_edited_one(scene, tmp_path, capsys):
+    (tmp_path / "data.yaml").write_text("name: engine\n")
+    message = refused(capsys, "edit", scene, "light=30,40", "--output", tmp_path / "data.yaml")
+    assert message.endswith("data.yaml is a file of another kind, which stays; choose another")
+    assert (tmp_path / "data.yaml").read_text() == "name: engine\n"
+    assert [edit(scene, f"light=30,{polar}") for polar in (40, 50)] == [0, 0]
+    assert read_scene(tmp_path / "new.yaml").light.polar == 50
+
+
 def test_a_missing_file_of_a_scene_is_named_with_the_scene(scene, tmp_path, capsys):
     values = yaml.safe_load(scene.read_text())
     values["cuts"] = {"planes": [{"normal": [1, 0, 0]}]}

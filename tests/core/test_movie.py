@@ -23,6 +23,9 @@ def test_one_picture_and_a_folder_of_pictures_that_is_never_another_films(tmp_pa
     with pytest.raises(ArgumentError, match="expected a folder without numbered pictures, got 0000"):
         write_frames(tmp_path / "turn", frames(2))
     assert [path.read_bytes() for path in sorted((tmp_path / "turn").iterdir())] == before
+    paths[0].unlink()
+    with pytest.raises(ArgumentError, match=r"expected a folder without numbered pictures, got 0001\.png"):
+        write_frames(tmp_path / "turn", frames(2))
 
 
 @pytest.mark.parametrize("fps", [15, 24, 30, 40, 50])

@@ -226,6 +226,8 @@ def require_scene(output: Path) -> None:
     """Require the path of a scene file, so that no file of another kind is replaced."""
     if output.suffix not in SCENES or output.is_dir():
         raise ArgumentError(f"--output: expected a file that ends in .yaml, got {output}")
+    if output.is_file() and b"texgs-scene" not in output.read_bytes():
+        raise ArgumentError(f"--output: {output} is a file of another kind, which stays; choose another")
     if output.exists() and (output.parent / METRICS).exists():
         raise ArgumentError(
             f"--output: {output} is a result of the workflow, whose next run writes it anew; choose another"

@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
     from texgs.fields.files import open_field
-    from texgs.scene.export import OF_CLOUDS, Export, export_model, export_scene, uncut
+    from texgs.scene.export import OF_CLOUDS, Export, export_model, export_scene, require_other, uncut
     from texgs.scene.scene_file import read_scene
 
     kind = kind_of(arguments)
@@ -86,6 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
         if note := uncut(scene):
             print(f"{arguments.to}: {note}", file=sys.stderr)
         return 0
+    require_other(arguments.to, scene or as_scene(arguments, None))
     field = open_field(arguments.source) if scene is None else chosen(scene, arguments.model).open()[0]
     print(export_model(arguments.to, field, export))
     return 0

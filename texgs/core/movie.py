@@ -40,9 +40,9 @@ def write_frames(
         raise ArgumentError(
             f"fps: expected {LEAST_GIF_FPS:g} to {MOST_GIF_FPS:g} in a GIF, got {fps}; write an MP4 film"
         )
-    if path.suffix == "" and (path / "0000.png").exists():
+    if path.suffix == "" and (there := min(path.glob(f"{'[0-9]' * 4}.png"), default=None)):
         raise ArgumentError(
-            f"{path}: expected a folder without numbered pictures, got 0000.png in it; remove them, or "
+            f"{path}: expected a folder without numbered pictures, got {there.name} in it; remove them, or "
             "choose another folder"
         )
     left = iter(frames)

@@ -67,6 +67,13 @@ def require_export(field: Kind, kind: str) -> None:
         )
 
 
+def require_other(path: Path, scene: Scene) -> None:
+    """Require a path that is none of the files which a scene reads."""
+    files = [file for model in scene.models.values() for file in model.files if file]
+    if path.resolve() in [file.resolve() for file in files]:
+        raise ArgumentError(f"{path}: expected a new file, got one that the scene reads; choose another")
+
+
 def uncut(scene: Scene) -> str:
     """Return what is to be told of a file of a scene, if anything: no kind holds cuts."""
     return "its cuts are left out" if scene.cuts else ""
@@ -79,6 +86,7 @@ def export_scene(path: Path, scene: Scene, export: Export) -> Path:
         ArgumentError, ShapeError: if its models cannot be exported so, nothing is visible, or the file cannot
             be written.
     """
+    require_other(path, scene)
     for entry in scene.models.values():
         field = files.kind_of(entry.file)
         require_export(field, export.kind)
