@@ -28,6 +28,22 @@ def test_one_picture_and_a_folder_of_pictures_that_is_never_another_films(tmp_pa
         write_frames(tmp_path / "turn", frames(2))
 
 
+@pytest.mark.parametrize("name", ["a.png", "a.gif", "a.mp4", "a", "deep/er/a"])
+def test_where_nothing_can_be_written_nothing_is_rendered(tmp_path, monkeypatch, name):
+    def rendered():
+        pytest.fail("a frame was rendered")
+        yield
+
+    (tmp_path / "file").touch()
+    with pytest.raises(
+        ArgumentError, match=rf"file/{name}.*: cannot write there \(Not a directory\); choose"
+    ):
+        write_frames(tmp_path / "file" / name, rendered())
+    monkeypatch.setattr("os.access", lambda *_: False)  # as for others than root
+    with pytest.raises(ArgumentError, match=rf"{name}.*: cannot write there \(Permission denied\); choose"):
+        write_frames(tmp_path / name, rendered())
+
+
 @pytest.mark.parametrize("fps", [15, 24, 30, 40, 50])
 def test_a_gif_takes_as_long_as_it_should(tmp_path, fps):
     """It counts in hundredths of a second, of which a frame may not have a whole number."""

@@ -52,6 +52,14 @@ def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
     return path
 
 
+def require_place(path: Path) -> None:
+    """Require a place where `write_atomic` can write a file, before the work for it."""
+    folder = next(each for each in path.absolute().parents if is_there(each))
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        reason = os.strerror(errno.EACCES if folder.is_dir() else errno.ENOTDIR)
+        raise ArgumentError(f"{path}: cannot write there ({reason}); choose another folder")
+
+
 def copy_atomic(source: Path, target: Path) -> None:
     """Copy a file, replacing the target in one step."""
     with source.open("rb") as file:

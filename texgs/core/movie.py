@@ -12,7 +12,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_atomic
+from texgs.core.io import require_place, write_atomic
 from texgs.core.memory import require_memory
 
 KINDS = (".png", ".gif", ".mp4")
@@ -45,6 +45,7 @@ def write_frames(
             f"{path}: expected a folder without numbered pictures, got {there.name} in it; remove them, or "
             "choose another folder"
         )
+    require_place(path if path.suffix else path / "0000.png")
     left = iter(frames)
     first = next(left, None)
     if first is None:
