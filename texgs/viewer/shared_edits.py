@@ -11,6 +11,7 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.core.names import METRICS, SCENE, SCENES, file_name, label, new_part_file
 from texgs.edit.function_model import with_model
+from texgs.fields.files import formats
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.check import checked
@@ -53,6 +54,11 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
         return Opened(read_scene(path), path, folder, name, file)
     if not path.is_file():
         raise ArgumentError(f"{path}: no such scene, folder or model; texgs compose writes a scene")
+    if not formats(path):
+        raise ArgumentError(
+            f"{path}: expected scene.yaml, a folder with one or a model file (.safetensors, .texgs, .ply), "
+            "got a file of another kind, or a damaged one"
+        )
     scene = Scene({label(str(path), path.stem): SceneModel(path)})
     return Opened(scene, path, folder, SCENE)
 
