@@ -229,6 +229,14 @@ def test_a_missing_file_of_a_scene_is_named_with_the_scene(scene, tmp_path, caps
     assert not (tmp_path / "x.png").exists()
 
 
+def test_a_model_that_is_cut_off_is_told_before_a_file_is_written(scene, tmp_path, capsys):
+    model = read_scene(scene).models["TF02"].file
+    model.write_bytes(model.read_bytes()[:-100])
+    message = refused(capsys, "edit", scene, "TF01.opacity=0.5", "--output", tmp_path / "new.yaml")
+    assert message.startswith(f"texgs edit: {scene}: models.TF02: {model}: expected a texgs-model file, got ")
+    assert not (tmp_path / "new.yaml").exists()
+
+
 def test_names_that_yaml_takes_for_numbers_or_that_have_dots(scene, tmp_path):
     values = yaml.safe_load(scene.read_text())
     values["models"] = {42: values["models"]["TF01"], "v1.2": values["models"]["TF02"]}

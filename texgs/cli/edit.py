@@ -46,8 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
     require_scene(arguments.output)
     session = Session.open(arguments.scene)
     apply_all(session, arguments.overrides)
-    if any(word.partition("=")[0].endswith(".file") for word in arguments.overrides):
-        _ = session.composition  # which the new model may not go into
+    with located(arguments.scene):
+        _ = session.composition  # what is wrong with its models is told before anything is written
     print(session.save(arguments.output))
     return 0
 
