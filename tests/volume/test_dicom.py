@@ -203,6 +203,16 @@ def test_a_slice_that_is_cut_off_is_refused(tmp_path, which):
         open_source(tmp_path)
 
 
+def test_a_file_that_is_none_of_dicom_but_has_its_ending_is_refused(tmp_path):
+    write_series(tmp_path, sample_values())
+    for name in ("DICOMDIR", "notes.txt", "._05-3.dcm"):
+        (tmp_path / name).write_text("no slice")
+    assert open_source(tmp_path).dims == (13, 12, 11)
+    (tmp_path / "05-3.DCM").write_text("no slice")
+    with pytest.raises(ArgumentError, match=r"05-3.DCM: expected a file of DICOM, got another; correct it"):
+        open_source(tmp_path)
+
+
 def write_phases(folder, tags, n_steps=3, first=4):
     """A series for each phase; tags are functions of its step. Their numbers begin with the last step."""
     for step in range(n_steps):

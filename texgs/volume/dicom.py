@@ -94,7 +94,9 @@ def series_in(folder: Path) -> list[FileSeries]:
         number, description, position = (tag(first, each) for each in OF_SERIES)
         every.append(FileSeries(number, description, position, uid, files, lattice))
     names = {Path(file).name for each in every for file in each.files}
-    unlisted = (path for path in sorted(folder.iterdir()) if path.name not in names)
+    unlisted = [path for path in sorted(folder.iterdir()) if path.name not in names]
+    if foreign := next((path.name for path in unlisted if is_foreign(path)), None):
+        raise ArgumentError(f"{foreign}: expected a file of DICOM, got another; correct it, or take it away")
     if damaged := next((path.name for path in unlisted if is_slice(path)), None):
         raise ArgumentError(f"{damaged}: cut off or damaged; put the whole slice there, or take it away")
     if not every:
@@ -135,6 +137,14 @@ def is_slice(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         return file.read(132)[128:] == MAGIC and PIXELS in file.read()
+
+
+def is_foreign(path: Path) -> bool:
+    """Return whether a file is none of DICOM, but has its ending; hidden ones of macOS do not count."""
+    if path.suffix.lower() != ".dcm" or path.name.startswith(".") or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(132)[128:] != MAGIC
 
 
 def slice_of(path: Path) -> Slice:
