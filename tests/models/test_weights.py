@@ -120,6 +120,15 @@ def test_a_folder_that_is_missing_names_its_repository_and_an_unknown_name_those
         locate("vgg19")
 
 
+def test_without_a_network_the_hub_is_asked_once(folder, monkeypatch):
+    constants = pytest.importorskip("huggingface_hub").constants
+    monkeypatch.setattr(constants, "HF_HUB_OFFLINE", False)
+    monkeypatch.setattr(constants, "ENDPOINT", UNREACHABLE)
+    monkeypatch.setattr("time.sleep", lambda seconds: pytest.fail("it tries again"))
+    with pytest.raises(MissingDataError, match=r"hub: .* a download failed \(.*; get them from https://"):
+        locate("hub")
+
+
 PINNED = f"someone/editor@{'c' * 40}"
 
 

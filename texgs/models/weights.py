@@ -14,6 +14,7 @@ from texgs.core.io import read_json
 from texgs.models.catalogue import File, Single, Snapshot, entry_of
 
 VERIFIED = Checksums()  # of files that this process has read
+CONNECTED = 20.0  # seconds within which a hub answers
 
 
 def locate(name: str) -> Path:
@@ -136,11 +137,12 @@ def _download(name: str, entry: Single | Snapshot) -> Path:
             file, folder = entry.file, cache_folder() / "weights"
             known = f"sha256:{file.sha256}"
             return Path(pooch.retrieve(entry.source, known, file.name, folder, progressbar=True))
-        from huggingface_hub import snapshot_download
+        from huggingface_hub import HfApi, snapshot_download
 
+        HfApi().model_info(entry.repository, revision=entry.revision, timeout=CONNECTED)  # it tries only once
         patterns = list(entry.patterns)
         return Path(snapshot_download(entry.repository, revision=entry.revision, allow_patterns=patterns))
-    except (ImportError, OSError, ValueError, RuntimeError) as error:  # those of the hub and of checksums too
+    except Exception as error:  # the hub's client passes on those of the library that it connects with
         files = [file.name for file in entry.files] if isinstance(entry, Single) else []
         target = f"file {' or '.join(files)}" if files else f"folder {name}"
         raise MissingDataError(
