@@ -26,6 +26,18 @@ def test_help_lists_every_verb(capsys):
     assert "dataset=" in out
 
 
+def test_a_mistake_in_a_stage_of_ones_own_is_one_sentence(tmp_path):
+    text = "from texgs.workflow.stage import Rule\nRule('toy', 'toy', filse=())\n"
+    (tmp_path / "broken.py").write_text(text)
+    code = f"from texgs.workflow import stages\nstages.__path__.append({str(tmp_path)!r})\n"
+    code += "import texgs.cli.main"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 2
+    told = "texgs: texgs.workflow.stages.broken: TypeError where it is imported: Rule.__init__() got "
+    assert done.stderr.startswith(f"{told}an unexpected keyword argument 'filse'")
+    assert len(done.stderr.splitlines()) == 1
+
+
 def test_version(capsys):
     with pytest.raises(SystemExit):
         main(["--version"])

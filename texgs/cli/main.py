@@ -15,7 +15,12 @@ from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.memory import as_out_of_memory
 from texgs.core.names import close
 from texgs.core.process import collect_rarely, keep_freed_memory, waiting
-from texgs.workflow.stage_table import STAGES
+
+try:
+    from texgs.workflow.stage_table import STAGES
+except TexgsError as error:  # in a file of the user's own
+    print(f"texgs: {error}", file=sys.stderr)
+    sys.exit(2)
 
 NUMBERS = re.compile(r"(?!-(\d+|\d*\.\d+)$)-[\d.][-\d.,eE]*")  # such as -90,20; argparse knows -90
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`.

@@ -9,6 +9,7 @@ from dataclasses import replace
 from importlib import import_module
 
 from texgs.config.schema import Config
+from texgs.core.specifications import imported
 from texgs.workflow.inputs import is_fit
 from texgs.workflow.locate import tf_names
 from texgs.workflow.stage import RULES, Stage
@@ -20,7 +21,7 @@ SWEPT = ("volume", "views", "phase", "edit", "edit_metrics", "gallery")  # place
 def discovered() -> Iterator[Stage]:
     """Yield the stages that the modules define."""
     for entry in pkgutil.iter_modules(import_module(PACKAGE).__path__):
-        module = import_module(f"{PACKAGE}.{entry.name}")
+        module = imported(f"{PACKAGE}.{entry.name}")
         yield from getattr(module, "STAGES", [module.STAGE] if hasattr(module, "STAGE") else [])
 
 
