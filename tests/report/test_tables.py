@@ -147,3 +147,12 @@ def test_a_data_set_may_have_the_name_of_a_stage(tmp_path):
         paths[-1].parent.mkdir(parents=True)
         shown.rename(paths[-1])
     require_apart(read_known(paths)[0])
+
+
+def test_columns_of_the_paper_without_a_value_are_left_out(tmp_path):
+    metrics(tmp_path, "surfels", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")
+    own = tables_of(records(tmp_path))["fitting"].titles
+    assert "PSNR" in own
+    assert not [title for title in own if title.endswith("(paper)")]
+    metrics(tmp_path, "surfels", FitResult(60.0, 9, psnr=40.0), "engine", "TF01")
+    assert "PSNR (paper)" in tables_of(records(tmp_path))["fitting"].titles

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from texgs.report.metrics_files import Record
 from texgs.report.results import FitResult
-from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Column, Table, data_frame
+from texgs.report.table import PAPER, SOURCES, UNLIKE, UNPUBLISHED, Column, Table, data_frame
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -125,7 +125,7 @@ def beside_paper(
         counts = ours["published"].map(lambda name: volumes().get(name, {}).get("basic_scenes"))
         ours["alike"] &= ours[SCENES.title] == counts
     names = [*map(Column, (DATA, LABEL, *keys.values())), SCENES]
-    published = [Column(f"{each.title} (paper)", each.digits, UNPUBLISHED) for each in columns.values()]
+    published = [Column(each.title + PAPER, each.digits, UNPUBLISHED) for each in columns.values()]
     shown = side_by_side(ours, theirs, ("published", *keys.values()), titles)
     return Table(ALIKE, [*names, *columns.values(), *published], shown)
 
@@ -155,11 +155,11 @@ def side_by_side(ours: DataFrame, theirs: DataFrame, keys: Sequence[str], titles
 
     published = [DATA, *keys[1:]]
     numbers = theirs[[*published, *titles]].astype(object)
-    rows = ours.merge(numbers, "left", left_on=list(keys), right_on=published, suffixes=("", " (paper)"))
+    rows = ours.merge(numbers, "left", left_on=list(keys), right_on=published, suffixes=("", PAPER))
     is_alike = rows["alike"].astype(bool)
     for title in titles:
-        cell = rows[f"{title} (paper)"]
-        rows[f"{title} (paper)"] = cell.mask(~is_alike & cell.notna(), UNLIKE)
+        cell = rows[title + PAPER]
+        rows[title + PAPER] = cell.mask(~is_alike & cell.notna(), UNLIKE)
     if any(place < len(volumes()) for place, _, _ in rows["rank"]):
         shown = set(rows.loc[is_alike, list(keys)].itertuples(index=False, name=None))
         is_left = [key not in shown for key in theirs[published].itertuples(index=False, name=None)]

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 MISSING = "not measured"
 SOURCES = "metrics files"  # column of the paths that a row was read from
 UNPUBLISHED = "-"  # in columns of the paper's numbers: it has none
+PAPER = " (paper)"  # end of the titles of these columns
 UNLIKE = "≠"  # there: it has one, of something else
 FORMATS = ("csv", "md", "tex")
 DOCUMENT = "tables.tex"
@@ -111,6 +112,10 @@ class Table:
     def is_empty(self) -> bool:
         """Return whether there are no rows."""
         return len(self.rows) == 0
+
+    def has(self, title: str) -> bool:
+        """Return whether a column has a value in any row."""
+        return bool(self.frame[title].notna().any())
 
     @cached_property
     def texts(self) -> DataFrame:

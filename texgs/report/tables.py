@@ -11,7 +11,7 @@ from texgs.report.metrics_files import LeftOut, Record, note
 from texgs.report.results import EditResult, FitResult
 from texgs.report.scene_tables import cuts, datasets, edits, rendering, steps
 from texgs.report.sweep_table import sweep
-from texgs.report.table import Table, tables_file
+from texgs.report.table import PAPER, Table, tables_file
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,8 @@ class TableSpec:
         made = self.make(records) if self.make else given or Table("", [], [])
         where = f"In the paper: {self.paper}." if self.paper else ""
         parts = (self.caption, where, made.caption, note(left_out, self.places))
-        return replace(made, heading=self.heading, caption=" ".join(filter(None, parts)))
+        shown = [each for each in made.columns if not each.title.endswith(PAPER) or made.has(each.title)]
+        return replace(made, columns=shown, heading=self.heading, caption=" ".join(filter(None, parts)))
 
 
 MAKERS: dict[str, Callable[[Sequence[Record[Any]]], Table]] = {
