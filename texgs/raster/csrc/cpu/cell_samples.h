@@ -2,6 +2,8 @@
 // Samples of a volume around the cells that a ray goes through, as floats. Rays take several samples in a cell, so
 // that what surrounds it is loaded once for all of these, and lanes look it up.
 #pragma once
+#include <type_traits>
+
 #include "simd.h"
 
 namespace texgs::TEXGS_ISA {
@@ -9,6 +11,9 @@ namespace {
 
 // Which rows of a block are loaded: those that hold the cell, or also those beside them.
 enum class Rows { of_cell, around };
+
+template <int N>
+using Planes = std::integral_constant<int, N>;
 
 // Blocks of four columns, rows and slices of samples, of which the middle two hold a cell. Samples outside of the
 // volume are the nearest ones inside.
@@ -38,11 +43,24 @@ public:
         first_ = truncate(first);
     }
 
+    // Calls use(planes) with the number of planes of a table in registers that holds a row of all blocks; 0 where
+    // none does.
+    template <class Use>
+    TEXGS_INLINE vf with_planes(Use use) const {
+        if (n_ <= 4) return use(Planes<1>());
+        if constexpr (kTableTexels >= 32)
+            if (n_ <= 8) return use(Planes<2>());
+        return use(Planes<kTableTexels >= 4 * kLanes ? kTableTexels / 16 : 0>());
+    }
+
     // Column x of row (y, z) of each lane's block.
-    TEXGS_INLINE vf at(int x, int y, int z) const {
-        constexpr int kPlanes = kTableTexels >= 32 ? 2 : 1;
+    template <int N>
+    TEXGS_INLINE vf at(Planes<N>, int x, int y, int z) const {
         const vi place = first_ + splat(x);
-        return n_ <= 4 * kPlanes ? table_lookup<kPlanes>(rows_[z][y], place) : gather(rows_[z][y], place);
+        if constexpr (N == 0)
+            return gather(rows_[z][y], place);
+        else
+            return table_lookup<N>(rows_[z][y], place);
     }
 
 private:
@@ -80,21 +98,25 @@ private:
 
 // Values at places f inside of cells.
 TEXGS_INLINE vf values_in(const Blocks& blocks, const vf (&f)[3]) {
-    vf v[8];
-    for (int i = 0; i < 8; ++i) v[i] = blocks.at(1 + (i & 1), 1 + (i >> 1 & 1), 1 + (i >> 2));
-    return trilinear(v, f);
+    return blocks.with_planes([&](auto planes) {
+        vf v[8];
+        for (int i = 0; i < 8; ++i) v[i] = blocks.at(planes, 1 + (i & 1), 1 + (i >> 1 & 1), 1 + (i >> 2));
+        return trilinear(v, f);
+    });
 }
 
 // Differences of values one cell before and behind, along each axis: those of the corners, trilinear.
 TEXGS_INLINE void differences_in(const Blocks& blocks, const vf (&f)[3], vf (&gradient)[3]) {
     for (int a = 0; a < 3; ++a) {
         const int dx = a == 0, dy = a == 1, dz = a == 2;
-        vf v[8];
-        for (int i = 0; i < 8; ++i) {
-            const int x = 1 + (i & 1), y = 1 + (i >> 1 & 1), z = 1 + (i >> 2);
-            v[i] = blocks.at(x + dx, y + dy, z + dz) - blocks.at(x - dx, y - dy, z - dz);
-        }
-        gradient[a] = trilinear(v, f);
+        gradient[a] = blocks.with_planes([&](auto planes) {
+            vf v[8];
+            for (int i = 0; i < 8; ++i) {
+                const int x = 1 + (i & 1), y = 1 + (i >> 1 & 1), z = 1 + (i >> 2);
+                v[i] = blocks.at(planes, x + dx, y + dy, z + dz) - blocks.at(planes, x - dx, y - dy, z - dz);
+            }
+            return trilinear(v, f);
+        });
     }
 }
 
