@@ -14,7 +14,17 @@ from texgs.core.camera import orbit
 from texgs.core.cuts import Box, Cuts, Plane
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.changes import apply_all
-from texgs.scene.cut_view import OPAQUE, SLAB, UNITS, cut_view, slab_thickness, softly_grown
+from texgs.scene.cut_view import (
+    HIDDEN,
+    OPAQUE,
+    SLAB,
+    STEP,
+    UNITS,
+    cut_view,
+    slab_of,
+    slab_thickness,
+    softly_grown,
+)
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
@@ -118,11 +128,39 @@ def test_weights_grow_and_then_fall_softly():
 def test_the_slab_fades_out_where_matter_becomes_faint(styled):
     """No pixel of a face jumps from the volume to the models: slabs get shorter with the alpha of a face."""
     twin, composed = Twin(styled), styled.open()
-    lengths = slab_thickness(composed, CAMERA, styled, twin) * CAMERA.ray_lengths()
-    weights = lengths / (SLAB * twin.opacity_unit)
+    thickness, part = slab_thickness(composed, CAMERA, styled, twin)
+    weights = torch.zeros(CAMERA.height, CAMERA.width)
+    weights[part] = thickness * CAMERA.ray_lengths()[part] / (SLAB * twin.opacity_unit)
     steps = torch.maximum(weights.diff(dim=0).abs()[:, :-1], weights.diff(dim=1).abs()[:-1])
     assert (float(weights.min()), float(weights.max())) == pytest.approx((0, 1), abs=1e-3)
     assert steps.max() < 0.35  # a rim of one coarse pixel falls over two of them
+
+
+@pytest.mark.parametrize("box", [(0, 0, 96, 96), (41, 3, 90, 94), (50, 50, 81, 83)])
+def test_only_the_part_with_faces_is_cast_and_nothing_else_changes(styled, box):
+    """Of any size, and where faces are cut off by the border, as if the slab were cast in all pixels."""
+    camera, twin, composed = CAMERA.crop(*box), Twin(styled), styled.open()
+    thickness, part = slab_thickness(composed, camera, styled, twin)
+    whole = torch.zeros(camera.height, camera.width)
+    assert thickness.numel() < whole.numel() or box != (0, 0, 96, 96)
+    whole[part] = thickness
+    cut = range_of(styled.cuts, camera)
+    slab = slab_of(cut, whole)
+    front = twin.with_step(STEP).cast(camera, styled, composed.palettes, slab).rgba
+    behind, far = slab.depth_range[1], cut.depth_range[1]
+    beyond = torch.stack([behind, torch.where(front[..., 3] < HIDDEN, far, behind)])
+    options = {"background": torch.tensor(styled.background), "depth_range": beyond}
+    models = composed.render(camera, styled.light, styled.edits, **options).color
+    expected = front[..., :3] + (1 - front[..., 3:]) * models
+    torch.testing.assert_close(cut_view(composed, camera, styled, twin).color, expected, atol=1e-4, rtol=0)
+
+
+def test_where_a_plane_meets_nothing_there_is_no_slab(styled):
+    beyond = replace(styled, cuts=Cuts([Plane([1.0, 0.2, 0.0], 2.0)]))
+    twin, composed = Twin(styled), styled.open()
+    assert not slab_thickness(composed, CAMERA, beyond, twin)[0].any()
+    models = models_within(beyond, range_of(beyond.cuts, CAMERA).depth_range)
+    assert torch.equal(cut_view(composed, CAMERA, beyond, twin).color, models)
 
 
 @pytest.mark.parametrize("mode", ["shaded", "normal", "depth", "ambient"])

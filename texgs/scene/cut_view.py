@@ -16,12 +16,13 @@ from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin, range_of
 from texgs.volume.images import smaller
 
-SLAB = 30.0  # opacity units of the volume behind a face, which hide most of what is beyond
+SLAB = 36.0  # opacity units of the volume behind a face, which hide most of what is beyond
 UNITS, OPAQUE = 3.0, 0.05  # a face is where so many opacity units behind a cut have at least this alpha
 RIM = 0.01  # of the smaller side of the picture: how far around a face the slab goes on
 HIDDEN = 0.998  # alpha of a slab behind which models are not drawn, half a level of 255
 STEP = 0.5  # voxels between the samples of a slab
 COARSE = 4  # pixels each way in which faces are looked for at once
+Part = tuple[slice, slice]  # rows and columns of a picture
 
 
 def cut_view(
@@ -66,34 +67,56 @@ def cut_view(
 
 def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Render:
     """Render a slab of the volume behind each face of a cut, over the models beyond it."""
-    slab = slab_of(cut, slab_thickness(composed, camera, scene, twin))
-    seen = twin.with_step(STEP).cast(camera, scene, composed.palettes, slab).rgba
-    behind, far = slab.depth_range[1], cut.depth_range[1]
+    thickness, part = slab_thickness(composed, camera, scene, twin)
+    rows, columns = part
+    inner = camera.crop(columns.start, rows.start, columns.stop, rows.stop)
+    slab = slab_of(CutRange(cut.depth_range[:, rows, columns], cut.face[part], cut.normals), thickness)
+    seen = twin.with_step(STEP).cast(inner, scene, composed.palettes, slab).rgba
+    beyond = cut.depth_range.clone()
+    near, far = beyond[:, rows, columns]
+    near.copy_(slab.depth_range[1])
+    far.copy_(torch.where(seen[..., 3] < HIDDEN, far, near))
     models = composed.render(
         *(camera, scene.light, scene.edits),
         background=camera.viewmat.new_tensor(scene.background),
-        depth_range=torch.stack([behind, torch.where(seen[..., 3] < HIDDEN, far, behind)]),
+        depth_range=beyond,
     )
-    return over(seen, models)
+    return over(seen, models, part)
 
 
-def over(front: Tensor, behind: Render) -> Render:
-    """Lay premultiplied RGBA [H, W, 4] over a render, whose tensors it changes, and return that."""
+def over(front: Tensor, behind: Render, part: Part) -> Render:
+    """Lay premultiplied RGBA [h, w, 4] over a part of a render, whose tensors it changes, and return that."""
     clear = 1 - front[..., 3]
-    for seen, back in zip(front.unbind(-1), (*behind.color.unbind(-1), behind.alpha), strict=True):
+    for seen, plane in zip(front.unbind(-1), (*behind.color.unbind(-1), behind.alpha), strict=True):
+        back = plane[part]
         torch.addcmul(seen, clear, back, out=back)  # by channels, which is faster than all at once
     return behind
 
 
-def slab_thickness(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> Tensor:
-    """Return how thick the slab of each pixel is, [H, W] camera z; around faces it falls to 0 softly."""
+def slab_thickness(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> tuple[Tensor, Part]:
+    """Return how thick the slab is in a part [h, w] of the picture, camera z, and which; elsewhere is none.
+
+    Around faces it falls to 0 softly.
+    """
+    size = camera.height, camera.width
     multiple = camera.crop(0, 0, *(-(-size // COARSE) * COARSE for size in (camera.width, camera.height)))
     small = smaller(multiple, COARSE)
     alpha = face_alpha(composed, small, scene, twin.with_step(1.0), range_of(scene.cuts, small))
     face = softly_grown((alpha / OPAQUE).clamp(max=1), ceil(RIM * min(small.height, small.width)))
-    thickness = face * (SLAB * twin.opacity_unit) / small.ray_lengths()
+    part = around(face)
+    thickness = (face * (SLAB * twin.opacity_unit) / small.ray_lengths())[part]
     thickness = interpolate(thickness[None, None], scale_factor=COARSE, mode="bilinear")[0, 0]
-    return thickness[: camera.height, : camera.width]
+    rows, columns = (
+        slice(COARSE * each.start, min(COARSE * each.stop, end)) for each, end in zip(part, size, strict=True)
+    )
+    return thickness[: rows.stop - rows.start, : columns.stop - columns.start], (rows, columns)
+
+
+def around(weights: Tensor) -> Part:
+    """Return where weights [H, W] are not 0, one pixel at least, and one more to each side."""
+    places = [weights.any(dim).nonzero()[:, 0].tolist() or [0] for dim in (1, 0)]
+    rows, columns = (slice(max(0, each[0] - 1), each[-1] + 2) for each in places)
+    return rows, columns
 
 
 def face_alpha(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Tensor:
@@ -103,16 +126,13 @@ def face_alpha(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut
 
 
 def softly_grown(weights: Tensor, pixels: int) -> Tensor:
-    """Return weights [H, W] grown by so many pixels, row and column; over as many more they fall to 0."""
-    grown = weights[None, None]
-    for rows, columns in ((1, 0), (0, 1)):
-        reached = [
-            max_pool2d(grown, (2 * rows * r + 1, 2 * columns * r + 1), 1, (rows * r, columns * r))
-            * ((2 * pixels + 1 - r) / (pixels + 1))
-            for r in range(pixels, 2 * pixels + 1)
-        ]
-        grown = torch.stack(reached).amax(dim=0)
-    return grown[0, 0]
+    """Return weights [H, W] grown by so many pixels each way; over as many more they fall to 0."""
+    reached = max_pool2d(weights[None], 2 * pixels + 1, 1, pixels)
+    grown = reached
+    for softer in range(pixels, 0, -1):
+        reached = max_pool2d(reached, 3, 1, 1)
+        grown = torch.maximum(grown, reached * (softer / (pixels + 1)))
+    return grown[0]
 
 
 def slab_of(cut: CutRange, thickness: Tensor) -> CutRange:
