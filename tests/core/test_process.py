@@ -45,8 +45,8 @@ from texgs.core.process import keep_freed_memory
 if KEEP and not keep_freed_memory():
     print(-1)
 else:
-    for _ in range(50):
-        np.ones(20_000_000 // 8), np.ones(20_000_000 // 8)
+    for size in [20_000_000] * 20 + [160_000_000] * 4:
+        np.ones(size // 8), np.ones(size // 8)
     print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
 """
     faults = []
