@@ -72,10 +72,10 @@ def transformed(weight: Tensor) -> Tensor:
     """Return G g G^T of each kernel g of [out, in, 3, 3], as [36, out / 16, in, 16]; filled up with zeros."""
     outputs, inputs = weight.shape[:2]
     g = torch.tensor(TRANSFORM, dtype=torch.float64)
-    padded = F.pad(weight.double(), (0, 0, 0, 0, 0, -inputs % BLOCK, 0, -outputs % BLOCK))
+    padded = F.pad(weight, (0, 0, 0, 0, 0, -inputs % BLOCK, 0, -outputs % BLOCK))
     blocks = padded.reshape(-1, BLOCK, padded.shape[1], 9).permute(3, 0, 2, 1).contiguous()
-    points = torch.kron(g, g) @ blocks.reshape(9, -1)  # [36, 9] and [9, out / 16, in, 16]
-    return points.reshape(36, *blocks.shape[1:]).float()
+    points = torch.kron(g, g).float() @ blocks.reshape(9, -1)  # [36, 9] and [9, out / 16, in, 16]
+    return points.reshape(36, *blocks.shape[1:])
 
 
 class _Convolve(torch.autograd.Function):
