@@ -26,13 +26,13 @@ class Pairs:
     """Views of a scene and those later on the path, warped into them by the depth of its geometry."""
 
     def __init__(self, measured: MeasuredScene) -> None:
-        from texgs.fields.kinds import kinds
+        from texgs.fields.files import kind_of
         from texgs.models.lpips import Lpips
         from texgs.scene.scene_file import read_scene
 
         self.measured = measured
         surfaces = without_hidden(read_scene(measured.geometry_file), measured.after)
-        self.depth = kinds()[next(iter(surfaces.models.values())).open()[0].kind].depth or "median"
+        self.depth = kind_of(next(iter(surfaces.models.values())).file).depth or "median"
         self.surfaces = surfaces.open(measured.shown.device)
         is_here = measured.vgg and measured.weights["lpips_vgg"]
         self.lpips = Lpips.load(measured.vgg, device=measured.shown.device) if is_here else None
