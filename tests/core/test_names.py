@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from texgs.core.errors import ArgumentError
-from texgs.core.names import file_name, label, named_file, part_file
+from texgs.core.names import close, file_name, label, named_file, part_file
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", ".hidden", "a/b", "a\\b", "/etc", "a\0b", "a\nb", "é" * 126])
@@ -39,3 +39,11 @@ def test_names_labels_and_paths_that_are_taken():
         with pytest.raises(ArgumentError, match="where: expected the path of a model, got") as caught:
             named_file("where", Path("a"), path, "a model")
         assert len(str(caught.value)) < 200
+
+
+@pytest.mark.parametrize(
+    ("word", "hint"),
+    [("z", ", did you mean +z or -z?"), ("opacitie", ", did you mean opacity?"), ("volume", "")],
+)
+def test_a_hint_names_what_is_most_like_a_word(word, hint):
+    assert close(word, ["+x", "-x", "+z", "-z", "opacity"]) == hint

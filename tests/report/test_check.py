@@ -93,6 +93,7 @@ def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, cap
     monkeypatch.chdir(tmp_path)
     write_scene("ball.yaml", scene)
     write_scene("old.yaml", replace(scene, volume=None))
+    write_scene("cut.yaml", replace(scene, cuts=Cuts([Plane((0.0, 0.0, 1.0), 0.0)])))
     words = ["--views", "19", "--width", "24", "--seed", "2"]
     assert main(["check", "ball.yaml", *words]) == 0
     told = json.loads((tmp_path / "ball-check.json").read_text())
@@ -108,6 +109,8 @@ def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, cap
         found = picture.info["Comment"], gif.info["comment"].decode(), film.metadata["comment"]
         assert picture.height > picture.width == 200
     assert set(found) == {told["sentence"]}
+    assert main(["check", "cut.yaml", *words]) == 0
+    assert "cut.yaml: its cuts are left out, as their faces show the volume" in capsys.readouterr().err
     other = Scene({"a": scene.models["a"]})
     assert checked(Path("ball.yaml"), other) == "", "of other models"
     write_scene("other.yaml", other)
@@ -119,4 +122,10 @@ def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, cap
     ):
         assert main(["check", file, *more, "--output", "none.json"]) == 2
         assert message in capsys.readouterr().err
+    for output, message in (
+        ("none.txt", "ends in .json, got none.txt"),
+        ("ball.yaml/x.json", "cannot write"),
+    ):
+        assert main(["check", "ball.yaml", "--output", output]) == 2
+        assert message in capsys.readouterr().err, "before any view"
     assert not list(tmp_path.glob("none*"))

@@ -123,6 +123,12 @@ def test_files_that_are_no_scene(folder):
         (folder / "bad.yaml").write_text(text)
         with pytest.raises(ArgumentError, match=rf"bad\.yaml: .*expected {message}"):
             read_scene(folder / "bad.yaml")
+    model = folder / "a" / "model.safetensors"
+    with pytest.raises(ArgumentError, match="expected a scene, got a model; texgs compose makes"):
+        read_scene(model)
+    model.write_bytes(model.read_bytes()[:-100])
+    with pytest.raises(ArgumentError, match="expected a scene, got a model"):
+        read_scene(model)
 
 
 def test_models_and_variants_that_do_not_belong(folder):

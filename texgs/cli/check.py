@@ -1,6 +1,7 @@
 """Check how far a scene is from its volume, over seeded views, lights and edits, and draw the worst."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from texgs.cli.options import add_device, add_lens, lens_of, option
@@ -21,13 +22,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the numbers and the picture."""
     from texgs.core.check import torch_device
-    from texgs.core.errors import located
+    from texgs.core.errors import ArgumentError, located
+    from texgs.core.io import require_place
     from texgs.report.check import check
     from texgs.scene.scene_file import read_scene
     from texgs.scene.twin import Twin
 
-    scene, device = read_scene(arguments.scene), torch_device(arguments.device)
     output = arguments.output or Path(f"{arguments.scene.stem}-check.json")
+    if output.suffix != ".json":
+        raise ArgumentError(f"--output: expected a file that ends in .json, got {output}")
+    require_place(output)
+    scene, device = read_scene(arguments.scene), torch_device(arguments.device)
+    if scene.cuts:
+        print(f"{arguments.scene}: its cuts are left out, as their faces show the volume", file=sys.stderr)
     with located(arguments.scene):
         composition, twin = scene.open(device), Twin(scene, device)
     seen = lens_of(arguments, scene.framed(composition)), arguments.views, arguments.seed, output

@@ -87,7 +87,9 @@ def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[L
         left_out += [LeftOut(entry.what, entry.why, places) for entry, places in outdated.items()]
     if not paths:
         where = ", ".join(map(str, arguments.metrics)) or "results"
-        raise ArgumentError(f"no whole results below {where}; run something first, such as make demo")
+        raise ArgumentError(
+            f"no whole results below {where}; run something first, such as texgs run dataset=engine"
+        )
     records, others = read_known(paths)
     require_apart(records)
     return records, [*left_out, *others]

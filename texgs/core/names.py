@@ -80,9 +80,11 @@ def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> 
 
 
 def close(word: object, known: Iterable[str]) -> str:
-    """Return a hint at the known word that is most like the given one; empty where none is."""
-    similar = difflib.get_close_matches(str(word), list(known), n=1)
-    return f", did you mean {similar[0]}?" if similar else ""
+    """Return a hint at the known word that is most like the given one, or at both; empty where none is."""
+    similar = difflib.get_close_matches(str(word), list(known), n=2)
+    shares = [difflib.SequenceMatcher(None, each, str(word)).ratio() for each in similar]
+    alike = [each for each, share in zip(similar, shares, strict=True) if share == shares[0]]
+    return f", did you mean {' or '.join(sorted(alike))}?" if alike else ""
 
 
 def natural_order(path: Path) -> list[tuple[str, int]]:

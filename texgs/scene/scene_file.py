@@ -14,8 +14,9 @@ from texgs.core.io import reading, write_bytes
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.lens import Frame
 from texgs.core.light import HEADLIGHT, Light
-from texgs.core.names import close, is_number, label, named_file, require_name
+from texgs.core.names import SCENES, close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
+from texgs.fields.files import formats
 from texgs.fields.part_edit import PartEdit, color
 from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment
 from texgs.scene.series_file import read_series
@@ -45,6 +46,8 @@ def read_scene(path: str | Path) -> Scene:
     if not path.exists():
         raise ArgumentError(f"{path}: no such file; texgs compose writes one")
     with reading(path, "a scene in YAML", "correct it"), located(path):
+        if path.suffix not in SCENES and formats(path):
+            raise ArgumentError("expected a scene, got a model; texgs compose makes a scene of models")
         if path.stat().st_size > LARGEST:
             raise ArgumentError(f"expected a scene of at most {LARGEST} bytes; is it another file?")
         return _scene(parse_yaml(path.read_text(encoding="utf-8")), path.parent)
