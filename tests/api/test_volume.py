@@ -42,6 +42,22 @@ def test_an_array_keeps_its_samples_and_places():
     assert repr(volume) == f"Volume hill: 7 x 6 x 5 float32, {values.min():g} to {values.max():g}"
 
 
+def test_z_of_nifti_points_up_unless_it_is_told_otherwise(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    values = field(5, 6, 7)
+    nibabel.save(nibabel.Nifti1Image(values.transpose(2, 1, 0), np.diag([1, 2, 3, 1])), tmp_path / "a.nii.gz")
+    for up, expected in ((None, "+z"), ("+y", "+y"), ("-x", "-x")):
+        given = {} if up is None else {"up": up}
+        read = texgs.Volume(tmp_path / "a.nii.gz", **given)
+        made = texgs.Volume(read_array(tmp_path / "a.nii.gz"), spacing=(1, 2, 3), up=expected)
+        assert np.array_equal(read.grid.values, made.grid.values), up
+
+
+def read_array(path):
+    """The samples [Z, Y, X] of a file, as they lie there."""
+    return texgs.Volume(path, up="+y").grid.values
+
+
 @given(
     st.tuples(*[st.integers(2, 5)] * 3),
     st.tuples(*[st.floats(0.1, 10)] * 3),

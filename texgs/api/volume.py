@@ -26,7 +26,7 @@ from texgs.volume.overlay import overlays
 from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import ArraySource, Source
-from texgs.volume.sources import open_source
+from texgs.volume.sources import open_source, tells_superior
 from texgs.volume.suggest import suggest
 from texgs.volume.summaries import Summary, write_summaries
 
@@ -50,7 +50,8 @@ class Volume:
             folder of slices of any format that texgs reads.
         spacing: distance of samples along x, y, z; default that of the data, else 1.
         origin: position of the first sample, x, y, z; default that of the data, else 0.
-        up: axis of the data that becomes +y of the world: "+y", "-y", "+z", ...
+        up: axis of the data that becomes +y of the world: "+y", "-y", "+z", ...; default "+z" of NIfTI and
+            folders of DICOM, where it points to the head, else "+y".
         crop: x0, x1, y0, y1, z0, z1 in samples of the data, half open; default all.
         reduce: one sample for every block of reduce^3.
         method: "mean" of a block, or "sample", its middle, for labels.
@@ -71,7 +72,7 @@ class Volume:
         *,
         spacing: Sequence[float] | None = None,
         origin: Sequence[float] | None = None,
-        up: str = "+y",
+        up: str | None = None,
         crop: Sequence[int] | None = None,
         reduce: int = 1,
         method: str = "mean",
@@ -86,6 +87,7 @@ class Volume:
         if isinstance(data, str | Path):
             steps, first = three("spacing", spacing), three("origin", origin)
             source = open_source(data, spacing=steps, origin=first, **keys)
+            up = "+z" if up is None and tells_superior(Path(data)) else up
         elif keys:
             raise ArgumentError(f"{', '.join(keys)}: only for files of some formats; leave them out")
         else:
@@ -93,7 +95,13 @@ class Volume:
         if source.note:
             warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
         self._channel = source.channel
-        how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": as_python(nan_value)}
+        how = {
+            "crop": crop,
+            "reduce": reduce,
+            "method": method,
+            "up": "+y" if up is None else up,
+            "nan_value": as_python(nan_value),
+        }
         self.summary = self._prepared(source, how)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         write_summaries(self.file, [self.summary], [""])
