@@ -181,6 +181,7 @@ def test_a_mistake_in_an_edit_writes_nothing(request, capsys, of, word, message)
         (["--frames", "0"], "--frames: expected at least 1, got 0"),
         (["--seconds", "0.01"], "--frames: expected at least 1, got 0.25"),
         (["--transparent"], "--transparent: expected PNG without --compare and --caption, got "),
+        (["--path", "orbit", "--output", "x.png"], "x.png: expected one frame, got 72; use .gif, .mp4 or"),
         (["--radius", "0"], "radius: expected more than 0, got 0"),
         (["--fov", "0"], "fov_y: expected degrees between 0 and 180, got 0"),
         (["--height", "-4"], "height: expected at least 1 pixel, got -4"),

@@ -160,6 +160,8 @@ def pair_of(
 def output_of(arguments: argparse.Namespace, count: int) -> Path:
     """Return where to write so many frames."""
     output = arguments.output or Path(f"{arguments.scene.stem}{'.png' if count == 1 else '.mp4'}")
+    if count > 1 and output.suffix == ".png":
+        raise ArgumentError(f"{output}: expected one frame, got {count}; use .gif, .mp4 or a folder")
     is_alone = not arguments.compare and not arguments.caption
     if arguments.transparent and not (is_alone and output.suffix in ("", ".png")):
         raise ArgumentError(f"--transparent: expected PNG without --compare and --caption, got {output}")
