@@ -49,13 +49,8 @@ def test_z_of_nifti_points_up_unless_it_is_told_otherwise(tmp_path):
     for up, expected in ((None, "+z"), ("+y", "+y"), ("-x", "-x")):
         given = {} if up is None else {"up": up}
         read = texgs.Volume(tmp_path / "a.nii.gz", **given)
-        made = texgs.Volume(read_array(tmp_path / "a.nii.gz"), spacing=(1, 2, 3), up=expected)
+        made = texgs.Volume(values, spacing=(1, 2, 3), up=expected)
         assert np.array_equal(read.grid.values, made.grid.values), up
-
-
-def read_array(path):
-    """The samples [Z, Y, X] of a file, as they lie there."""
-    return texgs.Volume(path, up="+y").grid.values
 
 
 @given(

@@ -87,7 +87,6 @@ class Volume:
         if isinstance(data, str | Path):
             steps, first = three("spacing", spacing), three("origin", origin)
             source = open_source(data, spacing=steps, origin=first, **keys)
-            up = "+z" if up is None and tells_superior(Path(data)) else up
         elif keys:
             raise ArgumentError(f"{', '.join(keys)}: only for files of some formats; leave them out")
         else:
@@ -95,13 +94,9 @@ class Volume:
         if source.note:
             warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
         self._channel = source.channel
-        how = {
-            "crop": crop,
-            "reduce": reduce,
-            "method": method,
-            "up": "+y" if up is None else up,
-            "nan_value": as_python(nan_value),
-        }
+        if up is None:
+            up = "+z" if isinstance(data, str | Path) and tells_superior(Path(data)) else "+y"
+        how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": as_python(nan_value)}
         self.summary = self._prepared(source, how)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         write_summaries(self.file, [self.summary], [""])

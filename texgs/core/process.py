@@ -15,7 +15,7 @@ POLICY = {
     "GOMP_SPINCOUNT": "1000",  # of GCC's, which torch has on Linux: look so often before that
 }
 NEW_OBJECTS = 50_000  # before the garbage collector looks at them
-GLIBC_OPTIONS = {-1: 1 << 30, -4: 0}  # M_TRIM_THRESHOLD; M_MMAP_MAX, areas that go back as they are freed
+GLIBC_OPTIONS = {-1: 1 << 30, -4: 0}  # M_TRIM_THRESHOLD; M_MMAP_MAX: map no block by itself
 
 
 def waiting() -> dict[str, str]:
