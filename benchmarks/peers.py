@@ -51,7 +51,7 @@ class Peer(workload.Workload):
             quats=a["quats"],
             scales=pad(a["scales"], (0, 1), value=1.0),
             opacities=a["opacities"],
-            colors=a["features"],
+            colors=a["features"][None],  # [views, N, 3]: what has no views fails in gsplat 1.5.3
             viewmats=a["viewmat"][None],
             Ks=a["K"][None],
             width=a["width"],

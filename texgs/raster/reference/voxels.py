@@ -24,7 +24,7 @@ def render_rays(
     direction = normalize(rays[:, 3:], dim=1)
     origin = (rays[:, :3] - rays.new_tensor(lower)) / spacing
     near, count = crossing(origin, direction, rays.new_tensor(density.shape) - 1, step)
-    k = torch.arange(max(int(count.max()), 1), dtype=rays.dtype)  # [S]
+    k = torch.arange(max(int(count.max()), 1), dtype=rays.dtype, device=rays.device)  # [S]
     distance = near[:, None] + (k + 0.5) * step  # [N, S]
     points = origin[:, None] + distance[..., None] * direction[:, None]  # [N, S, 3]
 
