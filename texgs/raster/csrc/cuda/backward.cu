@@ -111,7 +111,7 @@ __global__ __launch_bounds__(kThreads, 1) void backward_kernel(const Raster r) {
     using L = Layout<P, C, Geometry, Depth, Textured>;
     __shared__ Chunk<kSlotChunk, C, Textured> chunk;
     __shared__ SlotSums<L::kWidth> sums;
-    const int tile = blockIdx.x;
+    const int tile = static_cast<int>(r.tile_order[blockIdx.x]);
     const Place at(r, tile);
     const float limit = r.options.transmittance_min;
     PixelGradient<C, Depth> g[kPixels];

@@ -59,6 +59,14 @@ __global__ __launch_bounds__(kBlock) void find_tiles_kernel(const uint32_t* sort
     if (tile <= tiles) tile_begin[tile] = static_cast<uint32_t>(lower_bound(sorted_tiles, n, tile));
 }
 
+// Keys that sort the tiles by their numbers of pairs, most first, and the tiles as they come.
+__global__ __launch_bounds__(kBlock) void key_tiles_kernel(const Raster r, uint32_t* keys, uint32_t* order) {
+    const int tile = blockIdx.x * kBlock + threadIdx.x;
+    if (tile >= r.tiles) return;
+    keys[tile] = ~(r.tile_begin[tile + 1] - r.tile_begin[tile]);
+    order[tile] = static_cast<uint32_t>(tile);
+}
+
 }  // namespace
 
 void count_pairs(const Raster& r, cudaStream_t stream) {
@@ -72,6 +80,10 @@ void list_pairs(const Raster& r, uint32_t* tiles, uint32_t* slots, cudaStream_t 
 void find_tiles(const uint32_t* sorted_tiles, int64_t n, int tiles, uint32_t* tile_begin, cudaStream_t stream) {
     launch(find_tiles_kernel, blocks_for(tiles + 1, kBlock), kBlock, stream, sorted_tiles, n,
            static_cast<uint32_t>(tiles), tile_begin);
+}
+
+void key_tiles(const Raster& r, uint32_t* keys, uint32_t* order, cudaStream_t stream) {
+    launch(key_tiles_kernel, blocks_for(r.tiles, kBlock), kBlock, stream, r, keys, order);
 }
 
 }  // namespace texgs::cuda

@@ -13,7 +13,7 @@ __global__ __launch_bounds__(kThreads, 1) void contribute_kernel(const Raster r)
     constexpr int kWidth = Sums::kChannels + C;
     __shared__ Chunk<kSlotChunk, 1, false> chunk;
     __shared__ SlotSums<kWidth> sums;
-    const int tile = blockIdx.x;
+    const int tile = static_cast<int>(r.tile_order[blockIdx.x]);
     const Place at(r, tile);
     const float limit = r.options.transmittance_min;
     const texgs_contributions& wanted = r.contributions;

@@ -135,7 +135,7 @@ __device__ void finish_depth(const Raster& r, const Pixel<C, Depth>& pixel, int6
 template <class P, int C, bool Depth, bool Textured>
 __global__ __launch_bounds__(kThreads, 1) void forward_kernel(const Raster r) {
     __shared__ Chunk<kSize, C, Textured> chunk;
-    const int tile = blockIdx.x;
+    const int tile = static_cast<int>(r.tile_order[blockIdx.x]);
     const Place place(r, tile);
     const int used = r.surfels.channels + (r.with_normal ? 3 : 0);
     Pixel<C, Depth> pixels[kPixels];

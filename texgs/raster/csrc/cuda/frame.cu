@@ -83,6 +83,13 @@ void texgs_frame::list_pairs(int64_t capacity, cudaStream_t stream) {
     find_tiles(tiles.current, capacity, raster.tiles, tile_begin, stream);
     raster.tile_slots = slots.current;
     raster.tile_begin = tile_begin;
+
+    const int64_t n = raster.tiles;
+    PingPong keys{tile_keys_.ensure<uint32_t>(n), tile_keys2_.ensure<uint32_t>(n)};
+    PingPong order{tile_order_.ensure<uint32_t>(n), tile_order2_.ensure<uint32_t>(n)};
+    key_tiles(raster, keys.current, order.current, stream);
+    sort_pairs(keys, order, n, 32, sort_scratch(n), stream);
+    raster.tile_order = order.current;
 }
 
 void texgs_frame::list_all_pairs(cudaStream_t stream) {

@@ -43,6 +43,6 @@ private:
     texgs::cuda::Late n_pairs_;
     int64_t most_pairs_ = 0, most_surfels_ = 0, most_tiles_ = 0;  // of the views whose number of pairs is known
     texgs::cuda::Buffer records_, footprints_, normals_, keys_, keys2_, order_, order2_, pair_begin_, scratch_, listed_,
-        tiles_, tiles2_, tile_slots_, tile_slots2_, tile_begin_, median_, moments_, slots_, sums_, texel_sums_,
-        magnitudes_;
+        tiles_, tiles2_, tile_slots_, tile_slots2_, tile_begin_, tile_keys_, tile_keys2_, tile_order_, tile_order2_,
+        median_, moments_, slots_, sums_, texel_sums_, magnitudes_;
 };

@@ -64,6 +64,7 @@ struct Raster {
     Listed* listed;              // [capacity] by slot
     const uint32_t* tile_slots;  // [capacity] slots by tile, each tile's by depth
     const uint32_t* tile_begin;  // [tiles + 1] into tile_slots
+    const uint32_t* tile_order;  // [tiles] those with most pairs first: none is left alone at the end
 
     texgs_image image, grad;
     int32_t* median_surfel;     // [H, W] surfel whose fragment is the median
@@ -83,6 +84,7 @@ void project(const Raster&, cudaStream_t);
 void count_pairs(const Raster&, cudaStream_t);  // of each rank, into pair_begin; [N] = 0
 void list_pairs(const Raster&, uint32_t* tiles, uint32_t* slots, cudaStream_t);  // tile and slot of each pair
 void find_tiles(const uint32_t* sorted_tiles, int64_t n, int tiles, uint32_t* tile_begin, cudaStream_t);
+void key_tiles(const Raster&, uint32_t* keys, uint32_t* order, cudaStream_t);  // to sort them for tile_order
 void forward(const Raster&, cudaStream_t);
 int backward_slot_width(const Raster&);
 void backward(const Raster&, cudaStream_t);

@@ -85,7 +85,7 @@ __device__ void give_large(const TextureTable& t, const Given& given, int64_t* s
 // Six blocks on a multiprocessor: as many as there are with all numbers in registers.
 __global__ __launch_bounds__(kThreads, 6) void texel_kernel(const Raster r) {
     __shared__ Chunk<kThreads, 1, true> chunk;
-    const int tile = blockIdx.x;
+    const int tile = static_cast<int>(r.tile_order[blockIdx.x]);
     const Place at(r, tile);
     const float limit = r.options.transmittance_min, scale = FixedPoint(r).scale();
     float transmittance[kPixels], gradient[kPixels][3] = {};
