@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from math import inf, isfinite
-from operator import index
+from operator import index, mul
 
 import torch
 from torch import Tensor
@@ -176,12 +176,12 @@ def pinhole(viewmat: Tensor, K: Tensor) -> None:
         raise ArgumentError(f"K: expected focal lengths above 0, got K[0, 0] = {fx} and K[1, 1] = {fy}")
     if skew != 0 and isfinite(skew):
         raise ArgumentError(f"K: expected no skew, got K[0, 1] = {skew}")
-    for name, row in (("K[1, 0] and K[2]", [tilt, *last_row]), ("viewmat[3]", viewmat[3].tolist())):
+    *rows, last_row_of_view = viewmat.tolist()
+    for name, row in (("K[1, 0] and K[2]", [tilt, *last_row]), ("viewmat[3]", last_row_of_view)):
         errors = [abs(x - wanted) for x, wanted in zip(row, (0, 0, 0, 1), strict=True) if isfinite(x)]
         if max(errors, default=0) > ROUNDING:
             raise ArgumentError(f"{name}: expected 0, 0, 0, 1, got {row}; did you transpose?")
-    axes = viewmat[:3, :3].float()
-    if SKEWED < float((axes @ axes.T - torch.eye(3)).abs().max()) < inf:
-        raise ArgumentError(
-            f"viewmat: expected a rotation and a shift, got axes {axes.tolist()}; normalise them"
-        )
+    axes = [row[:3] for row in rows]
+    products = [abs(sum(map(mul, a, b)) - (a is b)) for a in axes for b in axes]
+    if any(SKEWED < product < inf for product in products):
+        raise ArgumentError(f"viewmat: expected a rotation and a shift, got axes {axes}; normalise them")
