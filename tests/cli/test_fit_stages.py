@@ -88,6 +88,14 @@ def test_a_material_per_surfel_on_request(seeded):
     assert ambient.std() > 0.01
 
 
+def test_light_sees_normals_of_their_own_or_those_of_planes(seeded):
+    main(["shading", *TINY])
+    p = read_model(seeded / "shading" / "model.safetensors").parameters
+    assert not torch.equal(p["normals"], p["quats"]), "both have learned"
+    main(["shading", *TINY, "fit.normals=surfel"])
+    assert "normals" not in read_model(seeded / "shading" / "model.safetensors").parameters
+
+
 def test_same_seed_same_model(seeded):
     main(["shading", *TINY])
     first = (seeded / "shading" / "model.safetensors").read_bytes()

@@ -100,12 +100,15 @@ def test_axes_are_carried_as_matter_is_turned_and_stretched():
         "means": torch.tensor([[0.2, -0.3, 0.1]]),
         "quats": torch.tensor([[1.0, 0, 0, 0]]),
         "scales": torch.tensor([[0.02, 0.03]]).log(),
+        "normals": torch.tensor([[1.0, 0, 1, 0]]),  # along x
     }
     carried = series.carried(p, moves)
     torch.testing.assert_close(carried["means"], p["means"] @ turn.T)
     axes = quats_to_matrices(carried["quats"])[0]
     torch.testing.assert_close(axes[:, 0], torch.tensor([0.0, 1, 0]), atol=1e-5, rtol=0)
     torch.testing.assert_close(axes[:, 2], torch.tensor([0.0, 0, 1]), atol=1e-5, rtol=0)
+    normal = quats_to_matrices(carried["normals"])[0, :, 2]
+    torch.testing.assert_close(normal, torch.tensor([0.0, 1, 0]), atol=1e-5, rtol=0)
     torch.testing.assert_close(carried["scales"].exp(), torch.tensor([[0.03, 0.024]]), atol=1e-5, rtol=0)
 
 

@@ -52,7 +52,8 @@ def at(model, time):
     """A model that moves to the right, turns, shrinks, fades and changes its colours."""
     p, g = dict(model.parameters), torch.Generator().manual_seed(time)
     p["means"] = p["means"] + p["means"].new_tensor([0.12 * time, 0, 0])
-    p["quats"] = normalize(p["quats"], dim=1) + 0.2 * time * torch.randn(p["quats"].shape, generator=g)
+    for name in ("quats", "normals"):
+        p[name] = normalize(p[name], dim=1) + 0.2 * time * torch.randn(p[name].shape, generator=g)
     p["scales"] = p["scales"] - 0.1 * time
     p["opacities"] = p["opacities"] + 0.5 * time
     p["colors"] = p["colors"] + 0.05 * time
@@ -64,6 +65,7 @@ def scene(tmp_path_factory):
     """Two models, of which one follows a series; a part of it has a look of its own, with its own colours."""
     folder = tmp_path_factory.mktemp("series")
     key, other = ball(1, n=300), ball(2, n=60, middle=0.3)
+    key.parameters["normals"] = key.parameters["quats"].flip(1)  # the other has none of its own
     styled = replace(key, parameters={**key.parameters, "colors": 0.5 * key.parameters["colors"] + 0.3})
     above = write_segment(folder / "above.segment", key, key.parameters["means"][:, 1] > 0.2, {})
     look = write_texture(folder / "look.safetensors", styled)
@@ -122,11 +124,12 @@ def test_sums_are_the_surfels_of_the_step(scene, time):
     rows = np.where(whole % 2, -(whole + 1) // 2, whole // 2)
     true, row = scene.at(time).models["A"].open()[0].parameters, 0
     for name, unit in UNITS.items():
-        values = normalize(base[name], dim=1) if name == "quats" else base[name]
+        is_turn = name in ("quats", "normals")
+        values = normalize(base[name], dim=1) if is_turn else base[name]
         sums = values.reshape(300, -1).double() + unit * torch.tensor(rows[row : row + values[0].numel()].T)
-        expected = normalize(true[name], dim=1) if name == "quats" else true[name].reshape(300, -1)
+        expected = normalize(true[name], dim=1) if is_turn else true[name].reshape(300, -1)
         row += values[0].numel()
-        if name == "quats":
+        if is_turn:
             assert (normalize(sums, dim=1) * expected).sum(dim=1).abs().min() > 1 - 1e-5
         else:
             assert (sums - expected).abs().max() < 0.55 * unit, "half a unit, and half precision of the base"

@@ -26,6 +26,11 @@ class FitKeys:
     facing: bool = key(
         True, "lights shine on the side that faces the viewer; false: on both, as in the paper"
     )
+    normals: str = key(
+        "own",
+        "light sees normals that are fitted, or those of the surfels' planes",
+        choices=("own", "surfel"),
+    )
     materials: str = key("shared", "one material for all, or one per surfel", choices=("shared", "surfel"))
     material_range: str = key(
         "bounded",

@@ -12,7 +12,7 @@ from texgs.edit.canvas import around, some
 from texgs.fields.surfels.model import Surfels
 
 PLACE = ("means", "quats", "scales")
-MOVED = (*PLACE, "opacities")  # of surfels, in a series
+MOVED = (*PLACE, "normals", "opacities")  # of surfels, in a series
 BETTER = 4.0  # times as much as before: from then on, a surfel learns from another step
 
 
@@ -50,7 +50,8 @@ def weights_of(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
 
 def placed(model: Surfels, step: Surfels) -> Surfels:
     """Return a model with its surfels where they are at a step of its series."""
-    return replace(model, parameters={**model.parameters, **{name: step.parameters[name] for name in MOVED}})
+    moved = {name: x for name, x in step.parameters.items() if name in MOVED}
+    return replace(model, parameters={**model.parameters, **moved})
 
 
 @torch.no_grad()

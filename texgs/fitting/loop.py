@@ -119,7 +119,7 @@ def spread(points: Tensor) -> float:
 def rates(names: Iterable[str], r: Rates, size: float) -> dict[str, Rate]:
     """Return the rate of each parameter that learns; `size` is the extent of the cameras."""
     starts = {"quats": r.quats, "scales": r.scales, "opacities": r.opacities, "colors": r.colors}
-    starts |= {"sh": r.sh, "sh_rest": r.sh_rest, **dict.fromkeys(MATERIAL, r.material)}
+    starts |= {"normals": r.quats, "sh": r.sh, "sh_rest": r.sh_rest, **dict.fromkeys(MATERIAL, r.material)}
     chosen = {name: Rate(starts[name], r.final) for name in names if name in starts}
     chosen["means"] = Rate(size * r.means, r.means_final)
     return {name: rate for name, rate in chosen.items() if rate.start > 0}

@@ -30,7 +30,8 @@ SIZE = 128  # pixels of the views of a step: surfels have their places, views on
 STEP = 1.0  # voxels between the samples of views
 ROUNDS = 3  # through all views: a part of one would bend surfels towards the views that are in it
 SLOWER = 0.3  # times the rates of surfels that start anywhere
-RATES = Rates(**{name: SLOWER * getattr(RATES_OF_SEEDS, name) for name in UNITS}, material=0.0)
+MOVED = UNITS.keys() - {"normals"}  # these turn as fast as surfels
+RATES = Rates(**{name: SLOWER * getattr(RATES_OF_SEEDS, name) for name in MOVED}, material=0.0)
 SHARE = 0.1  # of all surfels: so many of those that show least are planted where most is missing
 FEWEST = 4  # surfels to plant: of fewer the size is not known, see `surfels_at`
 HIDDEN = -12.0  # raw opacity of surfels where nothing is to be seen
@@ -121,12 +122,25 @@ def carried(parameters: Mapping[str, Tensor], moves: Motion) -> dict[str, Tensor
     arms = [reach[:, k, None] * axes[..., k] for k in range(2)]
     first, second = (arm + (moves.at(p["means"] + arm) - moves.at(p["means"] - arm)) / 2 for arm in arms)
     stretch = torch.stack([first.norm(dim=1), second.norm(dim=1)], dim=1) / reach
+    quats = spanning(first, second)
     return {
         **p,
+        **turned_along(p, quats),
         "means": p["means"] + moves.at(p["means"]),
-        "quats": spanning(first, second),
+        "quats": quats,
         "scales": p["scales"] + stretch.clamp(1 / STRETCH, STRETCH).log(),
     }
+
+
+def turned_along(parameters: Mapping[str, Tensor], quats: Tensor) -> dict[str, Tensor]:
+    """Return normals, where surfels have their own, turned as these turn to new quaternions [N, 4]."""
+    from kornia.geometry.conversions import rotation_matrix_to_quaternion
+
+    if "normals" not in parameters:
+        return {}
+    before, normals = (quats_to_matrices(parameters[name]) for name in ("quats", "normals"))
+    turn = quats_to_matrices(quats) @ before.mT
+    return {"normals": rotation_matrix_to_quaternion((turn @ normals).contiguous())}
 
 
 def spanning(first: Tensor, second: Tensor) -> Tensor:
@@ -157,4 +171,5 @@ def planted(
     distances, _ = cKDTree(parameters["means"][kept].numpy()).query(points.places.numpy())
     far = torch.from_numpy(distances).argsort(descending=True)[:count]
     new = {name: x[far] for name, x in surfels_on(points, seed).items()}
+    new["normals"] = new["quats"]
     return {name: x.index_copy(0, least, new[name]) if name in new else x for name, x in parameters.items()}

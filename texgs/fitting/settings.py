@@ -10,7 +10,7 @@ class CommonRates:
     """Learning rates of Adam at the start of a phase, of surfels and of 3D Gaussians."""
 
     means: float = key(1.6e-4, "rate of means, times the extent of the cameras", "world units", least=0)
-    quats: float = key(0.004, "rate of quaternions", least=0)
+    quats: float = key(0.004, "rate of quaternions, of normals too", least=0)
     scales: float = key(0.02, "rate of the logarithm of scales", least=0)
     opacities: float = key(0.2, "rate of the logit of opacities", least=0)
     sh: float = key(0.01, "rate of the zeroth spherical harmonic", least=0)

@@ -19,6 +19,7 @@ MEGABYTE = 10**6
 # What differences are whole numbers of. A pixel of a view of 800 x 800 is about 2^-9 world units wide; half a
 # unit of a colour is half a level of an 8-bit picture. Scales are logarithms, opacities logits.
 UNITS = {"means": 2**-13, "quats": 2**-9, "scales": 2**-6, "opacities": 2**-6, "colors": 2**-8}
+UNITS |= {"normals": 2**-9}  # of models that have them
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +77,7 @@ def pack_steps(scene: Scene, times: Sequence[int]) -> dict[int, str]:
         codes, models = {}, scene.at(time).models
         for name, number in numbers.items():
             gone = differences(first[name], models[name].surfels(keys[name])[0])
-            rows = [(gone[key] / unit)[:, None].flatten(1).T for key, unit in UNITS.items()]
+            rows = [(gone[key] / unit)[:, None].flatten(1).T for key, unit in UNITS.items() if key in gone]
             codes[f"{number}.codes"] = codes_of(torch.cat(rows).round().int())
         packed[time] = b64encode(zlib.compress(save(codes, {"units": json.dumps(UNITS)}), 9)).decode()
     return packed

@@ -55,6 +55,22 @@ def union(*models):
     return Surfels({**p, "palette": torch.zeros(3)}, models[0].shading)
 
 
+def test_light_and_pictures_of_normals_see_normals_of_their_own():
+    model, turned = ball(1), ball(5).parameters["quats"]
+    own = Surfels({**model.parameters, "normals": turned}, model.shading)
+    as_planes = Surfels({**model.parameters, "quats": turned}, model.shading)
+    one, other = (x.shading.colors(x.parameters, CAMERA, SIDE) for x in (own, as_planes))
+    assert torch.equal(one.base, other.base)
+    seen, alone = (x.render(CAMERA, SIDE, outputs=OUTPUTS) for x in (Composition([own, ball(2)]), own))
+    planes, bare = (x.render(CAMERA, SIDE, outputs=OUTPUTS) for x in (Composition([model, ball(2)]), model))
+    assert torch.equal(seen.depth, planes.depth)
+    assert torch.equal(alone.alpha, bare.alpha)
+    assert float((seen.normal - planes.normal).abs().max()) > 0.1
+    assert torch.equal(Composition([own]).render(CAMERA, outputs=OUTPUTS).normal, alone.normal)
+    same = Surfels({**model.parameters, "normals": model.parameters["quats"]}, model.shading)
+    assert_close(same.render(CAMERA, outputs=OUTPUTS).normal, bare.normal, atol=1e-5, rtol=0)
+
+
 @pytest.mark.parametrize("light", [Light("headlight"), SIDE])
 def test_one_model_unedited_is_the_model_bit_for_bit(light):
     model = ball(1)

@@ -122,7 +122,8 @@ def _without_unseen(model: Surfels, seen: Tensor) -> Surfels:
 def _rounded(name: str, values: Tensor) -> np.ndarray:
     """Return values in half precision where that can hold them."""
     half = values.half()
-    if name == "quats" and not torch.equal(half.float(), values):  # those of a compact file stay as they are
+    is_turn = name in ("quats", "normals")
+    if is_turn and not torch.equal(half.float(), values):  # those of a compact file stay as they are
         half = normalize(values, dim=1).half()  # any length is the same rotation, but half has few of them
     exact = name in EXACT or values.shape == (1,) or not bool(half.isfinite().all())
     return (values if exact else half).contiguous().numpy()

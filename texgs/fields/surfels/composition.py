@@ -1,7 +1,7 @@
 """Basic models as one scene: geometry and texels are joined once, edits cost a frame no copy of them."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from math import log, sqrt
 from typing import get_args
@@ -16,7 +16,7 @@ from texgs.fields.field import Look
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.shading import material
+from texgs.fields.surfels.shading import material, seen_normals
 from texgs.fields.surfels.variants import labels_of
 from texgs.raster import Render, Texture, rasterize
 from texgs.raster.shading import MATERIAL
@@ -119,6 +119,7 @@ class Composition:
         geometries = [geometry(model.parameters)[:3] for model in models]
         self.means, self.quats, self.scales = (torch.cat(x) for x in zip(*geometries, strict=True))
         self.texels, self.sizes, self.offsets = joined_textures(models)
+        self.has_normals = any("normals" in model.parameters for model in models)
         self._latest: tuple[list[PartEdit] | None, list[Edited], Tensor] | None = None
 
     def __len__(self) -> int:
@@ -158,15 +159,16 @@ class Composition:
         scales = self.scales
         if look == "discs":
             scales, opacities = NARROW * scales, torch.where(opacities > 0, DISC, 0.0)
-        return rasterize(
-            *(self.means, self.quats, scales, opacities),
-            *(camera.viewmat, camera.K, camera.width, camera.height),
-            texture=Texture(base, gain, self.texels, self.sizes, self.offsets),
-            background=background,
-            depth_range=depth_range,
-            outputs=outputs,
-            options=self.options,
-        )
+        geometry = (self.means, self.quats, scales, opacities)
+        frame = (camera.viewmat, camera.K, camera.width, camera.height)
+        shared = {"depth_range": depth_range, "options": self.options}
+        texture = Texture(base, gain, self.texels, self.sizes, self.offsets)
+        more = {"texture": texture, "background": background, "outputs": outputs}
+        render = rasterize(*geometry, *frame, **more, **shared)
+        if render.normal is None or not self.has_normals:
+            return render
+        normals = torch.cat([seen_normals(part.model.parameters, camera) for part in self.parts])
+        return replace(render, normal=rasterize(*geometry, *frame, features=normals, **shared).color)
 
     def _edited(self, edits: Sequence[PartEdit] | None) -> tuple[list[Edited], Tensor]:
         """Return all models with their edits, and opacities [N]; kept while only the camera moves."""

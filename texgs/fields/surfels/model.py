@@ -1,21 +1,25 @@
 """A basic model: raw parameters of surfels, and what turns them into geometry, material and colour."""
 
-from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Literal
+
+from torch import Tensor
 
 from texgs.core import check
+from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.fields.field import sizes_in_mib
 from texgs.fields.splats import GEOMETRY, Splats
-from texgs.fields.surfels.shading import ShadingModel
+from texgs.fields.surfels.shading import ShadingModel, seen_normals
+from texgs.raster import Render
 from texgs.raster.shading import MATERIAL
 
 SHAPES = {"means": "N 3", "quats": "N 4", "scales": "N 2", "opacities": "N", "sh": "N K 3", "colors": "N 3"}
-SHAPES |= {"palette": "3", "texels": "T 3", "sizes": "N 2", "offsets": "N"}
+SHAPES |= {"normals": "N 4", "palette": "3", "texels": "T 3", "sizes": "N 2", "offsets": "N"}
 TEXTURE = ("palette", "texels", "sizes", "offsets")
 # What the paper counts, and what we store; every tensor of a model is in one group.
-COUNTED = {"geometry": GEOMETRY, "shading": MATERIAL, "texture": ("texels",)}
-STORED = {"geometry": GEOMETRY, "shading": ("sh", "colors", *MATERIAL), "texture": TEXTURE}
+COUNTED = {"geometry": GEOMETRY, "shading": ("normals", *MATERIAL), "texture": ("texels",)}
+STORED = {"geometry": GEOMETRY, "shading": ("sh", "colors", "normals", *MATERIAL), "texture": TEXTURE}
 RELEASED = 100  # bytes of a surfel in the files of the authors' release, beside its texels
 
 
@@ -26,6 +30,8 @@ class Surfels(Splats):
     - geometry: `means` [N, 3] world units, `quats` [N, 4] wxyz of any length, `scales` [N, 2] natural
       logarithm, `opacities` [N] logit;
     - colour: `sh` [N, K, 3] before shading is known, `colors` [N, 3] (c_ind) with shading;
+    - normals of their own, which surfels need not have: `normals` [N, 4], quaternions whose third axis light
+      sees in place of that of `quats`;
     - material: `ambient`, `diffuse`, `specular`, `shininess`, raw, [N] or one for all [1];
     - texture: `palette` [3], `texels` [T, 3], `sizes` [N, 2] int32, `offsets` [N] int64; c_ind is then
       palette + colors + texel.
@@ -53,13 +59,22 @@ class Surfels(Splats):
             if name in given and given[name].shape not in ((n,), (1,)):
                 raise ArgumentError(f"{name}: expected [{n}] or [1], got {list(given[name].shape)}")
 
+    def rasterized(self, camera: Camera, opacity: float | Tensor | None = None, **shown: Any) -> Render:
+        """Rasterize, see `Splats`; normals in the image are those that light sees."""
+        render = super().rasterized(camera, opacity, **shown)
+        if render.normal is None or "normals" not in self.parameters:
+            return render
+        normals, part = seen_normals(self.parameters, camera), shown.get("depth_range")
+        seen = super().rasterized(camera, opacity, features=normals, depth_range=part)
+        return replace(render, normal=seen.color)
+
     def sizes(self) -> dict[str, float]:
         """Return sizes in MiB, see `Field.sizes`.
 
         The paper's breakdown counts 10 floats of geometry per surfel, 4 of material (or 4 in all where
-        surfels share one) and 3 per texel. `stored_` counts the bytes of all tensors: colours and harmonics
-        as shading, palette and layout as texture. `files_mib` are the files of the authors' release: 20
-        floats and 5 numbers of the layout for a surfel, beside its texels.
+        surfels share one) and 3 per texel, and 4 of normals of their own. `stored_` counts the bytes of all
+        tensors: colours and harmonics as shading, palette and layout as texture. `files_mib` are the files of
+        the authors' release: 20 floats and 5 numbers of the layout for a surfel, beside its texels.
         """
         counted, stored = (
             {

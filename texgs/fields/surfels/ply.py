@@ -97,7 +97,7 @@ def read_ply(path: str | Path) -> Surfels:
 def _columns(model: Surfels, flavour: str) -> dict[str, Tensor]:
     """Return [N] values by property, in the order of the flavour."""
     p = model.parameters
-    normals = quats_to_matrices(p["quats"])[..., 2]  # [N, 3]
+    normals = quats_to_matrices(p.get("normals", p["quats"]))[..., 2]  # [N, 3]
     sh = p["sh"] if model.stage == "surfels" else ((_color(p) - 0.5) / Y00)[:, None]  # [N, K, 3]
     if flavour == "release":
         place = dict(zip("xyz", p["means"].T, strict=True))

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.geometry import quats_to_matrices
 from texgs.core.light import Light
 from texgs.fields.surfels.material import RANGES, require_material
 from texgs.raster import Options, Texture
@@ -46,12 +47,20 @@ class ShadingModel:
     ) -> tuple[Tensor, Tensor]:
         """Return base [N, 3] and gain [N] of surfels with parameters `p`; factors are those of `material`.
 
-        A viewer who is not local is far behind the camera.
+        A viewer who is not local is far behind the camera. Normals of their own come before those of surfels.
         """
         viewer = camera.position if self.local_viewer else -FAR * camera.viewmat[2, :3]
         toward = None if light.kind == "headlight" else light.direction(camera).to(camera.viewmat)
         a, d, s, b = factors
-        return blinn_phong(colors, a, d, s, b, p["means"], p["quats"], viewer, toward, facing=self.facing)
+        turns = p.get("normals", p["quats"])
+        return blinn_phong(colors, a, d, s, b, p["means"], turns, viewer, toward, facing=self.facing)
+
+
+def seen_normals(parameters: Mapping[str, Tensor], camera: Camera) -> Tensor:
+    """Return the unit normals [N, 3] that light sees, on the side that faces a camera."""
+    normals = quats_to_matrices(parameters.get("normals", parameters["quats"]))[..., 2]
+    along = (normals * (camera.position - parameters["means"])).sum(dim=1, keepdim=True)
+    return torch.where(along < 0, -normals, normals)
 
 
 def material(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:

@@ -20,6 +20,8 @@ VERSION = 1
 # What differences are whole numbers of, for all that changes in a series. A pixel of a view of 800 x 800 is
 # about 2^-9 world units wide; scales are logarithms, opacities logits.
 UNITS = {"means": 2**-14, "quats": 2**-13, "scales": 2**-10, "opacities": 2**-10, "colors": 2**-13}
+UNITS |= {"normals": 2**-13}  # of models that have them
+TURNS = ("quats", "normals")
 MOST = 2**15 - 1  # units of a difference
 
 
@@ -45,9 +47,10 @@ def differences(key: Surfels, model: Surfels) -> dict[str, Tensor]:
     own, other = _comparable(key), _comparable(model)
     check.shape("means", other["means"], "N 3", N=len(key))
     check.finite(**other)
-    flip = (own["quats"] * other["quats"]).sum(dim=1, keepdim=True) < 0
-    other["quats"] = torch.where(flip, -other["quats"], other["quats"])  # the same rotation
-    return {name: other[name] - own[name] for name in UNITS}
+    for name in (name for name in TURNS if name in own):
+        flip = (own[name] * other[name]).sum(dim=1, keepdim=True) < 0
+        other[name] = torch.where(flip, -other[name], other[name])  # the same rotation
+    return {name: other[name] - own[name] for name in own}
 
 
 def at_step(key: Surfels, path: str | Path) -> Surfels:
@@ -67,7 +70,7 @@ def at_step(key: Surfels, path: str | Path) -> Surfels:
                 raise ArgumentError(
                     f"expected a step of this model of {len(key)} surfels, got {found}; make the series again"
                 )
-    moved = {name: own[name] + UNITS[name] * steps[name].to(own[name]) for name in UNITS}
+    moved = {name: own[name] + UNITS[name] * steps[name].to(own[name]) for name in own}
     return replace(key, parameters={**key.parameters, **moved})
 
 
@@ -80,5 +83,5 @@ def _comparable(model: Surfels) -> dict[str, Tensor]:
     """Return what changes in a series, with quaternions of length 1."""
     if "colors" not in model.parameters:
         raise ArgumentError(f"model: expected stage shading or texture, got {model.stage}; fit it further")
-    own = {name: model.parameters[name] for name in UNITS}
-    return {**own, "quats": normalize(own["quats"], dim=1)}
+    own = {name: model.parameters[name] for name in UNITS if name in model.parameters}
+    return {name: normalize(x, dim=1) if name in TURNS else x for name, x in own.items()}

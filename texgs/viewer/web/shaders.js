@@ -161,7 +161,8 @@ void main() {
   vec3 color = texelFetch(surfels, ivec3(at, COLORS), 0).xyz + part.xyz;
   vec4 flags = texelFetch(parts, ivec2(2, lookup.w), 0);
   vec3 tint = texelFetch(parts, ivec2(3, lookup.w), 0).rgb;
-  vec4 shaded = colour_of(color, material, tint, place.xyz, world.n, flags);
+  vec3 n = axes(normalize(texelFetch(surfels, ivec3(at, NORMALS), 0))).n;
+  vec4 shaded = colour_of(color, material, tint, place.xyz, n, flags);
   base = vec4(shaded.xyz, log2(opacity));
   gain = shaded.w * texel_step;
   texture_place = lookup.xyz;

@@ -12,7 +12,7 @@ export class Steps {
    */
   constructor(tensors, texts, held) {
     this.#first = new Map([...tensors].filter(([name]) => !name.endsWith(".codes"))); // texels stay
-    for (const [name, { data }] of this.#first) if (name.endsWith(".quats")) normalize(data);
+    for (const [name, { data }] of this.#first) if (/\.(quats|normals)$/.test(name)) normalize(data);
     this.#texts = new Map(held.map((time, index) => [time, texts[index]]));
   }
 
@@ -23,7 +23,9 @@ export class Steps {
     for (const [name, codes] of tensors) {
       const [number] = name.split("."), rows = wholeNumbers(codes);
       for (const [key, unit] of units) {
-        const { shape, data } = this.#first.get(`${number}.${key}`), columns = shape[1] ?? 1;
+        const first = this.#first.get(`${number}.${key}`);
+        if (!first) continue; // not every model has normals of its own
+        const { shape, data } = first, columns = shape[1] ?? 1;
         const sums = Float32Array.from(data);
         rows.splice(0, columns).forEach((row, k) => row.forEach((x, i) => { sums[columns * i + k] += unit * x; }));
         moved.set(`${number}.${key}`, { shape, data: sums });

@@ -3,7 +3,7 @@
 import { wholeNumbers } from "./tensors.js";
 
 export const WIDTH = 2048; // texels in a row of every texture; WebGL2 always has so many
-export const PLACED = ["place", "quats", "scales", "colors"]; // layers of 4 floats that change in time; place: mean and opacity
+export const PLACED = ["place", "quats", "scales", "colors", "normals"]; // layers of 4 floats that change in time; place: mean and opacity
 export const LAYERS = [...PLACED, "material"];
 const SHININESS = [1, 100]; // range of the bounded exponent
 
@@ -41,13 +41,14 @@ export function placeSurfels(surfels, tensors, models) {
   const layer = surfels.length / LAYERS.length;
   let first = 0;
   for (let number = 0; number < models; number++) {
-    const of = (name) => tensors.get(`${number}.${name}`).data, count = of("opacities").length;
-    const [place, quats, scales, colors] = PLACED.map((_, k) => surfels.subarray(k * layer + 4 * first));
+    const of = (name) => tensors.get(`${number}.${name}`)?.data, count = of("opacities").length;
+    const [place, quats, scales, colors, normals] = PLACED.map((_, k) => surfels.subarray(k * layer + 4 * first));
     fill(place, of("means"), count, 3);
     of("opacities").forEach((opacity, i) => { place[4 * i + 3] = sigmoid(opacity); });
     fill(quats, of("quats"), count, 4);
     fill(scales, of("scales").map(Math.exp), count, 2);
     fill(colors, of("colors"), count, 3);
+    fill(normals, of("normals") ?? of("quats"), count, 4);
     first += count;
   }
 }

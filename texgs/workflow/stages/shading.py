@@ -19,6 +19,7 @@ class ShadingRecipe(Recipe):
 
     material_range: str = read("fit.material_range")
     materials: str = read("fit.materials")
+    normals: str = read("fit.normals")
     first_material: Material = read("fit.first_material")
     changed: bool = read(lambda config: is_changed(config.fit, LATER))
 
@@ -45,6 +46,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     before = read_model(inputs["model"]).to(job.device)
     start = {name: x for name, x in before.parameters.items() if name not in HARMONICS}
     start["colors"] = base_color(before.parameters["sh"])
+    if fit.normals == "own" and phase.turns_normals:
+        start["normals"] = start["quats"].clone()
     first = raw_material(**asdict(fit.first_material), kind=fit.material_range)
     rows = 1 if fit.materials == "shared" else len(before)
     start |= {name: value.to(job.device).repeat(rows) for name, value in first.items()}

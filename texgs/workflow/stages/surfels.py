@@ -9,7 +9,8 @@ from texgs.workflow.stage import Config, Outcome, Stage, read
 from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
 from texgs.workflow.stages.settings import Recipe
 
-LATER = ("materials", "first_material", "shading", "texture")  # keys of a recipe that later stages read
+# Keys of a recipe that later stages read.
+LATER = ("normals", "materials", "first_material", "shading", "texture")
 
 
 @dataclass(kw_only=True)
