@@ -56,7 +56,7 @@ class ViewKeys:
         above=0,
     )
     lights: list[LightKeys] = key(
-        [LightKeys(), LightKeys("random"), LightKeys("random")],
+        [LightKeys(), *[LightKeys("random")] * 17],  # light from the side is the hardest to fit
         "training view i is lit by light i modulo their number; a random one is from another direction in "
         "each view, and a headlight where the field that is fitted cannot be relit",
     )
