@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import accumulate
 from math import log, sqrt
 from typing import get_args
@@ -159,16 +160,19 @@ class Composition:
         scales = self.scales
         if look == "discs":
             scales, opacities = NARROW * scales, torch.where(opacities > 0, DISC, 0.0)
-        geometry = (self.means, self.quats, scales, opacities)
-        frame = (camera.viewmat, camera.K, camera.width, camera.height)
-        shared = {"depth_range": depth_range, "options": self.options}
+        draw = partial(
+            rasterize,
+            *(self.means, self.quats, scales, opacities),
+            *(camera.viewmat, camera.K, camera.width, camera.height),
+            depth_range=depth_range,
+            options=self.options,
+        )
         texture = Texture(base, gain, self.texels, self.sizes, self.offsets)
-        more = {"texture": texture, "background": background, "outputs": outputs}
-        render = rasterize(*geometry, *frame, **more, **shared)
+        render = draw(texture=texture, background=background, outputs=outputs)
         if render.normal is None or not self.has_normals:
             return render
         normals = torch.cat([seen_normals(part.model.parameters, camera) for part in self.parts])
-        return replace(render, normal=rasterize(*geometry, *frame, features=normals, **shared).color)
+        return replace(render, normal=draw(features=normals).color)
 
     def _edited(self, edits: Sequence[PartEdit] | None) -> tuple[list[Edited], Tensor]:
         """Return all models with their edits, and opacities [N]; kept while only the camera moves."""
