@@ -23,31 +23,28 @@ export class Faces {
     this.#volume = volume;
     this.#shaders = makeProgram(gl, PRESENT_VERTEX, GROW_FRAGMENT);
     this.#seen = new Target(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT]);
-    this.#weights = [0, 1].map(() => new Target(gl, [gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE], gl.LINEAR));
+    this.#weights = new Target(gl, [gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE], gl.LINEAR);
   }
 
   /** A texture of weights in [0, 1], with a quarter of the pixels of a view each way. */
   weights(view, scene, look) {
     const size = view.size.map((side) => Math.ceil(side / COARSE));
     const focal = view.focal.map((x) => x / COARSE);
-    const pixels = Math.ceil(RIM * Math.min(...size)), [one, other] = this.#weights;
     this.#volume.cast(this.#seen, { ...view, size, focal }, scene, look,
       { step: 1, reach: UNITS * this.#volume.unit });
-    this.#grow(this.#seen, one, { channel: ALPHA, pixels, axis: [0, 1], gain: 1 / OPAQUE });
-    this.#grow(one, other, { channel: 0, pixels, axis: [1, 0], gain: 1 });
-    return other.picture;
+    this.#grow(Math.ceil(RIM * Math.min(...size)));
+    return this.#weights.picture;
   }
 
-  #grow(from, to, { channel, pixels, axis, gain }) {
+  #grow(pixels) {
     const gl = this.#gl, { program, uniforms } = this.#shaders;
-    to.begin(from.size);
+    this.#weights.begin(this.#seen.size);
     gl.useProgram(program);
-    bind(gl, 0, from.picture, uniforms.picture);
-    gl.uniform1i(uniforms.channel, channel);
+    bind(gl, 0, this.#seen.picture, uniforms.picture);
+    gl.uniform1i(uniforms.channel, ALPHA);
     gl.uniform1i(uniforms.pixels, pixels);
-    gl.uniform2iv(uniforms.axis, axis);
-    gl.uniform1f(uniforms.gain, gain);
+    gl.uniform1f(uniforms.gain, 1 / OPAQUE);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
-    to.end();
+    this.#weights.end();
   }
 }

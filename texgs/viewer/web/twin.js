@@ -5,7 +5,7 @@ import { Target } from "./target.js";
 import { VolumePass } from "./volume_pass.js";
 
 export const OF_TWIN = ["volume", "difference", "wipe"]; // modes
-const SLAB = 30; // units of length behind a face, which hide most of what is beyond
+const SLAB = 36; // units of length behind a face, as in texgs/scene/cut_view.py
 const STILL = 0.5, MOVING = 1; // voxels between samples
 
 /** Whether a volume can show all edits of models but looks, as `Scene.is_as_volume` has it. */

@@ -122,23 +122,22 @@ void main() {
 }
 `;
 
-// The largest value of a row or a column around a pixel; of values farther than `pixels` a share counts, falling to 0.
+// The largest value around a pixel; of values farther than `pixels`, rows or columns, a share counts, falling to 0.
 export const GROW_FRAGMENT = `#version 300 es
 precision highp float;
 precision highp sampler2D;
 uniform sampler2D picture;
 uniform int channel, pixels;
-uniform ivec2 axis;
 uniform float gain;
 out vec4 shown;
 void main() {
-  ivec2 middle = ivec2(gl_FragCoord.xy), size = textureSize(picture, 0);
+  ivec2 middle = ivec2(gl_FragCoord.xy), far = ivec2(2 * pixels);
+  ivec2 first = max(middle - far, 0), last = min(middle + far, textureSize(picture, 0) - 1);
   float high = 0.0;
-  for (int i = -2 * pixels; i <= 2 * pixels; i++) {
-    ivec2 at = middle + i * axis;
-    if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
-    float value = min(gain * texelFetch(picture, at, 0)[channel], 1.0);
-    high = max(high, value * min(float(2 * pixels + 1 - abs(i)) / float(pixels + 1), 1.0));
+  for (int y = first.y; y <= last.y; y++) for (int x = first.x; x <= last.x; x++) {
+    float value = min(gain * texelFetch(picture, ivec2(x, y), 0)[channel], 1.0);
+    int away = max(abs(x - middle.x), abs(y - middle.y));
+    high = max(high, value * min(float(2 * pixels + 1 - away) / float(pixels + 1), 1.0));
   }
   shown = vec4(high);
 }
