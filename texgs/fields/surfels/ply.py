@@ -47,9 +47,9 @@ BESIDE = "the release writes it beside the surfels"
 def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
     """Create or replace a binary PLY file in one step.
 
-    All flavours hold means, unit normals (which 2DGS leaves at zero), opacities, scales and quaternions raw,
-    as the model does, and colours as harmonics, `f_rest` one channel after the other. With shading the only
-    harmonic is that of the colour without light, (c_ind - 0.5) / Y00. Textures are lost: what is left of
+    All flavours hold means, unit normals that light sees (2DGS leaves them at zero), opacities, scales and
+    quaternions raw, as the model does, and colours as harmonics, `f_rest` one channel after the other. With
+    shading the only harmonic is that of the colour without light, (c_ind - 0.5) / Y00. Textures are lost: what is left of
     palette, offset and texture is their mean over each surfel. Low-pass filter and metadata are lost too.
 
     - "2dgs": `scale_0` and `scale_1`; without material.
