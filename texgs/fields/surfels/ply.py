@@ -49,8 +49,9 @@ def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
 
     All flavours hold means, unit normals that light sees (2DGS leaves them at zero), opacities, scales and
     quaternions raw, as the model does, and colours as harmonics, `f_rest` one channel after the other. With
-    shading the only harmonic is that of the colour without light, (c_ind - 0.5) / Y00. Textures are lost: what is left of
-    palette, offset and texture is their mean over each surfel. Low-pass filter and metadata are lost too.
+    shading the only harmonic is that of the colour without light, (c_ind - 0.5) / Y00. Textures are lost:
+    what is left of palette, offset and texture is their mean over each surfel. Low-pass filter and metadata
+    are lost too.
 
     - "2dgs": `scale_0` and `scale_1`; without material.
     - "3dgs": also `scale_2` = log(1e-6), for viewers of 3D Gaussians.
