@@ -144,6 +144,17 @@ def test_an_axis_that_is_none_is_refused():
         texgs.Volume(field(3, 3, 3), up="z")
 
 
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [("big scan.v2.npy", "big_scan"), ("2024.npy", "data"), ("volume.npy", "data"), ("öl.npy", "data")],
+)
+def test_a_volume_has_the_name_of_its_file_where_a_data_set_can_have_it(tmp_path, file, name):
+    np.save(tmp_path / file, field(3, 4, 5))
+    assert texgs.Volume(tmp_path / file).name == name
+    assert texgs.Volume(str(tmp_path / file), name="mine").name == "mine"
+    assert texgs.Volume(field(3, 4, 5)).name == "data"
+
+
 def test_files_are_opened_and_turned_upright(tmp_path):
     values = field(4, 5, 6)
     first = texgs.Volume(values, folder=tmp_path)
@@ -282,7 +293,7 @@ def test_what_a_file_leaves_open_is_told(tmp_path):
     image = pyvista.ImageData(dimensions=(5, 6, 7))
     image.point_data["p"], image.point_data["q"] = field(7, 6, 5).ravel(), 2 * field(7, 6, 5).ravel()
     image.save(tmp_path / "two.vti")
-    with pytest.warns(UserWarning, match=r"^data: array .; variable chooses another \(.\)$"):
+    with pytest.warns(UserWarning, match=r"^two: array .; variable chooses another \(.\)$"):
         texgs.Volume(tmp_path / "two.vti")
     volume = texgs.Volume(tmp_path / "two.vti", variable="q")
     assert np.array_equal(volume.grid.values, 2 * field(7, 6, 5))

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 from texgs.api.arrays import grid_of, three
 from texgs.api.display import as_python, camera_of, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
-from texgs.core.errors import ArgumentError
+from texgs.config.project import check_name, name_of
+from texgs.core.errors import ArgumentError, ConfigError
 from texgs.fields.part_edit import color
 from texgs.scene.frame import quantized
 from texgs.scene.scene import WHITE
@@ -56,7 +57,7 @@ class Volume:
         reduce: one sample for every block of reduce^3.
         method: "mean" of a block, or "sample", its middle, for labels.
         nan_value: takes the place of samples that are not finite, which are refused without it.
-        name: of the volume, in titles.
+        name: of the volume, in titles; default that of the file, or "data".
         folder: for the file, of this volume alone; default one that is gone with the object.
         **keys: what only some formats take, such as `dims` and `dtype` of raw samples, see
             `texgs.volume.sources.open_source`.
@@ -77,11 +78,11 @@ class Volume:
         reduce: int = 1,
         method: str = "mean",
         nan_value: float | None = None,
-        name: str = "data",
+        name: str | None = None,
         folder: str | Path | None = None,
         **keys: Any,
     ) -> None:
-        self.name = name
+        self.name = name = default_name(data) if name is None else name
         self._scratch = TemporaryDirectory(prefix="texgs-") if folder is None else None
         self.folder = Path(folder if folder is not None else self._scratch.name)  # type: ignore[union-attr]
         if isinstance(data, str | Path):
@@ -192,3 +193,13 @@ class Volume:
         cells = "".join(f"<tr><th>{key}</th><td>{escape(value)}</td></tr>" for key, value in rows.items())
         picture = inline(self.render(width=SMALL), self.name)
         return f"<b>{escape(self.name)}</b><div>{picture}<table>{cells}</table></div>"
+
+
+def default_name(data: Any) -> str:
+    """Return the name of a file or folder, as a data set can have it; "data" where it has none."""
+    name = name_of(Path(data)) if isinstance(data, str | Path) else ""
+    try:
+        check_name("name", name)
+    except ConfigError:
+        return "data"
+    return name

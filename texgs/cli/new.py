@@ -9,10 +9,10 @@ from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.cli.new_tfs import NO_NAME, with_tfs
+from texgs.cli.new_tfs import with_tfs
 from texgs.config.compose import compose
 from texgs.config.dataset_text import as_yaml, plain_tf, require_read
-from texgs.config.project import check_name
+from texgs.config.project import NO_NAME, check_name, name_of
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import is_there, write_bytes
 from texgs.core.memory import room_for_volume
@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise ArgumentError(f"--count: expected at least 1, got {arguments.count}")
     for path in arguments.tf or ():
         read_tf(path)  # a mistake in it is told before the volume is read
-    name = arguments.name or NO_NAME.sub("_", arguments.file.name.split(".")[0])
+    name = arguments.name or name_of(arguments.file)
     overrides = [word.removeprefix("dataset.volume.") for word in arguments.overrides]
     if "up" not in changed(overrides) and tells_superior(arguments.file):
         overrides.append("up=+z")

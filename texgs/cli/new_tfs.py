@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.project import check_name
+from texgs.config.project import NO_NAME, check_name
 from texgs.core.errors import ArgumentError, ConfigError, TexgsError
 
 if TYPE_CHECKING:
@@ -18,8 +17,6 @@ if TYPE_CHECKING:
     from texgs.config.schema import Config
     from texgs.volume.axes import Channel
     from texgs.volume.transfer import TransferFunction
-
-NO_NAME = re.compile(r"[^A-Za-z0-9_]+")  # what a name of a data set or of a TF cannot have
 
 
 def with_tfs(config: Config, channels: dict[str, Channel | None], arguments: argparse.Namespace) -> Dataset:

@@ -19,6 +19,7 @@ PROFILES = ROOT / "workflow" / "profiles"
 # Folders below `results`.
 RESERVED = ("volume", "transfer", "gallery", "logs", "mlartifacts", "tables", "scene", "study")
 LONGEST = 100  # characters of a name: it becomes that of files and folders
+NO_NAME = re.compile(r"[^A-Za-z0-9_]+")  # what a name of a data set or of a TF cannot have
 NO_TEXT = re.compile("null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNORECASE)  # to YAML or Hydra
 
 
@@ -48,6 +49,11 @@ def groups() -> str:
 def shown(path: Path) -> str:
     """Return a path as the user would write it."""
     return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+
+
+def name_of(file: Path) -> str:
+    """Return the name that a file gives to its data set; `check_name` may refuse it."""
+    return NO_NAME.sub("_", file.name.split(".")[0])
 
 
 def check_name(key: str, name: str) -> None:
