@@ -327,7 +327,12 @@ def test_words_are_one_step_or_none(scene):
     [
         ("a.html", {"size": 1}, "options of html: no such key 'size'; expected steps, volume"),
         ("a.html", {"volume": 1.0}, "volume: expected the volume that the scene was made from, got none"),
-        ("a.ply", {"voxels": 1}, "options of 3dgs: no such key 'voxels', did you mean voxel?"),
+        (
+            "a.ply",
+            {"kind": "mesh", "voxels": 1},
+            "options of mesh: no such key 'voxels', did you mean voxel?",
+        ),
+        ("a.glb", {"voxel": 0.1}, "options of gltf: no such key 'voxel'; expected device"),
     ],
 )
 def test_options_of_exports_are_checked(scene, tmp_path, file, options, message):

@@ -202,6 +202,12 @@ def test_a_grid_makes_no_cloud(scene, tmp_path, capsys):
         (["--to", "x.texgs", "--kind", "mesh"], "--to: expected a file that ends in .ply, got x.texgs"),
         (["--to", "x.texgs"], "--kind compact: expected a model file, got"),
         (["--to", "x.ply", "--kind", "release"], "--kind release: expected a model file, got"),
+        (["--to", "x.glb", "--voxel", "0.1"], "--voxel: expected --kind mesh, got gltf; leave it out"),
+        (["--to", "x.html", "--views", "12"], "--views: expected --kind mesh or compact, got html; leave it"),
+        (
+            ["--to", "x.ply", "--drop-unseen"],
+            "--drop-unseen: expected --kind compact, got 3dgs; leave it out",
+        ),
     ],
 )
 def test_a_mistake_writes_nothing(scene, tmp_path, monkeypatch, capsys, words, message):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -146,7 +146,7 @@ class Scene(Editing):
             ArgumentError: if the ending is unknown or another kind's, an option is, or the scene cannot be
                 written so.
         """
-        from texgs.scene.export import OF_MODELS, Export, export_scene
+        from texgs.scene.export import OF_MODELS, Export, export_scene, taken
         from texgs.viewer.page_volume import page_volume
         from texgs.viewer.standalone import write_page
 
@@ -159,7 +159,7 @@ class Scene(Editing):
             endings = dict.fromkeys(ending for each in able.values() for ending in each)
             expected = " or ".join(able.get(chosen, endings))
             raise ArgumentError(f"path: expected a file that ends in {expected}, got {path}")
-        takes = ["steps", "volume"] if chosen == "html" else [each.name for each in fields(Export)[1:]]
+        takes = ["steps", "volume"] if chosen == "html" else taken(chosen)
         known(options, takes, f"options of {chosen}")
         if chosen == "html":
             size = options.pop("volume", None)

@@ -68,9 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.scene.scene_file import read_scene
 
     kind = kind_of(arguments)
-    for name in ("volume", "steps"):
-        if getattr(arguments, name) is not None and kind != "html":
-            raise ArgumentError(f"--{name}: expected --to a page, .html, got {arguments.to}; leave it out")
+    require_taken(arguments, kind)
     scene = read_scene(arguments.source) if arguments.source.suffix in SCENES else None
     if kind == "html":
         print(of_page(arguments, scene))
@@ -119,6 +117,21 @@ def kind_of(arguments: argparse.Namespace) -> str:
             "by --model"
         )
     return kind
+
+
+def require_taken(arguments: argparse.Namespace, kind: str) -> None:
+    """Require options that count for what is exported."""
+    from texgs.scene.export import TAKES, Export, taken
+
+    for name in ("volume", "steps"):
+        if getattr(arguments, name) is not None and kind != "html":
+            raise ArgumentError(f"--{name}: expected --to a page, .html, got {arguments.to}; leave it out")
+    for name in NUMBERS:
+        if name not in taken(kind) and getattr(arguments, name) != getattr(Export, name):
+            able = " or ".join(each for each in TAKES if name in TAKES[each])
+            raise ArgumentError(
+                f"--{name.replace('_', '-')}: expected --kind {able}, got {kind}; leave it out"
+            )
 
 
 def as_scene(arguments: argparse.Namespace, scene: Scene | None) -> Scene:

@@ -38,6 +38,12 @@ from texgs.volume.cameras import icosphere_of
 OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
 OF_CLOUDS = {"usd": write_usd, "gltf": write_gltf, "spz": write_spz}  # of scenes, with their light
 
+TAKES = {
+    "points": ("opacity",),
+    "mesh": ("voxel", "views", "size"),
+    "compact": ("views", "size", "drop_unseen"),
+}
+
 
 @dataclass(frozen=True)
 class Export:
@@ -65,6 +71,11 @@ def require_export(field: Kind, kind: str) -> None:
             f"--kind {kind}: expected {able}, got {field.name}, which can be exported as "
             f"{' or '.join(field.exports) or 'nothing'}"
         )
+
+
+def taken(kind: str) -> list[str]:
+    """Return the options of `Export` that count for a kind."""
+    return [*TAKES.get(kind, ()), "device"]
 
 
 def require_other(path: Path, scene: Scene) -> None:
