@@ -110,6 +110,10 @@ def test_slips_are_sentences(scene, tmp_path):
         scene.light = 30, 400
     with pytest.raises(DeviceError, match="device: expected cpu or cuda, got gpu"):
         texgs.open(scene.session.save(tmp_path / "s.yaml"), device="gpu")
+    with pytest.raises(ArgumentError, match=r"views: expected at least 2 cameras on a path .*, got 0"):
+        scene.psnr(views=0)
+    with pytest.raises(ArgumentError, match=r"frames: expected at least 2 cameras on a path .*, got 1"):
+        scene.film("x.mp4", "test", frames=1)
     with pytest.raises(ArgumentError, match="what: expected one of view, test"):
         scene.film("x.mp4", "spin")
     with pytest.raises(ArgumentError, match=r"nowhere.yaml: no such file"):

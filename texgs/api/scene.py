@@ -121,7 +121,7 @@ class Scene(Editing):
 
         scene = replace(self.session.scene, cuts=NO_CUTS)
         lens = scene.framed(self.session.composition).lens(width=width, height=width)
-        pairs = (self.session.beside(camera, scene) for camera in spiral(views, lens))
+        pairs = (self.session.beside(camera, scene) for camera in spiral(views, lens, "views"))
         return fmean(compare(*pair)["psnr"] for pair in pairs)
 
     # ---- Files --------------------------------------------------------------

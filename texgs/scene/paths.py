@@ -50,7 +50,7 @@ def shots_of(
     from texgs.volume.cameras import orbit_path, spiral
 
     if path == "test":
-        return ((camera, scene) for camera in spiral(count, lens))
+        return ((camera, scene) for camera in spiral(count, lens, "frames"))
     if path == "orbit":
         return ((camera, scene) for camera in orbit_path(count, polar, lens, start=azimuth))
     camera = orbit(azimuth, polar, *lens)

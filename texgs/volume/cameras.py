@@ -34,14 +34,14 @@ def icosphere_of(count: int, lens: Lens, where: str = "views") -> list[Camera]:
     return icosphere(frequency_of(count, where), lens)
 
 
-def spiral(count: int, lens: Lens) -> list[Camera]:
+def spiral(count: int, lens: Lens, where: str = "count") -> list[Camera]:
     """Return cameras on a spiral from below to above that turns once, looking inwards: the test views.
 
     View i is at azimuth -180 + 360 i / (count - 1) and polar angle -90 + 180 i / (count - 1) degrees, with
     polar angles kept 0.01 degrees off the poles. The paper has 181 of them.
     """
     if count < 2:
-        raise ArgumentError(f"count: expected at least 2 cameras on a path from pole to pole, got {count}")
+        raise ArgumentError(f"{where}: expected at least 2 cameras on a path from pole to pole, got {count}")
     steps = [index / (count - 1) for index in range(count)]
     return [_orbit(-180 + 360 * t, -90 + 180 * t, lens) for t in steps]
 
