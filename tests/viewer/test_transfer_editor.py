@@ -1,6 +1,7 @@
 """Transfer functions are edited over the histogram in a real browser: the volume shows them at once."""
 
 import re
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from tests.viewer.in_browser import (
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
+from texgs.viewer.standalone import web_file
 
 
 @pytest.fixture
@@ -53,6 +55,19 @@ def test_what_is_dragged_is_the_volume_that_texgs_renders(chromium, sphere_file)
         page.get_by_role("button", name="Undo").click()
         page.get_by_label("Show", exact=True).select_option("Shaded")
         assert still(page) == before
+
+
+def test_a_function_that_moves_as_a_whole_stays_one_of_its_channel(chromium):
+    page = chromium.new_page()
+    tf = {"opacity": [[0.2, 0.0], [0.4, 0.5]], "color": [[0.3, 1.0, 0.0, 0.0]], "channel": 2}
+    module = "data:text/javascript," + quote(web_file("functions.js"))
+    moved = page.evaluate(f"tf => import('{module}').then((m) => m.shifted(tf, 0.5, [0, 1]))", tf)
+    page.close()
+    assert moved == {
+        "opacity": [[0.7, 0.0], [0.9, 0.5]],
+        "color": [[0.8, 1.0, 0.0, 0.0]],
+        "channel": 2,
+    }
 
 
 def test_functions_stand_in_the_link(chromium, sphere_file):

@@ -41,7 +41,7 @@ export function shifted(tf, by, [low, high]) {
   const values = tf.opacity.map(([value]) => value);
   const step = clamp(by, Math.min(0, low - values[0]), Math.max(0, high - values.at(-1)));
   const shift = (points) => points.map(([value, ...channels]) => [value + step, ...channels]);
-  return { opacity: shift(tf.opacity), color: shift(tf.color) };
+  return { ...tf, opacity: shift(tf.opacity), color: shift(tf.color) };
 }
 
 /** A peak in the middle of a range. */
