@@ -40,6 +40,7 @@ from texgs.volume.render import Appearance
 from texgs.volume.slabs import ArraySource
 from texgs.volume.sources import open_source
 from texgs.volume.summaries import read_summaries
+from texgs.workflow.moments import in_time
 from texgs.workflow.series import make_series, settings_of
 
 CPU = torch.device("cpu")
@@ -254,6 +255,12 @@ def test_no_file_of_a_pattern_is_told(folder, capsys):
     assert "--files: expected files that are there, got none_*.nrrd" in capsys.readouterr().err
     assert main(["render", "scene.yaml", "--path", "time", "--output", "f.mp4"]) == 2
     assert "expected a scene of a series, got one without" in capsys.readouterr().err
+
+
+def test_steps_that_share_only_the_root_keep_its_slash():
+    apart, beside = [Path("/a/s1.nrrd"), Path("/b/s2.nrrd")], [Path("/a/b/s1.nrrd"), Path("/a/c/s2.nrrd")]
+    assert [moment.name for moment in in_time(apart)] == ["/a/s1.nrrd", "/b/s2.nrrd"]
+    assert [moment.name for moment in in_time(beside)] == ["b/s1.nrrd", "c/s2.nrrd"]
 
 
 def test_python_moves_through_time_and_saves_all_steps(folder):

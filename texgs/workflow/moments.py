@@ -43,10 +43,10 @@ def in_time(files: Sequence[Path]) -> list[Moment]:
         got = ", ".join(map(str, files)) or "none"
         raise ArgumentError(f"expected two files at least, got {got}; 'step_*.nrrd' names several")
     paths = [file.absolute() for file in files]
-    base = commonpath([path.parent for path in paths])
-    moments = [
-        Moment(path.relative_to(base).as_posix(), file) for path, file in zip(paths, files, strict=True)
-    ]
+    base = Path(commonpath([path.parent for path in paths]))
+    is_root = base == Path(base.anchor)  # a name without its slash would be that of another file
+    names = [(path if is_root else path.relative_to(base)).as_posix() for path in paths]
+    moments = [Moment(name, file) for name, file in zip(names, files, strict=True)]
     if None in map(number_of, moments):
         return moments
     moments.sort(key=lambda moment: natural_order(Path(moment.name)))
