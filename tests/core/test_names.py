@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from texgs.core.errors import ArgumentError
-from texgs.core.names import close, file_name, label, named_file, part_file
+from texgs.core.names import close, file_name, label, named_file, part_file, part_files
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", ".hidden", "a/b", "a\\b", "/etc", "a\0b", "a\nb", "é" * 126])
@@ -20,6 +20,12 @@ def test_a_part_has_one_file_in_its_folder(names, file):
     assert part_file("where", *names) == file
     with pytest.raises(ArgumentError, match="dot at its start"):
         part_file("where", "../../x", "y")
+
+
+def test_parts_whose_names_give_one_file_have_two():
+    parts = ["TF01-x", "TF01/x", "TF01-x/2", "TF02"]
+    files = ["TF01-x.safetensors", "TF01-x-2.safetensors", "TF01-x-2-2.safetensors", "TF02.safetensors"]
+    assert part_files("where", parts) == dict(zip(parts, files, strict=True))
 
 
 @pytest.mark.parametrize("name", ["", " ", "a\x1b[2J", "\u202eb", "x" * 101])

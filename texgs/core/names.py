@@ -65,6 +65,15 @@ def part_file(where: str, *names: str) -> str:
     return file_name(where, f"{'-'.join(names)}.safetensors".replace("/", "-"))
 
 
+def part_files(where: str, parts: Iterable[str]) -> dict[str, str]:
+    """Return the file of each part, with a number where another part has one of that name."""
+    files: dict[str, str] = {}
+    for part in parts:
+        names = (part_file(where, part, *([str(n)] if n > 1 else [])) for n in count(1))
+        files[part] = next(name for name in names if name not in files.values())
+    return files
+
+
 def new_part_file(where: str, folder: Path, *names: str) -> Path:
     """Return the file of a part, with a number where there is one already: saved scenes may name that."""
     files = (folder / part_file(where, *names, *([str(n)] if n > 1 else [])) for n in count(1))

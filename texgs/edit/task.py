@@ -12,7 +12,7 @@ from torch import Tensor
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.lens import Lens
-from texgs.core.names import part_file
+from texgs.core.names import part_files
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import Method, method_of
 from texgs.fields.field import Field
@@ -134,8 +134,8 @@ class Task(Generic[Settings]):
         training views, to the edited model; `values` of the part's `PartEdit` may follow from this model.
         """
         scene = self.scene
-        for part in parts_of(scene, self.edit.parts):
-            file = self.output / part_file("edit.parts", part)
+        for part, name in part_files("edit.parts", parts_of(scene, self.edit.parts)).items():
+            file = self.output / name
             model, surfels = surfels_of(scene, part)
             surfels = None if surfels is None else surfels.to(self.device)
             edited = one(part, model.to(self.device), surfels, self.training_views(split(scene, part)[0]))
@@ -146,8 +146,8 @@ class Task(Generic[Settings]):
     def each_model(self, one: Callable[[str, Field, Sequence[View]], Field]) -> Scene:
         """Edit whole models of any kind one after the other, each alone, and return the scene with them."""
         scene = self.scene
-        for name in parts_of(scene, self.edit.parts):
-            entry, file = scene.models[split(scene, name)[0]], self.output / part_file("edit.parts", name)
+        for name, file_name in part_files("edit.parts", parts_of(scene, self.edit.parts)).items():
+            entry, file = scene.models[split(scene, name)[0]], self.output / file_name
             edited = one(name, entry.open()[0].to(self.device), self.training_views(name))
             scene = replaced(scene, name, replace(entry, file=kinds()[edited.kind].write(file, edited)))
         return scene
