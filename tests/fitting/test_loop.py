@@ -126,13 +126,13 @@ def test_images_of_one_colour_give_a_finite_model(color, alpha, losses):
         assert quality(model_of(fit), images) > 25
 
 
-def test_a_model_without_surfels_goes_on_and_stays_empty():
+def test_a_fit_that_has_lost_all_of_its_surfels_stops_and_says_so():
     images = flat_images([1.0, 1.0, 1.0], 0.0)
     start = ball_seeds(opacity=0.006)
     densify = Densify(start=0, stop=40, every=10, threshold=10.0, prune_opacity=0.5)
-    fit = run(new_fit(images=images, parameters=start, iterations=60, densify=densify))
-    assert len(fit.parameters["means"]) == 0
-    assert is_finite(fit.state())
+    message = r"iteration 10: .* all of it has been pruned; .* or lower densify\.prune_opacity$"
+    with pytest.raises(FitError, match=message):
+        run(new_fit(images=images, parameters=start, iterations=60, densify=densify))
 
 
 def seeded(images, view_set, count):

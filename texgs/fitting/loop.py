@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.errors import FitError
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.splats import Shading, join, visible_part
 from texgs.fitting.checkpoint import ResumableFit
@@ -67,6 +68,11 @@ class Fit(ResumableFit):
             self.control.observe(shift.grad, *self.images.size)
         self.optimizer.step(self.iteration / self.iterations)
         self.control.step(self.iteration, self.optimizer, self.generator(2 * self.iteration + 1))
+        if not len(self.parameters["means"]):
+            raise FitError(
+                f"iteration {self.iteration}: expected something that shows in the views, but all of it has "
+                "been pruned; let the transfer function show more, or lower densify.prune_opacity"
+            )
         return loss.detach()
 
     @torch.no_grad()
