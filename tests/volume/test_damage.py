@@ -105,6 +105,18 @@ def test_vtk_that_ends_its_process_is_a_sentence(tmp_path, monkeypatch):
         open_source(tmp_path / "packed.vti")
 
 
+def test_a_library_that_cannot_be_imported_is_not_the_fault_of_the_file(tmp_path, monkeypatch):
+    WRITERS["packed.vti"](tmp_path / "packed.vti", sample_values())
+    (tmp_path / "pyvista.py").write_text("raise ImportError('libGL.so.1: cannot open shared object file')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    message = (
+        r"packed\.vti: a \.vti file needs a Python package that is missing or broken \(libGL\.so\.1: cannot "
+        r"open shared object file\); install it again$"
+    )
+    with pytest.raises(ArgumentError, match=message):
+        open_source(tmp_path / "packed.vti")
+
+
 def test_vtk_in_a_process_of_its_own_runs_nothing_of_the_folder(tmp_path, monkeypatch):
     WRITERS["text.vtk"](tmp_path / "text.vtk", sample_values())
     (tmp_path / "numpy.py").write_text("raise SystemExit('was run')")

@@ -150,6 +150,11 @@ def reading_as(what: str, advice: str = ADVICE, where: str = "") -> Iterator[Non
             raise OutOfMemoryError(
                 f"{where}{what} needs more memory than there is ({reason(error)}); {advice}"
             ) from error
+        if isinstance(error, ImportError):
+            raise ArgumentError(
+                f"{where}{what} needs a Python package that is missing or broken ({reason(error)}); install "
+                "it again"
+            ) from error
         raise ArgumentError(f"{where}expected {what}, got {reason(error)}; {advice}") from error
 
 
