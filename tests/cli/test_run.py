@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -66,9 +67,18 @@ def texgs(folder, *words, **options):
 def test_a_dry_run_with_words_anywhere(tmp_path):
     done = texgs(tmp_path, "run", "-n", "tracking=none", "--cores", "1", *TINY.split(), "volumes", "tf=TF01")
     assert done.returncode == 0, done.stderr
+    counts = dict(re.findall(r"^(\w+) +(\d+)$", done.stdout + done.stderr, re.MULTILINE))
+    assert counts == {"volume": "1", "transfer": "1", "volumes": "1", "total": "3"}
+    assert "rule transfer" not in done.stdout + done.stderr
+    assert not list(tmp_path.glob("results/turbulence"))
+
+
+@pytest.mark.workflow
+def test_a_dry_run_lists_each_job_where_that_is_asked_for(tmp_path):
+    done = texgs(tmp_path, "run", "-n", "--quiet", "host", "--cores", "1", *TINY.split(), "volumes")
+    assert done.returncode == 0, done.stderr
     assert "rule transfer" in done.stdout + done.stderr
     assert "rule views" not in done.stdout + done.stderr
-    assert not list(tmp_path.glob("results/turbulence"))
 
 
 @pytest.mark.workflow

@@ -139,10 +139,14 @@ def require_pairs(words: Sequence[str]) -> None:
 
 
 def defaults(given: argparse.Namespace) -> list[str]:
-    """Return options that hold where the user says nothing else: Snakefile of texgs, local profile."""
+    """Return options that hold where the user says nothing else: Snakefile of texgs, local profile.
+
+    A dry run counts jobs by their rules; `--quiet host` lists each.
+    """
     from texgs.config.project import PROFILES, SNAKEFILE
 
-    options = ["--snakefile", str(SNAKEFILE)]
+    options = ["--quiet", "host", "reason", "rules"] if given.dryrun and given.quiet is None else []
+    options += ["--snakefile", str(SNAKEFILE)]
     if given.profile is None and given.workflow_profile is None:
         options += ["--workflow-profile", str(PROFILES / "local")]
     return options
