@@ -136,7 +136,7 @@ def test_a_study_is_not_overwritten(results, capsys):
 
 def test_votes_that_cannot_be_counted_leave_no_table(results, capsys):
     assert main(["votes"]) == 2
-    assert "results/study/key.json: no such file" in capsys.readouterr().err
+    assert "results/study/key.json: no such file; texgs study writes one" in capsys.readouterr().err
     assert main(["study", *SMALL, "--edits", *EDITS]) == 0
     assert main(["votes"]) == 2
     assert "votes: no ballots in results/study/votes; put the files there" in capsys.readouterr().err

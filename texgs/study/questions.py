@@ -13,7 +13,7 @@ from string import ascii_uppercase as LETTERS
 from typing import Any
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json, reading, write_json
+from texgs.core.io import is_there, read_json, reading, write_json
 from texgs.core.keys import typed
 from texgs.core.names import SCENE
 from texgs.report.metrics_files import Record, of
@@ -169,6 +169,8 @@ def read_key(path: str | Path) -> Study:
         ArgumentError: if the file is missing or no key.
     """
     advice = "texgs study writes one"
+    if not is_there(path):
+        raise ArgumentError(f"{path}: no such file; {advice}")
     with reading(path, "the key of a study", advice):
         study = typed(Study, read_json(path))
     for number, question in enumerate(study.questions, start=1):
