@@ -37,8 +37,7 @@ from texgs.volume.cameras import icosphere_of
 
 OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
 OF_CLOUDS = {"usd": write_usd, "gltf": write_gltf, "spz": write_spz}  # of scenes, with their light
-
-TAKES = {
+TAKES = {  # by kind: options of Export that count for it, besides the device
     "points": ("opacity",),
     "mesh": ("voxel", "views", "size"),
     "compact": ("views", "size", "drop_unseen"),
