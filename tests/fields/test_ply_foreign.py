@@ -82,6 +82,21 @@ def test_files_that_are_no_ply_are_named(written, tmp_path):
         read_ply(path)
 
 
+@pytest.mark.parametrize("kind", [{"text": True}, {"byte_order": "<"}, {"byte_order": ">"}])
+def test_vertices_may_come_after_others(written, tmp_path, kind):
+    model, path, read_ply = written
+    others = np.array([(1, 2.5), (3, 4.5)], [("a", "i2"), ("b", "f8")])
+    vertex = PlyElement.describe(PlyData.read(path)["vertex"].data, "vertex")
+    PlyData([PlyElement.describe(others, "other"), vertex], **kind).write(tmp_path / "later.ply")
+    assert same(read_ply(tmp_path / "later.ply"), model)
+
+
+def test_a_file_is_byte_for_byte_what_plyfile_writes(written, tmp_path):
+    _, path, _ = written
+    PlyData(PlyData.read(path).elements, byte_order="<").write(tmp_path / "again.ply")
+    assert (tmp_path / "again.ply").read_bytes() == path.read_bytes()
+
+
 @pytest.mark.parametrize("stage", STAGES)
 @pytest.mark.parametrize("kept", [0, 0.05, 0.5, 0.999])
 def test_a_file_cut_anywhere_is_refused(tmp_path, stage, kept):

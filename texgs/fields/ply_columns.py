@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import torch
@@ -9,6 +10,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
+from texgs.core.ply_file import TYPES
 from texgs.raster.shading import DEGREES
 
 
@@ -37,19 +39,28 @@ def colored(places: Tensor, colors: Tensor) -> dict[str, Tensor]:
 
 
 def write_columns(path: str | Path, columns: Mapping[str, Tensor], faces: np.ndarray | None = None) -> Path:
-    """Create or replace a binary PLY file of vertices, and of faces [F] if there are any, in one step.
+    """Create or replace a binary PLY file of vertices, and of triangles [F, 3] if there are any, in one step.
 
     Properties are float32, or bytes where columns are.
     """
-    from plyfile import PlyData, PlyElement
-
-    types = [(name, "u1" if column.dtype == torch.uint8 else "<f4") for name, column in columns.items()]
-    vertices = np.empty(len(columns["x"]), types)
+    types = {name: "uchar" if column.dtype == torch.uint8 else "float" for name, column in columns.items()}
+    vertices = np.empty(len(columns["x"]), [(name, TYPES[kind]) for name, kind in types.items()])
     for name, column in columns.items():
         vertices[name] = column.detach().numpy()
-    elements = {"vertex": vertices} | ({} if faces is None else {"face": faces})
-    described = [PlyElement.describe(array, name) for name, array in elements.items()]
-    return write_atomic(path, PlyData(described, byte_order="<").write)
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
+    header += [f"property {kind} {name}" for name, kind in types.items()]
+    blocks = [vertices.astype(vertices.dtype.newbyteorder("<"))]
+    if faces is not None:
+        header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+        blocks.append(np.empty(len(faces), [("count", "u1"), ("corners", "<i4", (3,))]))
+        blocks[1]["count"], blocks[1]["corners"] = 3, faces
+
+    def write(file: BinaryIO) -> None:
+        file.write("\n".join([*header, "end_header", ""]).encode())
+        for block in blocks:
+            block.tofile(file)
+
+    return write_atomic(path, write)
 
 
 def take(vertices: np.ndarray, *names: str) -> Tensor:

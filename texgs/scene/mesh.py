@@ -135,6 +135,5 @@ def with_triangles(mesh: Mesh, kept: np.ndarray) -> Mesh:
 def write_mesh(path: str | Path, mesh: Mesh) -> Path:
     """Create or replace a binary PLY file in one step; a mesh without colours is grey."""
     colors = np.full_like(mesh.vertices, 200, dtype=np.uint8) if mesh.colors is None else mesh.colors
-    faces = np.empty(len(mesh.triangles), [("vertex_indices", "<i4", (3,))])
-    faces["vertex_indices"] = mesh.triangles
-    return write_columns(path, colored(torch.from_numpy(mesh.vertices), torch.from_numpy(colors)), faces)
+    columns = colored(torch.from_numpy(mesh.vertices), torch.from_numpy(colors))
+    return write_columns(path, columns, mesh.triangles)
