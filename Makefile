@@ -50,6 +50,7 @@ demo: $(VENV)/installed
 lint: $(VENV)/dependencies
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/hadolint Dockerfile
 	$(BIN)/clang-format --dry-run -Werror $(FORMATTED)
 	$(BIN)/mypy
 	$(BIN)/snakefmt --check Snakefile workflow
@@ -75,7 +76,8 @@ lock: $(VENV)/dependencies
 	@echo "Resolving pyproject.toml"
 	@$(BIN)/python tools/lock.py > requirements.lock.new
 	@mv requirements.lock.new requirements.lock
-	@echo "Wrote requirements.lock"
+	@$(BIN)/python tools/licences.py > docs/licences.md
+	@echo "Wrote requirements.lock and docs/licences.md"
 
 clean:
 	rm -rf $(VENV) build dist texgs/raster/_native .hypothesis .mypy_cache .pytest_cache .ruff_cache

@@ -4,6 +4,10 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
+
+from tools.licences import HEADER as HEADER_OF_LICENCES
+from tools.licences import table
 from tools.lock import EXTRAS, HEADER, TORCH_FILE, without_torch
 
 ROOT = Path(__file__).parents[1]
@@ -25,6 +29,27 @@ def test_everything_asked_for_is_locked():
     lines = (ROOT / TORCH_FILE).read_text(encoding="utf-8").splitlines()
     (pinned,) = (line for line in lines if not line.startswith("#"))
     assert re.fullmatch(r"torch==[\d.]+", pinned)
+
+
+@pytest.mark.parametrize("name", ["Dockerfile", "environment.yml"])
+def test_other_ways_to_install_take_the_same_torch_and_a_python_that_texgs_has(name):
+    text, locked = (ROOT / name).read_text(encoding="utf-8"), (ROOT / TORCH_FILE).read_text(encoding="utf-8")
+    assert re.findall(r"torch==[\d.]+", text) == re.findall(r"^torch==[\d.]+", locked, flags=re.MULTILINE)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lowest, above = (int(minor) for minor in re.findall(r"3\.(\d+)", project["requires-python"]))
+    versions = {int(minor) for minor in re.findall(r"python[:=]3\.(\d+)", text)}
+    assert versions
+    assert all(lowest <= minor < above for minor in versions)
+
+
+def test_licences_are_those_of_all_packages_that_are_installed():
+    page = (ROOT / "docs" / "licences.md").read_text(encoding="utf-8").removeprefix(HEADER_OF_LICENCES)
+    assert by_package(table()).items() <= by_package(page).items()
+
+
+def by_package(rows):
+    parts = [row.strip("| ").split(" | ") for row in rows.splitlines()]
+    return {name: licence for licence, names in parts for name in names.split(", ")}
 
 
 def test_torch_and_its_cuda_libraries_are_left_out():
