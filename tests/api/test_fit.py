@@ -149,7 +149,8 @@ def test_models_in_seconds(ball, monkeypatch, tmp_path):
         ({"recipe": "now", "functions": {"a/b": TFS["inner"]}}, ArgumentError, "functions"),
     ],
 )
-def test_what_cannot_be_fitted_is_told(ball, change, error, words):
+def test_what_cannot_be_fitted_is_told_before_a_fit(ball, change, error, words, monkeypatch):
+    monkeypatch.setattr("texgs.fitting.now.fit_now", None)
     with pytest.raises(error, match=words):
         texgs.fit(**{"volume": ball, "functions": TFS, "size": 32, **change})
 

@@ -100,12 +100,12 @@ def fit_now_into(
     from texgs.volume.render import Appearance
 
     look, frame, models = Appearance(), frame_of(volume.grid, functions.values()), {}
+    files = {name: folder / file_name("functions", f"{name}.safetensors") for name in functions}
+    made_of = SceneVolume(copied(volume, folder), functions, look)
     caster = Caster(volume.grid, look, device)
     for name, tf in functions.items():
         *_, model = fit_now(caster, look, tf, frame.lens(width=size, height=size), name, seed)
-        file = folder / file_name("functions", f"{name}.safetensors")
-        models[name] = SceneModel(write_model(file, model))
-    made_of = SceneVolume(copied(volume, folder), functions, look)
+        models[name] = SceneModel(write_model(files[name], model))
     return write_scene(folder / SCENE, Models(models, volume=made_of, frame=frame))
 
 
