@@ -11,7 +11,7 @@ FORMATTED := $(filter-out %.txt,$(NATIVE)) $(shell find tests -name '*.h' -o -na
 help:
 	@echo "make demo      from a small generated volume to an edited scene and results/report.html"
 	@echo "make test      test all but what the next one adds; ARGS='-k name' picks some of all tests"
-	@echo "make test-all  make test, then whole runs, commands of the documentation, wheel and emulated CUDA"
+	@echo "make test-all  make test, then whole runs, commands of the documentation, browser, wheel, emulated CUDA"
 	@echo "make test-cluster  run the cluster profile on a real SLURM on this machine, where that is installed"
 	@echo "make bench     measure speed and memory, write JSON under benchmarks/"
 	@echo "make lint      ruff, mypy, clang-format, snakefmt, snakemake --lint and the import layers"
@@ -25,7 +25,7 @@ install: $(VENV)/installed
 
 # A worker for each core, with a thread each. Tests that ARGS picks: one process, without that overhead.
 WORKERS := OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
-SLOW := workflow or stages or docs or packaging or emulated or subprocess
+SLOW := workflow or stages or docs or packaging or browser or emulated or subprocess
 test: $(VENV)/installed
 ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)

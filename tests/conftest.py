@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 from texgs.core.process import collect_rarely
@@ -29,8 +30,12 @@ LONG = (
 )
 
 
+@pytest.hookimpl(tryfirst=True)  # before pytest chooses by marks
 def pytest_collection_modifyitems(config, items):
-    """Long files first for workers; one process alone begins with what fails fastest, as collected."""
+    """Mark what needs a browser. Long files first for workers; one process alone goes on as collected."""
+    for item in items:
+        if "chromium" in item.fixturenames:
+            item.add_marker("browser")
     if config.getoption("numprocesses", None) or hasattr(config, "workerinput"):
         items.sort(key=place)
 

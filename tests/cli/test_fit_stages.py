@@ -22,6 +22,8 @@ from texgs.report import fit_figure
 from texgs.scene.scene_file import read_scene
 from texgs.volume import view_set
 
+pytestmark = pytest.mark.stages
+
 
 @pytest.fixture
 def fitted(fitted_sphere, tmp_path, monkeypatch):

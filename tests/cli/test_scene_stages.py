@@ -19,6 +19,8 @@ from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import Twin
 from texgs.volume.view_set import read_views
 
+pytestmark = pytest.mark.stages
+
 
 @pytest.fixture(scope="module")
 def results(at, scene_of_two):

@@ -3,7 +3,11 @@
 import shutil
 from pathlib import Path
 
+import pytest
+
 from tests.workflow.project import Project
+
+pytestmark = pytest.mark.workflow
 
 STAGE = Path(__file__).parents[1] / "toys" / "projection.py"  # one file, as a user would add it
 
