@@ -117,7 +117,7 @@ def test_a_mistake_is_named_with_its_place(folder, change, message):
 
 
 def test_files_that_are_no_scene(folder):
-    with pytest.raises(ArgumentError, match="no such file; texgs compose writes one"):
+    with pytest.raises(ArgumentError, match="no such file; check its name, or let texgs compose write one"):
         read_scene(folder / "none.yaml")
     for text, message in (("a: [1", "YAML, got a mistake in line 1"), ("hello", "a table of keys .*'hello'")):
         (folder / "bad.yaml").write_text(text)
@@ -161,3 +161,13 @@ def test_a_variant_that_is_damaged(folder):
         save_file({**tensors, "texels": texels}, style, facts)
         with pytest.raises(ArgumentError, match=message):
             Scene({"A": entry}).open()
+
+
+def test_a_folder_stands_for_the_scene_in_it(folder):
+    below = write_scene(folder / "below" / "scene.yaml", scene_in(folder))
+    assert read_scene(folder / "below") == read_scene(folder) == read_scene(below)
+    write_scene(folder / "scene.yaml", scene_in(folder))
+    with pytest.raises(
+        ArgumentError, match=r"expected one scene.yaml .*, got 2 \(below/scene.yaml, scene.yaml\)"
+    ):
+        read_scene(folder)

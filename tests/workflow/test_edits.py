@@ -100,7 +100,11 @@ def test_edits_of_the_project_have_no_mistake(edit):
 @pytest.mark.parametrize(
     ("edit", "word", "message"),
     [
-        ("style", "edit.image.style=nowhere.png", "one of strokes, glass, .*; got 'nowhere.png'"),
+        (
+            "style",
+            "edit.image.style=nowhere.png",
+            "no such file as 'nowhere.png'; expected .* one of strokes, glass,",
+        ),
         ("glass", "edit.image.region=[[2, 0]]", "edit.image.region: expected two shares from 0 to below 1"),
         ("text", "edit.text.instruction=", "instruction: expected what to do in words"),
         ("gold", "edit.text.instruction=fur", "which needs guidance=instruct_pix2pix"),
@@ -117,8 +121,8 @@ def test_edits_of_the_project_have_no_mistake(edit):
         ("dge", "fit=quick", "edit dge: expected a fit of gaussians, got one of surfels"),
         ("igs2gs_quick", "edit.looks=true", "dataset.looks of sphere: expected a look for each of TF01, got"),
         ("arf", "edit.arf.nnfm=0", "edit.arf.nnfm, edit.arf.patches: expected a weight above 0 for one of"),
-        ("arf", "edit.arf.style=none.png", "edit.arf.style: expected the file of a picture, or one of"),
-        ("stylerf", "edit.stylerf.styles=[dots,none.png]", "edit.stylerf.styles: expected the file of a"),
+        ("arf", "edit.arf.style=none.png", "edit.arf.style: no such file as"),
+        ("stylerf", "edit.stylerf.styles=[dots,none.png]", "edit.stylerf.styles: no such file as"),
         ("stylerf", "edit.stylerf.styles=[dots,glass]", "expected one for each of 1 palette colours of fit="),
         ("dge_quick", "edit.dge.instruction=make it odd", "instruction: expected"),
         ("in2n_quick", "edit.in2n.noise=[0.9,0.1]", "edit.in2n.noise: expected two shares from 0 to 1, the"),

@@ -24,7 +24,7 @@ NUMBERS = ("opacity", "voxel", "views", "size", "drop_unseen", "device")  # argu
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to export, and where to."""
-    parser.add_argument("source", type=Path, help="scene.yaml or a model file")
+    parser.add_argument("source", type=Path, help="scene.yaml, a folder with one, or a model file")
     parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=" ".join(ENDINGS))
     parser.add_argument(
         "--kind",
@@ -65,8 +65,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
     from texgs.fields.files import open_field
     from texgs.scene.export import OF_CLOUDS, Export, export_model, export_scene, require_other, uncut
-    from texgs.scene.scene_file import read_scene
+    from texgs.scene.scene_file import only_scene, read_scene
 
+    if arguments.source.is_dir():
+        arguments.source = only_scene(arguments.source)
     kind = kind_of(arguments)
     require_taken(arguments, kind)
     scene = read_scene(arguments.source) if arguments.source.suffix in SCENES else None

@@ -27,7 +27,7 @@ MOST_GAIN = 16.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to show, from where, and where to."""
-    parser.add_argument("scene", type=Path, help="scene.yaml")
+    parser.add_argument("scene", type=Path, help="scene.yaml, or a folder with one")
     parser.add_argument(
         "--output",
         type=Path,

@@ -14,7 +14,7 @@ from texgs.core.io import reading, write_bytes
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.lens import Frame
 from texgs.core.light import HEADLIGHT, Light
-from texgs.core.names import SCENES, close, is_number, label, named_file, require_name
+from texgs.core.names import SCENE, SCENES, close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
 from texgs.fields.files import formats
 from texgs.fields.part_edit import PartEdit, color
@@ -28,6 +28,7 @@ T = TypeVar("T")
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
 OF_SCENE = ("light", "background", "cuts", "frame")
+MOST_LISTED = 5  # scene files of a folder, in an error
 KEYS = ("texgs-scene", *OF_SCENE, "models", "volume", "functions", "series", "time")
 EDITS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDITS)
@@ -37,20 +38,33 @@ VOLUME_KEYS = ("file", *LOOK, "tfs")
 
 
 def read_scene(path: str | Path) -> Scene:
-    """Read a scene file. Files in it are relative to its folder.
+    """Read a scene file, or the one in a folder or below. Files in it are relative to its folder.
 
     Raises:
         ArgumentError: if the file is missing or a key of it is not as it should be; says which.
     """
     path = Path(path)
+    if path.is_dir():
+        path = only_scene(path)
     if not path.exists():
-        raise ArgumentError(f"{path}: no such file; texgs compose writes one")
+        raise ArgumentError(f"{path}: no such file; check its name, or let texgs compose write one")
     with reading(path, "a scene in YAML", "correct it"), located(path):
         if path.suffix not in SCENES and formats(path):
             raise ArgumentError("expected a scene, got a model; texgs compose makes a scene of models")
         if path.stat().st_size > LARGEST:
             raise ArgumentError(f"expected a scene of at most {LARGEST} bytes; is it another file?")
         return _scene(parse_yaml(path.read_text(encoding="utf-8")), path.parent)
+
+
+def only_scene(folder: Path) -> Path:
+    """Return the scene file in a folder or below."""
+    files = sorted(folder.rglob(SCENE))
+    if len(files) != 1:
+        some = ", ".join(str(each.relative_to(folder)) for each in files[:MOST_LISTED])
+        more = ", ..." if len(files) > MOST_LISTED else ""
+        got = f"{len(files)} ({some}{more}); name one of them" if files else "none; texgs compose writes one"
+        raise ArgumentError(f"{folder}: expected one scene.yaml in this folder or below, got {got}")
+    return files[0]
 
 
 def _scene(values: Any, folder: Path) -> Scene:

@@ -17,13 +17,12 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.report.check import checked
 from texgs.scene.parts import NewLook, part_names, with_looks
 from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.scene_file import only_scene, read_scene, write_scene
 from texgs.scene.session import SCENE_KEYS, Session, files_of, state_of
 from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
 from texgs.volume.transfer import TransferFunction
 
-MOST_LISTED = 5
 Change = Edit | Undo | Redo | Rename | Remove
 
 
@@ -46,14 +45,16 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
     that holds files of others.
     """
     if path.is_dir():
-        path = _only_scene(path)
+        path = only_scene(path)
     of_job = (path.parent / METRICS).exists()
     folder = folder or (Path.cwd() if of_job else path.parent)
     if path.suffix in SCENES:
         name, file = ("edited.yaml", None) if of_job and path.name == SCENE else (path.name, path)
         return Opened(read_scene(path), path, folder, name, file)
     if not path.is_file():
-        raise ArgumentError(f"{path}: no such scene, folder or model; texgs compose writes a scene")
+        raise ArgumentError(
+            f"{path}: no such scene, folder or model; check its name, or let texgs compose write a scene"
+        )
     if not formats(path):
         raise ArgumentError(
             f"{path}: expected scene.yaml, a folder with one or a model file (.safetensors, .texgs, .ply), "
@@ -61,17 +62,6 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
         )
     scene = Scene({label(str(path), path.stem): SceneModel(path)})
     return Opened(scene, path, folder, SCENE)
-
-
-def _only_scene(folder: Path) -> Path:
-    """Return the scene file in a folder or below."""
-    files = sorted(folder.rglob(SCENE))
-    if len(files) != 1:
-        some = ", ".join(str(each.relative_to(folder)) for each in files[:MOST_LISTED])
-        more = ", ..." if len(files) > MOST_LISTED else ""
-        got = f"{len(files)} ({some}{more}); name one of them" if files else "none; texgs compose writes one"
-        raise ArgumentError(f"{folder}: expected one scene.yaml in this folder or below, got {got}")
-    return files[0]
 
 
 def title_of(path: Path) -> str:

@@ -178,7 +178,7 @@ def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
         return StylePicture.of(image, None if find is None else find(image.permute(1, 2, 0)))
     if not Path(name).exists():
         raise ArgumentError(
-            f"{key}: expected the file of a picture, or one of {', '.join(PICTURES)}; got {name!r}"
+            f"{key}: no such file as {name!r}; expected that of a picture, or one of {', '.join(PICTURES)}"
         )
     return read_style(name, find)
 
