@@ -26,7 +26,7 @@ def demo(tmp_path):
     (root / "volume").mkdir()
     values = np.random.default_rng(0).random((6, 5, 4), dtype=np.float32)
     nrrd.write(str(root / "volume/volume.nrrd"), values)
-    summary = {"minimum": 0.0, "maximum": 1.0, "histogram": [1, 2, 3]}
+    summary = {"dtype": "float32", "minimum": 0.0, "maximum": 1.0, "histogram": [1, 2, 3]}
     (root / "volume/volume.json").write_text(json.dumps(summary))
     (root / "TF02/views/train").mkdir(parents=True)
     for index in range(9):

@@ -16,7 +16,7 @@ BLUE = TransferFunction(((4, 1), (6, 1)), ((0, 0, 0, 1),))
 
 @pytest.fixture
 def volume(tmp_path):
-    summary = {"minimum": 0.0, "maximum": 10.0, "histogram": [1.0] * 10}
+    summary = {"dtype": "float32", "minimum": 0.0, "maximum": 10.0, "histogram": [1.0] * 10}
     (tmp_path / "volume.json").write_text(json.dumps(summary))
     return tmp_path / "volume.nrrd"
 

@@ -27,8 +27,8 @@ def plot(
 ) -> Figure:
     """Return a figure of basic transfer functions over the histograms of a volume's channels, see `Summary`.
 
-    Opacity is the height of each coloured area; the grey area is the number of voxels, on a log axis.
-    Channels are one below the other, with their labels.
+    Opacity is the height of each coloured area; the grey area is the number of voxels, on a log axis, of
+    integers as if each bin held equally many. Channels are one below the other, with their labels.
     """
     figure = new_figure(size[0], size[1] * len(channels), dpi)
     for number, (label, summary) in enumerate(channels.items()):
@@ -42,20 +42,35 @@ def _fill(
     opacity: Axes, summary: Mapping[str, Any], basic: Mapping[str, TransferFunction], title: str
 ) -> None:
     """Draw the functions of a channel over its histogram."""
-    counts = np.asarray(summary["histogram"], dtype=np.float64)
-    minimum, maximum = summary["minimum"], summary["maximum"]
+    counts, edges = _bins(summary)
     voxels = opacity.twinx()
     opacity.set_zorder(voxels.get_zorder() + 1)
     opacity.patch.set_visible(False)  # or it would hide the histogram
-    voxels.stairs(counts, np.linspace(minimum, maximum, len(counts) + 1), fill=True, color="0.82")
+    voxels.stairs(counts, edges, fill=True, color="0.82")
     voxels.set(yscale="log", ylim=(0.5, max(2 * counts.max(), 1.0)), ylabel="voxels")
     for name, tf in basic.items():
         _draw(opacity, name, tf)
-    lows, highs = zip((minimum, maximum), *(tf.support for tf in basic.values()), strict=True)
+    lows, highs = zip(edges[[0, -1]], *(tf.support for tf in basic.values()), strict=True)
     low, high = min(lows), max(highs)
     margin = 0.02 * (high - low)  # so that nothing lies on the frame
     opacity.set(xlim=(low - margin, high + margin), xlabel="value", title=words(title))
     opacity.set(ylim=(0, 1.12), yticks=np.linspace(0, 1, 6), ylabel="opacity")
+
+
+def _bins(summary: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the counts [N] of a histogram and the edges [N + 1] of its bins.
+
+    Of integers, bins that can hold none are left out, and counts are those of the mean number of integers.
+    """
+    counts = np.asarray(summary["histogram"], dtype=np.float64)
+    edges = np.linspace(summary["minimum"], summary["maximum"], len(counts) + 1)
+    if np.dtype(summary["dtype"]).kind not in "iu":
+        return counts, edges
+    firsts = np.ceil(edges)  # integers of the bins
+    firsts[-1] += 1  # the last bin includes its end
+    held = np.diff(firsts)
+    some = held > 0
+    return counts[some] * held[some].mean() / held[some], np.append(firsts[:-1][some], firsts[-1]) - 0.5
 
 
 def _draw(axes: Axes, name: str, tf: TransferFunction) -> None:
