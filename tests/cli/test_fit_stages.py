@@ -129,14 +129,13 @@ def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
     assert shown_files(seeded / "shading") == ["metrics.json", "model.safetensors"], "no checkpoint is left"
 
 
-def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatch):
+def test_figure_shows_test_views_and_the_phases_that_fit(fitted, monkeypatch):
     drawn = []
     write = fit_figure.write_fit_figure
     monkeypatch.setattr(fit_figure, "write_fit_figure", lambda *args: drawn.append(args) or write(*args))
     assert main(["figure", *TINY]) == 0
     ((path, models, views, reduce, title),) = drawn
-    assert list(models) == ["surfels", "shading", "texture"]
-    assert [phase for phase, model in models.items() if model is None] == ["surfels"], "it only seeds them"
+    assert list(models) == ["shading", "texture"], "surfels are only seeded"
     assert list(views) == ["test view 0", "test view 1"]
     assert (reduce, title.partition(":")[0]) == (1, "sphere/TF01, recipe demo")
     assert path == Path("results/sphere/TF01/demo/.figure.work/figure.png")

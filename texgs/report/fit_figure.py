@@ -31,7 +31,7 @@ KEY = Cell("", words="of the worst channel\nred: too bright\nblue: too dark")
 @torch.no_grad()
 def write_fit_figure(
     path: str | Path,
-    models: Mapping[str, Field | None],
+    models: Mapping[str, Field],
     views: Mapping[str, View],
     reduce: int = 1,
     title: str = "",
@@ -41,18 +41,13 @@ def write_fit_figure(
     A row for each view: the view, the model after each phase with its PSNR, and the error of the last one,
     that of the worst channel with its sign, four times enlarged. Then the maps of the last model in the first
     view: normals, depth, alpha and material. All cells show the same part of the frame, on white; PSNR is of
-    the whole frame. Views are all of one size; a phase that only seeds has no model.
+    the whole frame. Views are all of one size.
     """
-    last = list(models.values())[-1] if models else None
-    if not views or last is None:
-        raise ArgumentError(
-            f"{path}: expected a model of the last phase and a view, got {', '.join(models) or 'no model'} "
-            f"and {len(views)} views"
-        )
+    require_both(path, models, views)
     compared = [compare(models, view, reduce) for view in views.values()]
     rows = [Row(name, cells) for name, (cells, _) in zip(views, compared, strict=True)]
     name, view = next(iter(views.items()))
-    rows.append(Row(name, maps(last, view, reduce)))
+    rows.append(Row(name, maps(list(models.values())[-1], view, reduce)))
     return draw_visible(path, rows, torch.stack([visible for _, visible in compared]).any(dim=0), title)
 
 
@@ -65,8 +60,7 @@ def write_comparison(
     Each view has a row with the view and each fit with its PSNR, and below it a row with the errors, as in
     the figure of one fit. More recipes than a row has room for go on in further rows, beside the view again.
     """
-    if not views or not models:
-        raise ArgumentError(f"{path}: expected models and views, got {len(models)} and {len(views)}")
+    require_both(path, models, views)
     rows: list[Row] = []
     visible: list[Tensor] = []
     for name, view in views.items():
@@ -77,6 +71,12 @@ def write_comparison(
             rows.append(Row("errors", [KEY, *(error for (_, _, error), _ in compared)]))
             visible += [where for _, where in compared]
     return draw_visible(path, rows, torch.stack(visible).any(dim=0), title)
+
+
+def require_both(path: str | Path, models: Mapping[str, Field], views: Mapping[str, View]) -> None:
+    """Raise ArgumentError where there is no model or no view."""
+    if not views or not models:
+        raise ArgumentError(f"{path}: expected models and views, got {len(models)} and {len(views)}")
 
 
 def lines(recipes: Sequence[str]) -> list[Sequence[str]]:
@@ -92,16 +92,13 @@ def draw_visible(path: str | Path, rows: list[Row], visible: Tensor, title: str)
     return draw(path, [Row(row.name, [crop(cell, box) for cell in row.cells]) for row in rows], title)
 
 
-def compare(models: Mapping[str, Field | None], view: View, reduce: int) -> tuple[list[Cell], Tensor]:
+def compare(models: Mapping[str, Field], view: View, reduce: int) -> tuple[list[Cell], Tensor]:
     """Return the cells of one view, and where it or one of its renderings shows something, [H, W]."""
     planes = over_white(view, reduce)
     truth, visible = planes[:3].permute(1, 2, 0), planes[3] > VISIBLE
     height, width = visible.shape
     cells = [Cell("ground truth", truth, f"PSNR over {width} × {height} pixels")]
     for phase, model in models.items():
-        if model is None:
-            cells.append(Cell(phase, words="seeds only"))
-            continue
         image = model.render(smaller(view.camera, reduce).to(model.device), view.light)
         color = image.color.cpu().clamp(0, 1)
         visible = visible | (image.alpha.cpu() > VISIBLE)

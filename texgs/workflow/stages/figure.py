@@ -42,7 +42,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write figure.png.
 
     It reads the models of all phases by their names, and `views`, the transforms_train.json; without test
-    views training views are shown.
+    views training views are shown. A phase that only seeds is left out.
     """
     from texgs.fields.files import open_field
     from texgs.fields.surfels.model import Surfels
@@ -57,9 +57,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         counts["texels"] = len(last.parameters["texels"])
     title = f"{settings.dataset}/{settings.tf}, recipe {fit.name}: "
     title += ", ".join(f"{count:,} {things}" for things, count in counts.items())
-    only_seeds = {"surfels"} if fit.surfels_iterations == 0 else set()  # phases that do not fit
-    fitted = {phase: None if phase in only_seeds else model for phase, model in models.items()}
-    write_fit_figure(output / "figure.png", fitted, shown, fit.reduce, title)
+    if fit.surfels_iterations == 0:
+        models.pop("surfels", None)
+    write_fit_figure(output / "figure.png", models, shown, fit.reduce, title)
     return Outcome(FigureResult(list(shown), len(last)))
 
 
