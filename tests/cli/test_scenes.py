@@ -161,6 +161,11 @@ def test_edits_show_and_are_data(scene, tmp_path):
         ("scene", "TF01.texture=none.safetensors", "expected a file that is there, got none.safetensors"),
         ("scene", "TF01.opacity=[", "expected a number, true, false, r,g,b or #rrggbb"),
         ("scene", "cut=x,9", "expected a cut through the models, which lie from -"),
+        (
+            "scene",
+            "TF01.style=x.jpg",
+            "a look by a picture or by words is learned: by texgs view, scene.style",
+        ),
         ("scene", "visible", "expected KEY=VALUE, such as TF01.opacity=0.5"),
         ("dotted", "v1.2/shell.opacity=1", "expected a segment of v1.2 (it has none), got shell"),
         ("dotted", "TF01/shell.opacity=1", "expected a model of the scene (v1.2), got TF01"),

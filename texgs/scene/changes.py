@@ -25,6 +25,7 @@ from texgs.volume.nrrd_file import open_grid
 NUMBERED = re.compile(r"cut\.([1-9])=")
 PLANE = "AXIS,POSITION with x, -x, y, -y, z or -z, or NX,NY,NZ,OFFSET"
 BOX = "X0,Y0,Z0,X1,Y1,Z1"
+LOOKS = ("style", "picture", "instruction")  # what people look for here, too
 VOXELS = "v"  # behind a position along an axis that counts samples, the first of which is 0
 
 
@@ -87,6 +88,11 @@ def _require_through(session: Session, cuts: Cuts) -> None:
 def _change_part(session: Session, part: str, key: str, text: str) -> None:
     """Change one value of a part; an empty text takes it back."""
     entry_of(session.scene, part)
+    if key in LOOKS:
+        raise ArgumentError(
+            "a look by a picture or by words is learned: by texgs view, scene.style in Python, or an edit of "
+            "texgs run (docs/looks.md)"
+        )
     known({key: text}, SEGMENT_KEYS, key_path(part))
     if key in ("file", "texture"):
         session.set_file(part, key, _file(text) if text or key == "file" else None)
