@@ -110,8 +110,8 @@ def test_a_library_that_cannot_be_imported_is_not_the_fault_of_the_file(tmp_path
     (tmp_path / "pyvista.py").write_text("raise ImportError('libGL.so.1: cannot open shared object file')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     message = (
-        r"packed\.vti: a \.vti file needs a Python package that is missing or broken \(libGL\.so\.1: cannot "
-        r"open shared object file\); install it again$"
+        r"packed\.vti: expected a \.vti file and the Python packages that read it, got libGL\.so\.1: cannot "
+        r"open shared object file; install them again$"
     )
     with pytest.raises(ArgumentError, match=message):
         open_source(tmp_path / "packed.vti")

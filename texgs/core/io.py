@@ -152,8 +152,8 @@ def reading_as(what: str, advice: str = ADVICE, where: str = "") -> Iterator[Non
             ) from error
         if isinstance(error, ImportError):
             raise ArgumentError(
-                f"{where}{what} needs a Python package that is missing or broken ({reason(error)}); install "
-                "it again"
+                f"{where}expected {what} and the Python packages that read it, got {reason(error)}; "
+                + ("install them again" if advice == ADVICE else advice)
             ) from error
         raise ArgumentError(f"{where}expected {what}, got {reason(error)}; {advice}") from error
 
