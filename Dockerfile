@@ -1,6 +1,5 @@
 # texgs on CPUs:  docker build -t texgs .  and then  docker run --rm -v "$PWD:/work" texgs doctor
 FROM python:3.12-slim-bookworm AS build
-SHELL ["/bin/bash", "-o", "pipefail", "-c"]
 # hadolint ignore=DL3008
 RUN apt-get update && apt-get install --yes --no-install-recommends g++ && rm -rf /var/lib/apt/lists/*
 WORKDIR /texgs

@@ -14,6 +14,7 @@ from tests.fields.surfels.samples import STAGES, same
 from tests.fields.surfels.samples import sample as surfels
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.ply_file import read_vertices
 from texgs.fields.gaussians import files
 from texgs.fields.surfels import ply
 
@@ -89,6 +90,14 @@ def test_vertices_may_come_after_others(written, tmp_path, kind):
     vertex = PlyElement.describe(PlyData.read(path)["vertex"].data, "vertex")
     PlyData([PlyElement.describe(others, "other"), vertex], **kind).write(tmp_path / "later.ply")
     assert same(read_ply(tmp_path / "later.ply"), model)
+
+
+@pytest.mark.parametrize("kind", [{"text": True}, {"byte_order": "<"}])
+def test_no_vertices_have_their_properties_too(written, tmp_path, kind):
+    _, path, _ = written
+    none = PlyData.read(path)["vertex"].data[:0]
+    PlyData([PlyElement.describe(none, "vertex")], **kind).write(tmp_path / "none.ply")
+    assert read_vertices(tmp_path / "none.ply").dtype.names == none.dtype.names
 
 
 def test_a_file_is_byte_for_byte_what_plyfile_writes(written, tmp_path):

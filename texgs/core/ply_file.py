@@ -62,7 +62,9 @@ def _text(path: Path, vertex: Element, before: list[Element]) -> np.ndarray:
         for _ in range(sum(element.count for element in before)):
             next(file)
         lines = (line for line, _ in zip(file, range(vertex.count), strict=False))
-        return np.loadtxt(lines, vertex.columns, comments=None, ndmin=1) if vertex.count else np.empty(0)
+        if not vertex.count:
+            return np.empty(0, vertex.columns)
+        return np.loadtxt(lines, vertex.columns, comments=None, ndmin=1)
 
 
 def _binary(
@@ -94,9 +96,7 @@ def _read_header(path: Path) -> tuple[Order, list[Element], int]:
             case ["element", name, count] if count.isdecimal() and len(count) < 19 and int(count) <= size:
                 elements.append(Element(name, int(count)))
             case ["element", *_]:
-                raise ValueError(
-                    f"a header with the line {line[:60]!r} and {size} bytes in all; is it cut off?"
-                )
+                raise ValueError(f"a header with the line {line[:60]!r} and {size} bytes in all")
             case ["property", "list", _, _, name] if elements:
                 elements[-1].lists.append(name)
             case ["property", kind, name] if elements and kind in TYPES:
