@@ -15,9 +15,11 @@ FOLDER = Path(__file__).parents[2] / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 SMALL = {
     "sweep": "size, iterations, folder = 32, 20, 'results'",
-    "style_and_compare": "samples, size, recipe, style = 24, 64, 'quick', 'preview'",
-    "volume_to_scene": "samples, size, recipe = 24, 48, 'quick'",
+    "style_and_compare": "samples, size, recipe, style = 24, 64, 'demo', 'preview'",
+    "volume_to_scene": "samples, size, recipe = 24, 48, 'demo'",
 }
+# Few views, in place of the sweep of that name.
+SWEEP = "name: views\nvariants:\n  few: [views.train.frequency=1]\n  more: [views.train.frequency=2]\n"
 
 
 @pytest.mark.docs
@@ -25,6 +27,8 @@ SMALL = {
 def test_it_runs(path, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}:{os.environ['PATH']}")
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    (tmp_path / "conf" / "sweep").mkdir(parents=True)
+    (tmp_path / "conf" / "sweep" / "views.yaml").write_text(SWEEP)
     notebook = executed(path, tmp_path, SMALL[path.stem])
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     assert not [output for output in outputs if output.output_type == "error"]

@@ -14,10 +14,11 @@ pytestmark = pytest.mark.subprocess
 TESTS = Path(__file__).parents[1]
 KERNELS = ("operations", "losses", "shading", "voxels", "voxel_optimizer", "convolution")
 FILES = [
-    *(TESTS / "raster" / f"test_{name}.py" for name in (*KERNELS, "images_and_gradients", "determinism")),
+    *(TESTS / "raster" / f"test_{name}.py" for name in (*KERNELS, "images_and_gradients")),
     TESTS / "volume" / "test_caster.py",
 ]
-CHOSEN = "not finite_differences and not emulated and not large and not cuda"
+# Without what takes long and computes the same on all of them.
+CHOSEN = "not finite_differences and not emulated and not large and not cuda and not cells and not memory"
 
 
 def run(instruction_set, *command):

@@ -16,8 +16,9 @@ from texgs.volume.slabs import ArraySource
 
 pytestmark = pytest.mark.workflow
 
-# A method and a field that are one file each, as a user would add them.
+# A method, a field and a stage that are one file each, as a user would add them.
 TOYS = Path(__file__).parents[1] / "toys"
+PLACES = {"fade": "edit/methods", "ball": "fields/kinds", "projection": "workflow/stages"}
 BALL = "defaults: [default]\nname: ball\nfield: ball\nball: {radius: 0.45}\n"
 # A segment of the only model, an edit of it alone, and an edit by the method of the toys.
 EDITS = {
@@ -42,7 +43,7 @@ AFTER_FITS = {
     *("edit", "edit_metrics", "gallery"),
 }
 TABLES = {"tables", "report"}
-RULES = {"volume", "transfer", "views", "sheet", "ball"} | FITS | AFTER_FITS | TABLES
+RULES = {"volume", "transfer", "projection", "views", "sheet", "ball"} | FITS | AFTER_FITS | TABLES
 GROUPS = {  # only names
     *("all", "volumes", "sheets", "figures", "fits", "comparisons", "meshes", "scenes", "edits", "galleries"),
     "phase",
@@ -80,7 +81,7 @@ def made_again(before, after):
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
     project = Project(tmp_path_factory.mktemp("every"))
-    for folder, toy in (("edit/methods", "fade"), ("fields/kinds", "ball")):
+    for toy, folder in PLACES.items():
         shutil.copy(TOYS / f"{toy}.py", project.sources / "texgs" / folder)
     for name, text in EDITS.items():
         (project.sources / "conf" / "edit" / f"{name}.yaml").write_text(text)
@@ -114,7 +115,7 @@ def test_every_result_is_there_and_recorded(project):
     of_surfels, of_ball, of_sweep = 5 + 4 + 4 + 3, 2 + 3 + 2, 3
     pages = 4  # of surfels as fitted, and of their three looks
     side_by_side = 2  # comparison and gallery
-    of_volume = 5  # the volume, its TFs, a sheet, and views under many lights and under one
+    of_volume = 6  # the volume, its TFs, its projection, a sheet, and views under many lights and under one
     assert len(metrics(project)) == of_volume + of_surfels + pages + of_ball + of_sweep + side_by_side
     for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "meshes", "sweep-tiny"):
         assert len((results / "tables" / f"{name}.csv").read_text().splitlines()) > 1
@@ -130,7 +131,7 @@ def test_every_result_is_there_and_recorded(project):
     assert not list(results.rglob(".*.old"))
 
 
-def test_a_method_and_a_field_of_one_file_each_are_in_tables_and_report(project):
+def test_a_method_a_field_and_a_stage_of_one_file_each_are_in_tables_and_report(project):
     results = project.work / "results"
     rows = {
         name: (results / "tables" / f"{name}.csv").read_text().splitlines()
@@ -144,6 +145,8 @@ def test_a_method_and_a_field_of_one_file_each_are_in_tables_and_report(project)
     report = (results / "report.html").read_text()
     assert "<b>ball fade</b>" in report
     assert "<b>TF01 ball</b>" in report
+    assert (results / "sphere" / "projection" / "projection.png").exists()
+    assert "Largest sample along z." in report
     compared = json.loads((results / "sphere" / "TF01" / "comparison" / "looks" / "metrics.json").read_text())
     assert compared["numbers"]["recipes"] == ["demo", "ball"]
     assert compared["pictures"]["comparison.png"] in report
@@ -240,5 +243,7 @@ def test_what_was_made_by_hand_is_not_made_again(project):
     assert done.returncode == 0, done.stderr
     before = metrics(project)
     assert "sphere/TF01/demo-hand/figure" in before
-    run(project, "variant=hand edits=[]")
+    options = {**OPTIONS, "targets": ("figures",), "overrides": f"{SMALL} variant=hand edits=[]"}
+    done = project.snakemake(**options)
+    assert done.returncode == 0, done.stdout + done.stderr
     assert not made_again(before, metrics(project)) & {folder for folder in before if "demo-hand" in folder}

@@ -11,14 +11,15 @@ from tests.workflow.project import Project
 
 pytestmark = pytest.mark.workflow
 
-LONG = "~dataset.basic_tfs.TF02 views.train.frequency=2 views.width=800 views.height=800 views.step=0.03"
+MANY = "~dataset.basic_tfs.TF02 views.train.frequency=2 views.width=400 views.height=400 views.step=0.03"
+LONG = "~dataset.basic_tfs.TF02 views.train.frequency=1 views.width=800 views.height=800 views.step=0.03"
 
 
 def test_killed_in_the_middle_of_the_views(tmp_path):
     project = Project(tmp_path)
     views = project.work / "results" / "turbulence" / "TF01" / "views"
     work = views.with_name(".views.work")
-    process = project.start(overrides=LONG)
+    process = project.start(overrides=MANY)
     deadline = time.monotonic() + 300
     while len(images(work)) < 5 and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -30,10 +31,10 @@ def test_killed_in_the_middle_of_the_views(tmp_path):
     time.sleep(1)
     assert images(work) == kept, "the job outlived the workflow"
     assert not (views / "metrics.json").exists()
-    assert "locked" in project.snakemake(overrides=LONG).stderr
-    done = project.snakemake("--unlock", overrides=LONG)
+    assert "locked" in project.snakemake(overrides=MANY).stderr
+    done = project.snakemake("--unlock", overrides=MANY)
     assert done.returncode == 0, done.stderr
-    done = project.snakemake(overrides=LONG)
+    done = project.snakemake(overrides=MANY)
     assert done.returncode == 0, done.stdout + done.stderr
     finished = images(views)
     assert len(finished) == 42
@@ -52,11 +53,11 @@ def test_a_second_run_in_the_same_results_is_refused_and_harms_nothing(tmp_path)
     work = project.work / "results" / "turbulence" / "TF01" / ".views.work"
     first = project.start("--nolock", overrides=LONG)
     deadline = time.monotonic() + 300
-    while len(images(work)) < 2 and first.poll() is None and time.monotonic() < deadline:
+    while len(images(work)) < 1 and first.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
     second = project.snakemake("--nolock", overrides=f"{LONG} views.step=0.04")
     assert second.returncode == 2
     assert "results: another run works there; wait for it to end" in second.stderr
     out, err = first.communicate(timeout=200)
     assert first.returncode == 0, out + err
-    assert len(images(work.with_name("views"))) == 42
+    assert len(images(work.with_name("views"))) == 12
