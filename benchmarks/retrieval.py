@@ -82,7 +82,9 @@ def rows_of(arguments: argparse.Namespace, vgg: Vgg) -> list[dict[str, object]]:
                 lifts = " ".join(f"{model.edit.opacity:g}" for model in made.models.values())
                 told.append({"scene": title, "recipe": recipe, "style": Path(style).name, "opacity": lifts})
                 print(title, recipe, style, lifts, f"{seconds:.1f} s", flush=True)
-            rows += [{**row, **places} for row, places in zip(told, named(looks), strict=True)]
+            for row, places in zip(told, named(looks), strict=True):
+                firsts = {key.replace("place", "first"): int(place == 1) for key, place in places.items()}
+                rows.append({**row, **places, **firsts})
     return rows
 
 
@@ -103,7 +105,7 @@ def main() -> None:
     rows = rows_of(arguments, Vgg.load(layers=LAYERS))
     for key in sorted({(str(row["scene"]), str(row["recipe"])) for row in rows}):
         own = [row for row in rows if (row["scene"], row["recipe"]) == key]
-        shares = [fmean(row.get(f"place_by_{kind}") == 1 for row in own) for kind in ("colors", "pattern")]
+        shares = [fmean(row.get(f"first_by_{kind}", 0) for row in own) for kind in ("colors", "pattern")]
         print(*key, f"{len(own)} looks: first by colours {shares[0]:.0%}, by the pattern {shares[1]:.0%}")
     if arguments.output:
         pd.DataFrame(rows).to_csv(arguments.output, index=False)

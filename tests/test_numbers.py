@@ -30,7 +30,6 @@ SCALES = {  # of what files hold, by the units of the pages
     "%": (1, 100),
 }
 ELSEWHERE = {  # page: numbers that are of no measurement, and what they are of
-    "accuracy.md": {"114.5 MiB"},  # the paper
     "api.md": {"24 MB"},  # texgs/api/scene.py
     "data.md": {"0.65 GiB", "16 GiB", "256 GiB", "6 %"},  # files of others, an example
     "looks.md": {

@@ -15,13 +15,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from PIL import Image
 
 from benchmarks.browser import browser_path
 from benchmarks.results import RESULTS, ROOT, add
 from texgs.core.camera import orbit
-from texgs.core.figures import Cell, Row, as_picture, content, grid_rows, lay_out, new_figure, words
+from texgs.core.figures import Cell, Row, as_picture, content, grid_rows, lay_out
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
 from texgs.scene.twin import twin_of
@@ -54,13 +53,6 @@ LOOKS = {  # title: scene file below the scenes of the demo
     "painted": "edits/painted/scene.yaml",
     "one lobe in crimson": "edits/crimson/scene.yaml",
 }
-
-RECIPES = {  # variants of recipe `paper`, by the names that curves have
-    "O": "of 20 November",
-    "Y": "of 21 November",
-    "F": "now",
-}
-LEAST = 30.0  # dB: just after a reset of opacities there is nothing to see
 
 
 def shown(scene_file: Path, size: int, azimuth: float = 30, polar: float = 20) -> np.ndarray:
@@ -136,52 +128,6 @@ def viewer(run: Path) -> Image.Image:
     return Image.open(run / "viewer.png")
 
 
-def quality_over_time(table: Path) -> Image.Image:
-    """Draw PSNR over seconds, a line for each recipe; phases end in dots."""
-    figure = new_figure(8, 4, 120)
-    axes = figure.subplots()
-    for index, (recipe, rows) in enumerate(pd.read_csv(table).groupby("recipe", sort=False)):
-        ends = rows[rows.is_final]
-        axes.plot(rows.seconds, rows.psnr, color=f"C{index}", label=recipe)
-        axes.plot(ends.seconds, ends.psnr, "o", color=f"C{index}")
-        for row in ends.itertuples():
-            place = (row.seconds, row.psnr)
-            axes.annotate(row.phase, place, (4, -10), textcoords="offset points", fontsize=7)
-    axes.set(xlabel="seconds of fitting", ylabel="PSNR of test views, dB", xscale="log")
-    axes.margins(x=0.1)  # of which labels beside the dots need some
-    axes.grid(which="both", alpha=0.2)
-    axes.legend()
-    return as_picture(figure)
-
-
-def paper_recipe(table: Path) -> Image.Image:
-    """Draw PSNR over the iterations of the shading phase, of recipe `paper` and of earlier ones."""
-    figure, rows = new_figure(8, 4, 120), pd.read_csv(table)
-    axes = figure.subplots()
-    for variant, title in RECIPES.items():
-        own = rows[(rows.phase == "shading") & (rows.psnr > LEAST) & (rows.variant == variant)]
-        axes.plot(own.iteration, own.psnr, "o-", label=title, markersize=3)
-    axes.set(xlabel="iterations of the shading phase", ylabel="PSNR of every eighth test view, dB")
-    axes.grid(alpha=0.2)
-    axes.legend(fontsize=8)
-    return as_picture(figure)
-
-
-def disagreement(table: Path) -> Image.Image:
-    """Draw consistency and sharpness over seconds, a line for each method."""
-    figure, rows = new_figure(10, 4.4, 120), pd.read_csv(table)
-    labels = {"far": "RMSE of views seven apart", "sharpness": "sharpness against the guidance's"}
-    names = list(rows.method.unique())
-    for axes, (column, label) in zip(figure.subplots(1, 2), labels.items(), strict=True):
-        for name, own in rows.groupby("method", sort=False):
-            style = f"{'*' if 'one-shot' in name else 'o'}{'--' if 'frozen' in name else '-'}"
-            color = f"C{names.index(name.removesuffix(', frozen'))}"
-            axes.plot(own.seconds, own[column], style, color=color, label=words(name))
-        axes.set(xlabel="seconds", ylabel=label, xscale="log", ylim=(0, None))
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
-    return as_picture(figure)
-
-
 class Picture(NamedTuple):
     """How a picture is made."""
 
@@ -209,9 +155,6 @@ PICTURES = {
     ),
     "styles": Picture(styles, "styles", f"{FIT} image"),
     "viewer": Picture(viewer, "engine", f"{FIT} compose texgs.viewer.server"),
-    "quality_over_time": Picture(quality_over_time, "2026-11-23-quality-over-time-xeon.csv"),
-    "paper_recipe": Picture(paper_recipe, "2026-11-24-paper-curves-TF01-400.csv"),
-    "disagreement": Picture(disagreement, "2026-11-21-disagreement.csv"),
 }
 
 
