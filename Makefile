@@ -62,13 +62,14 @@ $(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/core
 	@$(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $@
 
+# Python compiles modules as they are imported; all 23,000 of them would take minutes.
 $(VENV)/dependencies: requirements.lock requirements-torch.lock
 	@$(PYTHON) tools/check_python.py
 	@echo "Creating $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
 	@echo "Installing the packages of requirements*.lock (torch alone is 200 MB, several GB with CUDA)"
-	@$(PIP) install --no-deps --require-hashes --requirement requirements.lock
-	@$(PIP) install $$($(PYTHON) tools/torch_index.py) --requirement requirements-torch.lock
+	@$(PIP) install --no-compile --no-deps --require-hashes --requirement requirements.lock
+	@$(PIP) install --no-compile $$($(PYTHON) tools/torch_index.py) --requirement requirements-torch.lock
 	@$(PIP) check
 	@touch $@
 
