@@ -205,7 +205,7 @@ def test_at_the_end_of_a_cell_there_are_facts_and_a_picture():
 
 
 def test_functions_and_light_are_checked():
-    with pytest.raises(ArgumentError, match="spacign: only for files of some formats; leave them out"):
+    with pytest.raises(ArgumentError, match=r"spacign: not for arrays, did you mean spacing\?"):
         texgs.Volume(field(8, 8, 8), spacign=2)
     volume = texgs.Volume(field(8, 8, 8))
     with pytest.raises(ArgumentError, match="count: expected a whole number from 1 on, got 0"):
@@ -223,6 +223,8 @@ def test_functions_and_light_are_checked():
         volume.render([])
     with pytest.raises(ArgumentError, match=r"TF01: expected a texgs.TransferFunction, got str"):
         volume.render(["red"])
+    with pytest.raises(ArgumentError, match=r"functions: expected one .* got 'quick'; name other arguments"):
+        volume.render("quick")
     with pytest.raises(ArgumentError, match="light: expected headlight, or azimuth"):
         volume.render(RED, light="sun")
     with pytest.raises(ArgumentError, match="width: expected at least 1 pixel, got 0"):

@@ -60,6 +60,13 @@ def test_names_the_file_and_the_line(mine, text, line, message):
     assert message in error
 
 
+def test_a_key_that_is_missing_names_the_folder(mine):
+    mine.write_text("title: x\n")
+    assert told("dataset=mine") == (
+        "dataset.name: expected a value, got none; write it into the file of conf/dataset"
+    )
+
+
 def test_brackets_without_end_name_the_file(mine):
     mine.write_text(f"name: x\ntitle: {'[' * 3000}{']' * 3000}\n")
     assert (

@@ -30,7 +30,15 @@ def test_helpers_are_passed_by(package):
 def test_two_of_one_name(package):
     for file in ("a.py", "b.py"):
         (package / file).write_text(MODULE.format("first"))
-    with pytest.raises(ConfigError, match=r"\.b: THING has the name first of .*\.a; choose another$"):
+    with pytest.raises(
+        ConfigError, match=r"\.a and .*\.b: expected THING of different names, got first twice"
+    ):
+        specifications(package.name, "THING")
+
+
+def test_what_is_no_specification(package):
+    (package / "a.py").write_text("def THING(): pass\n")
+    with pytest.raises(ConfigError, match=r"\.a: THING: expected a specification with a name, got function"):
         specifications(package.name, "THING")
 
 
@@ -39,6 +47,7 @@ def test_two_of_one_name(package):
     [
         ("import nope_of_texgs", "ModuleNotFoundError where it is imported: No module named 'nope_of_texgs'"),
         ("THING = (", r"SyntaxError where it is imported: '\(' was never closed \(broken.py, line 1\)"),
+        ("raise ValueError('odd')", "ValueError where it is imported: odd"),
     ],
 )
 def test_a_module_that_cannot_be_imported(package, text, message):

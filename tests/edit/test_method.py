@@ -6,6 +6,7 @@ import pytest
 
 from tests.toys.fade import METHOD
 from texgs.core.errors import ConfigError
+from texgs.core.keys import key
 from texgs.edit.method import MethodKeys
 from texgs.edit.task import edited_by
 
@@ -17,11 +18,19 @@ class Plain(MethodKeys):
     levels: int = 3
 
 
+class Undecorated(MethodKeys):
+    """Forgot what makes it a dataclass."""
+
+    levels: int = key(3, "levels")
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"needs": frozenset({"texure"})}, "fade: needs: texure is nothing .* can do, did you mean texture?"),
         ({"settings": Plain}, r"method fade: levels: expected key\(DEFAULT, HELP\), got no key\(\)"),
+        ({"settings": Undecorated}, r"method fade: Undecorated: write @dataclass\(frozen=True\) above it"),
+        ({"settings": dict}, "method fade: expected keys of a subclass of MethodKeys, got dict"),
     ],
 )
 def test_what_a_method_says_of_itself_is_checked(changes, message):

@@ -5,7 +5,7 @@ import torch
 
 from tests.edit.scenes import task
 from tests.fields.surfels.test_composition import ball
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, ConfigError
 from texgs.edit.task import parts_of, parts_with_surfels, surfels_of
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
@@ -44,6 +44,11 @@ def test_parts_are_named_once_and_by_default_all_models(tmp_path):
         parts_of(scene, ["cut/b"])
     with pytest.raises(ArgumentError, match=r"edit\.parts: expected different names, got cut twice"):
         parts_of(scene, ["cut", "cut"])
+
+
+def test_an_edited_part_is_surfels(tmp_path):
+    with pytest.raises(ConfigError, match="method none: expected Surfels of each_part, got NoneType"):
+        task(scene_of(tmp_path), tmp_path).each_part(lambda part, model, surfels, views: None)
 
 
 def test_a_new_look_takes_the_palette_of_an_earlier_edit_back(tmp_path):

@@ -47,6 +47,8 @@ def test_words_hold_for_the_edit_and_its_base_and_parts_can_be_given():
     [
         (("edits=[glass, glass]",), "edits: expected different names, got glass twice"),
         (("edits=[glas]",), "edit: expected one of .*crimson, .*glass, "),
+        (("edits=[fog]",), r"got fog; one of your own is a file, conf/edit/fog\.yaml"),
+        (("edits=[none]",), "edit=none: expected a method, got none; write `method: NAME` into"),
         (("edit=glass", "edit.base=glass"), "edit.base: glass starts from itself"),
         (("edit=glass", "edit.base=lobes"), "edit.base: expected the file of a scene or one of .* mean lobe"),
         (("edit=glass", "edit.parts=[TF09]"), "edit.parts: expected some of TF01, .*, got TF09"),

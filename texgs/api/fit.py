@@ -63,8 +63,8 @@ def fit(
 
     if not isinstance(volume, Volume):
         raise ArgumentError(f"volume: expected a texgs.Volume, got {type(volume).__name__}")
-    if size < LEAST:
-        raise ArgumentError(f"size: expected at least {LEAST} pixels, got {size}")
+    if not isinstance(size, Integral) or size < LEAST:
+        raise ArgumentError(f"size: expected a whole number of pixels, at least {LEAST}, got {size!r}")
     if not isinstance(seed, Integral) or not 0 <= seed < 2**63:
         raise ArgumentError(f"seed: expected a whole number from 0 on, got {seed!r}")
     recipes = [NOW, *members("fit")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO
 from typing import TYPE_CHECKING
 
@@ -46,11 +46,19 @@ def named(functions: AnyFunctions) -> dict[str, TransferFunction]:
     """Return functions by name; those without one are TF01, TF02, ..."""
     if isinstance(functions, TransferFunction):
         functions = [functions]
+    if isinstance(functions, str) or not isinstance(functions, Iterable):
+        raise ArgumentError(
+            f"functions: expected one texgs.TransferFunction or several, got {functions!r}; name other "
+            "arguments, as in recipe='now'"
+        )
     if not isinstance(functions, Mapping):
         functions = {f"TF{number:02d}": each for number, each in enumerate(functions, start=1)}
     for name, each in functions.items():
         if not isinstance(each, TransferFunction):
-            raise ArgumentError(f"{name}: expected a texgs.TransferFunction, got {type(each).__name__}")
+            raise ArgumentError(
+                f"{name}: expected a texgs.TransferFunction, got {type(each).__name__}; make one "
+                "by texgs.TransferFunction(opacity=[(value, opacity), ...], color=[(value, r, g, b), ...])"
+            )
     if not functions:
         raise ArgumentError("functions: expected at least one transfer function, got none")
     return dict(functions)

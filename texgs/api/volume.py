@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from filecmp import cmp
 from html import escape
+from inspect import signature
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from texgs.api.display import as_python, camera_of, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
 from texgs.config.project import check_name, name_of
 from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.names import close
 from texgs.fields.part_edit import color
 from texgs.scene.frame import quantized
 from texgs.scene.scene import WHITE
@@ -89,7 +91,8 @@ class Volume:
             steps, first = three("spacing", spacing), three("origin", origin)
             source = open_source(data, spacing=steps, origin=first, **keys)
         elif keys:
-            raise ArgumentError(f"{', '.join(keys)}: only for files of some formats; leave them out")
+            hint = close(next(iter(keys)), signature(Volume).parameters)
+            raise ArgumentError(f"{', '.join(keys)}: not for arrays{hint or '; leave them out'}")
         else:
             source = ArraySource(grid_of(data, spacing, origin), name)
         if source.note:

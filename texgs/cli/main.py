@@ -35,11 +35,12 @@ SHARED = {
     "download": "weights",
 }
 STAGE_VERBS = {stage.name: stage.help for stage in STAGES.values()}
-VERBS = {
+FIRST_VERBS = {
     "init": "start a folder with configurations of your own",
     "new": "start a data set from a volume file of your own, with suggested transfer functions",
     "run": "run the workflow: from the volume to the report, whatever is not done yet",
-    **STAGE_VERBS,
+}
+LATER_VERBS = {
     "edit": "change colours, opacities and lights of a scene",
     "series": "follow the models of a scene through the volumes of a series in time",
     "model": "fit a model of a transfer function that a scene tries, in seconds",
@@ -56,6 +57,11 @@ VERBS = {
     "weights": "list pretrained weights, and download those that are named",
     "doctor": "show what is installed, what is missing and what to do about it",
 }
+VERBS = {**FIRST_VERBS, **STAGE_VERBS, **LATER_VERBS}
+if taken := STAGE_VERBS.keys() & {*FIRST_VERBS, *LATER_VERBS}:
+    stage = STAGES[min(taken)]
+    print(f"texgs: {stage.module}: STAGE has the name of the verb {stage.name}; rename it", file=sys.stderr)
+    sys.exit(2)
 
 
 def overview() -> argparse.ArgumentParser:

@@ -16,7 +16,7 @@ from texgs.config.describe import keys
 from texgs.config.project import folders, members, shown
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
-from texgs.core.keys import UnknownKey, ValueMismatch
+from texgs.core.keys import MissingKey, UnknownKey, ValueMismatch
 from texgs.core.names import close
 
 RENAMED = {  # keys of the version before; what they are called now
@@ -42,6 +42,8 @@ def told() -> Iterator[None]:
         raise
     except ValueMismatch as error:
         problem = no_such_key(error.key) if isinstance(error, UnknownKey) else error
+        if isinstance(error, MissingKey):
+            problem = f"{error}; write it into the file of conf/{error.key.partition('.')[0]}"
         raise ConfigError(f"{origin(error.key, error.value)}{problem}") from error
     except MISTAKES as error:
         raise ConfigError(sentence(error)) from error
@@ -56,6 +58,7 @@ def sentence(error: Exception) -> str:
         group, _, name = error.missing_cfg_file.partition("/")
         known = members(group)
         hint = close(name, known) or ("; an address goes to tracking.uri" if group == "tracking" else "")
+        hint = hint or f"; one of your own is a file, conf/{group}/{name}.yaml"
         return f"{where}{group}: expected one of {', '.join(known)}, got {name}{hint}"
     if isinstance(error, OverrideParseException):
         return (

@@ -17,7 +17,8 @@ def specifications(package: str, attribute: str) -> dict[str, Any]:
     module without the name, such as METHOD, is a helper of others.
 
     Raises:
-        ConfigError: naming the module that cannot be imported, or whose specification has another's name.
+        ConfigError: naming the module that cannot be imported, or whose specification has none or another's
+            name.
     """
     defined, modules = dict[str, Any](), dict[str, str]()
     for entry in pkgutil.iter_modules(import_module(package).__path__):
@@ -25,9 +26,15 @@ def specifications(package: str, attribute: str) -> dict[str, Any]:
         specification = getattr(imported(module), attribute, None)
         if specification is None:
             continue
-        name = specification.name
+        name = getattr(specification, "name", None)
+        if not isinstance(name, str):
+            got = type(specification).__name__
+            raise ConfigError(f"{module}: {attribute}: expected a specification with a name, got {got}")
         if name in defined:
-            raise ConfigError(f"{module}: {attribute} has the name {name} of {modules[name]}; choose another")
+            raise ConfigError(
+                f"{modules[name]} and {module}: expected {attribute} of different names, got {name} twice; "
+                "rename yours"
+            )
         defined[name], modules[name] = specification, module
     return defined
 
@@ -36,5 +43,7 @@ def imported(name: str) -> ModuleType:
     """Import a module; what is wrong with it becomes one sentence."""
     try:
         return import_module(name)
-    except (ImportError, NameError, SyntaxError, TypeError) as error:
+    except ConfigError:  # a sentence already
+        raise
+    except (ImportError, NameError, SyntaxError, TypeError, ValueError) as error:
         raise ConfigError(f"{name}: {type(error).__name__} where it is imported: {error}") from error

@@ -79,12 +79,21 @@ class Method(Generic[Settings]):
     is_look: bool = True  # whether the scene looks different afterwards
 
     def __post_init__(self) -> None:
+        self._require_keys()
         self.settings.node = f"edit.{self.name}"
         if plain := [each.name for each in fields(self.settings) if "help" not in each.metadata]:
             raise ConfigError(f"method {self.name}: {plain[0]}: expected key(DEFAULT, HELP), got no key()")
         if unknown := sorted(self.needs - ALL):
             hint = close(unknown[0], ALL)
             raise ConfigError(f"method {self.name}: needs: {unknown[0]} is nothing that fields can do{hint}")
+
+    def _require_keys(self) -> None:
+        """Require that the keys are a dataclass of their own."""
+        keys, name = self.settings, getattr(self.settings, "__name__", self.settings)
+        if not isinstance(keys, type) or not issubclass(keys, MethodKeys):
+            raise ConfigError(f"method {self.name}: expected keys of a subclass of MethodKeys, got {name}")
+        if "__dataclass_params__" not in vars(keys):
+            raise ConfigError(f"method {self.name}: {name}: write @dataclass(frozen=True) above it")
 
     @property
     def stage(self) -> str:

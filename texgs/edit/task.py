@@ -139,6 +139,9 @@ class Task(Generic[Settings]):
             model, surfels = surfels_of(scene, part)
             surfels = None if surfels is None else surfels.to(self.device)
             edited = one(part, model.to(self.device), surfels, self.training_views(split(scene, part)[0]))
+            if not isinstance(edited, Surfels):
+                got = type(edited).__name__
+                raise ConfigError(f"method {self.edit.method}: expected Surfels of each_part, got {got}")
             path = write_texture(file, edited, {"part": part})
             scene = with_looks(scene, {part: NewLook(path, values(part, edited, surfels))})
         return scene

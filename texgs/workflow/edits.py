@@ -14,7 +14,7 @@ from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.core.names import close
 from texgs.core.plain_yaml import parse_yaml
 from texgs.edit.keys import EditKeys
-from texgs.edit.method import NO_METHOD, method_of
+from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.workflow.inputs import models_of_scene, scene_before, view_set
 from texgs.workflow.locate import tf_names
 
@@ -46,6 +46,11 @@ def lineage(words: Words) -> list[tuple[str, Words]]:
     following: Words | None = words
     while following is not None:
         edit = compose(following).edit
+        if edit.method == NO_METHOD:
+            raise ConfigError(
+                f"edit={edit.name}: expected a method, got none; write `method: NAME` into "
+                f"conf/edit/{edit.name}.yaml, with one of {', '.join(methods())}"
+            )
         if edit.name in [name for name, _ in chain]:
             raise ConfigError(f"edit.base: {edit.name} starts from itself; choose another base")
         chain.insert(0, (edit.name, following))

@@ -4,23 +4,24 @@ import time
 from collections.abc import Callable
 from os.path import relpath
 from pathlib import Path
+from typing import Any
 
 from texgs.config.compose import compose
 from texgs.config.schema import Config
 from texgs.core.checksum import Checksums
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.io import write_json
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.progress import curve_logger
 from texgs.edit.method import NO_METHOD
-from texgs.report.results import plain
+from texgs.report.results import Result, plain
 from texgs.workflow import result, tracked
 from texgs.workflow.job import Job
 from texgs.workflow.locate import cached_volume, source_file
 from texgs.workflow.missing import needed, require_same
 from texgs.workflow.provenance import record
 from texgs.workflow.runs import run
-from texgs.workflow.stage import Stage
+from texgs.workflow.stage import Outcome, Stage
 from texgs.workflow.stage_table import jobs
 
 
@@ -67,6 +68,7 @@ def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
         start = time.perf_counter()
         with curve_logger(recorded.log if recorded.id else None):
             outcome = job.stage.work(settings, dict(job.inputs), work)
+        require_outcome(job.stage, outcome, work)
         seconds = time.perf_counter() - start
         metrics = {
             **record(job.settings, identity, made_from, seconds),
@@ -78,6 +80,20 @@ def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
         write_json(work / result.METRICS, metrics)
         result.publish(job.output)
         tracked.log_result(recorded, job, metrics)
+
+
+def require_outcome(stage: Stage, outcome: Any, folder: Path) -> None:
+    """Require of a job that it tells what it has done, and has written what it names."""
+    where = f"stage {stage.name}: work"
+    if not isinstance(outcome, Outcome):
+        raise ConfigError(f"{where}: expected an Outcome, got {type(outcome).__name__}")
+    if not isinstance(outcome.result, Result):
+        raise ConfigError(
+            f"{where}: expected a kind of Result in its Outcome, got {type(outcome.result).__name__}"
+        )
+    for name in (*stage.rule.files, *(outcome.pictures or ())):
+        if not (folder / name).exists():
+            raise ConfigError(f"{where}: expected the file {name} in its folder, got none; write it there")
 
 
 def fetch_volume(config: Config) -> None:

@@ -14,6 +14,7 @@ from typing import Any, Literal, cast, get_type_hints
 
 from texgs.config.schema import Config
 from texgs.core.checksum import digest
+from texgs.core.errors import ConfigError
 from texgs.edit.method import methods
 from texgs.fields.kinds import kinds
 from texgs.metrics.metric import metrics
@@ -70,8 +71,15 @@ class Stage:
     @cached_property
     def schema(self) -> type[Any]:
         """Dataclass of its settings, whose fields say what they `read`: the first that `work` takes."""
-        first = next(iter(signature(self.work).parameters))
-        return cast(type[Any], get_type_hints(self.work)[first])
+        first = next(iter(signature(self.work).parameters), "settings")
+        schema = get_type_hints(self.work).get(first)
+        if not is_dataclass(schema):
+            got = "none" if schema is None else getattr(schema, "__name__", schema)
+            raise ConfigError(
+                f"stage {self.name}: work: expected a dataclass as annotation of {first}, such as "
+                f"`{first}: OfDataset`, got {got}"
+            )
+        return cast(type[Any], schema)
 
     @property
     def place(self) -> str:
