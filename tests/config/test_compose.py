@@ -162,7 +162,8 @@ print('torch' in sys.modules)
         ("++views.width=7", "++views.width=8", "++views.width=7"),
     ],
 )
-def test_a_composition_is_that_of_hydra(words):
+def test_a_composition_is_that_of_hydra(words, monkeypatch):
+    monkeypatch.delenv("TEXGS_DATA", raising=False)
     with initialize_config_dir(str(SHIPPED), version_base="1.3"):
         by_hydra = OmegaConf.to_container(hydra_compose("config", overrides=list(words)))
     expected = asdict(Config())

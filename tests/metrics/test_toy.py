@@ -78,3 +78,8 @@ def test_two_metrics_have_no_value_of_one_name(toy, monkeypatch):
 def test_columns_and_names_are_stated_once():
     measures = [measure for metric in metrics().values() for measure in metric.measures]
     assert len({measure.name for measure in measures}) == len({m.title for m in measures}) == len(measures)
+
+
+def test_one_measure_without_a_comma_is_told():
+    with pytest.raises(ConfigError, match=r"metric dark: measures: expected several in \(\), got one"):
+        Metric("dark", measures=Measure("dark", "dark"), run=print)

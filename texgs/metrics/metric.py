@@ -55,6 +55,10 @@ class Metric:
     # From what each look of a scene follows, and its values, to measures that it has among these looks.
     among: Callable[[Sequence[tuple[str, Mapping[str, Any]]]], Sequence[Mapping[str, Any]]] | None = None
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.measures, tuple):
+            raise ConfigError(f"metric {self.name}: measures: expected several in (), got one; put it into (,)")
+
     @property
     def names(self) -> list[str]:
         """Return the names of all its values."""

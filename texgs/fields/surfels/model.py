@@ -8,6 +8,7 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.names import close
 from texgs.fields.field import sizes_in_mib
 from texgs.fields.splats import GEOMETRY, Splats
 from texgs.fields.surfels.shading import ShadingModel, seen_normals
@@ -51,6 +52,9 @@ class Surfels(Splats):
             raise ArgumentError(
                 f"model: expected {', '.join(GEOMETRY)} and sh or colors, got {', '.join(given)}"
             )
+        if unknown := sorted(given.keys() - SHAPES.keys() - {*MATERIAL}):
+            hint = close(unknown[0], (*SHAPES, *MATERIAL))
+            raise ArgumentError(f"model: {unknown[0]} is no tensor of surfels{hint}")
         n = check.shape("means", given["means"], "N 3")["N"]
         for name, spec in SHAPES.items():
             if name in given:
