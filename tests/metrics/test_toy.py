@@ -81,5 +81,5 @@ def test_columns_and_names_are_stated_once():
 
 
 def test_one_measure_without_a_comma_is_told():
-    with pytest.raises(ConfigError, match=r"metric dark: measures: expected several in \(\), got one"):
+    with pytest.raises(ConfigError, match=r"measures: expected a tuple, .*, got Measure"):
         Metric("dark", measures=Measure("dark", "dark"), run=print)

@@ -57,7 +57,8 @@ class Metric:
 
     def __post_init__(self) -> None:
         if not isinstance(self.measures, tuple):
-            raise ConfigError(f"metric {self.name}: measures: expected several in (), got one; put it into (,)")
+            got = type(self.measures).__name__
+            raise ConfigError(f"metric {self.name}: measures: expected a tuple, (Measure(...),), got {got}")
 
     @property
     def names(self) -> list[str]:

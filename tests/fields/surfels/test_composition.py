@@ -204,10 +204,3 @@ def test_edits_out_of_range(values, message):
 
 def test_hexadecimal_colours():
     assert PartEdit(palette="#ff0080").palette == pytest.approx((1, 0, 128 / 255))
-
-
-def test_a_misspelt_tensor_is_refused():
-    parameters = {**ball(0).parameters}
-    parameters["texel"] = parameters.pop("texels")
-    with pytest.raises(ArgumentError, match="texel is no tensor of surfels, did you mean texels"):
-        Surfels(parameters)

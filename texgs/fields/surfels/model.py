@@ -8,7 +8,6 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.names import close
 from texgs.fields.field import sizes_in_mib
 from texgs.fields.splats import GEOMETRY, Splats
 from texgs.fields.surfels.shading import ShadingModel, seen_normals
@@ -38,7 +37,7 @@ class Surfels(Splats):
       palette + colors + texel.
 
     Raises:
-        ShapeError, ArgumentError: if a tensor is missing, unknown or of another shape.
+        ShapeError, ArgumentError: if a tensor is missing or of another shape.
     """
 
     kind: ClassVar[str] = "surfels"
@@ -52,9 +51,6 @@ class Surfels(Splats):
             raise ArgumentError(
                 f"model: expected {', '.join(GEOMETRY)} and sh or colors, got {', '.join(given)}"
             )
-        if unknown := sorted(given.keys() - SHAPES.keys() - {*MATERIAL}):
-            hint = close(unknown[0], (*SHAPES, *MATERIAL))
-            raise ArgumentError(f"model: {unknown[0]} is no tensor of surfels{hint}")
         n = check.shape("means", given["means"], "N 3")["N"]
         for name, spec in SHAPES.items():
             if name in given:
