@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+unexport PYTHONDONTWRITEBYTECODE # tests and jobs start hundreds of processes
 NATIVE := $(shell find texgs/raster/csrc -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.txt')
 FORMATTED := $(filter-out %.txt,$(NATIVE)) $(shell find tests -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh')
 
@@ -62,7 +63,7 @@ $(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/core
 	@$(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $@
 
-# Python compiles modules as they are imported; all 23,000 of them would take minutes.
+# pip would compile the 23,000 modules one by one. Some packages hold files that are no Python.
 $(VENV)/dependencies: requirements.lock requirements-torch.lock
 	@$(PYTHON) tools/check_python.py
 	@echo "Creating $(VENV)"
@@ -70,6 +71,7 @@ $(VENV)/dependencies: requirements.lock requirements-torch.lock
 	@echo "Installing the packages of requirements*.lock (torch alone is 200 MB, several GB with CUDA)"
 	@$(PIP) install --no-compile --no-deps --require-hashes --requirement requirements.lock
 	@$(PIP) install --no-compile $$($(PYTHON) tools/torch_index.py) --requirement requirements-torch.lock
+	@$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true
 	@$(PIP) check
 	@touch $@
 
