@@ -50,9 +50,14 @@ def remembered(function):
     return wraps(function)(lambda *arguments: of(pickle.dumps(arguments)))
 
 
-@remembered
 def decided(scene, options=DEFAULT_OPTIONS):
     """Pixels [H, W] in which no threshold is close, nor a kink of a texture."""
+    return decided_by_geometry(replace(scene, features=None, background=None), options)
+
+
+@remembered
+def decided_by_geometry(scene, options):
+    """The same of a scene without colours, which many scenes share."""
     scene = scene.double()
     counts = decisions(scene, options)
     same = ~near_texel_centre(scene, options)
