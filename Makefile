@@ -12,7 +12,7 @@ FORMATTED := $(filter-out %.txt,$(NATIVE)) $(shell find tests -name '*.h' -o -na
 help:
 	@echo "make demo      from a small generated volume to an edited scene and results/report.html"
 	@echo "make test      test all but what the next one adds; ARGS='-k name' picks some of all tests"
-	@echo "make test-all  make test, then whole runs, commands of the documentation, browser, wheel, emulated CUDA"
+	@echo "make test-all  all of them: also whole runs, commands of the documentation, browser, wheel, emulated CUDA"
 	@echo "make test-cluster  run the cluster profile on a real SLURM on this machine, where that is installed"
 	@echo "make bench     measure speed and memory, write JSON under benchmarks/"
 	@echo "make lint      ruff, mypy, clang-format, snakefmt, snakemake --lint and the import layers"
@@ -34,8 +34,8 @@ else
 	$(WORKERS) -m "not ($(SLOW))"
 endif
 
-test-all: test
-	$(WORKERS) -m "$(SLOW)"
+test-all: $(VENV)/installed
+	$(WORKERS)
 
 # Opt-in: it starts the daemons of SLURM. Without them it is skipped and says what to install.
 test-cluster: $(VENV)/installed
