@@ -58,9 +58,10 @@ lint: $(VENV)/dependencies
 	$(BIN)/snakemake --lint
 	$(BIN)/python -m pytest tests/test_layers.py
 
+# Not quiet: pip says every minute that it is still at work.
 $(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/core/native_sources.py $(NATIVE)
 	@echo "Compiling the native library (some minutes on two cores, with CUDA twice as many) and installing texgs"
-	@$(PIP) install --no-build-isolation --no-deps --editable .
+	@$(PIP) --verbose install --no-build-isolation --no-deps --editable .
 	@touch $@
 
 # pip would compile the 23,000 modules one by one. Some packages hold files that are no Python.

@@ -16,7 +16,7 @@ from tests.fuzz.child import run
 from tests.fuzz.readers import READERS
 from texgs.core.errors import LONGEST
 
-CASES = int(os.environ.get("TEXGS_FUZZ_CASES", "40"))
+CASES = int(os.environ.get("TEXGS_FUZZ_CASES", "20"))
 # A file of these takes a second.
 IN_A_PROCESS_EACH = (".vti", ".vtk", ".slc", ".mha", ".mhd", ".nrrd", ".nhdr", "samples")
 SECONDS = 300.0  # for all files of a reader
