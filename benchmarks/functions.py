@@ -78,7 +78,7 @@ async def dragged(file: Path, folder: Path) -> dict[str, object]:
             if own is None:
                 whole = frames.pixels(asked, edits.scene)
             else:
-                own._caster.cast(tf, asked.camera.camera(), edits.scene.light)
+                own._caster.cast(tf, asked.camera.camera(), edits.scene.light, by_cell=False)
             took[key] = perf_counter() - start
         if (whole != 255).any(axis=2).mean() < COVER:
             continue
