@@ -17,10 +17,12 @@ FILES = [
     *(TESTS / "raster" / f"test_{name}.py" for name in (*KERNELS, "images_and_gradients")),
     TESTS / "volume" / "test_caster.py",
 ]
-# Without what computes the same on all of them, and of random scenes, whose float64 definition takes long, those
+# Without what computes the same on all of them; of random scenes, whose float64 definition takes long, those
 # with all images, with numbers of channels that fill no vector, and with all that a texture can have.
-CHOSEN = "not finite_differences and not emulated and not large and not cuda and not cells and not memory"
-SCENES = "not test_images_and_gradients or all or behind or mixed or frozen or 7 or 29"
+CHOSEN = (
+    "not finite_differences and not emulated and not large and not cuda and not cells and not memory"
+    " and (not test_images_and_gradients or all or behind or mixed or frozen or 7 or 29)"
+)
 
 
 def run(instruction_set, *command):
@@ -41,7 +43,7 @@ def test_instruction_set(instruction_set):
     if instruction_set == native.instruction_set():
         pytest.skip("the tests themselves run on it")
     child = run(
-        instruction_set, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", f"{CHOSEN} and ({SCENES})", *map(str, FILES)
+        instruction_set, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", CHOSEN, *map(str, FILES)
     )
     if "this machine does not have it" in child.stdout:
         pytest.skip(f"this machine has no {instruction_set}")

@@ -14,7 +14,8 @@ ROOT = Path(__file__).parents[2]
 # The smallest experiment that has all rules; its volume takes no time.
 TINY = (
     "dataset.volume.generator=orbital dataset.volume.size=24 views=small views.width=40 views.height=32 "
-    "views.train.frequency=1 views.test.count=3 views.relit=2 views.turntable=2 views.step=0.5 edit.text.size=64"
+    "views.train.frequency=1 views.test.count=3 views.relit=2 views.turntable=2 views.step=0.5 "
+    "edit.text.size=64"
 )
 
 # Python runs this at its start. Else an editable installation finds texgs in the original sources.
