@@ -36,7 +36,7 @@ METHODS = (  # of the paper's tables, by their authors' iterations: hours
 )
 RUN = {  # words of `texgs run`, by the folder of its results
     "demo": "experiment=demo",
-    "fields": "experiment=fields comparisons",
+    "fields": "experiment=fields tf=TF04_400 dataset.image=400 fit.reduce=1 comparisons",
     "image": f"{METHODS} edits=[style,style_untextured,stylesplat,arf] gallery.section=image",
     "text": f"{METHODS} edits=[text,text_untextured,in2n,igs2gs,igs2gs_frozen] gallery.section=text",
     "styles": "datasets=[vortex,engine] dataset.vortex.fit.reduce=2 dataset.engine.views.width=400"
@@ -145,7 +145,7 @@ PICTURES = {
     "edits": Picture(copy("orbital/scene/demo/pse/pse.png"), "demo", f"{FIT} pse"),
     "looks": Picture(looks, "demo", f"{FIT} compose image text segment"),
     "fields": Picture(
-        copy("vortex/TF04_400/comparison/*/*.png"), "fields", f"{FIT} gaussians voxels comparison"
+        copy("vortex/TF04_400/comparison/*/*.png", 2), "fields", f"{FIT} gaussians voxels comparison"
     ),
     "image_methods": Picture(
         copy(GALLERY, smaller=2), "image", f"{FIT} gaussians voxels image stylesplat arf gallery"
