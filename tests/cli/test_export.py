@@ -50,6 +50,11 @@ def export(source, target, *words):
     return main(["export", str(source), "--to", str(target), *words])
 
 
+def test_the_file_may_be_named_as_in_other_verbs(scene, tmp_path):
+    assert main(["export", str(scene), "--output", str(tmp_path / "out.ply")]) == 0
+    assert (tmp_path / "out.ply").is_file()
+
+
 @pytest.mark.parametrize("kind", ["3dgs", "2dgs"])
 def test_gaussians_of_a_scene_are_those_of_its_models(scene, tmp_path, kind, capsys):
     assert export(scene, tmp_path / "out.ply", "--kind", kind) == 0

@@ -25,7 +25,7 @@ NUMBERS = ("opacity", "voxel", "views", "size", "drop_unseen", "device")  # argu
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to export, and where to."""
     parser.add_argument("source", type=Path, help="scene.yaml, a folder with one, or a model file")
-    parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=" ".join(ENDINGS))
+    parser.add_argument("--to", "--output", type=Path, required=True, metavar="FILE", help=" ".join(ENDINGS))
     parser.add_argument(
         "--kind",
         choices=EXPORTS,
