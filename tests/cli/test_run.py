@@ -123,9 +123,11 @@ def test_a_run_that_is_interrupted_says_that_it_goes_on(tmp_path):
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     process = subprocess.Popen([*TEXGS, *words], cwd=tmp_path, text=True, start_new_session=True, **pipes)
     deadline = time.monotonic() + 200
-    while not list(tmp_path.glob("results/turbulence/*/views/train/*.png")) and process.poll() is None:
+    while not list(tmp_path.glob("results/logs/turbulence/*/views.log")) and process.poll() is None:
         assert time.monotonic() < deadline
         time.sleep(0.05)
+    os.kill(process.pid, signal.SIGINT)  # to the run alone, which now waits for its job
+    time.sleep(1)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does for Ctrl-C
     _, err = process.communicate(timeout=100)
     assert process.returncode == 130

@@ -42,6 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
     interruptions = []
 
     def note(_signal: int, _frame: FrameType | None) -> None:
+        if interruptions:
+            return  # snakemake is ending; a second exception would stop that half-way
         interruptions.append(True)
         logging.getLogger("snakemake.logging").setLevel(logging.CRITICAL)  # jobs that end now have no fault
         raise KeyboardInterrupt  # snakemake ends its jobs, and then itself as if one had failed
