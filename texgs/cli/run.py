@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Call snakemake in this process; its exit code."""
-    interruptions = []
+    interruptions = list[bool]()
 
     def note(_signal: int, _frame: FrameType | None) -> None:
         if interruptions:
