@@ -83,6 +83,7 @@ def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypat
         torch.testing.assert_close(deferred[name], x.grad, atol=1e-6, rtol=1e-3)
 
 
+@pytest.mark.stages
 def test_free_colours_learn_those_of_the_recoloured_palette(field, images):
     colors = torch.tensor([[0.1, 0.7, 0.3], [0.2, 0.2, 0.9]])
     recolored = replace(field, parameters={**field.parameters, "palette.colors": colors})

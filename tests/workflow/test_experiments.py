@@ -164,6 +164,7 @@ def test_a_sweep_of_edits_without_any_has_no_fits_either():
     assert selected(words, nothing).by_sweep["lambda_s"]
 
 
+@pytest.mark.workflow
 def test_the_experiments_of_a_union_make_no_two_jobs_in_one_folder():
     """Each shipped union, with all data and weights there: the same folder is always the same job."""
     files = (ROOT / "conf" / "experiment").glob("*.yaml")

@@ -43,6 +43,8 @@ from texgs.volume.summaries import read_summaries
 from texgs.workflow.moments import in_time
 from texgs.workflow.series import make_series, settings_of
 
+pytestmark = pytest.mark.stages
+
 CPU = torch.device("cpu")
 PLACES = [-0.06, 0.0, 0.06]  # of a ball, along x
 

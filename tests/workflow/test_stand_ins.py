@@ -143,6 +143,7 @@ def galleries(plan):
     return found, captions
 
 
+@pytest.mark.workflow
 def test_figures_have_the_papers_data_sets_and_methods_where_these_are_there(machine):
     machine(*ALL, volumes=True)
     plan, missing = make(words_of({"experiment": "paper"}))
@@ -169,6 +170,7 @@ def test_figures_have_the_papers_data_sets_and_methods_where_these_are_there(mac
     }, "vortex has no volume"
 
 
+@pytest.mark.workflow
 def test_figures_name_what_stands_in_where_data_and_weights_are_missing(machine):
     machine()
     plan, missing = make(words_of({"experiment": "paper"}))
@@ -191,6 +193,7 @@ def test_figures_name_what_stands_in_where_data_and_weights_are_missing(machine)
     assert {own["fit"]["name"] for own in shown} == {"paper"}
 
 
+@pytest.mark.workflow
 def test_the_quick_run_takes_what_is_quick_though_all_is_there(machine):
     machine(*ALL, volumes=True)
     found, captions = galleries(make(words_of({"experiment": "paper_quick"}))[0])
