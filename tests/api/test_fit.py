@@ -8,6 +8,7 @@ import pytest
 
 import texgs
 from tests.fitting.short_fits import shorten
+from texgs.api.fit import configuration
 from texgs.core.errors import ArgumentError, ConfigError, DeviceError
 from texgs.metrics.quality import compare
 from texgs.scene.scene_file import read_scene
@@ -170,3 +171,22 @@ def test_an_interrupted_fit_goes_on(ball, monkeypatch, tmp_path):
     assert scene.parts == ["TF01"]
     assert before
     assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+@pytest.mark.parametrize("theirs", ["ball.nrrd", "ball.json"])
+def test_files_of_the_folder_are_not_replaced(ball, monkeypatch, tmp_path, theirs):
+    monkeypatch.setattr("texgs.fitting.now.fit_now", None)
+    (tmp_path / theirs).write_text("mine")
+    with pytest.raises(ArgumentError, match=r"folder: expected one without another ball.nrrd or ball.json"):
+        texgs.fit(ball, TFS, "now", size=32, folder=tmp_path)
+    assert (tmp_path / theirs).read_text() == "mine"
+    assert [file.name for file in tmp_path.iterdir()] == [theirs]
+
+
+def test_a_recipe_that_was_edited_meanwhile_is_read_again(ball, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (recipe := tmp_path / "conf" / "fit" / "mine.yaml").parent.mkdir(parents=True)
+    for iterations in (25, 75):
+        recipe.write_text(f"defaults: [quick]\nname: mine\nshading: {{iterations: {iterations}}}\n")
+        config = configuration(ball, TFS, ("fit=mine",), tmp_path)
+        assert config.fit.shading.iterations == iterations

@@ -16,7 +16,9 @@ from texgs.cli.main import main
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.core.image import read_rgba
 from texgs.core.light import Light
+from texgs.edit.new_segment import new_segment
 from texgs.fields.surfels.step_file import write_step
+from texgs.scene.parts import HIGHLIGHTS
 from texgs.scene.scene import Scene as Seen
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.series_file import Series, write_series
@@ -182,6 +184,22 @@ def test_an_instruction_by_filters(scene):
     assert scene.session.past == ["TF01, TF02 make it gold"]
 
 
+@pytest.mark.parametrize("second", ["gold", "silver"])
+def test_one_material_after_another_is_as_if_it_were_the_first(scene, tmp_path, second):
+    once = texgs.open(write_balls(tmp_path))
+    once.instruct(f"make it {second}", guidance="filters", size=64, parts="TF01")
+    for each in ("gold", second):
+        scene.instruct(f"make it {each}", guidance="filters", size=64, parts="TF01")
+    assert scene["TF01"].specular != 1
+    for key in HIGHLIGHTS:
+        assert getattr(scene["TF01"], key) == getattr(once["TF01"], key)
+
+
+def test_pictures_of_any_mode_are_styles(scene):
+    scene.style(Image.new("CMYK", (40, 40), (0, 255, 255, 0)), recipe="preview", parts="TF01")
+    assert scene.session.scene.models["TF01"].texture is not None
+
+
 def test_what_a_look_lacks_is_told(scene):
     with pytest.raises(ArgumentError, match=r"image.patern: no such key, did you mean pattern"):
         scene.style("glass", patern=2)
@@ -200,6 +218,16 @@ def test_a_click_makes_a_part(scene):
     assert scene.session.scene.models["TF01"].segments["spot"].edit.palette == (0, 1, 0)
     with pytest.raises(ArgumentError, match="model: expected one of TF01, TF02, got none"):
         scene.segment("other", (24, 24), size=48)
+
+
+def test_edits_that_a_page_makes_meanwhile_stay(scene, monkeypatch):
+    def meanwhile(*arguments, **options):
+        scene["TF02"].opacity = 0.25
+        return new_segment(*arguments, **options)
+
+    monkeypatch.setattr("texgs.edit.new_segment.new_segment", meanwhile)
+    scene.segment("spot", (24, 24), model="TF01", size=48, views=12, masks="grabcut")
+    assert scene["TF02"].opacity == 0.25
 
 
 # ---- Files ------------------------------------------------------------------

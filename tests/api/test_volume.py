@@ -8,8 +8,10 @@ import pyvista
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
+from pydicom.uid import generate_uid
 
 import texgs
+from tests.volume.test_dicom import write_series
 from tests.volume.zarr_files import axes_of, write_image
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
@@ -261,11 +263,31 @@ def test_image_data_that_are_a_part_of_others_keep_their_place():
             "expected samples that differ as float32, got all near",
         ),
         (np.ones((4, 4, 4)), {}, "expected a field that varies, but every sample is 1"),
+        (field(4, 4, 4), {"crop": 4}, "crop: expected 6 whole numbers, got 4"),
+        (field(4, 4, 4), {"crop": (0, 4 / 2, 0, 4, 0, 4)}, "crop: expected 6 whole numbers, got"),
+        ("a.raw", {"dims": 512, "dtype": "uint8"}, "dims: expected 3 whole numbers, got 512"),
+        ("a.raw", {"dims": (8, 8, 16 / 2)}, r"dims: expected 3 whole numbers, got \[8, 8, 8.0\]"),
+        ("a.txt", {"dims": (2, 2, 2), "column": 0}, "column: expected a whole number from 1 on, got 0"),
     ],
 )
 def test_mistakes_are_told_in_a_sentence(data, keys, message):
     with pytest.raises(ArgumentError, match=message):
         texgs.Volume(data, **keys)
+
+
+def test_numbers_of_numpy_are_sizes_and_a_number_is_a_series(tmp_path):
+    (raw := tmp_path / "a.raw").write_bytes(field(4, 3, 2).astype("<f4").tobytes())
+    assert texgs.Volume(raw, dims=np.array([2, 3, 4]), dtype="float32").grid.dims == (2, 3, 4)
+    (tmp_path / "slices").mkdir()
+    write_series(tmp_path / "slices", np.int16(1000 * field(4, 5, 6)), number=2)
+    write_series(tmp_path / "slices", np.int16(1000 * field(4, 5, 7)), number=3, uid=generate_uid())
+    assert texgs.Volume(tmp_path / "slices", series=2, up="+y").grid.dims[0] == 6
+
+
+def test_a_file_in_place_of_the_folder_is_told(tmp_path):
+    (tmp_path / "notes").touch()
+    with pytest.raises(ArgumentError, match=r"folder: expected one, but .*notes cannot be made"):
+        texgs.Volume(field(4, 4, 4), folder=tmp_path / "notes")
 
 
 def test_a_volume_is_cropped_and_reduced():

@@ -97,6 +97,14 @@ def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
     assert "## Table 1. Data sets" not in said.out, "tables without rows are not printed"
 
 
+def test_a_file_that_is_named_twice_counts_once(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")
+    assert main(["tables", str(path), str(path.relative_to(tmp_path)), "--output", "t"]) == 0
+    assert "| scan | quick | shading | 1 | 40.00 |" in capsys.readouterr().out
+    assert len(Path("t/fits.csv").read_text().splitlines()) == 2
+
+
 def test_the_verb_reads_whole_results_of_a_folder_and_names_others(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["tables", "mine"]) == 2

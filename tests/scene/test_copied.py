@@ -11,6 +11,8 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.scene.copied import write_copy
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene
+from texgs.scene.twin import SceneVolume
+from texgs.volume.render import Appearance
 
 
 def names(folder):
@@ -70,3 +72,21 @@ def test_a_file_in_the_place_of_the_folder(tmp_path, place):
     (tmp_path / "scene.yaml").write_text("")
     with pytest.raises(ArgumentError, match="expected a folder, but it cannot be made"):
         write_copy(tmp_path / place, Scene(ball_models(tmp_path, "TF01")))
+
+
+@pytest.mark.parametrize("gone", ["TF01.safetensors", "volume.nrrd"])
+def test_a_scene_of_which_a_file_is_gone_leaves_no_half_copy(tmp_path, gone):
+    volume = SceneVolume(tmp_path / "volume.nrrd", {}, Appearance())
+    volume.file.touch()
+    scene = Scene(ball_models(tmp_path, "TF01"), volume=volume)
+    (tmp_path / gone).unlink()
+    with pytest.raises(ArgumentError, match=f"{gone}: no such file, which the scene needs"):
+        write_copy(tmp_path / "kept", scene)
+    assert not (tmp_path / "kept").exists()
+
+
+def test_a_result_of_the_workflow_is_no_place_for_a_copy(tmp_path):
+    (tmp_path / "metrics.json").touch()
+    with pytest.raises(ArgumentError, match="expected a folder of your own, got a result of the workflow"):
+        write_copy(tmp_path, Scene(ball_models(tmp_path, "TF01")))
+    assert not (tmp_path / "scene.yaml").exists()

@@ -250,6 +250,17 @@ async def test_a_look_is_cancelled_and_leaves_nothing(browser, scene_file, monke
 
 
 @on_page
+async def test_a_folder_that_another_viewer_has_made_stays(browser, client, scene_file, monkeypatch):
+    taken = scene_file.parent / "scene-image-1"
+    taken.mkdir()
+    (taken / "TF01.safetensors").write_text("of another viewer")
+    monkeypatch.setattr(client.server_side.edits, "new_folder", lambda kind: taken)  # free a moment before
+    await browser.send(**look(parts=["TF01"], style="dots"))
+    assert "cannot be written (File exists)" in (await browser.next("notice"))["text"]
+    assert (taken / "TF01.safetensors").read_text() == "of another viewer"
+
+
+@on_page
 async def test_a_look_of_a_part_that_is_gone_stays_with_the_others(browser, client, scene_file, monkeypatch):
     reached, go_on = threading.Event(), threading.Event()
     monkeypatch.setattr(

@@ -3,6 +3,8 @@
 import asyncio
 import io
 import json
+from dataclasses import replace
+from shutil import copy
 
 import numpy as np
 import pytest
@@ -16,6 +18,8 @@ from texgs.cli.main import main
 from texgs.core.cuts import NO_CUTS
 from texgs.core.io import write_json
 from texgs.report.check import checksum_of
+from texgs.scene.parts import replaced
+from texgs.scene.scene import MOST_FUNCTIONS
 from texgs.scene.scene_file import read_scene
 from texgs.viewer import guard
 from texgs.viewer.messages import parse
@@ -323,7 +327,7 @@ async def test_a_scene_whose_model_is_gone_is_not_saved(browser, scene_file):
         notice = await browser.next("notice")
         assert notice["level"] == ("info" if is_saved else "error")
         assert is_saved or notice["text"] == (
-            f"{model}: no such file, which the scene needs; bring it back, then save"
+            f"{model}: no such file, which the scene needs; bring it back, then try again"
         )
         assert (scene_file.parent / "new.yaml").exists() is is_saved
         if not is_saved:
@@ -349,10 +353,37 @@ async def test_a_thousand_malformed_messages(browser, caplog):
 
 
 @on_page
-async def test_messages_have_a_limit(browser, client):
-    await browser.socket.send_str("x" * 100_000)
-    while (message := await asyncio.wait_for(browser.socket.receive(), WAIT)).type == WSMsgType.TEXT:
-        pass
+async def test_a_step_to_a_model_that_is_gone_is_refused_and_taken_back(browser, client, scene_file):
+    edits, models = client.server_side.edits, scene_file.parent
+    copy(models / "TF02.safetensors", finer := models / "finer.safetensors")
+    entry = replace(edits.scene.models["TF01"], file=finer)
+    edits._session.set_scene(replaced(edits.scene, "TF01", entry))
+    (models / "TF01.safetensors").unlink()
+    await browser.send(type="undo")
+    assert "TF01.safetensors: no such file, which the scene needs" in (await browser.next("notice"))["text"]
+    assert edits.scene.models["TF01"].file == finer
+    assert len(edits.state()["past"]) == 1
+    async with page(client) as other:
+        await other.next("scene")
+
+
+@on_page
+async def test_a_scene_may_have_all_the_functions_that_it_can_hold(browser, client):
+    points = [[x / 255, 0.123456789] for x in range(256)]
+    colors = [[x / 255, *[0.123456789] * 3] for x in range(256)]
+    functions = {f"f{n}": {"opacity": points, "color": colors} for n in range(MOST_FUNCTIONS)}
+    await browser.send(type="edit", part="", key="functions", value=functions)
+    while len(client.server_side.edits.scene.functions) < MOST_FUNCTIONS:
+        await browser.next("scene")
+
+
+@on_page
+async def test_messages_have_a_limit(client, monkeypatch):
+    monkeypatch.setattr("texgs.viewer.messages.LARGEST", 1 << 16)
+    async with page(client) as one:
+        await one.socket.send_str("x" * 100_000)
+        while (message := await asyncio.wait_for(one.socket.receive(), WAIT)).type == WSMsgType.TEXT:
+            pass
     assert message.type == WSMsgType.CLOSE
     async with page(client) as again:
         await again.next("scene")

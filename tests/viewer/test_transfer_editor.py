@@ -1,6 +1,7 @@
 """Transfer functions are edited over the histogram in a real browser: the volume shows them at once."""
 
 import re
+from dataclasses import replace
 from urllib.parse import quote
 
 import numpy as np
@@ -55,6 +56,14 @@ def test_what_is_dragged_is_the_volume_that_texgs_renders(chromium, sphere_file)
         page.get_by_role("button", name="Undo").click()
         page.get_by_label("Show", exact=True).select_option("Shaded")
         assert still(page) == before
+
+
+def test_a_scene_whose_volume_has_no_function_is_shown_without_the_editor(chromium, sphere_file):
+    scene = read_scene(sphere_file)
+    write_scene(sphere_file, replace(scene, volume=replace(scene.volume, tfs={})))
+    with served(sphere_file) as (_, address), opened(chromium, address) as page:
+        expect(page.get_by_role("button", name="Make model")).to_have_count(0)
+        assert still(page)
 
 
 def test_a_function_that_moves_as_a_whole_stays_one_of_its_channel(chromium):

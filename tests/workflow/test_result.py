@@ -146,6 +146,19 @@ def test_files_of_the_user_are_never_lost(output, name):
     assert (output / name).read_text() == "mine"
 
 
+def test_files_that_the_user_puts_there_while_the_job_works_are_not_lost(output):
+    make(output)
+    work = result.claim(output, OTHER)
+    write_json(work / result.METRICS, {})
+    (output / "mine.yaml").write_text("mine")
+    with pytest.raises(ArgumentError, match=r"the folder also holds mine.yaml; move what is yours away"):
+        result.publish(output)
+    (output / "mine.yaml").rename(output.with_name("mine.yaml"))
+    assert result.claim(output, OTHER) == work
+    result.publish(output)
+    assert result.stamped(output) == OTHER
+
+
 def test_a_folder_of_others_or_a_link_is_refused(output, tmp_path):
     output.mkdir(parents=True)
     (output / "thesis.tex").touch()

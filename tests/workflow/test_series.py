@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from shutil import rmtree
 
+import nibabel
 import numpy as np
 import pytest
 import torch
@@ -35,12 +36,13 @@ from texgs.scene.session import Session
 from texgs.scene.twin import SceneVolume
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
+from texgs.volume.nrrd_file import open_grid
 from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import ArraySource
 from texgs.volume.sources import open_source
 from texgs.volume.summaries import read_summaries
-from texgs.workflow.moments import in_time
+from texgs.workflow.moments import in_time, matching
 from texgs.workflow.series import make_series, settings_of
 
 pytestmark = pytest.mark.stages
@@ -257,6 +259,43 @@ def test_no_file_of_a_pattern_is_told(folder, capsys):
     assert "--files: expected files that are there, got none_*.nrrd" in capsys.readouterr().err
     assert main(["render", "scene.yaml", "--path", "time", "--output", "f.mp4"]) == 2
     assert "expected a scene of a series, got one without" in capsys.readouterr().err
+
+
+def test_names_with_brackets_are_files_before_they_are_patterns(tmp_path):
+    (folder := tmp_path / "d[1]").mkdir()
+    for name in ("s[0].nrrd", "s[1].nrrd", "s0.nrrd", "s1.nrrd"):
+        (folder / name).touch()
+    named = [folder / "s[0].nrrd", folder / "s[1].nrrd"]
+    assert matching(named) == named
+    assert [file.name for file in matching([folder / "s?.nrrd"])] == ["s0.nrrd", "s1.nrrd"]
+    assert [file.name for file in matching([tmp_path / "d*" / "s[01].nrrd"])] == ["s0.nrrd", "s1.nrrd"]
+
+
+def test_another_scene_of_the_folder_is_not_replaced(folder):
+    before = (folder / "scene.yaml").read_bytes()
+    with pytest.raises(ArgumentError, match="expected a folder for the series, got another scene"):
+        make_series(read_scene(folder / "scene.yaml"), matching([folder / "step_*.nrrd"]), folder, CPU)
+    (results := folder / "results").mkdir()
+    (results / "metrics.json").touch()
+    with pytest.raises(ArgumentError, match="expected a folder for the series, got a result of the workflow"):
+        make_series(read_scene(folder / "scene.yaml"), matching([folder / "step_*.nrrd"]), results, CPU)
+    assert (folder / "scene.yaml").read_bytes() == before
+
+
+def test_nifti_of_a_scene_from_python_is_read_as_it_is_told(folder, capsys):
+    for number, file in enumerate(sorted(folder.glob("step_*.nrrd"))):
+        values = open_grid(file).values.transpose(2, 1, 0)  # x, y, z
+        nibabel.save(nibabel.Nifti1Image(values, np.eye(4)), folder / f"visit_{number}.nii")
+    volume = texgs.Volume(folder / "visit_1.nii", folder=folder / "middle")
+    scene = read_scene(folder / "scene.yaml")
+    write_scene(folder / "own.yaml", replace(scene, volume=replace(scene.volume, file=volume.file)))
+    words = ["own.yaml", "--files", "visit_*.nii", "--output", "t"]
+    assert main(["series", *words]) == 2
+    assert "or say how that volume was read, such as up=+z or reduce=2" in capsys.readouterr().err
+    assert main(["series", *words, "up=+q"]) == 2
+    assert "up: expected one of" in capsys.readouterr().err
+    assert main(["series", "own.yaml", "up=+z", *words[1:]]) == 0
+    assert len(read_scene(folder / "t" / "scene.yaml").series.steps) == 3
 
 
 def test_steps_that_share_only_the_root_keep_its_slash():

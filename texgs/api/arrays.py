@@ -1,11 +1,13 @@
 """Grids from objects of other libraries, which are known by what they can: none of these is imported."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from operator import index
 from typing import Any
 
 import numpy as np
 
+from texgs.api.display import as_python
 from texgs.core.errors import ArgumentError, located
 from texgs.volume.axes import along, lattice
 from texgs.volume.grid import Grid, Triple
@@ -44,6 +46,30 @@ def three(name: str, numbers: Sequence[float] | None) -> Triple | None:
     except (TypeError, ValueError):
         raise ArgumentError(f"{name}: expected three numbers x, y, z, got {numbers!r:.100}") from None
     return x, y, z
+
+
+def whole(name: str, numbers: Any, count: int) -> tuple[int, ...] | None:
+    """Return so many whole numbers; None where there are none."""
+    if numbers is None:
+        return None
+    try:
+        return tuple(map(index, np.reshape(numbers, count).tolist()))
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{name}: expected {count} whole numbers, got {numbers!r:.100}") from None
+
+
+def keys_of_format(keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what only some formats take as these have it, with numbers of Python."""
+    plain = {key: as_python(value) for key, value in keys.items()}
+    if "dims" in plain:
+        plain["dims"] = whole("dims", plain["dims"], 3)
+    if isinstance(plain.get("series"), int):
+        plain["series"] = str(plain["series"])  # DICOM has text
+    if plain.get("column") is not None:
+        column = plain["column"]
+        if not isinstance(column, int) or column < 1:
+            raise ArgumentError(f"column: expected a whole number from 1 on, got {column!r}")
+    return plain
 
 
 def of_array(data: Any) -> np.ndarray:

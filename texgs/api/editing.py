@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from texgs.api.live import Viewer
 
 VOTING = 512  # pixels of views that vote on the surfels of a segment
+PNG_MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I", "I;16")  # of pictures that PNG holds
 
 
 class Editing:
@@ -204,10 +205,10 @@ class Editing:
         around = [each.to(device) for each in icosphere_of(views, framed.lens().square(VOTING))]
         file = self._new_folder("segment") / part_file("name", part)
         facts = {"view": [azimuth, polar], "point": pixels.tolist(), "masks": masks}
-        made = new_segment(
+        new_segment(
             scene, part, clicks, around, mask_model(masks, device), file, facts, title=f"segment {name}"
         )
-        self.session.set_scene(made.scene)
+        self.session.add_segment(part, file)
         self.changed(f"{part} new")
         return self[part]
 
@@ -217,7 +218,7 @@ class Editing:
         from texgs.config.recipes import Edit
         from texgs.edit.method import method_of
         from texgs.edit.task import edited_by, orbit_task, parts_of
-        from texgs.scene.parts import look_of
+        from texgs.viewer.looks import looks_of
 
         before, device = self.session.scene, self.session.composition.device
         names = [parts] if isinstance(parts, str) else [*parts]
@@ -229,7 +230,7 @@ class Editing:
         task = replace(orbit_task(before, edit, self._new_folder(method), device), draws=False)
         after = edited_by(method_of(edit), task).scene
         names = parts_of(before, edit.parts)
-        self.session.set_looks({name: look_of(after, name, before) for name in names})
+        self.session.set_looks(looks_of(after, names, before))
         return self.changed(f"{', '.join(names)} {next(iter(values.values()))}")
 
     def _picture(self, picture: Any) -> str:
@@ -238,7 +239,7 @@ class Editing:
             return str(picture)
         image = picture if hasattr(picture, "save") else self._painted(picture)
         file = self._new_folder("picture") / "style.png"
-        image.save(file)
+        (image if image.mode in PNG_MODES else image.convert("RGB")).save(file)
         return str(file)
 
     @staticmethod

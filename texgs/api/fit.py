@@ -19,7 +19,7 @@ from texgs.core.interrupts import interrupts_between_items
 from texgs.core.io import copy_atomic
 from texgs.core.names import SCENE, close, file_name
 from texgs.scene.session import Session
-from texgs.volume.summaries import write_summaries
+from texgs.volume.summaries import summary_file, write_summaries
 from texgs.volume.transfer import TransferFunction
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def configuration(
     volume: Volume, functions: Mapping[str, TransferFunction], words: tuple[str, ...], folder: Path
 ) -> Config:
     """Return the configuration of a data set that is a volume with basic transfer functions."""
-    from texgs.config.compose import compose
+    from texgs.config.compose import recompose
     from texgs.config.dataset import BasicTF, Dataset
     from texgs.config.dataset import Volume as VolumeKeys
     from texgs.config.project import check_name
@@ -142,7 +142,7 @@ def configuration(
     for name in (volume.name, *functions):
         check_name("name", name)
     few = (f"views.test.count={TEST_VIEWS}", f"views.relit={TEST_VIEWS}", "views.turntable=1")
-    config = compose(("tracking=none", "edit=none", *few, "metric.vtk_frames=0", *words))
+    config = recompose(("tracking=none", "edit=none", *few, "metric.vtk_frames=0", *words))
     basic = {name: BasicTF(**tf.to_dict()) for name, tf in functions.items()}
     keys = VolumeKeys(generator=None, file=str(copied(volume, folder).resolve()))
     dataset = Dataset(name=volume.name, title=volume.name, volume=keys, basic_tfs=basic)
@@ -152,7 +152,12 @@ def configuration(
 def copied(volume: Volume, folder: Path) -> Path:
     """Return a copy of the volume in a folder, where later processes find the same one."""
     file = folder / file_name("volume.name", f"{volume.name}.nrrd")
-    if not (file.is_file() and cmp(file, volume.file, shallow=False)):
+    if not file.exists() and not summary_file(file).exists():
         copy_atomic(volume.file, file)
+    elif not (file.is_file() and cmp(file, volume.file, shallow=False)):
+        raise ArgumentError(
+            f"folder: expected one without another {file.name} or {summary_file(file).name}, got {folder}; "
+            "choose another folder, or another name= of the volume"
+        )
     write_summaries(file, [volume.summary], [""])
     return file

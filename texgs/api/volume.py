@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from texgs.api.arrays import grid_of, three
+from texgs.api.arrays import grid_of, keys_of_format, three, whole
 from texgs.api.display import as_python, camera_of, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
 from texgs.config.project import check_name, name_of
@@ -89,7 +89,7 @@ class Volume:
         self.folder = Path(folder if folder is not None else self._scratch.name)  # type: ignore[union-attr]
         if isinstance(data, str | Path):
             steps, first = three("spacing", spacing), three("origin", origin)
-            source = open_source(data, spacing=steps, origin=first, **keys)
+            source = open_source(data, spacing=steps, origin=first, **keys_of_format(keys))
         elif keys:
             hint = close(next(iter(keys)), signature(Volume).parameters)
             raise ArgumentError(f"{', '.join(keys)}: not for arrays{hint or '; leave them out'}")
@@ -100,7 +100,13 @@ class Volume:
         self._channel = source.channel
         if up is None:
             up = "+z" if isinstance(data, str | Path) and tells_superior(Path(data)) else "+y"
-        how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": as_python(nan_value)}
+        how = {
+            "crop": whole("crop", crop, 6),
+            "reduce": reduce,
+            "method": method,
+            "up": up,
+            "nan_value": as_python(nan_value),
+        }
         self.summary = self._prepared(source, how)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         write_summaries(self.file, [self.summary], [""])
@@ -117,7 +123,12 @@ class Volume:
 
     def _prepared(self, source: Source, how: dict[str, Any]) -> Summary:
         """Write the file; one of another volume, or that the data are in, is left alone."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ArgumentError(
+                f"folder: expected one, but {self.folder} cannot be made ({error.strerror})"
+            ) from error
         with TemporaryDirectory(prefix=".volume-", dir=self.folder) as scratch:
             made = Path(scratch, self.file.name)
             summary = prepare(source, made, **how)

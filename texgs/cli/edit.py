@@ -91,6 +91,8 @@ def run_model(arguments: argparse.Namespace) -> int:
 def add_series_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the scene of one step, the files of all, and the folder of the series."""
     parser.add_argument("scene", type=Path, help="scene.yaml, whose volume is that of one of the steps")
+    keys = "how the scene's volume was read, as for texgs new, such as up=+z; of a data set that is known"
+    parser.add_argument("overrides", nargs="*", metavar="KEY=VALUE", help=keys)
     words = "volume of each step, a pattern such as 'step_*.nrrd' or 'visit_*/', or a file or folder with all"
     parser.add_argument("--files", nargs="+", required=True, metavar="FILE", help=words)
     parser.add_argument(
@@ -104,6 +106,7 @@ def run_series(arguments: argparse.Namespace) -> int:
 
     `texgs edit time=3` shows a step of the new scene, `texgs render --path time` all of them.
     """
+    from texgs.config.compose import compose
     from texgs.core.check import torch_device
     from texgs.scene.scene_file import read_scene
     from texgs.workflow.moments import matching
@@ -111,7 +114,10 @@ def run_series(arguments: argparse.Namespace) -> int:
 
     with located("--files"):
         files = matching(arguments.files)
-    print(make_series(read_scene(arguments.scene), files, arguments.output, torch_device(arguments.device)))
+    words = [f"dataset.volume.{word}" for word in arguments.overrides]
+    settings = compose(("dataset.volume.generator=null", *words)).dataset.volume if words else None
+    scene, device = read_scene(arguments.scene), torch_device(arguments.device)
+    print(make_series(scene, files, arguments.output, device, settings))
     return 0
 
 

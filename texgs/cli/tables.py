@@ -90,7 +90,7 @@ def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[L
         raise ArgumentError(
             f"no whole results below {where}; run something first, such as texgs run dataset=engine"
         )
-    records, others = read_known(paths)
+    records, others = read_known({path.resolve(): path for path in reversed(paths)}.values())  # each once
     require_apart(records)
     return records, [*left_out, *others]
 

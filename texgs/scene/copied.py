@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import copy_atomic
-from texgs.core.names import SCENE, file_name
+from texgs.core.names import METRICS, SCENE, file_name
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import write_scene
 from texgs.scene.series_file import Series, write_series
@@ -26,8 +26,15 @@ def write_copy(folder: str | Path, scene: Scene) -> Path:
     replaced.
 
     Raises:
-        ArgumentError: if the folder cannot be made.
+        ArgumentError: if the folder cannot be made or is a result of the workflow, or a file of the scene is
+            gone.
     """
+    if (Path(folder) / METRICS).exists():
+        raise ArgumentError(
+            f"{folder}: expected a folder of your own, got a result of the workflow, whose next run makes it "
+            "anew; choose another"
+        )
+    require_files(scene)
     copies, models = Copies(Path(folder)), {}
     series = scene.series and copies.series(scene.series)
     for name, model in scene.models.items():
@@ -35,6 +42,14 @@ def write_copy(folder: str | Path, scene: Scene) -> Path:
         models[name] = replace(copies.entry(model, name), segments=segments)
     volume = scene.volume and replace(scene.volume, file=copies.volume(scene.volume.file))
     return write_scene(copies.folder / SCENE, replace(scene, models=models, volume=volume, series=series))
+
+
+def require_files(scene: Scene) -> None:
+    """Require that all is there that would be copied."""
+    files = [file for model in scene.models.values() for file in model.files]
+    files += [scene.volume.file] if scene.volume else []
+    if gone := [file for file in files if file is not None and not file.exists()]:
+        raise ArgumentError(f"{gone[0]}: no such file, which the scene needs; bring it back, then try again")
 
 
 class Copies:

@@ -26,7 +26,7 @@ from texgs.models.instruction import understand, vocabulary
 from texgs.models.pictures import PICTURES
 from texgs.models.weights import unusable
 from texgs.scene.frame import frame
-from texgs.scene.parts import NewLook, look_of, with_looks
+from texgs.scene.parts import NewLook, entry_of, look_of, with_looks
 from texgs.scene.scene import Scene
 from texgs.viewer.messages import Look, Orbit
 from texgs.viewer.scratch import scratch_folder
@@ -186,8 +186,9 @@ def with_parts(edit: Any, scene: Scene) -> Any:
 
 
 def looks_of(scene: Scene, parts: Sequence[str], before: Scene) -> dict[str, NewLook]:
-    """Return the looks of parts, as far as they had others before."""
-    return {part: look_of(scene, part, before) for part in parts}
+    """Return the looks of parts, as far as they are other than what a new look begins with."""
+    start = with_looks(before, {part: NewLook(entry_of(before, part).texture) for part in parts})
+    return {part: look_of(scene, part, start) for part in parts}
 
 
 def linked_to(folder: Path, looks: Mapping[str, NewLook]) -> dict[str, NewLook]:

@@ -12,7 +12,7 @@ from texgs.core.errors import ArgumentError
 from texgs.scene.frame import Mode
 
 Compared = Literal["truth", "difference", "wipe"]  # the volume, the scene's difference from it, or both
-LARGEST = 1 << 16  # bytes of a message; a page's own have a few hundred
+LARGEST = 1 << 22  # bytes of a message; most have a few hundred, 32 functions of ParaView 400,000
 MOST_POINTS, MOST_CORNERS = 100, 500
 MOST_PARTS = 1000
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)

@@ -1,6 +1,6 @@
 """The one scene that all pages edit: what a viewer is started with, its steps, and where it is saved."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -125,8 +125,10 @@ class SharedEdits:
         session, step, title, before = self._session, None, "", self.scene
         if isinstance(asked, Undo):
             session.undo()
+            self._require_files(session.redo)
         elif isinstance(asked, Redo):
             session.redo()
+            self._require_files(session.undo)
         elif isinstance(asked, Rename):
             title = f"{asked.part} renamed to {asked.name}"
             session.rename_segment(asked.part, asked.name)
@@ -191,9 +193,7 @@ class SharedEdits:
     def save(self, name: str) -> Path:
         """Write the scene file in one step, unless what it would name is gone."""
         path, scene = self.path_of(name), self.scene
-        gone = [file for file in files_of(scene) if file is not None and not file.exists()]
-        if gone:
-            raise ArgumentError(f"{gone[0]}: no such file, which the scene needs; bring it back, then save")
+        self._require_files()
         write_scene(path, scene)
         self.name, self._title, self._saved = name, title_of(path), scene
         self._own[path.resolve()] = state_of(path.resolve())
@@ -204,6 +204,15 @@ class SharedEdits:
         stem = Path(self.name).stem
         folders = (self._folder / f"{stem}-{kind}-{number}" for number in count(1))
         return next(folder for folder in folders if not folder.exists())
+
+    def _require_files(self, take_back: Callable[[], object] = lambda: None) -> None:
+        """Require that all is there that the scene reads; otherwise take the step to it back."""
+        gone = [file for file in files_of(self.scene) if file is not None and not file.exists()]
+        if gone:
+            take_back()
+            raise ArgumentError(
+                f"{gone[0]}: no such file, which the scene needs; bring it back, then try again"
+            )
 
     def _edit(self, edit: Edit) -> None:
         """Change one value of a part or of the scene."""

@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from shutil import rmtree
 from time import monotonic
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -209,11 +208,7 @@ class Work:
 
         start = monotonic()
         try:
-            try:
-                edited = await self._jobs.run(partial(self._looks.make, scene, edit, output, show), watch)
-            except Exception:
-                rmtree(output, ignore_errors=True)
-                raise
+            edited = await self._jobs.run(partial(self._looks.make, scene, edit, output, show), watch)
             looks = looks_of(edited.scene, edit.parts, scene)
             with located(f"textures are in {output}"):
                 async with self._changing:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from glob import glob
+from glob import escape, glob
 from itertools import pairwise
 from os.path import commonpath
 from pathlib import Path
@@ -23,10 +23,16 @@ class Moment(NamedTuple):
 
 
 def matching(patterns: Iterable[str | Path]) -> list[Path]:
-    """Return what paths with wildcards stand for, files or folders; each has to stand for some."""
+    """Return what paths with wildcards stand for, files or folders; each has to stand for some.
+
+    A path that is there stands for itself, and a folder that is there is no pattern, whatever is in its name.
+    """
     files = []
-    for pattern in patterns:
-        matches = sorted(map(Path, glob(str(pattern))), key=natural_order)  # noqa: PTH207 - Path's takes no whole path
+    for pattern in map(str, patterns):
+        folder = pattern.rstrip("/").rpartition("/")[0]
+        known = escape(folder) if Path(folder).exists() else folder
+        found = [pattern] if Path(pattern).exists() else glob(known + pattern[len(folder) :])  # noqa: PTH207 - Path's takes no whole path
+        matches = sorted(map(Path, found), key=natural_order)
         if not matches:
             raise ArgumentError(f"expected files that are there, got {pattern}")
         files += matches

@@ -98,6 +98,7 @@ def claim(output: Path, identity: dict[str, Any], *, is_fresh: bool = False) -> 
 
 def publish(output: Path) -> None:
     """Put what a job has made, with the checksums of all its files, in place of the result before it."""
+    require_own(output)  # the job took its time, in which somebody may have put a file there
     work, old = work_folder(output), output.with_name(f".{output.name}.old")
     names = sorted(path.relative_to(work).as_posix() for path in work.rglob("*") if path.is_file())
     write_json(work / FILES, {name: sha256(work / name) for name in names if name != STAMP})

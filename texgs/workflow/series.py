@@ -49,6 +49,7 @@ def make_series(
     another lattice, or have changed since are refused, and a folder of another series.
     """
     volume = volume_of(scene)
+    require_own_scene(folder)
     settings = settings or settings_of(volume.file)
     moments = moments_of(files, settings)
     series = Series(folder / "series.json", [moment.name for moment in moments], list(scene.models))
@@ -104,10 +105,20 @@ def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, v
                 )
             other = open_grid(target)
             if other.dims != grid.dims or not np.allclose(other.spacing, grid.spacing):
+                target.unlink()  # made anew when it is clear how
                 raise ArgumentError(
                     f"expected {grid.dims} samples with spacing {grid.spacing} as of the scene's volume, got "
-                    f"{other.dims} with {other.spacing}; resample the file"
+                    f"{other.dims} with {other.spacing}; resample the file, or say how that volume was read, "
+                    "such as up=+z or reduce=2"
                 )
+
+
+def require_own_scene(folder: Path) -> None:
+    """Require that a scene in a folder is one of a series, which this one may replace."""
+    is_other = (folder / SCENE).exists() and not (folder / "series.json").exists()
+    if is_other or (folder / METRICS).exists():
+        what = "another scene" if is_other else "a result of the workflow"
+        raise ArgumentError(f"{folder}: expected a folder for the series, got {what}; choose another")
 
 
 def changed_at(path: Path) -> float:

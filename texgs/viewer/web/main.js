@@ -46,8 +46,9 @@ class Page extends ScenePage {
     this.time = new TimeSlider(this.state, get("time"), () => this.state.isPending);
     this.compare = new Compare(this);
     this.toolbar = new Toolbar(this, choices);
-    get("transfer-section").hidden = !scene.transfer;
-    if (scene.transfer) new TransferEditor(get("transfer"), this, scene.transfer, choices.presets);
+    const hasFunctions = scene.transfer && Object.keys(scene.tfs).length > 0;
+    get("transfer-section").hidden = !hasFunctions;
+    if (hasFunctions) new TransferEditor(get("transfer"), this, scene.transfer, choices.presets);
     get("look-start").onclick = () => this.beginLook();
     get("look-start").disabled = !scene.models.some((model) => model.can.includes("look"));
     this.follow();

@@ -25,7 +25,7 @@ class StandalonePage extends ScenePage {
     if (scene.held) this.time = new TimeSlider(this.state, get("time"), () => renderer.isBusy);
     if (scene.volume) {
       this.compare = new Compare(this);
-      new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
+      if (Object.keys(scene.tfs).length) new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
     }
     this.state.addEventListener("change", () => {
       this.#tellWords();
