@@ -76,8 +76,9 @@ def test_a_view_beside_its_volume(results, tmp_path, monkeypatch, capsys):
     assert main(["render", "cut.yaml", "--compare", *size]) == 2
     assert "got a cut one that shows its volume; take cuts back" in capsys.readouterr().err
     assert main(["render", "cut.yaml", "--compare", "fitted", *size, "--output", "c.png"]) == 0
-    assert main(["edit", str(path), "cut=x,0", "--output", str(path)]) == 2
-    assert "is a result of the workflow, whose next run writes it anew" in capsys.readouterr().err
+    for file in (path, path.with_name("mine.yaml")):
+        assert main(["edit", str(path), "cut=x,0", "--output", str(file)]) == 2
+        assert "is a result of the workflow, which makes it anew" in capsys.readouterr().err
     old = write_scene("old.yaml", replace(scene, volume=None))
     assert main(["render", str(old), "--compare", "--output", "none.png"]) == 2
     assert "old.yaml: volume: expected the volume that the scene was made from" in capsys.readouterr().err

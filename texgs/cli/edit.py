@@ -234,7 +234,7 @@ def require_scene(output: Path) -> None:
         raise ArgumentError(f"--output: expected a file that ends in .yaml, got {output}")
     if output.is_file() and b"texgs-scene" not in output.read_bytes():
         raise ArgumentError(f"--output: {output} is a file of another kind, which stays; choose another")
-    if output.exists() and (output.parent / METRICS).exists():
+    if (output.parent / METRICS).exists():
         raise ArgumentError(
-            f"--output: {output} is a result of the workflow, whose next run writes it anew; choose another"
+            f"--output: {output.parent} is a result of the workflow, which makes it anew; choose another"
         )
