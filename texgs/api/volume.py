@@ -100,13 +100,8 @@ class Volume:
         self._channel = source.channel
         if up is None:
             up = "+z" if isinstance(data, str | Path) and tells_superior(Path(data)) else "+y"
-        how = {
-            "crop": whole("crop", crop, 6),
-            "reduce": reduce,
-            "method": method,
-            "up": up,
-            "nan_value": as_python(nan_value),
-        }
+        crop, nan_value = whole("crop", crop, 6), as_python(nan_value)
+        how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": nan_value}
         self.summary = self._prepared(source, how)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         write_summaries(self.file, [self.summary], [""])
