@@ -144,6 +144,11 @@ def test_models_in_seconds(ball, monkeypatch, tmp_path):
         ({"seed": -1}, ArgumentError, "seed: expected a whole number from 0 on, got -1"),
         ({"size": 8}, ArgumentError, "size: expected a whole number of pixels, at least 16, got 8"),
         ({"size": "big"}, ArgumentError, "size: expected a whole number of pixels, at least 16, got 'big'"),
+        (
+            {"overrides": "views.step=3"},
+            ArgumentError,
+            "overrides: expected a list of words, got 'views.step=3'",
+        ),
         ({"overrides": ["views.trian=3"]}, ConfigError, "views.trian: no such key"),
         ({"functions": [TFS["inner"], TFS["inner"]]}, ArgumentError, "TF01 and TF02"),
         ({"functions": {"1x": TFS["inner"]}}, ConfigError, "1x"),

@@ -112,7 +112,7 @@ def test_slips_are_sentences(scene, tmp_path):
         scene.light = 30, 400
     with pytest.raises(DeviceError, match="device: expected cpu or cuda, got gpu"):
         texgs.open(scene.session.save(tmp_path / "s.yaml"), device="gpu")
-    with pytest.raises(ArgumentError, match=r"views: expected at least 2 cameras on a path .*, got 0"):
+    with pytest.raises(ArgumentError, match=r"views: expected a whole number from 2 on, got 0"):
         scene.psnr(views=0)
     with pytest.raises(ArgumentError, match=r"frames: expected at least 2 cameras on a path .*, got 1"):
         scene.film("x.mp4", "test", frames=1)
@@ -372,6 +372,21 @@ def test_options_of_exports_are_checked(scene, tmp_path, file, options, message)
         scene.export(tmp_path / file, **options)
     assert message in str(error.value)
     assert not (tmp_path / file).exists()
+
+
+def test_numbers_of_films_and_views_are_checked(scene, tmp_path):
+    for call, message in (
+        (lambda: scene.psnr(views="a"), "views: expected a whole number from 2 on, got 'a'"),
+        (
+            lambda: scene.film(tmp_path / "f.gif", frames=2.5),
+            "frames: expected a whole number from 1 on, got 2.5",
+        ),
+        (lambda: scene.film(tmp_path / "f.gif", fps="x"), "fps: expected a number, got 'x'"),
+        (lambda: scene.instruct(3), "instruction: expected text, got 3"),
+    ):
+        with pytest.raises(ArgumentError, match=re.escape(message)):
+            call()
+    assert not (tmp_path / "f.gif").exists()
 
 
 def test_a_picture_that_is_none_is_told(scene):

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from operator import index
 from typing import Any
 
@@ -66,10 +67,14 @@ def keys_of_format(keys: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(plain.get("series"), int):
         plain["series"] = str(plain["series"])  # DICOM has text
     if plain.get("column") is not None:
-        column = plain["column"]
-        if not isinstance(column, int) or column < 1:
-            raise ArgumentError(f"column: expected a whole number from 1 on, got {column!r}")
+        check_count("column", plain["column"])
     return plain
+
+
+def check_count(name: str, value: Any, least: int = 1) -> None:
+    """Require a whole number."""
+    if not isinstance(value, Integral) or value < least:
+        raise ArgumentError(f"{name}: expected a whole number from {least} on, got {value!r}")
 
 
 def of_array(data: Any) -> np.ndarray:

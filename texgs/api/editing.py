@@ -158,6 +158,8 @@ class Editing:
         Raises:
             ArgumentError: for unknown keys, values or words, or missing weights.
         """
+        if not isinstance(instruction, str):
+            raise ArgumentError(f"instruction: expected text, got {instruction!r:.100}")
         return self._look("text", {"instruction": instruction, **settings}, parts)
 
     @interrupts_between_items()

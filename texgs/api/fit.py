@@ -71,6 +71,8 @@ def fit(
     if recipe not in recipes:
         known, hint = ", ".join(recipes), close(recipe, recipes)
         raise ArgumentError(f"recipe: expected one of {known}, got {recipe}{hint}")
+    if isinstance(overrides, str):
+        raise ArgumentError(f"overrides: expected a list of words, got {overrides!r}; put [] around it")
     if recipe == NOW and overrides:
         raise ArgumentError(f"overrides: not for the recipe {NOW}; leave them out")
     torch_device(device)

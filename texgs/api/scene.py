@@ -8,13 +8,14 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
+from texgs.api.arrays import check_count
 from texgs.api.display import MB, LivePage, Page, camera_of, picture_of
 from texgs.api.editing import Editing
 from texgs.core.check import torch_device
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
-from texgs.core.names import EXPORTS
+from texgs.core.names import EXPORTS, require_numbers
 from texgs.scene.copied import write_copy
 from texgs.scene.frame import Mode
 from texgs.scene.scene_file import known
@@ -105,6 +106,8 @@ class Scene(Editing):
             raise ArgumentError(f"what: expected one of {', '.join(PATHS)}, got {what}")
         scene, composed = self.session.scene, self.session.composition
         count = PATHS[what] if frames is None else frames
+        check_count("frames", count)
+        require_numbers(fps=fps)
         lens = scene.framed(composed).lens(width=width, height=width if height is None else height)
         shots = shots_of(scene, composed, what, count, lens, azimuth, polar)
         bar = progress(shots, count, title=Path(path).name, unit="frame")
@@ -119,6 +122,7 @@ class Scene(Editing):
         from texgs.metrics.quality import compare
         from texgs.volume.cameras import spiral
 
+        check_count("views", views, least=2)
         scene = replace(self.session.scene, cuts=NO_CUTS)
         lens = scene.framed(self.session.composition).lens(width=width, height=width)
         pairs = (self.session.beside(camera, scene) for camera in spiral(views, lens, "views"))
