@@ -42,6 +42,7 @@ def test_a_box_keeps_what_is_between_its_corners(first, second):
     [
         (lambda: Plane([0.0, 0.0, 0.0]), "normal: expected three numbers that are not all 0"),
         (lambda: Plane([1.0, 0.0]), "normal: expected three numbers"),
+        (lambda: Plane([0.0, 0.0, 1e-5], 100.0), r"offset: expected at most 1e\+06 .*, got 1e\+07"),
         (lambda: Box([0.0] * 3, [1.0, 0.0, 1.0]), "box: expected two corners of three numbers, low below"),
         (lambda: Box([0.0] * 2, [1.0] * 2), "box: expected two corners of three numbers"),
         (lambda: Cuts([Plane([1.0, 0.0, 0.0])] * 7), "planes: expected at most 6, got 7"),

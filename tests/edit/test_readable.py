@@ -85,6 +85,12 @@ def test_an_opaque_part_stays_as_it_is_and_one_that_never_is_readable_gets_the_l
     assert readable_factors(scene_of(tmp_path, veil=ball(opacity=-5.0)), ["veil"], "cpu") == {"veil": LARGEST}
 
 
+def test_a_part_that_was_edited_to_a_high_opacity_gets_no_more_than_there_is(tmp_path):
+    scene = scene_of(tmp_path, {"veil": PartEdit(opacity=100.0)}, veil=ball(opacity=-9.0))
+    given = replace(task(scene, tmp_path, ["veil"]), settings=ImageKeys(opacity="auto"))
+    assert 100 <= raised(given).scene.models["veil"].edit.opacity <= 1000
+
+
 def test_what_is_inside_keeps_half_of_its_pixels(tmp_path):
     """Three faint shells, each readable alone, would hide the core together."""
     shells = {name: sized(radius, FAINT) for name, radius in (("a", 0.5), ("b", 0.55), ("c", 0.6))}

@@ -164,6 +164,28 @@ def test_faces_have_the_intensity_of_their_planes_over_a_unit(opacity, light, de
         )
 
 
+@pytest.mark.parametrize("is_lit", [True, False])
+def test_faces_beside_samples_that_are_none_are_finite(is_lit, device):
+    """Sums take vectors of samples, whose last one is not full: other lanes hold what was there before."""
+    values = np.random.default_rng(0).random((20, 20, 20), np.float32)
+    values[::5, ::5, ::5] = np.nan
+    tf = TransferFunction([(0.2, 0.0), (0.5, 0.3), (0.9, 0.0)], [(0.0, 1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0)])
+    camera = orbit(20, 10, 1.5, 60, 100, 100)
+    cut = planes([[1.0, 0.0, 0.0]], [0.1], camera, device)
+    cast = Caster(Grid(values), Appearance(), device).cast(
+        tf, camera, HEADLIGHT, depth_range=cut.depth_range, faces=cut, lit_faces=is_lit
+    )
+    assert (cast.rgba[..., 3] > 0).sum() > 2000
+    assert cast.rgba.isfinite().all()
+
+
+def test_no_plane_cuts_nothing(device):
+    cut = cut_range(torch.zeros(0, 3, device=device), torch.zeros(0, device=device), CAMERA.to(device))
+    caster = Caster(ball(20), Appearance(), device)
+    cast = caster.cast(SHELLS, CAMERA, SIDE, depth_range=cut.depth_range, faces=cut)
+    assert torch.equal(cast.rgba, caster.cast(SHELLS, CAMERA, SIDE).rgba)
+
+
 def test_without_faces_even_matter_is_dark(device):
     x, _, _ = lattice(17, 17, 17)
     cut = planes(*CORNER, VIEW, device)
@@ -178,10 +200,14 @@ def test_without_faces_even_matter_is_dark(device):
     (ArgumentError, "depth_range: expected float32", {"depth_range": torch.zeros(2, 50, 60).double()}),
     (ArgumentError, "view: expected depth ranges and planes with faces", {"depth_range": None}),
     (ShapeError, r"faces.face: expected \[50, 60\], got \[2, 2\]", {"face": torch.zeros(2, 2).int()}),
+    (ArgumentError, "faces.face: expected int32, got torch.int8", {"face": torch.zeros(50, 60).char()}),
+    (ArgumentError, "faces.normals: expected float32", {"normals": torch.zeros(1, 3).double()}),
+    (ShapeError, r"faces.normals: expected \[P, 3\], got \[1, 2\]", {"normals": torch.zeros(1, 2)}),
 ])  # fmt: skip
 def test_mistakes_are_named(error, message, change):
     cut = planes([[0.0, 0.0, 1.0]], [0.0], CAMERA, "cpu")
-    faces = cut._replace(face=change.pop("face", cut.face))
+    faces = cut._replace(**{name: x for name, x in change.items() if name in ("face", "normals")})
+    change = {name: x for name, x in change.items() if name == "depth_range"}
     with pytest.raises(error, match=message):
         Caster(ball(8), Appearance()).cast(
             SHELLS, CAMERA, HEADLIGHT, **{"depth_range": cut.depth_range, "faces": faces, **change}

@@ -28,6 +28,10 @@ class Plane:
         if abs(length - 1) > UNIT:
             object.__setattr__(self, "normal", [each / length for each in self.normal])
             object.__setattr__(self, "offset", self.offset / length)
+        if not abs(self.offset) <= FAR:
+            raise ArgumentError(
+                f"offset: expected at most {FAR:g} world units along the unit normal, got {self.offset:g}"
+            )
 
 
 @dataclass(frozen=True)

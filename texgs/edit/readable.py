@@ -139,7 +139,7 @@ class Sight:
         alone = {name: replace(edit, visible=name == part) for name, edit in self.edits.items()}
 
         def is_readable(share: float) -> bool:
-            opacity = LARGEST ** (1 - share) * alone[part].opacity
+            opacity = min(LARGEST ** (1 - share) * alone[part].opacity, MOST)
             shares = self.shares({**alone, part: replace(alone[part], opacity=opacity)})
             return weighted_mean(each.sum(-1) for each in shares) >= READABLE
 
@@ -150,7 +150,7 @@ class Sight:
         import torch
 
         edits = {
-            name: replace(edit, opacity=factors.get(name, 1.0) * edit.opacity)
+            name: replace(edit, opacity=min(factors.get(name, 1.0) * edit.opacity, MOST))
             for name, edit in self.edits.items()
         }
         return torch.stack([(each > SHOWS).sum(dim=(0, 1)) for each in self.shares(edits)]).sum(0)

@@ -40,7 +40,8 @@ class Options:
     far: float = 100.0
     """Camera z that maps to 1 in the normalised depth of the distortion; it clips nothing. World units."""
     check_finite: bool = False
-    """Look for NaN and infinite inputs first and report them by name; costs a pass over the inputs."""
+    """Look for NaN and infinite inputs first and report them by name; costs a pass over the inputs. Without
+    it, a colour that is not finite reaches pixels beyond its surfel on the CPU, which blends whole blocks."""
 
 
 DEFAULT_OPTIONS = Options()

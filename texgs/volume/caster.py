@@ -153,6 +153,9 @@ class Caster:
             cut["depth_range"] = depth_range
         if faces is not None:
             check.shape("faces.face", faces.face, size)
+            if faces.face.dtype != torch.int32:
+                raise ArgumentError(f"faces.face: expected int32, got {faces.face.dtype}")
+            require({"faces.normals": (faces.normals, "P 3")})
             cut |= {"face": faces.face, "planes": faces.normals}
         on_device = {name: x.to(self.device).contiguous() for name, x in cut.items()}
         return {**on_device, "n_planes": len(faces.normals) if faces else 0}

@@ -19,9 +19,13 @@ struct Queue {
     float k[kSamples + kLanes], value[kSamples + kLanes], weight[kSamples + kLanes];
 
     bool is_full() const { return n >= kSamples; }
-    // Vectors that hold the first kSamples samples, or all of them; other lanes repeat the last one.
+    // Vectors that hold the first kSamples samples, or all of them; other lanes repeat the last one, as what is not
+    // finite there would reach sums that only set a weight to 0.
     int vectors() {
-        if (!is_full()) store(k + n, vf(k[n - 1]));
+        if (!is_full()) {
+            store(k + n, vf(k[n - 1]));
+            store(value + n, vf(value[n - 1]));
+        }
         return is_full() ? kVectors : (n + kLanes - 1) / kLanes;
     }
     // Adds those of a vector of samples that are chosen.
