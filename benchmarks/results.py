@@ -6,7 +6,9 @@ since then. `--mark` puts a dagger behind each link to one in README.md and docs
 
     python -m benchmarks.results FILE --command "texgs run ..." --code "views surfels shading texture"
 
-right after it was measured; `--revision` names the commit if the code has changed in the meantime.
+right after it was measured; `--revision` names the commit if the code has changed in the meantime. After a
+change that keeps the bits of what is measured, as files of both have shown, `--same COMMIT FILE...` says that
+results of the code of a commit are of this source tree, too; the column `same` keeps which tree that was.
 
 `benchmarks/results/index.csv` has a row for each. Its column `code` names what was measured: stages, kinds of
 field and methods of editing by their names, other modules by their whole names; or the result that a picture
@@ -100,8 +102,21 @@ def add(path: Path, command: str, code: str, revision: str = "") -> None:
         sys.exit(f"--revision: expected a commit of this clone that has {code}, got {revision}")
     found = committed if revision else digest_of(parts(code))
     commit += "-dirty" if found != committed else ""
-    rows.loc[path.name] = [command, machine.processor(), commit, code, found]
+    rows.loc[path.name] = [command, machine.processor(), commit, code, found, ""]
     rows.sort_index().to_csv(INDEX, lineterminator="\n")
+
+
+def keep(names: list[str], before: str) -> None:
+    """Enter that results of the code of a commit are those of this source tree, bit for bit."""
+    from benchmarks import machine
+
+    rows = index()
+    for name in names:
+        code = rows.code[name]
+        if not rows.digest[name] or rows.digest[name] != digest_of(parts_at(code, before)):
+            sys.exit(f"--same: expected results of the code of {before}, got {name}; measure it again")
+        rows.loc[name, ["digest", "same"]] = [digest_of(parts(code)), machine.revision()]
+    rows.to_csv(INDEX, lineterminator="\n")
 
 
 def note(path: str | Path, code: str) -> None:
@@ -131,12 +146,16 @@ def main() -> None:
     parser.add_argument("--command", default="not kept", help="that made the result to enter")
     parser.add_argument("--code", help="what it measures, see above; enters it")
     parser.add_argument("--revision", default="", help="commit of it; default: this source tree")
+    parser.add_argument("--same", metavar="COMMIT", help="whose code made the same, bit for bit; enters that")
     given = parser.parse_args()
     for path in given.files if given.code else ():
         add(path, given.command, given.code, given.revision)
     rows, names = index(), [path.name for path in given.files]
     if unknown := sorted(set(names) - set(rows.index)):
         parser.error(f"expected files of {INDEX.name}, got {', '.join(unknown)}")
+    if given.same:
+        keep(names, given.same)
+        rows = index()
     found = older(rows)
     for page in pages() if given.mark else ():
         page.write_text(marked(page, found), encoding="utf-8")

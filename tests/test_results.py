@@ -44,7 +44,7 @@ def clone(tmp_path, monkeypatch):
         "texgs/fitting/loop.py": "RATE = 1\n",
         "texgs/fitting/other.py": "RATE = 1\n",
         "benchmarks/results/a.csv": "",
-        "benchmarks/results/index.csv": "file,command,machine,revision,code,digest\n",
+        "benchmarks/results/index.csv": "file,command,machine,revision,code,digest,same\n",
         "docs/b.png": "",
         "docs/page.md": "([a](../benchmarks/results/a.csv)), ![b](b.png), [c](c.png)\n",
         "docs/accuracy.md": "[a](../benchmarks/results/a.csv)\n",
@@ -121,6 +121,24 @@ def test_a_result_of_an_earlier_commit_has_its_digest(clone, monkeypatch, capsys
     change(clone, "RATE = 2\n")
     called(monkeypatch, capsys, path, *now, "--revision", before.revision)
     assert list(results.index().loc["a.csv"])[2:] == list(before)[2:]
+
+
+def test_results_may_be_those_of_later_code_and_only_those_of_the_commit_that_it_was_compared_with(
+    clone, monkeypatch, capsys
+):
+    path = clone / "benchmarks/results/a.csv"
+    called(monkeypatch, capsys, path, "--code", "shading")
+    before = results.index().loc["a.csv"]
+    change(clone, "RATE = 1.0\n")
+    assert "0 of 1" in called(monkeypatch, capsys, path, "--same", before.revision)
+    now = results.index().loc["a.csv"]
+    assert (now.revision, now.same) == (before.revision, f"{before.revision}-dirty")
+    change(clone, "RATE = 2\n")
+    with pytest.raises(
+        SystemExit, match=r"--same: expected results of the code of .*, got a.csv; measure it"
+    ):
+        called(monkeypatch, capsys, path, "--same", before.revision)
+    assert "1 of 1" in called(monkeypatch, capsys)
 
 
 @pytest.mark.parametrize(
