@@ -80,6 +80,7 @@ lock: $(VENV)/dependencies
 	@echo "Resolving pyproject.toml"
 	@$(BIN)/python tools/lock.py > requirements.lock.new
 	@mv requirements.lock.new requirements.lock
+	@$(PIP) install --no-compile --no-deps --require-hashes --requirement requirements.lock
 	@$(BIN)/python tools/licences.py > docs/licences.md
 	@echo "Wrote requirements.lock and docs/licences.md"
 

@@ -97,6 +97,21 @@ def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
     assert "## Table 1. Data sets" not in said.out, "tables without rows are not printed"
 
 
+def test_tables_of_a_folder_go_there(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("texgs.workflow.graph.earlier", lambda *_: ([str(path)], {}))
+    path = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")
+    (tmp_path / "other").mkdir()
+    assert main(["tables", "other"]) == 0
+    assert main(["report", "other"]) == 0
+    assert main(["tables", str(path)]) == 0
+    capsys.readouterr()
+    assert (tmp_path / "other" / "tables" / "fits.csv").is_file()
+    assert (tmp_path / "other" / "report.html").is_file()
+    assert (tmp_path / "results" / "tables" / "fits.csv").is_file()
+    assert not (tmp_path / "results" / "report.html").exists()
+
+
 def test_a_file_that_is_named_twice_counts_once(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")

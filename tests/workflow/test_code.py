@@ -1,5 +1,7 @@
 """The digest of the code of a stage: what counts, and what is kept for later processes."""
 
+import ast
+
 import pytest
 
 from texgs.config.compose import compose
@@ -143,3 +145,14 @@ def test_a_damaged_cache_is_an_empty_one(tree, tmp_path, damage):
     path.write_text(path.read_text().replace(*damage, 1))
     forget()
     assert code.code_digest("texgs.volume.stage") == before
+
+
+def test_what_a_stage_imports_to_do_its_work_counts():
+    """Imports at the top decide settings and inputs; those in functions are of the work."""
+    for stage in (code.ROOT / "texgs" / "workflow" / "stages").glob("*.py"):
+        for function in ast.walk(ast.parse(stage.read_text(encoding="utf-8"))):
+            if isinstance(function, ast.FunctionDef):
+                used = {name for name in code.imports(function) if code.source(name, code.ROOT)}
+                assert used <= code.code_of([f"texgs.workflow.stages.{stage.stem}"]).keys(), stage
+    assert "texgs.fitting.series" in code.code_of(["texgs.workflow.stages.steps"])
+    assert "texgs.workflow.differences" in code.code_of(["texgs.cli.tables"])

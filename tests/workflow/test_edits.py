@@ -5,8 +5,9 @@ import pytest
 from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
+from texgs.scene.series_file import Series, write_series
 from texgs.workflow.checks import check_edit, require_edit
-from texgs.workflow.edits import edits
+from texgs.workflow.edits import edits, files_of_scene
 from texgs.workflow.stage_table import STAGES
 
 
@@ -152,3 +153,16 @@ def test_what_an_edit_by_hand_starts_from_is_told_at_once(tmp_path):
     with pytest.raises(ConfigError, match=r"edit\.parts: expected some of"):
         require(("dataset=engine", "edit=glass", "edit.parts=[nothing]"))
     require(("dataset=engine", "edit=glass"))
+
+
+def test_an_edit_of_a_scene_of_a_series_comes_from_all_of_its_steps(tmp_path):
+    series = Series(tmp_path / "series.json", ["a", "b"], ["ball"])
+    write_series(series)
+    for step in (0, 1):
+        series.model("ball", step).touch()
+    (tmp_path / "ball.safetensors").touch()
+    (scene := tmp_path / "scene.yaml").write_text(
+        "models: {ball: {file: ball.safetensors}}\nseries: series.json"
+    )
+    files = {path.name for path in files_of_scene(scene).values()}
+    assert files == {"ball.safetensors", "series.json", *(series.model("ball", step).name for step in (0, 1))}

@@ -40,8 +40,14 @@ def test_the_page_of_clusters_names_rules_that_exist():
 
 def test_every_rule_with_a_gpu_is_in_the_example_of_the_page():
     with_gpu = {rule.name for rule in RULES.values() if rule.gpu}
-    example = re.search(r"name it for these rules:\n\n```yaml\n(.*?)```", PAGE, flags=re.DOTALL)
-    assert set(yaml.safe_load(example[1])["set-resources"]) == with_gpu
+    example = re.search(r"name it for these rules, [^\n]*:\n\n```yaml\n(.*?)```", PAGE, flags=re.DOTALL)[1]
+    shown = yaml.safe_load(example)["set-resources"]
+    assert set(shown) == with_gpu
+    profile = yaml.safe_load((ROOT / "workflow" / "profiles" / "slurm" / "profile.yaml").read_text())
+    lost = [
+        rule for rule in shown if not profile["set-resources"].get(rule, {}).items() <= shown[rule].items()
+    ]
+    assert not lost, "the lines of the page replace those of the profile"
 
 
 def test_jobs_share_a_submission_only_with_those_that_they_wait_for():

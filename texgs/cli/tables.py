@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.cli.options import option
 from texgs.core.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -16,15 +15,15 @@ if TYPE_CHECKING:
     from texgs.study.ballots import Votes
 
 
-def add_arguments(parser: argparse.ArgumentParser, output: str = "results/tables") -> None:
+def add_arguments(parser: argparse.ArgumentParser, output: str = "tables") -> None:
     """Add where the numbers are, and where the tables or the report go."""
     parser.add_argument(
         "metrics", nargs="*", type=given_path, help="metrics.json files, or a folder of results (results/)"
     )
     parser.add_argument("--missing", type=Path, help="JSON file of what was left out, with reasons")
-    study = "key of a user study, with ballots in votes/ beside it"
-    option(parser, "--study", Path("results/study/key.json"), study)
-    option(parser, "--output", Path(output), "")
+    study = "key of a user study, with ballots in votes/ beside it; default study/key.json in the results"
+    parser.add_argument("--study", type=Path, help=study)
+    parser.add_argument("--output", type=Path, help=f"default {output} in the results")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -37,9 +36,9 @@ def run(arguments: argparse.Namespace) -> int:
     records, old = records_of(arguments)
     for entry in old:
         print(f"Left out: {entry}", file=sys.stderr)
-    given = given_tables(records, votes_beside(arguments.study))
+    given = given_tables(records, votes_beside(study_of(arguments)))
     tables = tables_of(records, read_left_out(arguments.missing), given)
-    write_tables(arguments.output, tables)
+    write_tables(arguments.output or results_of(arguments) / "tables", tables)
     for table in tables.values():
         if not table.is_empty:
             print(table.markdown())
@@ -48,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def add_report_arguments(parser: argparse.ArgumentParser) -> None:
     """Add where the numbers are, and where the report goes."""
-    add_arguments(parser, "results/report.html")
+    add_arguments(parser, "report.html")
 
 
 def run_report(arguments: argparse.Namespace) -> int:
@@ -59,16 +58,28 @@ def run_report(arguments: argparse.Namespace) -> int:
     from texgs.study.votes import shown
 
     records, old = records_of(arguments)
-    left_out, votes = [*read_left_out(arguments.missing), *old], votes_beside(arguments.study)
+    left_out, votes = [*read_left_out(arguments.missing), *old], votes_beside(study_of(arguments))
     given = given_tables(records, votes)
     more = {} if given["user_study"].is_empty else {"study": [shown(votes)]}
-    print(write_report(arguments.output, records, left_out, given, more))
+    output = arguments.output or results_of(arguments) / "report.html"
+    print(write_report(output, records, left_out, given, more))
     return 0
 
 
 def given_path(word: str) -> Path:
     """Return the path of a file or folder, which may have the key of results in front, as in other verbs."""
     return Path(word.removeprefix("results="))
+
+
+def results_of(arguments: argparse.Namespace) -> Path:
+    """Return the folder of results that is given; where it is none or several, results."""
+    folders = [each for each in arguments.metrics if each.is_dir()]
+    return folders[0] if len(folders) == len(arguments.metrics) == 1 else Path("results")
+
+
+def study_of(arguments: argparse.Namespace) -> Path:
+    """Return the key of the study that is given, else of that of the results."""
+    return arguments.study or results_of(arguments) / "study" / "key.json"
 
 
 def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[LeftOut]]:

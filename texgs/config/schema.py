@@ -71,7 +71,9 @@ class Sweep:
     over: list[str] = key(
         [], "keys with several values, such as fit.low_pass=2,6; each combination is a variant"
     )
-    edits: list[str] = key([], "edits that are made of each variant; default those of the experiment")
+    edits: list[str] = key(
+        [], "edits that are made of each variant, unless `edits=` names some; default those of the experiment"
+    )
 
 
 @dataclass(frozen=True)

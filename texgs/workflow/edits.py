@@ -15,6 +15,7 @@ from texgs.core.names import close
 from texgs.core.plain_yaml import parse_yaml
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import NO_METHOD, method_of, methods
+from texgs.scene.series_file import read_series
 from texgs.workflow.inputs import models_of_scene, scene_before, view_set
 from texgs.workflow.locate import tf_names
 
@@ -181,7 +182,19 @@ def files_of_scene(scene: Path) -> dict[str, Path]:
         for key, value in table.items() if isinstance(table, dict) else ():
             if key == "volume":  # no edit reads it
                 continue
+            if key == "series" and (path := scene.parent / str(value)).is_file():
+                files |= {f"of_series.{number}": each for number, each in enumerate([path, *steps_of(path)])}
             if key in ("file", "texture") and (path := scene.parent / str(value)).is_file():
                 files[f"of_scene.{len(files)}"] = path
             named.append(value)
     return files
+
+
+def steps_of(series: Path) -> list[Path]:
+    """Return the models of all steps of a series, as far as they are there: an edit learns from some."""
+    try:
+        known = read_series(series)
+    except ArgumentError:
+        return []  # the job tells what is wrong with it
+    models = [known.model(name, step) for name in known.models for step in range(len(known.steps))]
+    return [model for model in models if model.is_file()]

@@ -18,6 +18,7 @@ from texgs.workflow.stage import EVERY, Config, Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import OfScene
 
 if TYPE_CHECKING:
+    import torch
     from torch import Tensor
 
     from texgs.core.camera import Camera
@@ -72,9 +73,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         for case, (seen, count) in shown.items():
             cut, images = replace(seen, cuts=Cuts(planes[:count])), {}
             for way, render in ways_of(composed, twin, camera, cut).items():
-                start = time.perf_counter()
-                images[way] = render().color.clamp(0, 1)
-                ms[case, way].append(1000 * (time.perf_counter() - start))
+                milliseconds, color = timed(render, device)
+                images[way] = color.clamp(0, 1)
+                ms[case, way].append(milliseconds)
             for place, mask in places(composed, twin, camera, cut).items():
                 for way in COMPARED if int(mask.sum()) >= LEAST else ():
                     score = psnr(images[way][mask][None], images["volume"][mask][None])
@@ -85,6 +86,19 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     write_grid(output / "cuts.png", {way: images[:SHOWN] for way, images in rows.items()}, titles)
     result = CutResult(settings.planes, settings.views.width, settings.views.height)
     return Outcome(replace(result, ways=[summary(case, way, ms[case, way], scores) for case, way in ms]))
+
+
+def timed(render: Callable[[], Render], device: torch.device) -> tuple[float, Tensor]:
+    """Return how long a frame takes until it is there, milliseconds, and its colours."""
+    import torch
+
+    if device.type == "cuda":
+        torch.cuda.synchronize(device)
+    start = time.perf_counter()
+    color = render().color
+    if device.type == "cuda":
+        torch.cuda.synchronize(device)
+    return 1000 * (time.perf_counter() - start), color
 
 
 def seeded(frame: Frame, settings: Settings) -> Iterator[tuple[Camera, list[Plane]]]:
