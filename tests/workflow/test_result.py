@@ -1,5 +1,6 @@
 """The folder of a result: what survives failures and kills, what counts as damaged, what is refused."""
 
+import json
 import multiprocessing
 import os
 import shutil
@@ -209,6 +210,14 @@ def test_fingerprints_of_views_from_elsewhere_and_of_slices_know_all_that_jobs_r
     assert is_told(views, tmp_path / "train" / "r_0.png", "two")
     assert is_told(views, tmp_path / "points3d.ply", "where surfels start")
     assert not is_told(views, tmp_path / "notes.txt", "mine")
+    (own := tmp_path / "own").mkdir()
+    named = [{"file_path": "../train/r_0"}, {"file_path": str(tmp_path / "r_1.png")}, {"file_path": 3}, {}]
+    (elsewhere := own / "transforms_train.json").write_text(json.dumps({"frames": named[:2]}))
+    assert is_told(elsewhere, tmp_path / "train" / "r_0.png", "three")
+    assert is_told(elsewhere, tmp_path / "r_1.png", "one")
+    assert not is_told(elsewhere, tmp_path / "train" / "r_2.png", "of others")
+    elsewhere.write_text(json.dumps({"frames": named}))
+    assert result.fingerprint(elsewhere, Checksums())
     (slices := tmp_path / "slices").mkdir()
     (slices / "z1.tif").write_text("one")
     assert is_told(slices, slices / "z1.tif", "two")

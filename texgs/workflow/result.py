@@ -199,6 +199,7 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
     if path.name.startswith("transforms_"):
         members = [each for each in folder.rglob("*") if each.suffix in (".json", ".png")]
         members += [points for points in [folder / POINTS] if points.is_file()]
+        members += images_outside(folder)
     elif path.is_dir():
         files = [each for each in path.rglob("*") if each.is_file()]  # chunks and DICOM have any suffix
         members = [each for each in files if each.suffix.lower() in SLICES] or files
@@ -206,7 +207,23 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
         return combined([(path.name, checksums.of(path)), (samples.name, checksums.of(samples))])
     else:
         return checksums.of(path)
-    return combined((each.relative_to(folder).as_posix(), checksums.of(each)) for each in members)
+    return combined(
+        (str(each.relative_to(folder) if each.is_relative_to(folder) else each), checksums.of(each))
+        for each in members
+    )
+
+
+def images_outside(folder: Path) -> list[Path]:
+    """Return the images that files of views name and that do not lie below their folder."""
+    images = set[Path]()
+    for file in folder.glob("transforms_*.json"):
+        try:
+            frames = read_json(file)["frames"]
+            images |= {folder / f"{str(frame['file_path']).removesuffix('.png')}.png" for frame in frames}
+        except (ArgumentError, KeyError, TypeError):
+            continue  # the job tells what is wrong with it
+    apart = (image for image in images if not image.resolve().is_relative_to(folder.resolve()))
+    return sorted(image for image in apart if image.is_file())
 
 
 def require_intact(path: Path) -> None:
