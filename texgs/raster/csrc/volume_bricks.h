@@ -39,7 +39,8 @@ inline void check_cast(const texgs_cast_view& view) {
     require(view.width >= 1 && view.height >= 1, "view: expected at least one pixel");
     require(view.width <= TEXGS_MAX_SIDE && view.height <= TEXGS_MAX_SIDE, "view: expected fewer pixels");
     require(view.step > 0.0f && view.opacity_unit > 0.0f, "view: expected a step and an opacity unit above 0");
-    require(!view.face || (view.depth_range && (view.planes || !view.n_planes)), "view: expected depth ranges and planes with faces");
+    require(!view.face || (view.depth_range && (view.planes || !view.n_planes)),
+            "view: expected depth ranges and planes with faces");
 }
 
 inline int64_t count_bricks(const texgs_volume& volume, int32_t size[3]) {
