@@ -1,6 +1,6 @@
 """A scene with all of its files in one folder, to keep or to pass on."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from filecmp import cmp
 from itertools import count
@@ -13,6 +13,7 @@ from texgs.core.names import METRICS, SCENE, file_name
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import write_scene
 from texgs.scene.series_file import Series, write_series
+from texgs.scene.session import files_of
 from texgs.volume.summaries import summary_file
 
 Entry = TypeVar("Entry", SceneModel, SceneSegment)
@@ -34,7 +35,7 @@ def write_copy(folder: str | Path, scene: Scene) -> Path:
             f"{folder}: expected a folder of your own, got a result of the workflow, whose next run makes it "
             "anew; choose another"
         )
-    require_files(scene)
+    require_files([*files_of(scene), scene.volume.file if scene.volume else None])
     copies, models = Copies(Path(folder)), {}
     series = scene.series and copies.series(scene.series)
     for name, model in scene.models.items():
@@ -44,10 +45,8 @@ def write_copy(folder: str | Path, scene: Scene) -> Path:
     return write_scene(copies.folder / SCENE, replace(scene, models=models, volume=volume, series=series))
 
 
-def require_files(scene: Scene) -> None:
-    """Require that all is there that would be copied."""
-    files = [file for model in scene.models.values() for file in model.files]
-    files += [scene.volume.file] if scene.volume else []
+def require_files(files: Iterable[Path | None]) -> None:
+    """Require that files of a scene are there; None stands for what it does without."""
     if gone := [file for file in files if file is not None and not file.exists()]:
         raise ArgumentError(f"{gone[0]}: no such file, which the scene needs; bring it back, then try again")
 

@@ -15,6 +15,7 @@ from texgs.fields.files import formats
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.check import checked
+from texgs.scene.copied import require_files
 from texgs.scene.parts import NewLook, part_names, with_looks
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import only_scene, read_scene, write_scene
@@ -125,10 +126,10 @@ class SharedEdits:
         session, step, title, before = self._session, None, "", self.scene
         if isinstance(asked, Undo):
             session.undo()
-            self._require_files(session.redo)
+            self._require_step(session.redo)
         elif isinstance(asked, Redo):
             session.redo()
-            self._require_files(session.undo)
+            self._require_step(session.undo)
         elif isinstance(asked, Rename):
             title = f"{asked.part} renamed to {asked.name}"
             session.rename_segment(asked.part, asked.name)
@@ -193,7 +194,7 @@ class SharedEdits:
     def save(self, name: str) -> Path:
         """Write the scene file in one step, unless what it would name is gone."""
         path, scene = self.path_of(name), self.scene
-        self._require_files()
+        require_files(files_of(scene))
         write_scene(path, scene)
         self.name, self._title, self._saved = name, title_of(path), scene
         self._own[path.resolve()] = state_of(path.resolve())
@@ -205,14 +206,13 @@ class SharedEdits:
         folders = (self._folder / f"{stem}-{kind}-{number}" for number in count(1))
         return next(folder for folder in folders if not folder.exists())
 
-    def _require_files(self, take_back: Callable[[], object] = lambda: None) -> None:
-        """Require that all is there that the scene reads; otherwise take the step to it back."""
-        gone = [file for file in files_of(self.scene) if file is not None and not file.exists()]
-        if gone:
+    def _require_step(self, take_back: Callable[[], object]) -> None:
+        """Require that all is there that the scene of a step reads; otherwise take the step back."""
+        try:
+            require_files(files_of(self.scene))
+        except ArgumentError:
             take_back()
-            raise ArgumentError(
-                f"{gone[0]}: no such file, which the scene needs; bring it back, then try again"
-            )
+            raise
 
     def _edit(self, edit: Edit) -> None:
         """Change one value of a part or of the scene."""
