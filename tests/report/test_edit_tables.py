@@ -96,6 +96,15 @@ def test_means_are_of_one_size_and_one_recipe_whatever_it_has_adapted_to(tmp_pat
     ], "of an edit that was not measured no size is known"
 
 
+def test_no_mean_is_over_edits_of_different_devices(tmp_path):
+    for dataset, device, minutes in (("a", "CPU", 9.0), ("b", "CPU", 11.0), ("c", "GPU", 1.0)):
+        options = {"follows": "style", "method": "image", "device": device}
+        edit(tmp_path, "style", {"editing_min": minutes}, dataset=dataset, **options)
+    entries = rows(image_driven(records(tmp_path)))
+    means = [row for row in entries if row["data set"].startswith("mean") and row["recipe"] == "quick"]
+    assert [(row["data set"], row["minutes"]) for row in means] == [("mean of 2", 10.0)]
+
+
 def test_each_kind_of_edit_has_its_own_table(tmp_path):
     edit(tmp_path, "style", {}, follows="style", method="image")
     edit(tmp_path, "painted", {}, follows="style", method="image", compared=False)

@@ -94,7 +94,7 @@ def table(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
     """Return rows of edits, means of those of one size, and the paper's rows of its own."""
     titles = [measure.title for measure in listed]
     columns = [Column(measure.title, measure.digits) for measure in listed]
-    means = mean_rows(rows, (LABEL, "edit", "pixels"), ["method", *titles])
+    means = mean_rows(rows, (LABEL, "edit", "pixels", "device"), ["method", *titles])
     means = [{**row, "method": row["method"] or ADAPTS} for row in means]
     theirs = published(follows, listed) if rows and follows else []
     sentences = [CAPTION, NOT_ALIKE, *notes(rows, titles)] if theirs else [CAPTION, *notes(rows, titles)]
@@ -144,6 +144,7 @@ def row_of(edit: Edit, measured: Record[EditMeasures] | None) -> dict[str, Any]:
         "counts": bool(seen and seen.width and not edit.stand_in),
         "follows": words_of(made.followed),
         "lambda_s": made.lambda_s,
+        "device": edit.facts.get("device"),
         "pixels": f"{seen.width}x{seen.height}" if seen and seen.width else None,
         "has_texture": field is not None and "texture" in field.can,  # geometry may stay anyway
         "is_kept": seen is not None and bool(seen.values.get("geometry_kept")),

@@ -25,7 +25,7 @@ ALIKE = (
     "even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
 )
 DATA, LABEL = "data set", "recipe"  # titles of columns
-SEEN = "seen"  # size and number of views, in rows: means are over fits of the same
+SEEN = "seen"  # size and number of views, and changes of the recipe, in rows: means are over fits of the same
 SCENES = Column("basic scenes", 0)
 Rows = Sequence[Mapping[str, Any]]
 
@@ -81,13 +81,14 @@ def rank_in_paper(dataset: str) -> tuple[int, int, str]:
 
 def cells(record: Record[Any], **more: Any) -> dict[str, Any]:
     """Return what rows of all tables have of a job: its names, its place and its file."""
+    views = (getattr(record.result, key, 0) for key in ("width", "height", "train_views"))
     return {
         DATA: record.title,
         "TF": record.tf,
         LABEL: record.label,
         "rank": rank(record),
         "published": "" if record.stand_in else record.dataset,  # whose numbers stand beside
-        SEEN: tuple(getattr(record.result, key, 0) for key in ("width", "height", "train_views")),
+        SEEN: (*views, bool(record.facts.get("recipe_changed"))),
         SOURCES: [record.path],
         **more,
     }
