@@ -119,7 +119,7 @@ def made(page: Any) -> Film:
     page.wait_for_timeout(1000)
     film.shoot()
     page.get_by_role("button", name="Make model").click()
-    page.wait_for_timeout(500)
+    page.locator("#job").wait_for(timeout=WAIT)  # the server starts it after the click
     end = monotonic() + WAIT / 1000
     while monotonic() < end and page.locator("#job").is_visible():
         page.wait_for_timeout(400)

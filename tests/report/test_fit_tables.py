@@ -213,8 +213,9 @@ def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
 
 @pytest.mark.parametrize("first", [(200, False), (800, True)], ids=["size", "changes"])
 def test_no_mean_is_over_views_of_different_sizes_or_over_changes_of_a_recipe(tmp_path, first):
-    plain = (800, False)
-    for tf, (pixels, is_changed), psnr in (("TF01", first, 40.0), ("TF02", plain, 20.0), ("TF03", plain, 30.0)):
+    others = (800, False)
+    kinds = (("TF01", first, 40.0), ("TF02", others, 20.0), ("TF03", others, 30.0))
+    for tf, (pixels, is_changed), psnr in kinds:
         result = FitResult(60.0, 9, psnr=psnr, width=pixels, height=pixels, train_views=92)
         metrics(tmp_path, "texture", result, "scan", tf, recipe_changed=is_changed)
     frame = fitting(records(tmp_path)).frame
