@@ -18,8 +18,16 @@ SMALL = {
     "style_and_compare": "samples, size, recipe, style = 24, 64, 'demo', 'preview'",
     "volume_to_scene": "samples, size, recipe = 24, 48, 'demo'",
 }
-# Few views, in place of the sweep of that name.
-SWEEP = "name: views\nvariants:\n  few: [views.train.frequency=1]\n  more: [views.train.frequency=2]\n"
+RECIPE = (
+    "defaults: [default]\nname: {}\nseeds: {{count: 400}}\n"
+    "shading: {{iterations: 60, densify: {{stop: 40, every: 20}}}}\ntexture: {{sweeps: 1}}\n"
+)
+# In place of the files of these names: few views and iterations.
+FILES = {
+    "views/default": "train: {kind: icosphere, frequency: 1}\ntest: {kind: spiral, count: 12}\nrelit: 3\n",
+    "sweep/views": "name: views\nvariants:\n  few: [views.test.count=6]\n  more: [views.train.frequency=2]\n",
+    **{f"fit/{name}": RECIPE.format(name) for name in ("demo", "quick")},
+}
 
 
 @pytest.mark.docs
@@ -27,8 +35,10 @@ SWEEP = "name: views\nvariants:\n  few: [views.train.frequency=1]\n  more: [view
 def test_it_runs(path, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}:{os.environ['PATH']}")
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    (tmp_path / "conf" / "sweep").mkdir(parents=True)
-    (tmp_path / "conf" / "sweep" / "views.yaml").write_text(SWEEP)
+    for name, text in FILES.items():
+        file = tmp_path / "conf" / f"{name}.yaml"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
     notebook = executed(path, tmp_path, SMALL[path.stem])
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     assert not [output for output in outputs if output.output_type == "error"]
