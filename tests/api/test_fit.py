@@ -19,7 +19,7 @@ TFS = {
     "outer": texgs.TransferFunction([[0.2, 0.0], [0.3, 0.1], [0.4, 0.0]], [[0.3, 0.2, 0.4, 0.9]]),
     "inner": texgs.TransferFunction([[0.6, 0.0], [0.8, 0.5], [1.0, 0.5]], [[0.8, 0.9, 0.5, 0.1]]),
 }
-SMALL = ("views.train.frequency=1", "fit.shading.iterations=30", "views.step=1")
+SMALL = ("views.train.frequency=1", "fit.seeds.count=400", "fit.shading.iterations=30", "views.step=1")
 
 
 @pytest.fixture(scope="module")

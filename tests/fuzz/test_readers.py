@@ -16,6 +16,8 @@ from tests.fuzz.child import run
 from tests.fuzz.readers import READERS
 from texgs.core.errors import LONGEST
 
+pytestmark = pytest.mark.subprocess
+
 CASES = int(os.environ.get("TEXGS_FUZZ_CASES", "20"))
 # A file of these takes a second.
 IN_A_PROCESS_EACH = (".vti", ".vtk", ".slc", ".mha", ".mhd", ".nrrd", ".nhdr", "samples")

@@ -15,7 +15,7 @@ import tifffile
 from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 
 from tests.real_data import real_data
-from tests.volume.volume_files import WRITERS, assert_holds, sample_values, whole
+from tests.volume.volume_files import NAMES, WRITERS, assert_holds, sample_values, whole
 from texgs.core.errors import ArgumentError, OutOfMemoryError, ShapeError
 from texgs.volume.sources import open_source
 
@@ -32,7 +32,7 @@ def refused(path) -> str:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.3, 0.6, 0.97])
-@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_file_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path, capfd, name, share):
     path = tmp_path / name
     WRITERS[name](path, sample_values())
@@ -45,7 +45,7 @@ def test_a_file_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_foreign_file_is_refused(tmp_path, capfd, name):
     (tmp_path / name).write_bytes(bytes(range(256)) * 40)
     refused(tmp_path / name)

@@ -21,7 +21,9 @@ from texgs.volume.slabs import RawSource
 from texgs.volume.sources import open_source
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "int16", "float32"])
+@pytest.mark.parametrize(
+    "dtype", ["uint8", *(pytest.param(dtype, marks=pytest.mark.subprocess) for dtype in ("int16", "float32"))]
+)
 @pytest.mark.parametrize("name", WRITERS)
 def test_round_trip(tmp_path, name, dtype):
     values = sample_values(dtype)

@@ -6,6 +6,7 @@ from pathlib import Path
 import nibabel
 import nrrd
 import numpy as np
+import pytest
 import pyvista
 import tifffile
 from vtkmodules.vtkIOImage import vtkMetaImageWriter
@@ -98,4 +99,10 @@ WRITERS: dict[str, Writer] = {
     "rows.npy": np.save,
     "columns.npy": lambda path, values: np.save(path, np.asfortranarray(values)),
 }
+# By a process for each file, which takes half a second or more.
+BY_A_PROCESS = (".vti", ".vtk", ".mha", ".mhd", ".nrrd", ".nhdr")
+NAMES = [
+    pytest.param(name, marks=pytest.mark.subprocess) if name.endswith(BY_A_PROCESS) else name
+    for name in WRITERS
+]
 HAS_SPACING = tuple(name for name in WRITERS if not name.endswith((".tif", ".tiff", ".npy")))

@@ -179,6 +179,7 @@ def test_the_experiments_of_a_union_make_no_two_jobs_in_one_folder():
                     assert of_folder.setdefault(stage.output(each), job) == job, stage.output(each)
 
 
+@pytest.mark.workflow
 def test_the_whole_paper_has_images_of_each_data_sets_size():
     by_sweep = selected(("experiment=paper", "on_missing=stop"), nothing).by_sweep
     listed = [each for sweep, some in by_sweep.items() if sweep != "resolution" for each in some]
