@@ -99,7 +99,7 @@ WRITERS: dict[str, Writer] = {
     "rows.npy": np.save,
     "columns.npy": lambda path, values: np.save(path, np.asfortranarray(values)),
 }
-# By a process for each file, which takes half a second or more.
+# Endings of files that a process of its own reads, in half a second or more; `make test` leaves these out.
 BY_A_PROCESS = (".vti", ".vtk", ".mha", ".mhd", ".nrrd", ".nhdr")
 NAMES = [
     pytest.param(name, marks=pytest.mark.subprocess) if name.endswith(BY_A_PROCESS) else name
