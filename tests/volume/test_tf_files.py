@@ -115,7 +115,14 @@ class TestParaView:
         ('[{"RGBPoints": []}]', "RGBPoints: expected four numbers per point, got 0"),
         ('[{"RGBPoints": "abcd"}]', "RGBPoints: expected a list of numbers, got 'abcd'"),
         ('[{"RGBPoints": [0, 0, 0, "x"]}]', "RGBPoints: expected a list of numbers"),
-        ('[{"RGBPoints": [0, 0, 0, 255, 1, 0, 0, 0]}]', r"color\[0\]: expected r, g, b in \[0, 1\]"),
+        (
+            '[{"RGBPoints": [0, 0, 0, 255, 1, 0, 0, 0]}]',
+            r"RGBPoints: expected r, g, b in \[0, 1\], got \[0, 0, 255\]",
+        ),
+        (
+            '[{"RGBPoints": [0, 1e19, 0, 0, 1, 0, 0, 1], "ColorSpace": "Diverging"}]',
+            r"RGBPoints: expected r, g, b in \[0, 1\]",
+        ),
         ('[{"RGBPoints": [0, 0, 0, 0], "Points": [0, 1]}]', "Points: expected four numbers per point, got 2"),
         ('[{"RGBPoints": [0, 0, 0, 0], "ColorSpace": "CMYK"}]', "ColorSpace: expected one of RGB, HSV"),
     ],

@@ -79,6 +79,9 @@ def _from_preset(presets: list[dict[str, Any]]) -> TransferFunction:
             f"preset {preset.get('Name')!r}: expected RGBPoints, got a categorical colour map; choose another"
         )
     color = _fours(preset, "RGBPoints")
+    for _, *rgb in color:  # VTK turns hues by full turns, without end where a colour is far above 1
+        if not all(0 <= x <= 1 for x in rgb):
+            raise ArgumentError(f"RGBPoints: expected r, g, b in [0, 1], got {rgb!r:.60}")
     ramp = [(color[0][0], 0.0, 0.5, 0.0), (color[-1][0], 1.0, 0.5, 0.0)]
     nodes = _fours(preset, "Points") if preset.get("Points") else ramp
     if not all(0 <= x <= 1 for _, _, *shape in nodes for x in shape):
