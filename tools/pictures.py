@@ -97,7 +97,7 @@ def styles(run: Path) -> Image.Image:
         edits = [f"{name}/scene/quick/edits/style-{style}" for name in ("vortex", "engine")]
         files = [run / f"{edit}-{recipe}/scene.yaml" for edit in edits for recipe in ("preview", "default")]
         rows[style] = [picture, *(shown(file, 512) for file in files)]
-    return as_picture(lay_out(grid_rows(rows, ["picture", *(("laid onto it", "edited") * 2)])))
+    return as_picture(lay_out(grid_rows(rows, ["picture", *(("laid onto it", "edited") * 2)]))).reduce(2)
 
 
 def copy(pattern: str, smaller: int = 1) -> Callable[[Path], Image.Image]:
