@@ -33,7 +33,7 @@ def test_a_mistake_in_a_stage_of_ones_own_is_one_sentence(tmp_path):
     code += "import texgs.cli.main"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2
-    told = "texgs: texgs.workflow.stages.broken: TypeError where it is imported: Rule.__init__() got "
+    told = "texgs: texgs.workflow.stages.broken, line 2: TypeError where it is imported: Rule.__init__() got "
     assert done.stderr.startswith(f"{told}an unexpected keyword argument 'filse'")
     assert len(done.stderr.splitlines()) == 1
 

@@ -45,12 +45,12 @@ def test_what_is_no_specification(package):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("import nope_of_texgs", "ModuleNotFoundError where it is imported: No module named 'nope_of_texgs'"),
+        ("import nope_of_texgs", "line 1: ModuleNotFoundError where it is imported: No module named 'nope_of_texgs'"),
         ("THING = (", r"SyntaxError where it is imported: '\(' was never closed \(broken.py, line 1\)"),
-        ("raise ValueError('odd')", "ValueError where it is imported: odd"),
+        ("x = 1\nraise ValueError('odd')", "line 2: ValueError where it is imported: odd"),
     ],
 )
 def test_a_module_that_cannot_be_imported(package, text, message):
     (package / "broken.py").write_text(text)
-    with pytest.raises(ConfigError, match=rf"\.broken: {message}$"):
+    with pytest.raises(ConfigError, match=rf"\.broken[:,] {message}$"):
         specifications(package.name, "THING")

@@ -28,6 +28,11 @@ class Undecorated(MethodKeys):
     ("changes", "message"),
     [
         ({"needs": frozenset({"texure"})}, "fade: needs: texure is nothing .* can do, did you mean texture?"),
+        ({"needs": "texture"}, r"method fade: needs: expected a set, {'texture'}, got text"),
+        ({"name": "my toon"}, "METHOD: expected letters, digits and _ in its name, got 'my toon'"),
+        ({"summary": ""}, "method fade: summary: expected words for texgs --help, got none"),
+        ({"run": lambda: None}, r"method fade: expected <lambda>\(task\), got <lambda>\(\)"),
+        ({"run": "run"}, "method fade: expected a function, got str"),
         ({"settings": Plain}, r"method fade: levels: expected key\(DEFAULT, HELP\), got no key\(\)"),
         ({"settings": Undecorated}, r"method fade: Undecorated: write @dataclass\(frozen=True\) above it"),
         ({"settings": dict}, "method fade: expected keys of a subclass of MethodKeys, got dict"),
@@ -40,4 +45,4 @@ def test_what_a_method_says_of_itself_is_checked(changes, message):
 
 def test_what_a_method_returns_is_checked():
     with pytest.raises(ConfigError, match="method fade: expected an EditedScene, got str"):
-        edited_by(replace(METHOD, run=str), 1)
+        edited_by(replace(METHOD, run=lambda task: "done"), 1)

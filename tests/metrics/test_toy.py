@@ -3,6 +3,7 @@
 import math
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ import texgs.metrics.edits
 from tests.metrics.test_edit_metrics import scenes, subject  # noqa: F401
 from tests.report.written import metrics as write_metrics
 from tests.report.written import records, rows
+from tests.toys.brightness import METRIC
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.specifications import specifications
 from texgs.metrics.metric import Measure, Metric, metrics, require_declared, values_of
@@ -78,6 +80,23 @@ def test_two_metrics_have_no_value_of_one_name(toy, monkeypatch):
 def test_columns_and_names_are_stated_once():
     measures = [measure for metric in metrics().values() for measure in metric.measures]
     assert len({measure.name for measure in measures}) == len({m.title for m in measures}) == len(measures)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"better": "lower"}, "measure brightness: better: expected up, down or '', got 'lower'"),
+        ({"digits": "3"}, "measure brightness: digits: expected a whole number, got '3'"),
+    ],
+)
+def test_a_column_is_checked(changes, message):
+    with pytest.raises(ConfigError, match=message):
+        replace(METRIC.measures[0], **changes)
+
+
+def test_a_metric_takes_what_is_measured():
+    with pytest.raises(ConfigError, match=r"metric brightness: expected <lambda>\(measured\), got <lambda>"):
+        replace(METRIC, run=lambda before, after: {})
 
 
 def test_one_measure_without_a_comma_is_told():

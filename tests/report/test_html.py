@@ -12,6 +12,7 @@ from tests.study.studies import study
 from texgs.report.html import write_report as write_records
 from texgs.report.metrics_files import LeftOut, read_known
 from texgs.report.results import (
+    SECTIONS,
     ComparisonResult,
     EditResult,
     FitResult,
@@ -21,7 +22,6 @@ from texgs.report.results import (
     SheetResult,
     TimingResult,
 )
-from texgs.report.sections import SECTIONS
 from texgs.study.ballots import Ballot, Votes
 from texgs.study.votes import shown, study_table
 from texgs.workflow.differences import differences_of

@@ -10,8 +10,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_json
 from texgs.core.names import METRICS
 from texgs.report.metrics_files import LeftOut, read_known, require_apart
-from texgs.report.results import EditResult, FitResult, SceneResult
-from texgs.report.sections import SECTIONS
+from texgs.report.results import SECTIONS, EditResult, FitResult, SceneResult
 from texgs.report.tables import specs, tables_of
 from texgs.study.ballots import Ballot, Votes
 from texgs.study.votes import study_table

@@ -51,7 +51,9 @@ def test_whole_results_of_other_runs_are_shown():
     assert shown({}) == ({str(VIEWS), str(FIT), str(EDIT)}, set())
     assert shown(job(FIT, {"settings": "a"}, VIEWS) | job(VIEWS, {"settings": "v"})) == ({str(EDIT)}, set())
     (EDIT / "model.safetensors").write_text("damaged")
-    assert shown({}) == ({str(VIEWS), str(FIT)}, set())
+    assert shown({}) == ({str(VIEWS), str(FIT)}, {str(EDIT)})
+    (entry,) = earlier("results", Graph(), Checksums())[1]
+    assert entry.why == "model.safetensors is damaged or missing; run its job again"
 
 
 def test_an_edit_of_a_fit_that_has_been_made_anew_is_left_out_and_told():

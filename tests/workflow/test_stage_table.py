@@ -7,10 +7,12 @@ import pytest
 
 from tests.toys.projection import STAGE, ProjectionResult
 from texgs.cli import main
+from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
+from texgs.report.results import Result
 from texgs.workflow import stage_table
 from texgs.workflow.execution import require_outcome
-from texgs.workflow.stage import Outcome, Rule
+from texgs.workflow.stage import Outcome, Rule, read, selected
 from texgs.workflow.stage_table import STAGES, by_name, require_stage
 
 
@@ -24,6 +26,7 @@ def changed(**changes):
         (dict, "toy: STAGE: expected a Stage, got type"),
         (replace(STAGE, name="my stage"), "toy: STAGE: expected letters, digits and _ in its name"),
         (changed(files=("a.png")), "toy: files of its Rule: expected names with commas"),
+        (replace(STAGE, work=lambda settings, inputs: None), r"toy: work of its Stage: expected <lambda>\("),
         (changed(folder="{datset}/a"), r"folder of its Rule: expected some of {dataset}, .*, got {datset}"),
     ],
 )
@@ -37,6 +40,7 @@ def test_a_stage_has_a_verb_files_and_a_folder(stage, message):
     ("stage", "message"),
     [
         (replace(STAGE, name="sheet"), "expected stages of different names, got sheet twice"),
+        (changed(target="volume"), "stage projection: target of its Rule: .* no name of a rule, got volume"),
         (changed(name="sheet"), "stages projection and sheet: expected a name of its own for each Rule"),
         (
             changed(folder="{dataset}/transfer"),
@@ -65,6 +69,26 @@ def test_the_settings_of_a_stage_are_a_dataclass():
     for work, got in ((untold, "none"), (wrong, "int")):
         with pytest.raises(ConfigError, match=f"stage projection: work: expected a dataclass .* got {got}"):
             _ = replace(STAGE, work=work).schema
+
+
+@dataclass
+class Misspelt:
+    """Settings that read a key that there is not."""
+
+    width: int = read("views.widths")
+
+
+def test_settings_read_keys_that_there_are():
+    with pytest.raises(ConfigError, match=r"test_stage_table: Misspelt.width: reads .* 'widths'"):
+        selected(Misspelt, compose(()))
+
+
+def test_a_result_has_a_section_of_the_report():
+    with pytest.raises(ConfigError, match="Misplaced: section: no section datas, did you mean data?"):
+
+        class Misplaced(Result, section="datas"): ...
+
+    assert "Misplaced" not in Result.kinds
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,7 @@ def results(folder: str | Path = "results") -> pandas.DataFrame:
     """
     import pandas
 
+    import_module("texgs.workflow.stage_table")  # results of stages' own are defined in their modules
     records, _ = read_known(below(folder))
     if not records:
         raise ArgumentError(f"{folder}: expected results of texgs run, got none; name their folder")

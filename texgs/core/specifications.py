@@ -3,6 +3,9 @@
 import pkgutil
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
+from inspect import signature
+from traceback import extract_tb
 from types import ModuleType
 from typing import Any
 
@@ -46,4 +49,19 @@ def imported(name: str) -> ModuleType:
     except ConfigError:  # a sentence already
         raise
     except (ImportError, NameError, SyntaxError, TypeError, ValueError) as error:
-        raise ConfigError(f"{name}: {type(error).__name__} where it is imported: {error}") from error
+        spec = find_spec(name)
+        lines = [each.lineno for each in extract_tb(error.__traceback__) if spec and each.filename == spec.origin]
+        where = f"{name}, line {lines[-1]}" if lines else name
+        raise ConfigError(f"{where}: {type(error).__name__} where it is imported: {error}") from error
+
+
+def require_call(owner: str, function: Any, parameters: str) -> None:
+    """Require a function that takes these parameters in turn, such as "settings, inputs, output"."""
+    if not callable(function):
+        raise ConfigError(f"{owner}: expected a function, got {type(function).__name__}")
+    known = signature(function)
+    try:
+        known.bind(*parameters.split(", "))
+    except TypeError as error:
+        name, own = function.__name__, ", ".join(known.parameters)
+        raise ConfigError(f"{owner}: expected {name}({parameters}), got {name}({own})") from error

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from texgs.core.errors import ConfigError
 from texgs.core.keys import typed
 from texgs.core.names import close
-from texgs.core.specifications import specifications
+from texgs.core.specifications import require_call, specifications
 from texgs.fields.kinds import ALL, kinds
 
 if TYPE_CHECKING:
@@ -79,10 +79,17 @@ class Method(Generic[Settings]):
     is_look: bool = True  # whether the scene looks different afterwards
 
     def __post_init__(self) -> None:
+        if not self.name.isidentifier():
+            raise ConfigError(f"METHOD: expected letters, digits and _ in its name, got {self.name!r}")
+        if not self.summary:
+            raise ConfigError(f"method {self.name}: summary: expected words for texgs --help, got none")
+        require_call(f"method {self.name}", self.run, "task")
         self._require_keys()
         self.settings.node = f"edit.{self.name}"
         if plain := [each.name for each in fields(self.settings) if "help" not in each.metadata]:
             raise ConfigError(f"method {self.name}: {plain[0]}: expected key(DEFAULT, HELP), got no key()")
+        if isinstance(self.needs, str):
+            raise ConfigError(f"method {self.name}: needs: expected a set, {{{self.needs!r}}}, got text")
         if unknown := sorted(self.needs - ALL):
             hint = close(unknown[0], ALL)
             raise ConfigError(f"method {self.name}: needs: {unknown[0]} is nothing that fields can do{hint}")

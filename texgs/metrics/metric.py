@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.names import is_number
-from texgs.core.specifications import specifications
+from texgs.core.specifications import require_call, specifications
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -40,6 +40,12 @@ class Measure:
     published: str = ""  # column of the paper's tables of edits
     words: Mapping[Any, str] | None = None  # what tables say in place of its values
 
+    def __post_init__(self) -> None:
+        if self.better not in ("", "up", "down"):
+            raise ConfigError(f"measure {self.name}: better: expected up, down or '', got {self.better!r}")
+        if not isinstance(self.digits, int | None):
+            raise ConfigError(f"measure {self.name}: digits: expected a whole number, got {self.digits!r}")
+
 
 @dataclass(frozen=True)
 class Metric:
@@ -59,6 +65,7 @@ class Metric:
         if not isinstance(self.measures, tuple):
             got = type(self.measures).__name__
             raise ConfigError(f"metric {self.name}: measures: expected a tuple, (Measure(...),), got {got}")
+        require_call(f"metric {self.name}", self.run, "measured")
 
     @property
     def names(self) -> list[str]:

@@ -10,8 +10,8 @@ from texgs.core.figures import as_picture, new_figure, words
 from texgs.core.io import write_bytes
 from texgs.report.metrics_files import LeftOut, Record, of
 from texgs.report.published import THEIRS, in_order
-from texgs.report.results import FitResult
-from texgs.report.sections import SECTIONS, Figure, data_uri, figures
+from texgs.report.results import SECTIONS, FitResult
+from texgs.report.sections import Figure, data_uri, figures
 from texgs.report.sweep_figure import sweep_figure
 from texgs.report.table import SOURCES, Table, report_file
 from texgs.report.tables import specs, sweeps_of, tables_of

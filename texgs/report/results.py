@@ -8,7 +8,29 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, ClassVar, Self
 
+from texgs.core.errors import ConfigError
 from texgs.core.keys import typed
+from texgs.core.names import close
+
+SECTIONS = {  # of the report, in the order of the paper
+    "data": "Data sets and views",
+    "scenes": "Scenes to open",
+    "fitting": "Fitting",
+    "pse": "Editing of colour, opacity and light",
+    "relight": "Relighting",
+    "cuts": "Cuts",
+    "time": "Through time",
+    "image": "Image-driven editing",
+    "text": "Text-driven editing",
+    "parts": "Partial editing and other edits",
+    "ablations": "Ablations",
+    "sizes": "Model sizes",
+    "rendering": "Rendering",
+    "study": "User study",
+    "differences": "Where we differ from the paper",
+    "more": "Further tables and figures",
+}
+
 
 
 class Result:
@@ -19,6 +41,9 @@ class Result:
 
     def __init_subclass__(cls, section: str = "more") -> None:
         """Make a kind of result known, with the section of the report that its pictures belong to."""
+        if section not in SECTIONS:
+            known = close(section, SECTIONS) or f"; there are {', '.join(SECTIONS)}"
+            raise ConfigError(f"{cls.__module__}: {cls.__name__}: section: no section {section}{known}")
         cls.pictured_in = section
         Result.kinds[cls.__name__] = cls
 

@@ -16,26 +16,8 @@ from PIL import Image
 from texgs.edit.method import NO_METHOD
 from texgs.report.metrics_files import Record
 from texgs.report.published import in_order
-from texgs.report.results import ComparisonResult, EditResult, GalleryResult, PageResult
+from texgs.report.results import SECTIONS, ComparisonResult, EditResult, GalleryResult, PageResult
 
-SECTIONS = {
-    "data": "Data sets and views",
-    "scenes": "Scenes to open",
-    "fitting": "Fitting",
-    "pse": "Editing of colour, opacity and light",
-    "relight": "Relighting",
-    "cuts": "Cuts",
-    "time": "Through time",
-    "image": "Image-driven editing",
-    "text": "Text-driven editing",
-    "parts": "Partial editing and other edits",
-    "ablations": "Ablations",
-    "sizes": "Model sizes",
-    "rendering": "Rendering",
-    "study": "User study",
-    "differences": "Where we differ from the paper",
-    "more": "Further tables and figures",
-}
 OF_PICTURES = {"relight.png": "relight"}  # where a stage has pictures of several sections
 OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
 # Side by side where there is room, as pictures of styles are.

@@ -20,7 +20,7 @@ class TableSpec:
 
     name: str  # of its files
     title: str
-    section: str  # of the report, a key of `texgs.report.sections.SECTIONS`
+    section: str  # of the report, a key of `texgs.report.results.SECTIONS`
     places: Sequence[str]  # of the jobs that it reads, names of rules of the workflow
     make: Callable[[Sequence[Record[Any]]], Table] | None  # None: whoever writes the tables hands it in
     caption: str = ""

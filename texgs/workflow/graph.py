@@ -17,7 +17,7 @@ from texgs.workflow.checks import check_basic_tfs, check_edit, check_fit
 from texgs.workflow.experiments import LeftOut, Selection, selected
 from texgs.workflow.job import Job, settings_digest
 from texgs.workflow.missing import lacking, missing_weights
-from texgs.workflow.result import fingerprint, is_complete, stamped
+from texgs.workflow.result import damaged, fingerprint, is_complete, stamped
 from texgs.workflow.stage_table import STAGES, SWEPT
 from texgs.workflow.stage_table import jobs as jobs_of
 
@@ -129,6 +129,8 @@ def earlier(
     outdated: dict[LeftOut, list[str]] = {}
     for folder in sorted({path.parent.as_posix() for path in below(results)} - set(of_run.run)):
         if not is_complete(Path(folder), checksums):
+            if lost := damaged(Path(folder), checksums):
+                outdated[LeftOut(folder, f"{lost[0]} is damaged or missing; run its job again")] = []
             continue
         facts = read_json(file := Path(folder, METRICS))
         if (stage := STAGES.get(facts["stage"])) is None:

@@ -128,7 +128,11 @@ def selected(schema: type[Any], config: Config) -> dict[str, Any]:
     hints, values = get_type_hints(schema), {}
     for each in fields(schema):
         if "read" in each.metadata:
-            values[each.name] = each.metadata["read"](config)
+            try:
+                values[each.name] = each.metadata["read"](config)
+            except AttributeError as error:
+                where = f"{schema.__module__}: {schema.__name__}.{each.name}"
+                raise ConfigError(f"{where}: reads what the configuration has not: {error}") from error
         elif is_dataclass(part := hints[each.name]):
             values[each.name] = selected(cast(type[Any], part), config)
     return values

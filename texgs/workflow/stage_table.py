@@ -12,7 +12,7 @@ from typing import Any
 
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
-from texgs.core.specifications import imported
+from texgs.core.specifications import imported, require_call
 from texgs.workflow.inputs import is_fit
 from texgs.workflow.locate import tf_names
 from texgs.workflow.stage import RULES, Stage
@@ -41,6 +41,7 @@ def require_stage(module: str, stage: Any) -> None:
         raise ConfigError(
             f"{module}: files of its Rule: expected names with commas, as in ('a.png',), got text"
         )
+    require_call(f"{module}: work of its Stage", stage.work, "settings, inputs, output")
     for _, name, *_ in Formatter().parse(stage.rule.folder):
         if name is not None and name not in WILDCARDS:
             known = ", ".join(f"{{{each}}}" for each in WILDCARDS)
@@ -65,6 +66,13 @@ def by_name(stages: Iterable[Stage]) -> dict[str, Stage]:
                     f"{value} twice; choose another for yours"
                 )
         named[stage.name] = stage
+    rules = {"all", "tables", "report", "downloads", "download", *(each.rule.name for each in named.values())}
+    for stage in named.values():
+        if stage.rule.target in rules:
+            raise ConfigError(
+                f"stage {stage.name}: target of its Rule: expected no name of a rule, got {stage.rule.target}; "
+                "take a target that there is, such as volumes or scenes, or one of your own"
+            )
     return named
 
 
