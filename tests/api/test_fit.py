@@ -1,6 +1,8 @@
 """Fits from Python: the stages of the workflow without a project, and the fit in seconds."""
 
 import json
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -10,6 +12,7 @@ import texgs
 from tests.fitting.short_fits import shorten
 from texgs.api.fit import configuration
 from texgs.core.errors import ArgumentError, ConfigError, DeviceError
+from texgs.core.io import write_json
 from texgs.metrics.quality import compare
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.origins import Origins
@@ -82,6 +85,16 @@ def test_results_are_a_table(scene, folder):
     assert (row.dataset, row.recipe) == ("ball", "quick")
     with pytest.raises(ArgumentError, match="expected results of texgs run, got none"):
         texgs.results(folder / "nothing")
+
+
+def test_results_of_a_stage_need_nothing_but_their_folder(tmp_path):
+    """Also those that a module of a stage defines, in a process that has run none."""
+    numbers = {"basic_tfs": 1, "ranges": {}}
+    facts = {"stage": "transfer", "dataset": "ball", "result": "TransferResult", "numbers": numbers}
+    write_json(tmp_path / "metrics.json", facts)
+    code = f"import texgs; print(texgs.results({str(tmp_path)!r}).stage[0])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout == "transfer\n", done.stderr
 
 
 def test_psnr_is_the_mean_beside_the_volume(scene):

@@ -90,6 +90,8 @@ def test_a_dry_run_lists_each_job_where_that_is_asked_for(tmp_path):
         (["reprot"], 2, "texgs run: reprot: no such target, did you mean report?"),
         (["nosuchthing"], 2, "texgs run: nosuchthing: no such target; expected all, tables, report, "),
         (["dataset", "engine"], 2, "dataset: expected dataset=engine in one word, got dataset alone"),
+        (["--fit", "quick"], 2, "texgs run: --fit: expected fit=quick in one word, got --fit alone"),
+        (["edits=glass"], 2, "texgs: edits: expected a list, [glass], got 'glass'"),
         (["datset=engine"], 2, "datset: no such key, did you mean dataset?"),
     ],
 )

@@ -45,7 +45,10 @@ def test_what_is_no_specification(package):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("import nope_of_texgs", "line 1: ModuleNotFoundError where it is imported: No module named 'nope_of_texgs'"),
+        (
+            "import nope_of_texgs",
+            "line 1: ModuleNotFoundError where it is imported: No module named 'nope_of_texgs'",
+        ),
         ("THING = (", r"SyntaxError where it is imported: '\(' was never closed \(broken.py, line 1\)"),
         ("x = 1\nraise ValueError('odd')", "line 2: ValueError where it is imported: odd"),
     ],

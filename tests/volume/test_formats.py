@@ -178,6 +178,13 @@ def test_a_stack_of_slices_with_a_gap_is_refused(tmp_path, numbers, missing):
         open_source(tmp_path)
 
 
+def test_slices_of_two_formats_are_told_apart(tmp_path):
+    tifffile.imwrite(tmp_path / "s1.tif", np.zeros((4, 5), np.uint8))
+    (tmp_path / "s1.dcm").touch()
+    with pytest.raises(ArgumentError, match=r"slices of one format, got s1.tif and s1.dcm; move"):
+        open_source(tmp_path)
+
+
 def test_a_compressed_tiff_that_cannot_be_read_says_so_at_once(tmp_path, monkeypatch):
     tifffile.imwrite(tmp_path / "v.tif", sample_values("uint8"), compression="zlib")
     monkeypatch.setattr("texgs.volume.tiff.READABLE", (1,))

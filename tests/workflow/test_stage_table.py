@@ -40,7 +40,7 @@ def test_a_stage_has_a_verb_files_and_a_folder(stage, message):
     ("stage", "message"),
     [
         (replace(STAGE, name="sheet"), "expected stages of different names, got sheet twice"),
-        (changed(target="volume"), "stage projection: target of its Rule: .* no name of a rule, got volume"),
+        (changed(target="volume"), "stage projection: target of its Rule: got volume, the name of a rule"),
         (changed(name="sheet"), "stages projection and sheet: expected a name of its own for each Rule"),
         (
             changed(folder="{dataset}/transfer"),
@@ -84,7 +84,7 @@ def test_settings_read_keys_that_there_are():
 
 
 def test_a_result_has_a_section_of_the_report():
-    with pytest.raises(ConfigError, match="Misplaced: section: no section datas, did you mean data?"):
+    with pytest.raises(ConfigError, match="Misplaced: section: no section datas, did you mean data"):
 
         class Misplaced(Result, section="datas"): ...
 

@@ -67,12 +67,12 @@ def snakemake(words: Sequence[str]) -> bool:
 
         theirs.ArgumentParser.error = Parser.error
         sys.argv[:1] = ["snakemake"]  # what these parsers are of
-        given, _ = get_argument_parser().parse_known_intermixed_args(list(words))
+        given, unknown = get_argument_parser().parse_known_intermixed_args(list(words))
     except RuntimeError as error:  # it looks for its own configuration in the user's home
         raise ArgumentError(f"HOME: snakemake needs a home folder ({error}); set HOME to one") from error
     except CliException as error:
         raise ArgumentError(f"{error} See snakemake --help.") from error
-    require_pairs([word for word in words if word in given.targets])
+    require_pairs([word for word in words if word in (*given.targets, *unknown)])
     chosen = [word for word in given.targets if WORD.fullmatch(word)]
     rest = [word for word in words if word not in chosen]
     sys.argv = ["snakemake", *rest]  # the Snakefile looks there
@@ -132,12 +132,12 @@ def no_target(word: str) -> str:
 
 
 def require_pairs(words: Sequence[str]) -> None:
-    """Require that none of the words is the key of a choice alone, as in `dataset engine`."""
+    """Require that none of the words is the key of a choice alone, as in `dataset engine`, `--fit quick`."""
     from texgs.workflow.plan import GROUPS
 
     for word, after in pairwise((*words, "NAME")):
-        if word in GROUPS:
-            raise ArgumentError(f"{word}: expected {word}={after} in one word, got {word} alone")
+        if (key := word.removeprefix("--")) in GROUPS:
+            raise ArgumentError(f"{word}: expected {key}={after} in one word, got {word} alone")
 
 
 def defaults(given: argparse.Namespace) -> list[str]:

@@ -150,7 +150,7 @@ def _value(hint: Any, value: Any, key: str) -> Any:
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     is_list = isinstance(value, Sequence) and not isinstance(value, str)
     if origin is list and not is_list:
-        raise mismatch(key, "a list", value)
+        raise mismatch(key, f"a list, [{value}]" if isinstance(value, str) else "a list", value)
     if origin is list or (hint is Any and is_list):
         return [_value((*arguments, Any)[0], each, f"{key}.{index}") for index, each in enumerate(value)]
     if origin is dict or (hint is Any and isinstance(value, Mapping)):

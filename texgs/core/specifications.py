@@ -50,7 +50,9 @@ def imported(name: str) -> ModuleType:
         raise
     except (ImportError, NameError, SyntaxError, TypeError, ValueError) as error:
         spec = find_spec(name)
-        lines = [each.lineno for each in extract_tb(error.__traceback__) if spec and each.filename == spec.origin]
+        lines = [
+            each.lineno for each in extract_tb(error.__traceback__) if spec and each.filename == spec.origin
+        ]
         where = f"{name}, line {lines[-1]}" if lines else name
         raise ConfigError(f"{where}: {type(error).__name__} where it is imported: {error}") from error
 

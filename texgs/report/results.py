@@ -32,7 +32,6 @@ SECTIONS = {  # of the report, in the order of the paper
 }
 
 
-
 class Result:
     """What a job tells, a dataclass; files name it by its class."""
 

@@ -69,6 +69,10 @@ def open_tiff(path: Path, spacing: Triple | None, origin: Triple | None) -> Sour
     import tifffile
 
     files = tiffs_in(path) if path.is_dir() else [path]
+    if path.is_dir() and (others := sorted(path.glob("[!.]*.dcm"))):
+        raise ArgumentError(
+            f"expected slices of one format, got {files[0].name} and {others[0].name}; move those of one away"
+        )
     what = f"TIFF files, but {files[0].name} is none" if path.is_dir() else "a TIFF file"
     with reading_as(what), complaints_raised(), tifffile.TiffFile(files[0]) as tiff:
         known = spacing or spacing_of(tiff)

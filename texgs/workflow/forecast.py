@@ -120,11 +120,12 @@ def show(words: tuple[str, ...]) -> int:
         print(f"missing  {line}")
     kinds = ", ".join(f"{count} {stage}" for stage, count in expected.to_do.items())
     print(f"jobs     {sum(expected.to_do.values())} to do ({kinds or 'none'}), {expected.done} done")
-    slower = probe() / speeds()[PROBE].constant
-    print(
-        f"time     about {duration(expected.seconds * slower)}: an estimate, from speeds measured on other "
-        f"scenes; just now this machine rasterizes {1 / slower:.1f} times as fast as theirs"
-    )
+    if expected.to_do:
+        slower = probe() / speeds()[PROBE].constant
+        print(
+            f"time     about {duration(expected.seconds * slower)}: an estimate, from speeds measured on "
+            f"other scenes; just now this machine rasterizes {1 / slower:.1f} times as fast as theirs"
+        )
     return 1 if expected.missing else 0
 
 

@@ -70,7 +70,7 @@ def by_name(stages: Iterable[Stage]) -> dict[str, Stage]:
     for stage in named.values():
         if stage.rule.target in rules:
             raise ConfigError(
-                f"stage {stage.name}: target of its Rule: expected no name of a rule, got {stage.rule.target}; "
+                f"stage {stage.name}: target of its Rule: got {stage.rule.target}, the name of a rule; "
                 "take a target that there is, such as volumes or scenes, or one of your own"
             )
     return named
