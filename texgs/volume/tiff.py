@@ -69,7 +69,7 @@ def open_tiff(path: Path, spacing: Triple | None, origin: Triple | None) -> Sour
     import tifffile
 
     files = tiffs_in(path) if path.is_dir() else [path]
-    if path.is_dir() and (others := sorted(path.glob("[!.]*.dcm"))):
+    if path.is_dir() and (others := sorted(path.glob("[!.]*.[dD][cC][mM]"))):
         raise ArgumentError(
             f"expected slices of one format, got {files[0].name} and {others[0].name}; move those of one away"
         )
