@@ -19,7 +19,7 @@ class Volume:
         choices=("sphere", "orbital", "turbulence", "jets", "rings", "flame"),
     )
     size: int = key(128, "samples along each side of a generated field", least=16)
-    seed: int = key(0, "seed of a generated field")
+    seed: int = key(0, "seed of a generated field", least=0)
     file: str | None = key(
         None, "file, or folder of TIFF or DICOM slices, or of Zarr; relative to data_folder"
     )

@@ -3,6 +3,7 @@
 import difflib
 import re
 from collections.abc import Iterable
+from fractions import Fraction
 from itertools import count
 from math import isfinite
 from pathlib import Path
@@ -96,9 +97,13 @@ def close(word: object, known: Iterable[str]) -> str:
     return f", did you mean {' or '.join(sorted(alike))}?" if alike else ""
 
 
-def natural_order(path: Path) -> list[tuple[str, int]]:
-    """Return the place of a file among others by the numbers in its path: slice9 comes before slice10."""
-    return [(text, int(number or -1)) for text, number in re.findall(r"(\D*)(\d*)", str(path))]
+def natural_order(path: Path, *, has_decimals: bool = False) -> list[tuple[str, Fraction]]:
+    """Return the place of a file among others by the numbers in its path: slice9 comes before slice10.
+
+    Where numbers may have decimals, 0.25 comes before 0.5.
+    """
+    number = r"\d+(?:\.\d+)?|" if has_decimals else r"\d*"
+    return [(text, Fraction(digits or -1)) for text, digits in re.findall(rf"(\D*)({number})", str(path))]
 
 
 def is_number(value: object) -> bool:

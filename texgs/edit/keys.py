@@ -22,6 +22,6 @@ class EditKeys:
         False, "each model follows the picture or the instruction that dataset.looks has for its basic TF"
     )
     compared: bool = key(False, "a method of the paper's comparisons, with rows in its tables")
-    seed: int = key(0, "random numbers")
+    seed: int = key(0, "random numbers", least=0)
     source_caption: str = key("", "the scene before, in words, for CLIP's metrics")
     target_caption: str = key("", "the scene afterwards, in words, for CLIP's metrics")

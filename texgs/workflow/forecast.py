@@ -61,7 +61,8 @@ def forecast(words: tuple[str, ...]) -> Forecast:
             done += 1
             continue
         to_do[job.stage.name] += 1
-        seconds += STEP_SECONDS + table[job.stage.name].seconds(*work_of(job, planned.configs[folder]))
+        speed = table.get(job.stage.name, Speed(0, 0, 0))  # nobody has measured stages of one's own
+        seconds += STEP_SECONDS + speed.seconds(*work_of(job, planned.configs[folder]))
     return Forecast(selection, [*planned.missing], to_do, done, seconds + (START_SECONDS if to_do else 0))
 
 

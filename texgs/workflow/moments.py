@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Sequence
+from fractions import Fraction
 from glob import escape, glob
 from itertools import pairwise
 from os.path import commonpath
@@ -11,7 +12,8 @@ from typing import NamedTuple
 from texgs.core.errors import ArgumentError
 from texgs.core.names import natural_order
 
-NUMBER = re.compile(r"\d+(?=\D*$)")
+FORMAT = re.compile(r"\.[A-Za-z]\w*$")  # not the .5 of a folder t_0.5
+NUMBER = re.compile(r"(\d+)(?:\.(\d+))?(?=\D*$)")
 
 
 class Moment(NamedTuple):
@@ -43,7 +45,7 @@ def in_time(files: Sequence[Path]) -> list[Moment]:
     """Return the steps of several files, in the order of their numbers where all have one.
 
     Numbers that are multiples of their least distance count steps, of which none may be missing; others are
-    dates, say.
+    dates, say. Numbers may have decimals, as in t_0.5.
     """
     if len(files) < 2:
         got = ", ".join(map(str, files)) or "none"
@@ -53,22 +55,37 @@ def in_time(files: Sequence[Path]) -> list[Moment]:
     is_root = base == Path(base.anchor)  # a name without its slash would be that of another file
     names = [(path if is_root else path.relative_to(base)).as_posix() for path in paths]
     moments = [Moment(name, file) for name, file in zip(names, files, strict=True)]
-    if None in map(number_of, moments):
+    has_decimals = are_decimal(names)
+    numbers = {name: number_of(name, has_decimals) for name in names}
+    if None in numbers.values():
         return moments
-    moments.sort(key=lambda moment: natural_order(Path(moment.name)))
-    gaps = [(number_of(after) or 0) - (number_of(before) or 0) for before, after in pairwise(moments)]
+    moments.sort(key=lambda moment: natural_order(Path(moment.name), has_decimals=has_decimals))
+    gaps = [(numbers[after.name] or 0) - (numbers[before.name] or 0) for before, after in pairwise(moments)]
     least = min(gaps)
     is_count = least > 0 and all(gap % least == 0 for gap in gaps)
     for (before, after), gap in zip(pairwise(moments), gaps, strict=True):
         if is_count and gap > least:
             raise ArgumentError(
-                f"expected a file each {least}, got none between {before.name} and {after.name}; "
+                f"expected a file each {float(least):g}, got none between {before.name} and {after.name}; "
                 "name the files of one part of the series"
             )
     return moments
 
 
-def number_of(moment: Moment) -> int | None:
+def are_decimal(names: Iterable[str]) -> bool:
+    """Return whether the last numbers in names are decimals: some have more digits behind a point than others.
+
+    Where some of these end with 0, as in 3.10, they count: nobody writes a decimal so.
+    """
+    found = [NUMBER.search(FORMAT.sub("", name)) for name in names]
+    fractions = {number[2] or "" for number in found if number}
+    return len({*map(len, fractions)}) > 1 and not any(len(x) > 1 and x.endswith("0") for x in fractions)
+
+
+def number_of(name: str, has_decimals: bool) -> Fraction | None:
     """Return the last number in the name of a step, without what tells its format."""
-    found = NUMBER.search(str(Path(moment.name).with_suffix("")))
-    return int(found[0]) if found else None
+    number = NUMBER.search(FORMAT.sub("", name))
+    if number is None:
+        return None
+    whole, decimals = number.groups()
+    return Fraction(f"{whole}.{decimals or 0}" if has_decimals else decimals or whole)

@@ -101,7 +101,7 @@ def publish(output: Path) -> None:
     require_own(output)  # the job took its time, in which somebody may have put a file there
     work, old = work_folder(output), output.with_name(f".{output.name}.old")
     names = sorted(path.relative_to(work).as_posix() for path in work.rglob("*") if path.is_file())
-    write_json(work / FILES, {name: sha256(work / name) for name in names if name != STAMP})
+    write_json(work / FILES, {name: sha256(work / name) for name in names if name not in (STAMP, FILES)})
     if output.exists():
         output.rename(old)
     work.rename(output)

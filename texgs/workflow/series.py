@@ -9,8 +9,9 @@ import numpy as np
 import torch
 
 from texgs.config.dataset import Volume
+from texgs.core.checksum import Checksums, digest
 from texgs.core.errors import ArgumentError, located
-from texgs.core.io import read_json
+from texgs.core.io import read_json, write_json
 from texgs.core.keys import typed
 from texgs.core.names import METRICS, SCENE, natural_order
 from texgs.core.plain_yaml import parse_yaml
@@ -26,6 +27,7 @@ from texgs.volume.headers import NRRD
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.summaries import write_summaries
 from texgs.workflow.moments import Moment, in_time
+from texgs.workflow.result import fingerprint
 from texgs.workflow.stages.volume import prepared, source
 
 
@@ -91,26 +93,36 @@ def moments_of(files: Sequence[Path], settings: Volume) -> list[Moment]:
 
 def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, volume: SceneVolume) -> None:
     """Prepare the volumes that are missing, as that of the scene was, and require its lattice."""
-    grid = open_grid(volume.file)
+    grid, record, checksums = open_grid(volume.file), series.file.with_name("sources.json"), Checksums.load()
+    made_of = read_json(record) if record.exists() else {}
     for step, moment in enumerate(progress(moments, title="volumes", unit="step")):
         target = series.volume(step)
+        own = settings if moment.time is None else replace(settings, time=moment.time)
+        identity = digest(f"{own} {moment.file and fingerprint(moment.file, checksums)}")
         with located(moment.name):
-            if not target.exists():
-                own = settings if moment.time is None else replace(settings, time=moment.time)
+            if not target.exists() or made_of.get(target.name) != identity:
+                require_unfollowed(series, step)
+                target.unlink(missing_ok=True)
+                write_json(record, made_of := {**made_of, target.name: identity})
                 write_summaries(target, prepared(settings, [source(own, moment.file)], target), [""])
-            elif moment.file is not None and changed_at(moment.file) > target.stat().st_mtime:
-                raise ArgumentError(
-                    f"{moment.file} has changed since {target} was made of it; remove {target.parent}, or "
-                    "choose another folder"
-                )
             other = open_grid(target)
             if other.dims != grid.dims or not np.allclose(other.spacing, grid.spacing):
-                target.unlink()  # made anew when it is clear how
                 raise ArgumentError(
                     f"expected {grid.dims} samples with spacing {grid.spacing} as of the scene's volume, got "
                     f"{other.dims} with {other.spacing}; resample the file, or say how that volume was read, "
                     "such as up=+z or reduce=2"
                 )
+    checksums.save()
+
+
+def require_unfollowed(series: Series, step: int) -> None:
+    """Require that a step whose volume is made has no models, which would be of another volume."""
+    for name in series.models:
+        if (file := series.model(name, step)).exists():
+            raise ArgumentError(
+                f"{file} is of another volume: its file has changed since, or was read in another way; remove "
+                f"{file.parent}, or choose another folder"
+            )
 
 
 def require_own_scene(folder: Path) -> None:
@@ -119,12 +131,6 @@ def require_own_scene(folder: Path) -> None:
     if is_other or (folder / METRICS).exists():
         what = "another scene" if is_other else "a result of the workflow"
         raise ArgumentError(f"{folder}: expected a folder for the series, got {what}; choose another")
-
-
-def changed_at(path: Path) -> float:
-    """Return when a file, or the latest one below a folder, was changed, in seconds."""
-    files = [path, *path.rglob("*")] if path.is_dir() else [path]
-    return max(each.stat().st_mtime for each in files)
 
 
 def settings_of(file: Path) -> Volume:
