@@ -1,6 +1,7 @@
 """The viewer of a scene that Python holds: edits on pages reach Python, and the other way round."""
 
 import asyncio
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import aiohttp
@@ -8,6 +9,7 @@ import aiohttp
 import texgs
 from tests.scene.balls import write_balls
 from tests.viewer.pages import Browser
+from texgs.scene.scene_file import read_scene
 
 
 async def talk(address, scene):
@@ -40,3 +42,13 @@ def test_pages_and_python_edit_the_same_scene(tmp_path):
     assert scene.undo()
     assert scene["TF02"].visible
     assert scene.show(live=True).address == shown.address
+
+
+def test_what_a_page_saves_outlives_the_process(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scene = texgs.open(write_balls(tmp_path / "balls"))
+    scene.show(live=True)
+    edits = scene._viewer._server.edits
+    assert edits.save("mine.yaml") == Path("mine/scene.yaml").absolute()
+    assert edits.would_replace("mine.yaml") is False
+    assert {model.file.parent for model in read_scene("mine").models.values()} == {Path("mine")}

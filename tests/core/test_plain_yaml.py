@@ -25,6 +25,8 @@ def test_what_grows_is_refused():
     )
     with pytest.raises(ArgumentError, match=r"got an alias \(\*name\) in line 2; write them out"):
         parse_yaml(laughs)
+    with pytest.raises(ArgumentError, match="expected each key once, got b again in line 4; rename it"):
+        parse_yaml("a:\n  b: 1\n  c: 2\n  b: 3")
     with pytest.raises(ArgumentError, match="expected at most 20 tables and lists in one another"):
         parse_yaml("[" * 100_000)
     for tagged in ("!!bool x", "a: !!timestamp x", "!!int ''", "!!python/object:os.system {}"):

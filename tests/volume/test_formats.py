@@ -5,6 +5,7 @@ import nrrd
 import numpy as np
 import pytest
 import pyvista
+import SimpleITK as sitk
 import tifffile
 
 from tests.volume.volume_files import (
@@ -76,6 +77,39 @@ def test_nifti_scale_and_single_fourth_axis(tmp_path):
     source = open_source(tmp_path / "v.nii")
     assert source.dtype == np.float32
     np.testing.assert_allclose(source.slices(0, 11), sample_values() * 0.5 - 3)
+
+
+def test_nifti_without_orientation_is_as_stored(tmp_path):
+    """Method 1 of the standard. SimpleITK mirrors nothing either."""
+    image = nibabel.Nifti1Image(sample_values("int16").T, None)
+    image.header.set_zooms((0.5, 2.0, 3.0))
+    image.header["sform_code"] = image.header["qform_code"] = 0
+    nibabel.save(image, tmp_path / "v.nii")
+    source = open_source(tmp_path / "v.nii")
+    np.testing.assert_array_equal(source.slices(0, 11), sample_values("int16"))
+    assert (source.spacing, source.note) == (
+        (0.5, 2, 3),
+        "NIfTI tells no orientation: axes are taken as stored",
+    )
+    itk = sitk.GetArrayFromImage(sitk.ReadImage(tmp_path / "v.nii"))
+    np.testing.assert_array_equal(source.slices(0, 11), itk)
+
+
+def test_mrc_with_other_axes_is_refused(tmp_path):
+    sitk.WriteImage(sitk.GetImageFromArray(sample_values("int16")), tmp_path / "v.mrc")
+    np.testing.assert_array_equal(open_source(tmp_path / "v.mrc").slices(0, 11), sample_values("int16"))
+    data = bytearray((tmp_path / "v.mrc").read_bytes())
+    data[64:76] = np.array([3, 2, 1], "<i4").tobytes()
+    (tmp_path / "v.mrc").write_bytes(data)
+    with pytest.raises(ArgumentError, match=r"rows and sections along x, y, z, got z, y, x; write it again"):
+        open_source(tmp_path / "v.mrc")
+
+
+def test_files_that_macos_leaves_are_no_slices(tmp_path):
+    for number in (8, 9):
+        tifffile.imwrite(tmp_path / f"s{number}.tif", np.full((4, 5), number, np.uint8))
+    (tmp_path / "._s8.tif").write_bytes(b"\0\5\x16\7")
+    assert open_source(tmp_path).dims == (5, 4, 2)
 
 
 @pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])

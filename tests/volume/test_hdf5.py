@@ -131,6 +131,15 @@ def test_zero_is_a_fill_value_and_an_offset(tmp_path):
     np.testing.assert_array_equal(whole(path), np.where(VALUES == 0, np.nan, 2.0 * VALUES))
 
 
+def test_a_fill_value_with_more_digits_than_samples(tmp_path):
+    """As h5py writes a number of Python."""
+    stored = np.where(VALUES == 0, -999.9, VALUES).astype(np.float32)
+    path = write(tmp_path / "v.h5", v=stored)
+    with h5py.File(path, "a") as file:
+        file["v"].attrs["_FillValue"] = -999.9
+    np.testing.assert_array_equal(whole(path), np.where(VALUES == 0, np.nan, stored))
+
+
 @pytest.mark.parametrize("chunks", [(1, 12, 13), (4, 5, 6), (3, 12, 13), (11, 2, 2)])
 @pytest.mark.parametrize("is_turned", [False, True])
 def test_every_chunk_is_read_once_and_no_more_than_a_layer_at_a_time(

@@ -331,3 +331,15 @@ def test_keys_of_other_formats_are_refused(tmp_path):
     path = write_image(tmp_path / "v.zarr", [VALUES], axes_of("zyx"), [SCALES[0]])
     with pytest.raises(ArgumentError, match="series: not for this format; leave them out"):
         open_source(path, series="1")
+
+
+def test_the_fill_value_of_xarray_in_format_2_is_missing(tmp_path):
+    values = np.arange(120, dtype=np.float32).reshape(4, 5, 6)
+    filled = np.where(values == 7, -9999, values)
+    array = zarr.create_array(
+        LocalStore(tmp_path / "v.zarr"), data=filled, zarr_format=2, fill_value=-9999, attributes={}
+    )
+    np.testing.assert_array_equal(open_source(tmp_path / "v.zarr").slices(0, 4), filled)
+    array.attrs["_ARRAY_DIMENSIONS"] = ["z", "y", "x"]
+    expected = np.where(values == 7, np.nan, values)
+    np.testing.assert_array_equal(open_source(tmp_path / "v.zarr").slices(0, 4), expected)

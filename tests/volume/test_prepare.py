@@ -163,6 +163,7 @@ def test_mistakes_are_named_and_leave_the_old_file(tmp_path):
         (ramp, {"crop": (0, 5, 0, 4)}, "crop: expected six integers"),
         (ramp, {"crop": (0, 5, 0, 4, 1, 2)}, "crop and reduce leave 5 x 4 x 1; crop or reduce less"),
         (ramp, {"reduce": 3}, "crop and reduce leave 2 x 2 x 1"),
+        (np.full((3, 4, 5), np.nan), {"nan_value": 0}, "expected a field that varies, but every sample is 0"),
         (ramp, {"nan_value": float("nan")}, "nan_value: expected a finite float32, got nan"),
     ]:
         with pytest.raises(ArgumentError, match=message):

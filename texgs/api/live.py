@@ -22,7 +22,8 @@ class Viewer:
 
     Args:
         session: that pages and Python edit.
-        folder: where pages save scenes.
+        folder: for files of looks and segments that pages make. What they save goes to the current folder,
+            with copies of these.
 
     Raises:
         ArgumentError: if nothing can be served on this machine.
@@ -30,7 +31,7 @@ class Viewer:
 
     def __init__(self, session: Session, folder: Path) -> None:
         title = ", ".join(session.scene.models)
-        opened = Opened(session.scene, folder / SCENE, folder, SCENE, title=title)
+        opened = Opened(session.scene, folder / SCENE, folder, SCENE, title=title, copies=Path.cwd())
         self._server = Server(opened, session.composition.device, session=session)
         self._loop, self._token = asyncio.new_event_loop(), secrets.token_urlsafe(32)
         threading.Thread(target=self._loop.run_forever, name="texgs viewer", daemon=True).start()

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from texgs.cli.options import add_device, add_lens, lens_of, option
+from texgs.cli.options import add_device, add_lens, lens_of, option, require_own_place
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,12 +25,15 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.errors import ArgumentError, located
     from texgs.core.io import require_place
     from texgs.report.check import check
-    from texgs.scene.scene_file import read_scene
+    from texgs.scene.scene_file import only_scene, read_scene
     from texgs.scene.twin import Twin
 
+    if arguments.scene.is_dir():
+        arguments.scene = only_scene(arguments.scene)
     output = arguments.output or Path(f"{arguments.scene.stem}-check.json")
     if output.suffix != ".json":
         raise ArgumentError(f"--output: expected a file that ends in .json, got {output}")
+    require_own_place(output)
     require_place(output)
     scene, device = read_scene(arguments.scene), torch_device(arguments.device)
     if scene.cuts:

@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.cli.options import add_device, add_lens, lens_of, option
+from texgs.cli.options import add_device, add_lens, lens_of, option, require_own_place
 from texgs.core.errors import ArgumentError, located
 from texgs.core.lens import Lens
-from texgs.core.names import METRICS, SCENES, new_part_file, require_name
+from texgs.core.names import SCENES, new_part_file, require_name
 
 if TYPE_CHECKING:
     import torch
@@ -234,7 +234,4 @@ def require_scene(output: Path) -> None:
         raise ArgumentError(f"--output: expected a file that ends in .yaml, got {output}")
     if output.is_file() and b"texgs-scene" not in output.read_bytes():
         raise ArgumentError(f"--output: {output} is a file of another kind, which stays; choose another")
-    if (output.parent / METRICS).exists():
-        raise ArgumentError(
-            f"--output: {output.parent} is a result of the workflow, which makes it anew; choose another"
-        )
+    require_own_place(output)

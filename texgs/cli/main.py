@@ -22,7 +22,8 @@ except TexgsError as error:  # in a file of the user's own
     print(f"texgs: {error}", file=sys.stderr)
     sys.exit(2)
 
-NUMBERS = re.compile(r"(?!-(\d+|\d*\.\d+)$)-[\d.][-\d.,eE]*")  # such as -90,20; argparse knows -90
+NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")  # such as -1e-3, of which argparse knows -90 alone
+NUMBERS = re.compile(rf"(?!{NUMBER.pattern})-[\d.][-\d.,eE]*")  # such as -90,20
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`.
 # Verbs in the module of another have `add_VERB_arguments` and `run_VERB` there; those of stages share one.
 SHARED = {
@@ -85,6 +86,7 @@ def parser(verb: str) -> argparse.ArgumentParser:
     if verb in STAGE_VERBS:
         about = f"{VERBS[verb][0].upper()}{VERBS[verb][1:]}."
     made = Parser(prog=f"texgs {verb}", description=about, conflict_handler="resolve")
+    made._negative_number_matcher = NUMBER
     getattr(module, add)(made)
     made.set_defaults(verb=verb, run=getattr(module, run))
     return made

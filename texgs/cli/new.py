@@ -65,6 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.volume.sources import tells_superior
     from texgs.volume.tf_files import read_tf
     from texgs.workflow.locate import series_files
+    from texgs.workflow.series import moments_of
 
     if arguments.count is not None and arguments.count < 1:
         raise ArgumentError(f"--count: expected at least 1, got {arguments.count}")
@@ -76,7 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
         overrides.append("up=+z")
     given = configuration(name, arguments.file, overrides)
     given = replace(given, dataset=replace(given.dataset, series=[*map(absolute, arguments.series)]))
-    series_files(given)
+    if len(files := series_files(given)) == 1:
+        moments_of(files, given.dataset.volume)
     folder = own_folder() / "dataset"
     check_name("--name", name)
     if name in members("dataset") and not arguments.force:

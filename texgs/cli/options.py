@@ -1,10 +1,12 @@
-"""What the command lines of verbs share: how mistakes are told, options with a default, cameras."""
+"""What the command lines of verbs share: how mistakes are told, options with a default, places, cameras."""
 
 import argparse
+from pathlib import Path
 from typing import Any, NoReturn
 
+from texgs.core.errors import ArgumentError
 from texgs.core.lens import Frame, Lens
-from texgs.core.names import close
+from texgs.core.names import METRICS, close
 
 LENS = Lens()
 
@@ -24,6 +26,14 @@ def option(parser: argparse.ArgumentParser, name: str, default: Any, words: str,
     """Add an option with a default, whose type it has; the default stands behind its help."""
     shown = f"{words} (%(default)s)".lstrip()
     parser.add_argument(name, **{"type": type(default), "default": default, "help": shown, **more})
+
+
+def require_own_place(output: Path) -> None:
+    """Require an output outside of the folders of jobs, which are made anew with all that is in them."""
+    if (output.parent / METRICS).exists():
+        raise ArgumentError(
+            f"--output: {output.parent} is a result of the workflow, which makes it anew; choose another"
+        )
 
 
 def add_device(parser: argparse.ArgumentParser) -> None:

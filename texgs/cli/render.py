@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from texgs.cli.options import add_device, add_lens, lens_of, option
+from texgs.cli.options import add_device, add_lens, lens_of, option, require_own_place
 from texgs.core.errors import ArgumentError, located
 from texgs.scene.paths import PATHS
 
@@ -65,12 +65,14 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.report.check import checked
     from texgs.scene.frame import Mode
     from texgs.scene.paths import shots_of
-    from texgs.scene.scene_file import read_scene
+    from texgs.scene.scene_file import only_scene, read_scene
     from texgs.scene.session import Session
     from texgs.scene.twin import needs_twin
 
     if arguments.mode not in get_args(Mode):
         raise ArgumentError(f"--mode: expected one of {', '.join(get_args(Mode))}, got {arguments.mode}")
+    if arguments.scene.is_dir():
+        arguments.scene = only_scene(arguments.scene)
     scene = read_scene(arguments.scene)
     count = frames_of(arguments)
     output = output_of(arguments, count)
@@ -160,6 +162,7 @@ def pair_of(
 def output_of(arguments: argparse.Namespace, count: int) -> Path:
     """Return where to write so many frames."""
     output = arguments.output or Path(f"{arguments.scene.stem}{'.png' if count == 1 else '.mp4'}")
+    require_own_place(output)
     if count > 1 and output.suffix == ".png":
         raise ArgumentError(f"{output}: expected one frame, got {count}; use .gif, .mp4 or a folder")
     is_alone = not arguments.compare and not arguments.caption

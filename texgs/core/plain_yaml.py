@@ -32,6 +32,17 @@ class PlainLoader(yaml.SafeLoader):  # type: ignore[misc]
         self.depth -= 1
         return node
 
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Return a table, whose keys stand there once each: PyYAML would take the last."""
+        keys = [key.value for key, _ in node.value]
+        for number, (key, _) in enumerate(node.value):
+            if key.value in keys[:number]:
+                line = key.start_mark.line + 1
+                raise ArgumentError(
+                    f"expected each key once, got {key.value} again in line {line}; rename it"
+                )
+        return dict(super().construct_mapping(node, deep))
+
 
 PlainLoader.add_implicit_resolver("tag:yaml.org,2002:float", NUMBER, list("-+.0123456789"))
 

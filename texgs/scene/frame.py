@@ -110,7 +110,8 @@ def pixels(render: Render, mode: Mode, background: Tensor) -> Tensor:
 def relative_depth(render: Render) -> Tensor:
     """Return the mean depth [H, W], 0 at the nearest and 1 at the farthest point that is not faint."""
     depth = render.depth
-    seen = depth[render.alpha > 0.5]  # type: ignore[index]
+    solid = min(0.5, 0.5 * float(render.alpha.max()))  # of what is translucent all over, its densest half
+    seen = depth[render.alpha > solid]  # type: ignore[index]
     if not len(seen):
         return torch.zeros_like(render.alpha)
     low, high = seen.min(), seen.max()

@@ -15,7 +15,7 @@ from texgs.fields.files import formats
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.check import checked
-from texgs.scene.copied import require_files
+from texgs.scene.copied import require_files, write_copy
 from texgs.scene.parts import NewLook, part_names, with_looks
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import only_scene, read_scene, write_scene
@@ -37,6 +37,7 @@ class Opened:
     name: str  # that a scene file gets unless another one is chosen
     file: Path | None = None  # of the scene, where edits may be written to it
     title: str = ""  # by which a page knows the scene; the end of the path by default
+    copies: Path | None = None  # where saving makes a folder with all files; by default only a scene file
 
 
 def open_scene(path: Path, folder: Path | None = None) -> Opened:
@@ -74,7 +75,7 @@ class SharedEdits:
     """The scene that all pages edit, and where it is saved."""
 
     def __init__(self, session: Session, opened: Opened) -> None:
-        self._session, self._folder = session, opened.folder
+        self._session, self._folder, self._copies = session, opened.folder, opened.copies
         self.name, self._source = opened.name, opened.source
         self._title = opened.title or title_of(opened.source)
         files = [opened.file.resolve()] if opened.file else []
@@ -117,7 +118,7 @@ class SharedEdits:
             "future": self._session.future,
             "saved": self.is_saved,
             "file": self.name,
-            "folder": str(self._folder.resolve()),
+            "folder": str((self._copies or self._folder).resolve()),
             "title": self._title,
         }
 
@@ -181,10 +182,16 @@ class SharedEdits:
         return file
 
     def path_of(self, name: str) -> Path:
-        """Return the scene file of a name in the folder for saving."""
+        """Return the scene file of a name in the folder for saving, or of a folder of that name there."""
         if Path(file_name("save as", name)).suffix not in SCENES:
             raise ArgumentError(f"save as: expected a name that ends in .yaml, got {name}")
-        return self._folder / name
+        path = self._copies / Path(name).stem / SCENE if self._copies else self._folder / name
+        if (path.parent / METRICS).exists():
+            raise ArgumentError(
+                f"save as: {path.parent} is a result of the workflow, which makes it anew; start the viewer "
+                "in another folder, or with --folder"
+            )
+        return path
 
     def would_replace(self, name: str) -> bool:
         """Return whether saving replaces a file that is neither opened nor saved here, or has changed."""
@@ -195,7 +202,7 @@ class SharedEdits:
         """Write the scene file in one step, unless what it would name is gone."""
         path, scene = self.path_of(name), self.scene
         require_files(files_of(scene))
-        write_scene(path, scene)
+        path = write_copy(path.parent, scene) if self._copies else write_scene(path, scene)
         self.name, self._title, self._saved = name, title_of(path), scene
         self._own[path.resolve()] = state_of(path.resolve())
         return path

@@ -30,6 +30,8 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
     reader.SetFileName(str(path))
     try:
         reader.ReadImageInformation()
+        if path.suffix.lower() == ".mrc":
+            require_usual_axes(path)
         sizes = list(reader.GetSize())
         dims, dtype = require_volume(sizes, reader.GetPixelIDValue(), reader.GetNumberOfComponents())
         fields = read_fields(path)[0] if path.suffix.lower() in NRRD else {}
@@ -51,6 +53,19 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
         return lattice, sitk.GetArrayFromImage(reader.Execute())
     except RuntimeError as error:
         raise ArgumentError(sentence(error)) from error
+
+
+def require_usual_axes(path: Path) -> None:
+    """Require an MRC file whose columns, rows and sections are along x, y and z: ITK takes all for such."""
+    with path.open("rb") as file:
+        file.seek(64)  # MAPC, MAPR, MAPS
+        words = file.read(12)
+    axes = [np.frombuffer(words, f"{end}i4").tolist() for end in "<>"]
+    if any(sorted(each) == [1, 2, 3] != each for each in axes):
+        got = ", ".join("xyz"[axis - 1] for axis in next(each for each in axes if sorted(each) == [1, 2, 3]))
+        raise ArgumentError(
+            f"expected columns, rows and sections along x, y, z, got {got}; write it again in that order"
+        )
 
 
 def require_volume(

@@ -101,7 +101,11 @@ class LayerSource(Source):
 
     def _decoded(self, values: np.ndarray) -> np.ndarray:
         """Return samples of the source's type: packed ones by scale and offset, NaN for missing ones."""
-        missing = [values == self._coded[name] for name in CODED[2:] if name in self._coded]
+        codes = [np.asarray(self._coded[name]) for name in CODED[2:] if name in self._coded]
+        if values.dtype.kind == "f":  # a code may be written with more digits than samples have
+            with np.errstate(over="ignore"):
+                codes = [code.astype(values.dtype) for code in codes]
+        missing = [values == code for code in codes]
         values = values.view(values.dtype.str.replace("i", "u")) if self._is_unsigned else values
         scale, offset = (self._coded.get(name) for name in CODED[:2])
         if scale is not None or offset is not None:

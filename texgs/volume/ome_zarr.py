@@ -55,6 +55,9 @@ def open_zarr(
         known = {level: axes for levels in images.values() for level, axes in levels.items()}
         array, axes = nodes[name], known.get(name) or _named_axes(name, nodes)
         attributes = dict(array.attrs)
+        is_of_xarray = array.metadata.zarr_format == 2 and "_ARRAY_DIMENSIONS" in attributes
+        if is_of_xarray and array.fill_value is not None:
+            attributes = {"_FillValue": array.fill_value, **attributes}
         if isinstance(fill := attributes.get("_FillValue"), str):  # a number as xarray packs it in format 3
             attributes["_FillValue"] = np.frombuffer(b64decode(fill), "<f8")
         stored = StoredArray(array.__getitem__, array.dtype, axes, array.chunks, attributes, note)

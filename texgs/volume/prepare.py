@@ -117,17 +117,17 @@ class _Tally:
 
     def finite(self, slab: np.ndarray, start: tuple[int, int, int], nan_value: float | None) -> np.ndarray:
         """Return the slab with NaN and infinity replaced; count them where no value was chosen."""
-        self.see(slab)
-        if slab.dtype.kind != "f":
-            return slab
-        bad = ~np.isfinite(slab)
+        bad = ~np.isfinite(slab) if slab.dtype.kind == "f" else np.zeros(0, bool)
         if not bad.any():
+            self.see(slab)
             return slab
         if nan_value is None:
             self.n_bad += int(bad.sum())
             place = np.unravel_index(bad.argmax(), bad.shape)
             self.first = self.first or tuple(int(p) + s for p, s in zip(place[::-1], start, strict=True))
-        return np.where(bad, np.float32(nan_value or 0.0), slab)
+        slab = np.where(bad, np.float32(nan_value or 0.0), slab)
+        self.see(slab)
+        return slab
 
     def see(self, slab: np.ndarray) -> None:
         """Note whether samples differ, as they are in the source."""

@@ -190,7 +190,10 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time:
         shape = image.shape[:3] + tuple(size for size in rest if size != 1)
         x, y, z = dims_of(shape)[::-1]
         check_lattice((x, y, z), stored)
-        turn = nibabel.io_orientation(image.affine)
+        codes = [int(image.header[f"{form}_code"]) for form in ("sform", "qform")]
+        # Method 1 of the standard: nibabel would mirror x.
+        told = image.affine if any(codes) else np.diag([*image.header.get_zooms()[:3], 1.0])
+        turn = nibabel.io_orientation(told)
         if np.isnan(turn).any():
             raise ArgumentError("expected three independent axes, got a singular affine matrix")
         proxy: Any = image.dataobj
@@ -199,11 +202,15 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time:
         require_room((x, y, z), np.dtype(np.float32) if is_scaled else stored)
         samples = np.asarray(proxy, np.float32) if is_scaled else np.asanyarray(proxy)
         values = nibabel.apply_orientation(samples.reshape(shape, order="F"), turn)  # [X, Y, Z]
-        affine = image.affine @ nibabel.orientations.inv_ornt_aff(turn, shape)
+        affine = told @ nibabel.orientations.inv_ornt_aff(turn, shape)
     dx, dy, dz = (float(step) for step in nibabel.affines.voxel_sizes(affine))
     first = (float(affine[0, 3]), float(affine[1, 3]), float(affine[2, 3]))
     source = ArraySource(Grid(values.T, spacing or (dx, dy, dz), origin or first), path.name)
     source.n_steps, source.note = n_steps, step_note(time, n_steps)
+    if not any(codes):
+        source.note = "; ".join(
+            filter(None, (source.note, "NIfTI tells no orientation: axes are taken as stored"))
+        )
     return source
 
 

@@ -129,7 +129,8 @@ def spacing_of(tiff: Any) -> Triple | None:
 
 def tiffs_in(folder: Path) -> list[Path]:
     """Return the TIFF files of a folder in natural order: slice9 comes before slice10."""
-    return sorted((file for file in folder.iterdir() if file.suffix.lower() in SLICES), key=natural_order)
+    files = (file for file in folder.iterdir() if not file.name.startswith("."))  # as ._ files of macOS
+    return sorted((file for file in files if file.suffix.lower() in SLICES), key=natural_order)
 
 
 def require_all_slices(files: list[Path]) -> None:

@@ -73,7 +73,7 @@ def in_time(files: Sequence[Path]) -> list[Moment]:
 
 
 def are_decimal(names: Iterable[str]) -> bool:
-    """Return whether the last numbers in names are decimals: some have more digits behind a point than others.
+    """Return whether the last numbers in names are decimals: some differ in digits behind a point.
 
     Where some of these end with 0, as in 3.10, they count: nobody writes a decimal so.
     """

@@ -120,7 +120,7 @@ def require_unfollowed(series: Series, step: int) -> None:
     for name in series.models:
         if (file := series.model(name, step)).exists():
             raise ArgumentError(
-                f"{file} is of another volume: its file has changed since, or was read in another way; remove "
+                f"{file} is of another volume: its file has changed, or was read in another way; remove "
                 f"{file.parent}, or choose another folder"
             )
 

@@ -94,10 +94,12 @@ export class SurfelPass {
     this.target.bind();
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, pixels);
     this.target.end();
-    let low = Infinity, high = 0;
+    let low = Infinity, high = 0, densest = 0;
+    for (let i = 3; i < pixels.length; i += 4) densest = Math.max(densest, pixels[i]);
+    const solid = Math.min(0.5, 0.5 * densest); // as relative_depth of texgs/scene/frame.py
     for (let i = 0; i < pixels.length; i += 4) {
       const alpha = pixels[i + 3], depth = pixels[i] / alpha;
-      if (alpha > 0.5) [low, high] = [Math.min(low, depth), Math.max(high, depth)];
+      if (alpha > solid) [low, high] = [Math.min(low, depth), Math.max(high, depth)];
     }
     return high ? [low, high] : [BEYOND, BEYOND];
   }
