@@ -10,13 +10,14 @@ import pytest
 
 import texgs
 from tests.fitting.short_fits import shorten
-from texgs.api.fit import configuration
+from texgs.api.fit import compose_in, configuration
 from texgs.core.errors import ArgumentError, ConfigError, DeviceError
 from texgs.core.io import write_json
 from texgs.metrics.quality import compare
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.origins import Origins
 from texgs.volume.cameras import spiral
+from texgs.workflow.result import claim, publish
 
 TFS = {
     "outer": texgs.TransferFunction([[0.2, 0.0], [0.3, 0.1], [0.4, 0.0]], [[0.3, 0.2, 0.4, 0.9]]),
@@ -77,6 +78,16 @@ def test_a_second_fit_in_the_folder_does_nothing(scene, ball, folder):
     assert np.array_equal(np.asarray(again.render(width=32)), np.asarray(scene.render(width=32)))
 
 
+def test_a_fit_with_other_settings_in_the_folder_says_what_it_replaces(ball, monkeypatch, tmp_path):
+    monkeypatch.setattr("texgs.workflow.execution.execute", lambda *job, **force: True)
+    folder = tmp_path / "kept"
+    views = folder / "ball" / "inner" / "views"
+    write_json(claim(views, {"settings": "others"}) / "metrics.json", {})
+    publish(views)
+    with pytest.warns(UserWarning, match=r"views holds results of other settings, which this replaces; anot"):
+        compose_in(ball, TFS, ("fit=quick",), folder)
+
+
 def test_results_are_a_table(scene, folder):
     table = texgs.results(folder)
     row = table[(table.stage == "texture") & (table.tf == "inner")].iloc[0]
@@ -91,7 +102,8 @@ def test_results_of_a_stage_need_nothing_but_their_folder(tmp_path):
     """Also those that a module of a stage defines, in a process that has run none."""
     numbers = {"basic_tfs": 1, "ranges": {}}
     facts = {"stage": "transfer", "dataset": "ball", "result": "TransferResult", "numbers": numbers}
-    write_json(tmp_path / "metrics.json", facts)
+    write_json(claim(tmp_path / "transfer", {}) / "metrics.json", facts)
+    publish(tmp_path / "transfer")
     code = f"import texgs; print(texgs.results({str(tmp_path)!r}).stage[0])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout == "transfer\n", done.stderr

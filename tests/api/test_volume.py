@@ -122,6 +122,10 @@ def test_xarray_is_known_by_names_and_coordinates():
             xarray.DataArray(field(3, 3, 3), dims=("z", "y", "x"), coords={"x": [0, 1, 5]}),
             "DataArray: expected even distances along x; resample, or set spacing",
         ),
+        (
+            xarray.Dataset({"t": (("z", "y", "x"), field(3, 3, 3))}),
+            "one array, got a Dataset of t; choose one",
+        ),
         ("no-such-file.nrrd", "no such file or folder"),
     ],
 )

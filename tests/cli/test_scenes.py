@@ -319,3 +319,24 @@ def test_a_compact_file_that_unpacks_to_more_than_there_is(tmp_path):
     path.write_bytes(line + b"\n" + lzma.compress(many, preset=0))
     with pytest.raises(ArgumentError, match=r"got 8 bytes of tensors, expected 8|cut short or damaged"):
         read_compact(path)
+
+
+def test_the_current_folder_is_a_scene(scene, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["render", ".", "--width", "16"]) == 0
+    assert capsys.readouterr().out == "scene.png\n"
+
+
+def test_pictures_go_into_no_result_of_the_workflow(scene, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "metrics.json").touch()
+    for verb in ("render", "check"):
+        assert main([verb, "scene.yaml"]) == 2
+        assert "--output: . is a result of the workflow, which makes it anew" in capsys.readouterr().err
+    (tmp_path / "own").mkdir()
+    assert main(["render", "scene.yaml", "--width", "16", "--output", "own/a.png"]) == 0
+
+
+@pytest.mark.parametrize("words", [("-1e-3", "0", "0"), ("0", "-1e-3", "0"), ("0", "-.5", "-2.")])
+def test_small_negative_numbers_are_numbers(scene, tmp_path, words):
+    assert render(scene, tmp_path / "a.png", "--target", *words) == 0

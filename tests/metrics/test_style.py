@@ -1,4 +1,5 @@
 from statistics import fmean
+from types import SimpleNamespace
 
 import pytest
 import torch
@@ -7,6 +8,8 @@ from torch.nn.functional import cosine_similarity
 from tests.edit.scenes import ball, views
 from tests.models.networks import vgg  # noqa: F401  a fixture
 from texgs.fields.surfels.composition import Composition
+from texgs.metrics.edits.style import Distances
+from texgs.metrics.metric import Style
 from texgs.metrics.style import StyleTarget, gram, on_object
 
 
@@ -75,3 +78,12 @@ def test_distances_are_those_of_all_features_on_the_object_by_exact_search():
 def pairs(count):
     """All pairs of different numbers below a count."""
     return [(a, b) for a in range(count) for b in range(a)]
+
+
+def test_a_picture_of_thin_lines_is_compared_as_a_whole(vgg):  # noqa: F811
+    measured = SimpleNamespace(vgg=vgg, styles=[], shown=SimpleNamespace(device="cpu"))
+    image, region = torch.rand(3, 64, 64), torch.zeros(64, 64, dtype=torch.bool)
+    region[::16] = True
+    whole = StyleTarget.of(Distances(measured).features(image, torch.ones(64, 64)))
+    thin = Distances(measured).target(Style(None, image, region))
+    assert torch.equal(thin.gram, whole.gram)

@@ -10,7 +10,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import raw_material
-from texgs.scene.frame import frame
+from texgs.scene.frame import frame, relative_depth
 from texgs.scene.scene import Scene, SceneModel
 
 
@@ -46,6 +46,16 @@ def test_alpha_is_white_on_black_and_depth_grows_away_from_the_camera(scene):
     assert np.corrcoef(np.arange(len(order)), greys[order])[0, 1] > 0.9
     assert greys.min() < 20
     assert 150 < greys.max() <= 230
+
+
+def test_depth_of_a_translucent_scene_grows_away_from_the_camera(scene):
+    model = ball(1, n=1500)
+    faint = {**model.parameters, "opacities": torch.full((1500,), -4.0)}
+    shown = Composition([Surfels(faint, model.shading)]).render(CAMERA, SIDE, outputs=("depth",))
+    densest = float(shown.alpha.max())
+    assert densest < 0.5
+    depth = relative_depth(shown)[shown.alpha > 0.5 * densest]
+    assert (float(depth.min()), float(depth.max())) == (0, 1)
 
 
 def test_normals_of_a_flat_scene_are_one_colour():

@@ -63,6 +63,18 @@ def test_an_edit_of_a_fit_that_has_been_made_anew_is_left_out_and_told():
     assert entry.why == f"comes from {FIT}, which has been made anew since; run its job again"
 
 
+def test_what_comes_from_it_is_left_out_however_far():
+    make(VIEWS, {"settings": "v"}, "views")
+    make(FIT, {"settings": "a"}, views=VIEWS / "model.safetensors")
+    make(EDIT, {"settings": "e"}, "edit_text", model=FIT / "model.safetensors")
+    assert shown({}) == ({str(VIEWS), str(FIT), str(EDIT)}, set())
+    make(VIEWS, {"settings": "w"}, "views")
+    assert shown({}) == ({str(VIEWS)}, {str(FIT), str(EDIT)})
+    assert {entry.why.partition(",")[0] for entry in earlier("results", Graph(), Checksums())[1]} == {
+        f"comes from {VIEWS}"
+    }
+
+
 @pytest.mark.parametrize(
     "jobs",
     [job(FIT, {"settings": "b"}), job(FIT, {"settings": "a"}, VIEWS) | job(VIEWS, {"settings": "w"})],

@@ -141,8 +141,11 @@ def test_swept_values_are_told_in_full():
         ((*words_of(a=[]), "sweep.over=['fit.low_pass=2,6']"), "sweep.over: expected none beside"),
         (("sweep.name=x",), "sweep x: expected variants, keys to sweep over or several seeds, got none"),
         (("+sweep.variants.a=[]",), "sweep.name: expected a name for the table of the variants, got none"),
-        (("edit.image.lambda_s=0,1",), "sweep lambda_s: expected an edit that its variants change, got none"),
-        (("edit.image.lambda_s=0,1", "edits=[style,gold]"), f"sweep lambda_s: {OTHER_KEYS}"),
+        (
+            ("edit.image.lambda_s=0,1",),
+            "sweep image_lambda_s: expected an edit that its variants change, got none",
+        ),
+        (("edit.image.lambda_s=0,1", "edits=[style,gold]"), f"sweep image_lambda_s: {OTHER_KEYS}"),
         (("variant=a/b",), "variant: expected at most 100 letters, digits, _, - or ., got 'a/b'"),
     ],
 )
@@ -178,4 +181,4 @@ def test_a_file_with_a_variant_twice_is_named(tmp_path, monkeypatch):
 
 def test_kinds_of_views_are_not_the_papers_sweep_over_their_number():
     assert "sweep.name=kinds_of_views" in as_sweep(("dataset=sphere", "views=small,headlight"))
-    assert "sweep.name=frequency" in as_sweep(("dataset=sphere", "views.train.frequency=2,3"))
+    assert "sweep.name=train_frequency" in as_sweep(("dataset=sphere", "views.train.frequency=2,3"))

@@ -29,6 +29,9 @@ def grid_of(data: Any, spacing: Sequence[float] | None, origin: Sequence[float] 
         ArgumentError, ShapeError: if there is no scalar field on a regular lattice.
     """
     said = three("spacing", spacing), three("origin", origin)
+    if hasattr(data, "data_vars"):
+        names = ", ".join(map(str, data.data_vars))
+        raise ArgumentError(f"data: expected one array, got a Dataset of {names}; choose one by its name")
     if hasattr(data, "dims") and hasattr(data, "coords"):
         return of_data_array(data, *said)
     if hasattr(data, "GetDirectionMatrix"):

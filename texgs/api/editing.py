@@ -136,7 +136,7 @@ class Editing:
 
         Args:
             picture: a picture that texgs paints (strokes, glass, ...), a file, or an image.
-            parts: names of parts; default all.
+            parts: names of parts; default all models, whose segments stay as they are.
             **settings: keys of `edit.image` such as `recipe="preview"` or `pattern=0.5`; recipe `patches`
                 needs no weights of VGG-16.
 
@@ -152,7 +152,7 @@ class Editing:
 
         Args:
             instruction: for InstructPix2Pix; or, with `guidance="filters"`, of words that filters know.
-            parts: names of parts; default all.
+            parts: names of parts; default all models, whose segments stay as they are.
             **settings: keys of `edit.text`.
 
         Raises:

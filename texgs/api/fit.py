@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from filecmp import cmp
@@ -103,6 +104,8 @@ def fit_now_into(
 
     look, frame, models = Appearance(), frame_of(volume.grid, functions.values()), {}
     files = {name: folder / file_name("functions", f"{name}.safetensors") for name in functions}
+    if (folder / SCENE).exists():
+        warnings.warn(f"{folder} holds a scene, which this replaces; another folder keeps both", stacklevel=3)
     made_of = SceneVolume(copied(volume, folder), functions, look)
     caster = Caster(volume.grid, look, device)
     for name, tf in functions.items():
@@ -121,7 +124,7 @@ def compose_in(
 
     config = configuration(volume, functions, words, folder)
     known = {stage.output(each): (stage, each) for stage, each in jobs(config)}
-    ensure(STAGES["compose"], config, known, tell=lambda line: None)
+    ensure(STAGES["compose"], config, known, tell=lambda line: None, warn=warnings.warn)
     return made("compose", config)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.core.errors import ArgumentError
-from texgs.report.metrics_files import below, read_known
 from texgs.report.results import plain
+from texgs.workflow.graph import current_records
 
 if TYPE_CHECKING:
     import pandas
@@ -20,15 +20,17 @@ def results(folder: str | Path = "results") -> pandas.DataFrame:
     """Return a row for each job of `texgs run`: what it is of, its seconds, and its numbers.
 
     Columns are `FACTS`, `edit`, `job_seconds` and all numbers by their names in metrics.json, such as `psnr`;
-    what a job has not is missing there. Lists are left out.
+    what a job has not is missing there. Lists are left out. A warning tells of each result that is damaged or
+    comes from one that has been made anew since; these have no rows.
 
     Raises:
         ArgumentError: if there are no results in the folder, or all are of another version of texgs.
     """
     import pandas
 
-    import_module("texgs.workflow.stage_table")  # results of stages' own are defined in their modules
-    records, _ = read_known(below(folder))
+    records, left_out = current_records(folder)
+    for entry in left_out:
+        warnings.warn(f"left out: {entry}", stacklevel=2)
     if not records:
         raise ArgumentError(f"{folder}: expected results of texgs run, got none; name their folder")
     rows = []

@@ -22,7 +22,7 @@ class FitKeys:
     field: str = key("surfels", "kind of field that is fitted", choices=tuple(fit_specs()))
     seed: int = key(0, "seed of random numbers", least=0)
     reduce: int = key(1, "factor by which images are made smaller, by averaging", least=1)
-    low_pass: float = key(6.0, "k of the low-pass filter, variance 1/k px^2; stays with the model", least=0)
+    low_pass: float = key(6.0, "k of the low-pass filter, variance 1/k px^2; stays with the model", above=0)
     facing: bool = key(
         True, "lights shine on the side that faces the viewer; false: on both, as in the paper"
     )

@@ -37,7 +37,7 @@ def highlights_of(instruction: str, model: Surfels, surfels: Tensor | None = Non
     The factors bring the medians of the part's own k_s and beta, as fitted, to those of the material.
 
     Args:
-        instruction: such as "make it gold"; one that names no material changes nothing: {}.
+        instruction: such as "make it gold"; one that says anything else, too, changes nothing: {}.
         model: relightable.
         surfels: [N] bool, those of the part; all by default.
     """

@@ -32,11 +32,12 @@ def formats(path: Path) -> set[str]:
     """Return entries of a file's header, one of which names its format; none where it has no header of ours.
 
     Files of fields are safetensors with one entry of metadata, begin with a line of JSON, or are PLY files,
-    which are told apart by their properties: 3D Gaussians have a third scale.
+    which are told apart by their properties: 3D Gaussians have a third scale, and surfels with shading may.
     """
     try:
         if is_ply(path):
-            scales = properties(path) & {"scale_1", "scale_2"}
+            named = properties(path)
+            scales = {"scale_1"} if "ambient_factor" in named else named & {"scale_1", "scale_2"}
             return {f"ply {max(scales)}"} if scales else set()
         with path.open("rb") as file:
             start = file.read(9)

@@ -84,7 +84,8 @@ class Statistics:
     """[N] number of pixels that it was blended into."""
     radii: Tensor
     """[N] half of the longer side, in pixels, of the box on screen in which its alpha can reach `alpha_min`;
-    at most the image's diagonal; 0 where the surfel is skipped or that box misses the image."""
+    at most the image's diagonal; 0 where the surfel is skipped, and possibly where that box misses or
+    just touches the image."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,6 +121,7 @@ def ensure(
     *,
     force: bool = False,
     tell: Callable[[str], None] = print,
+    warn: Callable[[str], None] | None = None,
 ) -> None:
     """Run a stage, and before it the jobs whose files it reads, unless their results are there already.
 
@@ -130,6 +131,7 @@ def ensure(
         known: those jobs by their folders, of which those that were run are taken out.
         force: run the stage itself in any case.
         tell: gets a line for each job.
+        warn: gets a sentence where a result of other settings is replaced; default `tell`.
     """
     from texgs.models.weights import locate
 
@@ -139,13 +141,17 @@ def ensure(
     known.pop(stage.output(config), None)
     for path in stage.inputs(config).values():
         if path.parent in known:
-            ensure(*known[path.parent], known, tell=tell)
+            ensure(*known[path.parent], known, tell=tell, warn=warn)
     checksums = Checksums.load()
     job = Job.of(stage, config, checksums)
     if stage.place == "edit" and (force or not job.is_done()):
         for name in needed(config.edit):
             locate(name)
         job = Job.of(stage, config, checksums)  # with what was downloaded
+    if job.replaces_other():
+        (warn or tell)(
+            f"{job.output} holds results of other settings, which this replaces; another folder keeps both"
+        )
     has_run = execute(job, tracked.Tracking(config.tracking.uri, config.tracking.experiment), force=force)
     checksums.save()
     tell(f"{job.output}: {'done' if has_run else 'up to date'}")

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from os.path import normpath
 from pathlib import Path
+from typing import Any
 
 from texgs.config.project import Words
 from texgs.config.schema import Config
@@ -12,10 +13,10 @@ from texgs.core.checksum import Checksums
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.io import read_json
 from texgs.core.names import METRICS
-from texgs.report.metrics_files import below
+from texgs.report.metrics_files import Record, below, read_known
 from texgs.workflow.checks import check_basic_tfs, check_edit, check_fit
 from texgs.workflow.experiments import LeftOut, Selection, selected
-from texgs.workflow.job import Job, settings_digest
+from texgs.workflow.job import Job
 from texgs.workflow.missing import lacking, missing_weights
 from texgs.workflow.result import damaged, fingerprint, is_complete, stamped
 from texgs.workflow.stage_table import STAGES, SWEPT
@@ -47,12 +48,7 @@ class Graph:
     @cached_property
     def of_other_settings(self) -> list[str]:
         """The folders that hold results of other settings, which the run will replace."""
-        return sorted(
-            folder
-            for folder, job in self.run.items()
-            if (job.output / METRICS).exists()
-            and (stamped(job.output) or {}).get("settings") != settings_digest(job.settings)
-        )
+        return sorted(folder for folder, job in self.run.items() if job.replaces_other())
 
     def is_replaced(self, folder: str) -> bool:
         """Return whether the run puts another result into a folder, or one that comes from such a result."""
@@ -125,25 +121,43 @@ def earlier(
     These are metrics files with digests of their contents, and with their places the results that come from
     others which have been replaced since, or will be by this run.
     """
-    digests: dict[str, str] = {}
     outdated: dict[LeftOut, list[str]] = {}
+    whole: dict[str, dict[str, Any]] = {}  # facts by folder
     for folder in sorted({path.parent.as_posix() for path in below(results)} - set(of_run.run)):
-        if not is_complete(Path(folder), checksums):
-            if lost := damaged(Path(folder), checksums):
-                outdated[LeftOut(folder, f"{lost[0]} is damaged or missing; run its job again")] = []
-            continue
-        facts = read_json(file := Path(folder, METRICS))
-        if (stage := STAGES.get(facts["stage"])) is None:
+        if is_complete(Path(folder), checksums):
+            facts = read_json(Path(folder, METRICS))
+            if facts["stage"] in STAGES:
+                whole[folder] = facts
+                continue
             why = f"is of the stage {facts['stage']}, which is not there any more; remove the folder"
             outdated[LeftOut(folder, why)] = []
-            continue
-        for name, path in facts.get("made_from", {}).items():  # not told by versions of texgs before this
-            source, was = Path(normpath(Path(folder, path))), facts["inputs"][name]
-            is_other = source.is_file() and fingerprint(source, checksums) != was
-            if is_other or (source.is_file() and of_run.is_replaced(source.parent.as_posix())):
-                why = f"comes from {source.parent}, which has been made anew since; run its job again"
-                outdated[LeftOut(folder, why)] = [stage.place]
-                break
-        else:
-            digests[file.as_posix()] = checksums.of(file)
-    return digests, outdated
+        elif lost := damaged(Path(folder), checksums):
+            outdated[LeftOut(folder, f"{lost[0]} is damaged or missing; run its job again")] = []
+
+    @cache
+    def replaced(folder: str) -> str:
+        """Return the first of the folders that a result comes from, however far, that is another one now."""
+        for name, path in whole[folder].get("made_from", {}).items():  # older versions of texgs do not tell
+            source, was = Path(normpath(Path(folder, path))), whole[folder]["inputs"][name]
+            parent = source.parent.as_posix()
+            if not source.is_file():
+                continue
+            if fingerprint(source, checksums) != was or of_run.is_replaced(parent):
+                return parent
+            if parent in whole and (origin := replaced(parent)):
+                return origin
+        return ""
+
+    for folder, facts in whole.items():
+        if origin := replaced(folder):
+            why = f"comes from {origin}, which has been made anew since; run its job again"
+            outdated[LeftOut(folder, why)] = [STAGES[facts["stage"]].place]
+    current = [Path(folder, METRICS) for folder in whole if not replaced(folder)]
+    return {file.as_posix(): checksums.of(file) for file in current}, outdated
+
+
+def current_records(results: str | Path) -> tuple[list[Record[Any]], list[LeftOut]]:
+    """Read the whole results below a folder that come from what is there now, and what is left out."""
+    files, outdated = earlier(str(results), Graph(), Checksums.load())
+    records, old = read_known(files)
+    return records, [*(LeftOut(each.what, each.why, places) for each, places in outdated.items()), *old]

@@ -10,6 +10,7 @@ import yaml
 from texgs.config.schema import Config
 from texgs.core.checksum import Checksums, digest
 from texgs.core.io import write_bytes
+from texgs.core.names import METRICS
 from texgs.workflow import result
 from texgs.workflow.missing import weights_of
 from texgs.workflow.stage import Stage
@@ -43,6 +44,11 @@ class Job:
             "code": self.stage.code(self.settings),
             "inputs": {name: result.fingerprint(path, self.checksums) for name, path in self.inputs.items()},
         }
+
+    def replaces_other(self) -> bool:
+        """Return whether the folder holds a result of other settings, which the job would replace."""
+        known = result.stamped(self.output) or {}
+        return (self.output / METRICS).exists() and known.get("settings") != settings_digest(self.settings)
 
     def is_done(self) -> bool:
         """Return whether the folder holds the whole result of exactly this job."""

@@ -61,7 +61,8 @@ def as_sweep(words: Words) -> Words:
         raise ConfigError(f"{over[0]}: {chosen[0]} has variants of its own; leave out one of the two")
     if chosen or not swept:
         return (*rest, *seeds)
-    name = "-".join(key_of(word).rpartition(".")[2] for word in over) or ONLY_SEEDS
+    keys = [key_of(word) for word in over]
+    name = "-".join((key.partition(".")[2] or key).replace(".", "_") for key in keys) or ONLY_SEEDS
     name = OF_KINDS if name == OF_NUMBERS else name
     listed = ",".join(map(quoted, over))
     return (*rest, *seeds, f"sweep.name={name}", f"sweep.over=[{listed}]")

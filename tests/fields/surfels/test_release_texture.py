@@ -5,6 +5,7 @@ import torch
 from tests.fields.surfels.ply_files import columns_of, numbered, write_vertices
 from tests.fields.surfels.samples import sample
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.fields.files import kind_of
 from texgs.fields.surfels.ply import read_ply, write_ply
 
 
@@ -32,6 +33,7 @@ def release_run(folder):
 
 def test_textures_of_the_release(tmp_path):
     path, relightable, pictures = release_run(tmp_path)
+    assert kind_of(path).name == "surfels"
     model = read_ply(path)
     assert (model.stage, model.shading) == ("texture", relightable.shading)
     p = model.parameters

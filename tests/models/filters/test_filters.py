@@ -117,6 +117,13 @@ def test_tint_keeps_light_and_dark():
     assert_close(tinted[middle], torch.tensor([0.1, 0.5, 0.5]), atol=0.01, rtol=0)
 
 
+def test_tones_of_more_pixels_than_are_sorted_are_the_same(monkeypatch):
+    views = plain_views(color=(0.2, 0.4, 0.9))
+    tone = surface_of(views)[0].tone
+    monkeypatch.setattr("texgs.models.filters.surface.MOST_SORTED", len(tone) // 8)
+    assert_close(surface_of(views)[0].tone, tone, atol=0.01, rtol=0)
+
+
 def test_straight_colours_of_half_transparent_views():
     views = plain_views(color=(0.3, 0.6, 0.9))
     half = views.alphas * 0.5

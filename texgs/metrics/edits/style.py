@@ -36,10 +36,16 @@ class Distances:
         self.distances: list[list[tuple[float, float]]] = [[] for _ in self.targets]
 
     def target(self, style: Style) -> StyleTarget:
-        """Return what views are compared with."""
+        """Return what views are compared with: of a picture its region, or all where that is all thin."""
+        import torch
+
         from texgs.metrics.style import StyleTarget
 
-        return StyleTarget.of(self.features(style.image.to(self.measured.shown.device), style.region.float()))
+        image = style.image.to(self.measured.shown.device)
+        rows = self.features(image, style.region.float())
+        if not len(rows):  # lines too thin for any position
+            rows = self.features(image, torch.ones_like(style.region).float())
+        return StyleTarget.of(rows)
 
     def features(self, image: Tensor, share: Tensor) -> Tensor:
         """Return the features [n, C] that styles are compared by, of what has a share [H, W] of an image."""
