@@ -50,7 +50,7 @@ def test_alpha_is_white_on_black_and_depth_grows_away_from_the_camera(scene):
 
 def test_depth_of_a_translucent_scene_grows_away_from_the_camera(scene):
     model = ball(1, n=1500)
-    faint = {**model.parameters, "opacities": torch.full((1500,), -4.0)}
+    faint = {**model.parameters, "opacities": torch.full((1500,), -4.6)}
     shown = Composition([Surfels(faint, model.shading)]).render(CAMERA, SIDE, outputs=("depth",))
     densest = float(shown.alpha.max())
     assert densest < 0.5

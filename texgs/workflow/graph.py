@@ -13,6 +13,7 @@ from texgs.core.checksum import Checksums
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.io import read_json
 from texgs.core.names import METRICS
+from texgs.report import metrics_files
 from texgs.report.metrics_files import Record, below, read_known
 from texgs.workflow.checks import check_basic_tfs, check_edit, check_fit
 from texgs.workflow.experiments import LeftOut, Selection, selected
@@ -156,8 +157,9 @@ def earlier(
     return {file.as_posix(): checksums.of(file) for file in current}, outdated
 
 
-def current_records(results: str | Path) -> tuple[list[Record[Any]], list[LeftOut]]:
+def current_records(results: str | Path) -> tuple[list[Record[Any]], list[metrics_files.LeftOut]]:
     """Read the whole results below a folder that come from what is there now, and what is left out."""
     files, outdated = earlier(str(results), Graph(), Checksums.load())
     records, old = read_known(files)
-    return records, [*(LeftOut(each.what, each.why, places) for each, places in outdated.items()), *old]
+    left_out = [metrics_files.LeftOut(each.what, each.why, places) for each, places in outdated.items()]
+    return records, [*left_out, *old]
