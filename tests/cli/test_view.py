@@ -89,17 +89,28 @@ def test_unsaved_edits_are_asked_about_or_told(scene_file, monkeypatch, capsys, 
 
 def test_another_file_is_not_replaced_without_a_word(scene_file, monkeypatch, capsys):  # noqa: F811
     """Scenes of jobs are saved as edited.yaml, which may be there; a name that is none is asked for again."""
-    monkeypatch.chdir(scene_file.parent)
+    own = scene_file.parent / "own"
+    own.mkdir()
+    monkeypatch.chdir(own)
     (scene_file.parent / "metrics.json").write_text("{}")
-    (scene_file.parent / "edited.yaml").write_text("mine")
+    (own / "edited.yaml").write_text("mine")
     edits = Server(open_scene(scene_file)).edits
     edits.change(Edit("TF01", "visible", False, 0), author=1)
     monkeypatch.setattr("sys.stdin", Terminal("n\n"))
     view.ask_to_save(edits)
     assert "edited.yaml? The file there is replaced. [y/N]" in capsys.readouterr().out
-    assert (scene_file.parent / "edited.yaml").read_text() == "mine"
+    assert (own / "edited.yaml").read_text() == "mine"
     monkeypatch.setattr(edits, "name", "../no.yaml")
     monkeypatch.setattr("sys.stdin", Terminal("other.yaml\ny\n"))
     view.ask_to_save(edits)
     assert "save as: expected" in capsys.readouterr().err
-    assert not read_scene(scene_file.parent / "other.yaml").models["TF01"].edit.visible
+    assert not read_scene(own / "other.yaml").models["TF01"].edit.visible
+
+
+def test_nothing_is_saved_into_a_result_of_the_workflow(scene_file, monkeypatch):  # noqa: F811
+    monkeypatch.chdir(scene_file.parent)
+    (scene_file.parent / "metrics.json").write_text("{}")
+    with pytest.raises(
+        ArgumentError, match="is a result of the workflow, .* in another folder, or with --fold"
+    ):
+        Server(open_scene(scene_file)).edits.save("edited.yaml")

@@ -20,7 +20,7 @@ from texgs.core.io import write_json
 from texgs.report.check import checksum_of
 from texgs.scene.parts import replaced
 from texgs.scene.scene import MOST_FUNCTIONS
-from texgs.scene.scene_file import read_scene
+from texgs.scene.scene_file import read_scene, write_scene
 from texgs.viewer import guard
 from texgs.viewer.messages import parse
 from texgs.viewer.segments import isolated
@@ -280,10 +280,13 @@ async def test_scenes_are_saved_in_their_folder_only(browser, scene_file):
 @pytest.fixture
 def earlier(scene_file, monkeypatch):
     """What somebody has saved of a scene that a job wrote."""
-    monkeypatch.chdir(scene_file.parent)
+    own = scene_file.parent / "own"
+    own.mkdir()
+    monkeypatch.chdir(own)
     (scene_file.parent / "metrics.json").write_text("{}")
-    (path := scene_file.parent / "edited.yaml").write_text(scene_file.read_text())
-    return path
+    for name in ("scene.yaml", "edited.yaml"):
+        write_scene(own / name, read_scene(scene_file))
+    return own / "edited.yaml"
 
 
 @on_page

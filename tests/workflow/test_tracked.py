@@ -44,7 +44,7 @@ def test_names_tell_variant_seed_and_edit(stage, words, tf, expected):
 def test_tags_are_of_what_a_job_is_and_leave_out_what_it_is_not():
     result = tags(job("edit_text", (*GOLD, "edit.seed=0,1")), IDENTITY, "abc")
     expected = {"stage": "edit_text", "dataset": "sphere", "recipe": "demo", "field": "surfels"}
-    expected |= {"variant": "128", "sweep": "size", "seed": "1", "fit_seed": "0", "edit": "gold"}
+    expected |= {"variant": "128", "sweep": "text_size", "seed": "1", "fit_seed": "0", "edit": "gold"}
     assert result.items() >= {**expected, "device": "cpu", PARENT: "abc"}.items()
     assert not tags(job("volume", ()), IDENTITY, None).keys() & {"tf", "variant", "sweep", "edit", PARENT}
 

@@ -77,8 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
         overrides.append("up=+z")
     given = configuration(name, arguments.file, overrides)
     given = replace(given, dataset=replace(given.dataset, series=[*map(absolute, arguments.series)]))
-    if len(files := series_files(given)) == 1:
-        moments_of(files, given.dataset.volume)
+    files = series_files(given)
     folder = own_folder() / "dataset"
     check_name("--name", name)
     if name in members("dataset") and not arguments.force:
@@ -87,6 +86,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
     field, keys = array_of(given.dataset.volume), changed(overrides)
     channels = channels_of(given.dataset.volume, field)
+    if len(files) == 1 and not channels:
+        moments_of(files, given.dataset.volume)  # of a file or folder that has several
     if field and "reduce" not in keys:
         given = reduced(given, field, len(channels))
         keys += ["reduce"] if given.dataset.volume.reduce > 1 else []

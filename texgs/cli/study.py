@@ -38,9 +38,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Write ballot.html, then key.json; print the questions."""
     from texgs.core.check import torch_device
     from texgs.core.io import write_bytes
+    from texgs.report.metrics_files import below, read_known
     from texgs.study.ballot_page import ballot_page
     from texgs.study.questions import KINDS, Study, questions_of, write_key
-    from texgs.workflow.graph import current_records
 
     key, page = arguments.output / KEY, arguments.output / PAGE
     if key.exists():
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     if not LEAST <= arguments.size <= MOST:
         raise ArgumentError(f"--size: expected {LEAST} to {MOST} pixels, got {arguments.size}")
-    records, old = current_records(arguments.results)
+    records, old = read_known(below(arguments.results))
     for entry in old:
         print(f"Left out: {entry}", file=sys.stderr)
     questions = questions_of(records, arguments.edits, arguments.seed)
