@@ -111,6 +111,6 @@ def test_nothing_is_saved_into_a_result_of_the_workflow(scene_file, monkeypatch)
     monkeypatch.chdir(scene_file.parent)
     (scene_file.parent / "metrics.json").write_text("{}")
     with pytest.raises(
-        ArgumentError, match="is a result of the workflow, .* in another folder, or with --fold"
+        ArgumentError, match=r"is a result of the workflow, .* in another folder, or with --fold"
     ):
         Server(open_scene(scene_file)).edits.save("edited.yaml")

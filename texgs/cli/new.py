@@ -77,8 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
         overrides.append("up=+z")
     given = configuration(name, arguments.file, overrides)
     given = replace(given, dataset=replace(given.dataset, series=[*map(absolute, arguments.series)]))
-    files = series_files(given)
-    folder = own_folder() / "dataset"
+    files, folder = series_files(given), own_folder() / "dataset"
     check_name("--name", name)
     if name in members("dataset") and not arguments.force:
         is_own = (folder / f"{name}.yaml").exists()
