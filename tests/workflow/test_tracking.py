@@ -59,7 +59,7 @@ def test_every_job_has_a_finished_run(project, search):
 
 
 def test_the_best_psnr_by_view_count_is_a_query(search):
-    fits = search("tags.stage = 'texture' and tags.sweep = 'frequency'")
+    fits = search("tags.stage = 'texture' and tags.sweep = 'train_frequency'")
     assert len(fits) == 4
     by_count = {run.data.params["views.train.frequency"]: run.data.metrics["psnr"] for run in fits[::-1]}
     assert set(by_count) == {"1", "2"}
