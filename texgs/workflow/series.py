@@ -100,8 +100,9 @@ def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, v
         own = settings if moment.time is None else replace(settings, time=moment.time)
         identity = digest(f"{own} {moment.file and fingerprint(moment.file, checksums)}")
         with located(moment.name):
-            if not target.exists() or made_of.get(target.name) != identity:
+            if is_other := made_of.get(target.name) != identity:
                 require_unfollowed(series, step)
+            if is_other or not target.exists():
                 target.unlink(missing_ok=True)
                 write_json(record, made_of := {**made_of, target.name: identity})
                 write_summaries(target, prepared(settings, [source(own, moment.file)], target), [""])
