@@ -38,6 +38,8 @@ def test_the_distance_is_the_published_one(files):
     lpips = Lpips.load(folder / "vgg.pth", folder / "heads.pth")
     assert float(lpips.distance(image, other)) == pytest.approx(defined(image, other, heads), rel=1e-4)
     assert float(lpips.distance(image, image)) == 0
+    fastest = Lpips.load(folder / "vgg.pth", folder / "heads.pth", dtype=None)
+    assert fastest.vgg.dtype == torch.float32  # on a CPU, also where that multiplies bfloat16 itself
     with pytest.raises(ShapeError, match=r"other: expected \[1, 32, 40, 3\]"):
         lpips.distance(image, other[:20])
     with pytest.raises(ShapeError, match=r"image: expected \[N, H, W, 3\], got \[32, 40\]"):

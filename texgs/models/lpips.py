@@ -30,9 +30,12 @@ class Lpips:
         vgg: Vgg | str | Path | None = None,
         heads: str | Path | None = None,
         device: torch.device | str = "cpu",
-        dtype: torch.dtype = torch.float32,
+        dtype: torch.dtype | None = torch.float32,
     ) -> Self:
-        """Read both files of weights, by default where they are found; a VGG with `LAYERS` may be given."""
+        """Read both files of weights, by default where they are found; a VGG with `LAYERS` may be given.
+
+        Without a dtype features are computed in the fastest, see `Vgg.load`.
+        """
         heads = locate("lpips_vgg") if heads is None else heads
         names = [f"lin{index}.model.1.weight" for index in range(len(LAYERS))]
         stored = read_tensors(heads, names)

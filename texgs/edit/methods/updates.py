@@ -47,9 +47,8 @@ class UpdateKeys(InstructionKeys):
         """Return the loss on views."""
         from texgs.edit.dataset_update import PhotometricLoss
         from texgs.models.lpips import Lpips
-        from texgs.models.networks import fast_dtype
 
-        network = Lpips.load(device=device, dtype=fast_dtype(device)) if self.lpips else None
+        network = Lpips.load(device=device, dtype=None) if self.lpips else None
         return PhotometricLoss(self.l1, self.dssim, self.lpips, network)
 
     def weights(self) -> dict[str, str]:
