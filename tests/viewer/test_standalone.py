@@ -247,6 +247,22 @@ def test_a_number_out_of_range_is_told(page):
     assert number.input_value() == "1"
 
 
+def test_what_a_key_has_moved_can_be_reset_at_once(page):
+    opacity = page.get_by_label("Opacity of B", exact=True)
+    opacity.press("ArrowLeft")
+    reset = page.get_by_role("button", name="Reset opacity of B")
+    assert reset.is_enabled()
+    reset.click()
+    assert opacity.input_value() == "1"
+
+
+def test_a_key_event_without_a_key_breaks_nothing(page):
+    broken = []
+    page.on("pageerror", lambda error: broken.append(error))
+    page.evaluate("document.dispatchEvent(new Event('keydown', { bubbles: true }))")
+    assert broken == []
+
+
 def test_the_oldest_of_many_steps_stay_made(page):
     visible = page.locator("#models").get_by_title("Visible").last
     visible.evaluate("box => { for (let count = 0; count < 251; count++) box.click(); }")

@@ -36,7 +36,7 @@ export class EditHistory {
 
   /** Whether a key does something; while somebody types, only what is held does. */
   #press({ key, ctrlKey, metaKey, altKey, shiftKey }, isTyping) {
-    const { state } = this.#page, low = key.toLowerCase();
+    const { state } = this.#page, low = (key ?? "").toLowerCase(); // filling in may send none
     if (document.querySelector("dialog[open]") || altKey) return false;
     if ((ctrlKey || metaKey) && low in this.#held) {
       this.#held[low]();

@@ -91,6 +91,9 @@ export function slider(label, what, { max, most = 1000, unedited = 1, min = 0, s
     number.dispatchEvent(new CustomEvent("refused", { bubbles: true, detail }));
   });
   number.addEventListener("blur", () => show(latest)); // where it was left empty, or is refused
+  for (const input of [range, number]) { // what came while it was in use
+    input.addEventListener("change", () => { if (input.validity.valid) show(latest); });
+  }
   return { row, show };
 }
 

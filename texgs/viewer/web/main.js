@@ -134,7 +134,11 @@ connection.addEventListener("message", ({ detail }) => {
     notices.tell(detail.text, detail.level);
   }
 });
-connection.addEventListener("open", () => page?.state.restart());
+connection.addEventListener("open", () => {
+  const said = "The connection broke before all edits had arrived: Steps lists those that have.";
+  if (page?.state.isPending) notices.tell(said, "error stays");
+  page?.state.restart();
+});
 connection.addEventListener("unsent", () => notices.tell("Not done: there is no connection to texgs view.", "error"));
 connection.addEventListener("lost", ({ detail: why }) => { // before the page's job hears of it
   if (page?.job.isAtWork) notices.tell("The connection broke, which cancelled what was being made.", "error stays");

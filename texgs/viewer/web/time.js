@@ -6,7 +6,7 @@ import { timesOf } from "./state.js";
 const PACE = 200; // milliseconds from step to step, at least
 
 export class TimeSlider {
-  #state; #times; #range; #name; #play; #isBusy; #timer = 0; #played = 0;
+  #state; #times; #range; #name; #play; #isBusy; #timer = 0; #played = 0; #isOwn = false;
 
   /**
    * @param {State} state
@@ -33,6 +33,9 @@ export class TimeSlider {
       this.#name.title = this.#range.ariaValueText = steps[time] ?? "";
     };
     state.addEventListener("change", show);
+    state.addEventListener("edit", () => { // else its steps would part those of a drag
+      if (!this.#isOwn) this.stop();
+    });
     show();
   }
 
@@ -58,6 +61,8 @@ export class TimeSlider {
   }
 
   #show(index, step) {
+    this.#isOwn = true;
     this.#state.edit("", "time", this.#times[index], step);
+    this.#isOwn = false;
   }
 }

@@ -138,6 +138,7 @@ export class TransferEditor {
       gesture(input, (step) => {
         if (input.value !== "" && input.validity.valid) edit(Number(input.value), step);
       });
+      input.addEventListener("blur", () => this.#showInputs()); // a value may have been refused or limited
       this.#parts.inputs.append(element("label", {}, `${label} `, input));
       return input;
     };

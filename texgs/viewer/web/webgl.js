@@ -127,6 +127,7 @@ export class WebglRenderer {
 
   /** The same picture as a canvas of its own; of another size, or without its background, if need be. */
   async still(camera, scene, { before, ...how }) {
+    if (this._gl.isContextLost()) throw new Error("The graphics driver has taken the picture back; try again when it is there.");
     const view = this._view(camera), shown = before ? this._before(scene) : scene;
     return this.at(shown.time, () => this._still(view, shown, how));
   }
