@@ -54,6 +54,50 @@ def test_large_surfels_that_reach_behind_the_camera(seed):
     assert float(((seen - truth).abs() > 0.02).float().mean()) < 0.02
 
 
+@pytest.mark.parametrize("z", [3.9, 3.971, 3.9715, 3.972, 3.9725, 3.973, 3.974, 3.975, 3.977, 3.979, 3.985, 4.2])
+def test_a_surfel_that_ends_just_before_the_camera_is_whole(device, z):
+    viewmat = torch.eye(4)
+    viewmat[2, 3] = z
+    tensors = {
+        "means": torch.tensor([[-0.2, 0.4, 0]]),
+        "quats": torch.tensor([[-0.53, 0.28, -0.075, 0.21]]),
+        "scales": torch.tensor([[0.064, 1.5]]),  # in depth it ends 3.97 before its mean
+        "opacities": torch.tensor([0.9]),
+        "features": torch.ones(1, 1),
+        "viewmat": viewmat,
+        "K": torch.tensor([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]]),
+    }
+    seen = rasterize(**{name: x.to(device) for name, x in tensors.items()}, width=64, height=48).alpha
+    exact = {name: x.double() for name, x in tensors.items()}
+    truth = reference.rasterize(**exact, width=64, height=48).alpha
+    torch.testing.assert_close(seen.cpu().double(), truth, atol=0.01, rtol=0)
+
+
+@pytest.mark.parametrize("apart", [1e-1, 1e-2, 1e-3])
+def test_distortion_of_layers_that_are_close(device, apart):
+    def rendered(rasterize, dtype, device):
+        tensors = {
+            "means": torch.tensor([[0, 0, 3], [0, 0, 3 + apart]]),
+            "quats": torch.tensor([[1.0, 0, 0, 0]] * 2),
+            "scales": torch.full((2, 2), 0.5),
+            "opacities": torch.full((2,), 0.5),
+            "features": torch.ones(2, 1),
+            "viewmat": torch.eye(4),
+            "K": torch.tensor([[40.0, 0, 8], [0, 40, 8], [0, 0, 1]]),
+        }
+        tensors = {name: x.to(device, dtype) for name, x in tensors.items()}
+        means = tensors["means"].requires_grad_()
+        distortion = rasterize(**tensors, width=16, height=16, outputs=("distortion",)).distortion
+        (gradient,) = torch.autograd.grad(distortion.sum(), means)
+        return distortion.detach().cpu().double(), gradient[:, 2].cpu().double()
+
+    # Their depths themselves are rounded to 2e-7.
+    for ours, exact in zip(
+        rendered(rasterize, torch.float32, device), rendered(reference.rasterize, torch.float64, "cpu"), strict=True
+    ):
+        torch.testing.assert_close(ours, exact, rtol=3e-6 / apart, atol=0)
+
+
 def check_learning(scene, device, name, compared, options=DEFAULT_OPTIONS):
     """Compare the gradients of random combinations of some images."""
     tolerance = dict.fromkeys(scene.leaves(), GRADIENT_TOLERANCE.get(name, 1e-3))

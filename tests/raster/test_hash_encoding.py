@@ -6,7 +6,7 @@ import torch
 from tests.raster.operations import LEVELS, points
 from tests.raster.requirements import refuses
 from texgs.core.errors import ArgumentError
-from texgs.raster.hash_encoding import HashLevels
+from texgs.raster.hash_encoding import HashLevels, encode
 from texgs.raster.reference import hash_encoding as definition
 
 
@@ -61,3 +61,11 @@ def test_levels_of_the_published_configuration():
 )
 def test_levels_that_cannot_be(values, message):
     refuses(ArgumentError, message, HashLevels, **values)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_point_that_is_not_a_number_is_seen(axis):
+    spoiled = points(4)
+    spoiled["points"][1, axis] = float("nan")
+    features = encode(**spoiled, levels=LEVELS)
+    assert features.isnan().any(dim=1).tolist() == [False, True, False, False]

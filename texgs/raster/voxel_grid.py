@@ -87,7 +87,8 @@ class VoxelGrid:
             raise ShapeError(f"rows: expected 4, 16 or 32 floats, got {list(rows.shape)}")
         grid = replace(
             self,
-            rows=rows.contiguous(),
+            # The library reads four numbers at once: memory that begins elsewhere is copied.
+            rows=rows.contiguous() if rows.data_ptr() % 16 == 0 else rows.clone(),
             density=rows.new_empty(len(rows)),
             occupied=torch.empty_like(self.occupied),
             distance=torch.empty_like(self.distance),

@@ -76,7 +76,8 @@ template <class F>
 TEXGS_MATHS Bounds<F> bound(const SurfelProjection<F>& r, F cut, F cx, F cy, float low_pass) {
     Bounds<F> b;
     const Conic<F> e = project_conic(cut, r.M);
-    b.behind = e.ww > F(-1e-3f) * r.pose.p.z * r.pose.p.z;
+    // Nearer to the camera's plane than a tenth of the depth, the ellipse is a difference of large numbers.
+    b.behind = e.ww > F(-0.2f) * r.pose.p.z * r.pose.p.z;
     // A thin ellipse has an ill-conditioned inverse; growing it by a fraction of a pixel only adds candidates.
     const F grow = fma(1e-6f, e.xx + e.yy, 1e-2f);
     const Mask<F> disc_only = is_edge_on(r);
@@ -119,7 +120,6 @@ TEXGS_MATHS Outline<F> outline(const Surfel<F>& s, const SurfelProjection<F>& r,
     out.reach = sqrt(out.cut * fma(r.a.z, r.a.z, r.b.z * r.b.z));
     out.clipped = r.pose.p.z - out.reach <= F(o.near_plane);
     out.bounds = bound(r, out.cut, cx, cy, o.low_pass);
-    out.bounds.behind = out.bounds.behind & out.clipped;
     out.visible = is_visible(r.pose, s.opacity, cx, cy, o);
     out.never_filtered = is_never_filtered(out.bounds, out.forms, o);
     return out;

@@ -93,14 +93,13 @@ TEXGS_INLINE void take_median(ForwardScratch& s, Batch batch, int pixel, vf alph
 
 // Moments of the depth in normalised device coordinates, about that of the pixel's first fragment: no cancellation.
 TEXGS_INLINE void add_distortion(const Raster& r, ForwardScratch& s, Batch batch, int pixel, vf alpha) {
-    const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
     vf m1 = load(s.z.moments[0] + pixel), m2 = load(s.z.moments[1] + pixel), origin = load(s.z.moments[2] + pixel);
     for (int j = 0; j < batch.n; ++j) {
         const vf w = load(s.weight[j]);
         const vm counts = w > vf(0.0f);
-        const vf m = fnma(vf(scale * r.options.near_plane), vf(1.0f) / load(s.depth[j]), scale);
-        origin = select(counts & (alpha <= vf(0.0f)), m, origin);
-        const vf centred = m - origin, wm = w * centred;
+        const vf z = load(s.depth[j]);
+        origin = select(alpha <= vf(0.0f), select(counts, z, 1.0f), origin);
+        const vf centred = centred_ndc(r, z, origin), wm = w * centred;
         m1 = add_where(counts, m1, wm);
         m2 = fma_where(counts, wm, centred, m2);
         alpha += w;

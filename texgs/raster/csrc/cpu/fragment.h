@@ -23,6 +23,16 @@ TEXGS_INLINE void with_constant(int n, Body body) {
     if constexpr (Most > 1) with_constant<Most - 1>(n, body);
 }
 
+// By which depths in normalised device coordinates, 0 at the near and 1 at the far plane, differ: scale (1/z - 1/z').
+inline float ndc_scale(const Raster& r) {
+    return r.options.far_plane / (r.options.far_plane - r.options.near_plane) * r.options.near_plane;
+}
+
+// Depth z in them less that of a depth `origin`, without cancellation.
+TEXGS_INLINE vf centred_ndc(const Raster& r, vf z, vf origin) {
+    return vf(ndc_scale(r)) * (z - origin) / (z * origin);
+}
+
 inline void load_plane(const Raster& r, int tile, const float* image, float* plane);
 inline void prefetch_planes(const Raster& r, int tile, const float* image, int planes);
 

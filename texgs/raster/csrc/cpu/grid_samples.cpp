@@ -66,10 +66,12 @@ void texgs_grid_samples::render(GridJob& job, bool keep) {
     job.basis = keep ? basis_.ensure<float>(n * floats) : nullptr;
     job.lengths = keep ? lengths_.ensure<int32_t>(n) : nullptr;
     n_chunks_ = (n + kChunkRays - 1) / kChunkRays;
-    while (static_cast<int64_t>(chunks_.size()) < n_chunks_) chunks_.emplace_back();
+    const int64_t lists = keep ? n_chunks_ : threads();  // what is not kept goes with the next chunk of its thread
+    while (static_cast<int64_t>(chunks_.size()) < lists) chunks_.emplace_back();
     missing_ = 0;
-    parallel_for(n_chunks_, 1, [&](int64_t begin, int64_t end, int) {
-        for (int64_t i = begin; i < end; ++i) march_chunk(job, i, i * kChunkRays, std::min((i + 1) * kChunkRays, n));
+    parallel_for(n_chunks_, 1, [&](int64_t begin, int64_t end, int worker) {
+        for (int64_t i = begin; i < end; ++i)
+            march_chunk(job, keep ? i : worker, i * kChunkRays, std::min((i + 1) * kChunkRays, n));
     });
     if (missing_) throw OutOfMemory{missing_};
 }

@@ -26,7 +26,8 @@ void find_corners(const HashLevel& level, const float* points, int n, Corners& c
             const float at = scale * points[3 * (i < n ? i : n - 1) + axis], least = at > 0.0f ? at : 0.0f;
             const int first = static_cast<int>(least < scale ? least : scale), last = level.resolution - 1;
             cell[axis][i] = first < last ? first : last;
-            inside[axis][i] = (least < scale ? least : scale) - static_cast<float>(cell[axis][i]);
+            const float place = (least < scale ? least : scale) - static_cast<float>(cell[axis][i]);
+            inside[axis][i] = at == at ? place : at;  // NaN is to be seen
         }
     for (int corner = 0; corner < 8; ++corner) {
         const uint32_t dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;

@@ -89,7 +89,7 @@ struct Raster {
 
     texgs_image image, grad;
     float* median_stop;         // [tiles, 256] alpha behind the fragment that is a pixel's median
-    float* distortion_moments;  // [tiles, 3, 256] sum w m', sum w m'^2, origin of m'
+    float* distortion_moments;  // [tiles, 3, 256] sum w m', sum w m'^2, depth where m' = 0
 
     float* slots;  // [slots, slot_stride]
     int slot_stride;

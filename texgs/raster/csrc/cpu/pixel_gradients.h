@@ -22,7 +22,7 @@ struct alignas(64) PixelPlanes {
 // The same of the depths.
 struct alignas(64) DepthGradients {
     float depth[kTilePixels], median[kTilePixels], median_stop[kTilePixels];
-    float origin[kTilePixels], m[kTilePixels], m2[kTilePixels];  // q += m m' + m2 m'^2, m' = m - origin
+    float origin[kTilePixels], m[kTilePixels], m2[kTilePixels];  // q += m m' + m2 m'^2, m' = 0 at the depth origin
     float alpha[kTilePixels];                                    // blended so far
 };
 
@@ -111,20 +111,13 @@ inline void prefetch_gradients(const Raster& r, int tile) {
     if (r.grad.depth) prefetch_planes(r, tile, r.image.depth, 1);
 }
 
-// Depth in normalised device coordinates, 0 at the near and 1 at the far plane, from `origin`.
-TEXGS_INLINE vf centred_ndc(const Raster& r, vf z, vf origin) {
-    const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
-    return fnma(vf(scale * r.options.near_plane), vf(1.0f) / z, scale) - origin;
-}
-
 // dL/dz of fragments, from distortion, median and expected depth.
 TEXGS_INLINE vf depth_gradient(const Raster& r, DepthGradients& d, int pixel, vf z, vf w) {
     vf by_w = load(d.depth + pixel);
     if (r.grad.distortion) {
-        const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
         const vf m = centred_ndc(r, z, load(d.origin + pixel));
         const vf by_m = fma(vf(2.0f) * load(d.m2 + pixel), m, load(d.m + pixel));
-        by_w = fma(by_m, vf(scale * r.options.near_plane) / (z * z), by_w);
+        by_w = fma(by_m, vf(ndc_scale(r)) / (z * z), by_w);
     }
     vf gz = w * by_w;
     if (r.grad.median) {

@@ -16,7 +16,7 @@ template <int C, bool Depth>
 struct Pixel {
     float transmittance, alpha = 0.0f, color[C] = {};
     struct {
-        float depth = 0.0f, median = 0.0f, m = 0.0f, m2 = 0.0f, origin = 0.0f;
+        float depth = 0.0f, median = 0.0f, m = 0.0f, m2 = 0.0f, origin = 1.0f;
         int32_t median_surfel = -1;
     } z;
 };
@@ -25,9 +25,8 @@ struct Pixel {
 template <class P, class Pixel>
 __device__ void blend_depth(const texgs_options& o, const Record& record, const Fragment& f, float w, Pixel& pixel) {
     const float z = depth_of<P>(record, f);
-    const NormalizedDepth normalized(o, z);
-    if (pixel.alpha == 0.0f) pixel.z.origin = normalized.m;
-    const float m = normalized.m - pixel.z.origin;
+    if (pixel.alpha == 0.0f) pixel.z.origin = z;
+    const float m = NormalizedDepth(o, z, pixel.z.origin).m;
     pixel.z.depth = fma(w, z, pixel.z.depth);
     pixel.z.m = fma(w, m, pixel.z.m);
     pixel.z.m2 = fma(w * m, m, pixel.z.m2);

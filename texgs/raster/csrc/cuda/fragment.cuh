@@ -89,13 +89,13 @@ __device__ Fragment evaluate(const Raster& r, const Record& s, const Place& plac
     return f;
 }
 
-// Depth mapped to 0 at the near plane and 1 at the far plane, and its derivative.
+// Depth mapped to 0 at the near plane and 1 at the far plane, less that of a depth `origin`, and its derivative.
 struct NormalizedDepth {
     float m, slope;
-    __device__ NormalizedDepth(const texgs_options& o, float z) {
-        const float scale = o.far_plane / (o.far_plane - o.near_plane), c = __fmul_rn(scale, o.near_plane);
-        const float inverse = reciprocal(z);
-        m = fma(-c, inverse, scale), slope = __fmul_rn(__fmul_rn(c, inverse), inverse);
+    __device__ NormalizedDepth(const texgs_options& o, float z, float origin) {
+        const float inverse = reciprocal(z), scale = o.far_plane / (o.far_plane - o.near_plane);
+        const float c = __fmul_rn(__fmul_rn(scale, o.near_plane), inverse);
+        m = __fmul_rn(__fmul_rn(c, z - origin), reciprocal(origin)), slope = __fmul_rn(c, inverse);
     }
 };
 

@@ -13,7 +13,7 @@ struct PixelGradient {
     float remaining = 0.0f;  // sum of w_j q_j over the fragments not yet visited
     struct {
         float depth = 0.0f, median = 0.0f;
-        float m = 0.0f, m2 = 0.0f, origin = 0.0f;  // q += m m' + m2 m'^2, m' = m - origin
+        float m = 0.0f, m2 = 0.0f, origin = 1.0f;  // q += m m' + m2 m'^2, m' = 0 at the depth origin
         int32_t median_surfel = -1;
     } z;
 
@@ -32,8 +32,8 @@ struct PixelGradient {
 
     // Adds to q what depends on a fragment's depth; returns dL/d(depth).
     __device__ float weigh_depth(const texgs_options& o, float depth, float w, int32_t surfel, float& q) const {
-        const NormalizedDepth normalized(o, depth);
-        const float m = normalized.m - z.origin;
+        const NormalizedDepth normalized(o, depth, z.origin);
+        const float m = normalized.m;
         q = fma(z.depth, depth, q);
         q = fma(m, fma(z.m2, m, z.m), q);
         const float by_m = fma(2.0f * z.m2, m, z.m);

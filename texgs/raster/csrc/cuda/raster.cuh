@@ -68,7 +68,7 @@ struct Raster {
 
     texgs_image image, grad;
     int32_t* median_surfel;     // [H, W] surfel whose fragment is the median
-    float* distortion_moments;  // [3, H, W] sum w m', sum w m'^2, origin of m'
+    float* distortion_moments;  // [3, H, W] sum w m', sum w m'^2, depth where m' = 0
 
     float* slots;  // [capacity, slot_width]
     int slot_width;
