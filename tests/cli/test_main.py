@@ -92,7 +92,7 @@ def test_the_command_line_starts_without_heavy_imports():
 @pytest.mark.parametrize(
     ("verb", "message"),
     [
-        ("texture", "texgs texture: interrupted; the same command goes on where it stopped\n"),
+        ("texture", "texgs texture: interrupted; the same command goes on with what is not done\n"),
         ("doctor", "texgs doctor: interrupted; the same command starts again\n"),
     ],
 )

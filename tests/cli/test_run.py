@@ -88,6 +88,7 @@ def test_a_dry_run_lists_each_job_where_that_is_asked_for(tmp_path):
         (["nonsense=1"], 2, "texgs: nonsense: no such key"),
         (["--bogus"], 2, "unrecognized arguments: --bogus"),
         (["reprot"], 2, "texgs run: reprot: no such target, did you mean report?"),
+        (["volume"], 2, "texgs run: volume: no such target, did you mean volumes?"),
         (["nosuchthing"], 2, "texgs run: nosuchthing: no such target; expected all, tables, report, "),
         (["dataset", "engine"], 2, "dataset: expected dataset=engine in one word, got dataset alone"),
         (["--fit", "quick"], 2, "texgs run: --fit: expected fit=quick in one word, got --fit alone"),
@@ -133,7 +134,7 @@ def test_a_run_that_is_interrupted_says_that_it_goes_on(tmp_path):
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does for Ctrl-C
     _, err = process.communicate(timeout=100)
     assert process.returncode == 130
-    assert err.splitlines()[-1] == "texgs run: interrupted; the same command goes on where it stopped"
+    assert err.splitlines()[-1] == "texgs run: interrupted; the same command goes on with what is not done"
     assert "Traceback" not in err
     assert "Error in rule" not in err, "jobs that were interrupted have no fault"
 

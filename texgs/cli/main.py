@@ -144,7 +144,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         goes_on = verb in STAGE_VERBS or verb in ("run", "series")
-        end = "goes on where it stopped" if goes_on else "starts again"
+        end = "goes on with what is not done" if goes_on else "starts again"
         print(f"texgs {verb}: interrupted; the same command {end}", file=sys.stderr)
         return 130
     except BrokenPipeError:  # as `| head` leaves it; what is still in the buffer goes nowhere

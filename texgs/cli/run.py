@@ -73,6 +73,7 @@ def snakemake(words: Sequence[str]) -> bool:
     except CliException as error:
         raise ArgumentError(f"{error} See snakemake --help.") from error
     require_pairs([word for word in words if word in (*given.targets, *unknown)])
+    require_targets(given.targets)
     chosen = [word for word in given.targets if WORD.fullmatch(word)]
     rest = [word for word in words if word not in chosen]
     sys.argv = ["snakemake", *rest]  # the Snakefile looks there
@@ -122,13 +123,26 @@ def told_errors(targets: Sequence[str] = ()) -> Iterator[None]:
 
 def no_target(word: str) -> str:
     """Return that a word is no target, with the name that is most like it, or all of them."""
-    from texgs.workflow.stage_table import RULES
-
-    names = dict.fromkeys(
-        ("all", "tables", "report", *(each.target for each in RULES.values() if each.target))
-    )
+    names = target_names()
     hint = close(word, names) or f"; expected {', '.join(names)} or a file that the run makes"
     return f"{word}: no such target{hint}"
+
+
+def target_names() -> list[str]:
+    """Return the names of what a run can be asked to make."""
+    from texgs.workflow.stage_table import RULES
+
+    own = (each.target for each in RULES.values() if each.target)
+    return [*dict.fromkeys(("all", "tables", "report", *own))]
+
+
+def require_targets(words: Sequence[str]) -> None:
+    """Require that no word is a rule for one result: a target names those of all data sets."""
+    from texgs.workflow.stage_table import RULES
+
+    for word in words:
+        if word in RULES and word not in target_names():
+            raise ArgumentError(no_target(word))
 
 
 def require_pairs(words: Sequence[str]) -> None:

@@ -1,5 +1,7 @@
 """Mistakes in the choice of a fit or an edit, told before any job runs and any earlier result goes."""
 
+import shlex
+
 from texgs.config.compose import compose
 from texgs.config.dataset import Dataset
 from texgs.config.project import Words, members
@@ -126,4 +128,5 @@ def require_edit(stage: Stage, words: Words) -> None:
     if config.edit.base is not None and not scene_before(config).is_file():
         name, before = chain[-2]
         verb = method_of(compose(before).edit).stage
-        raise MissingDataError(f"edit.base: {name} is not done yet; run texgs {verb} edit={name} first")
+        same = shlex.join([word for word in words if not word.startswith("edit=")])
+        raise MissingDataError(f"edit.base: {name} is not done yet; run texgs {verb} {same} edit={name} first")

@@ -11,6 +11,7 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import TYPE_CHECKING, Any
 
+from texgs.core.errors import ConfigError
 from texgs.core.progress import progress
 from texgs.report.results import CutResult, CutWay
 from texgs.workflow.inputs import has_scene, has_volume, scene_and_volume
@@ -57,6 +58,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.scene.twin import Twin
     from texgs.workflow.stages.pse import chain
 
+    if not settings.planes:
+        raise ConfigError("metric.cut_planes: expected at least 1 plane, got 0; experiment=cuts has 20")
     scene = read_scene(inputs["scene"])
     device = torch_device(settings.fit.device)
     composed: Any = scene.open(device)
