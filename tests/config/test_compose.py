@@ -86,7 +86,7 @@ def test_a_copied_file_does_not_take_the_place_of_its_original(tmp_path, monkeyp
         ("views.train.kind=ico", "views.train.kind: expected one of icosphere, spiral, orbit, got ico"),
         ("a=b=c", "a=b=c: expected key=value"),
         ("views", "views: expected key=value"),
-        ("dataset=[engine,sphere]", "dataset: expected one name, got [engine,sphere]; several go to datasets="),
+        ("dataset=[engine,sphere]", "dataset: expected one name, got [engine,sphere]; several go to data"),
         ("edit.text.instruction=dark, red!", "needs quotes inside those of the shell, such as 'edit.text"),
         ("nonsense=1", "nonsense: no such key"),
         ("views.mapper=gpu", "views.mapper: this key is called views.renderer now"),

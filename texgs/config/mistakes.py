@@ -62,8 +62,8 @@ def sentence(error: Exception) -> str:
         return f"{where}{group}: expected one of {', '.join(known)}, got {name}{hint}"
     if isinstance(error, OverrideParseException):
         return (
-            f"{shortened(error.override)}: expected key=value; a value with commas, brackets, ', ! or = needs "
-            "quotes inside those of the shell, such as 'edit.text.instruction=\"make it gold!\"'"
+            f"{shortened(error.override)}: expected key=value; a value with commas, brackets, ', ! or = "
+            "needs quotes inside those of the shell, such as 'edit.text.instruction=\"make it gold!\"'"
         )
     if isinstance(error, TypeError) or "group override" in str(error):
         return "a group: expected the name of a file of conf/, such as dataset=engine, got something else"

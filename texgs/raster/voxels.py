@@ -121,7 +121,8 @@ def render_rays(grid: VoxelGrid, rays: Tensor, march: March | None = None) -> Ra
 
     Density and coefficients are interpolated trilinearly every `march.step`, from half a step after the ray
     enters the lattice; alpha = 1 - exp(-max(0, density) length), colour = max(0, 0.5 + Y(direction) . sh).
-    Differentiable in `grid.rows` after the first, but for distance. For a definition see `texgs.raster.reference.voxels`.
+    Differentiable in `grid.rows` after the first, but for distance. For a definition see
+    `texgs.raster.reference.voxels`.
 
     Args:
         grid: its density and occupancy up to date, see `VoxelGrid.refresh`.

@@ -129,4 +129,6 @@ def require_edit(stage: Stage, words: Words) -> None:
         name, before = chain[-2]
         verb = method_of(compose(before).edit).stage
         same = shlex.join([word for word in words if not word.startswith("edit=")])
-        raise MissingDataError(f"edit.base: {name} is not done yet; run texgs {verb} {same} edit={name} first")
+        raise MissingDataError(
+            f"edit.base: {name} is not done yet; run texgs {verb} {same} edit={name} first"
+        )

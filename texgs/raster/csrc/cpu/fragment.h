@@ -29,9 +29,7 @@ inline float ndc_scale(const Raster& r) {
 }
 
 // Depth z in them less that of a depth `origin`, without cancellation.
-TEXGS_INLINE vf centred_ndc(const Raster& r, vf z, vf origin) {
-    return vf(ndc_scale(r)) * (z - origin) / (z * origin);
-}
+TEXGS_INLINE vf centred_ndc(const Raster& r, vf z, vf origin) { return vf(ndc_scale(r)) * (z - origin) / (z * origin); }
 
 inline void load_plane(const Raster& r, int tile, const float* image, float* plane);
 inline void prefetch_planes(const Raster& r, int tile, const float* image, int planes);
