@@ -245,6 +245,10 @@ def test_what_cannot_be_shown_leaves_no_picture_of_before(chromium, tmp_path):
             page.get_by_role("checkbox", name="TF02").uncheck()
             expect(told).to_be_hidden(timeout=WAIT)
             assert (shown(page) != nothing).any(2).all(), "a difference of 0 is white"
+            expect(page.locator("#marks"), "they are seen from the camera").to_be_hidden()
+            page.locator("#picture").dblclick()
+            expect(page.get_by_text("Double click on the scene in another mode")).to_be_visible(timeout=WAIT)
+            page.get_by_role("button", name="Close").click()
             page.get_by_role("checkbox", name="TF02").check()
             expect(told).to_be_visible(timeout=WAIT)
 
@@ -535,8 +539,13 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
             with served(scene_file, port) as (_, again):
                 assert again == address
                 expect(lost).to_be_hidden(timeout=WAIT)
+                page.get_by_role("checkbox", name="Headlight").uncheck()
+                azimuth = page.get_by_role("spinbutton", name="Azimuth of the light, degrees, as a number")
+                azimuth.fill("70")
+                azimuth.press("Enter")
                 page.get_by_role("button", name="Make the other edits again").click()
-                expect(page.get_by_role("listitem")).to_have_text(steps)
+                newer = [steps[0], "light azimuth 70°, polar 10°", steps[1]]
+                expect(page.get_by_role("listitem"), "the newer light stays").to_have_text(newer)
                 expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked()
             expect(page.get_by_text("texgs view has ended. Start it again")).to_be_visible(timeout=WAIT)
             undone = page.get_by_text("Not done: there is no connection to texgs view.")

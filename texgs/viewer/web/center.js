@@ -9,6 +9,10 @@ const GLIDE = 300; // milliseconds
 export function centerByDoubleClick(page, isLocked) {
   page.canvas.addEventListener("dblclick", async ({ offsetX, offsetY }) => {
     if (isLocked()) return;
+    if (!page.isOfCamera) {
+      page.notices.tell("This is a training view. Double click on the scene in another mode to turn around a point.");
+      return;
+    }
     const { camera, canvas, renderer, shown, state } = page, [width, height] = renderer.size();
     const place = [offsetX * width / canvas.clientWidth, offsetY * height / canvas.clientHeight];
     const point = await renderer.pointAt(camera, state.scene, shown, place.map(Math.floor));

@@ -19,7 +19,7 @@ export class PlaneHandles {
 
   /**
    * @param {Cuts} cuts
-   * @param {object} page - with camera, canvas, shown and state
+   * @param {object} page - with camera, canvas, isOfCamera, shown and state
    */
   constructor(cuts, page) {
     this.#cuts = cuts;
@@ -35,9 +35,8 @@ export class PlaneHandles {
 
   /** Draw the arrows as the camera sees them. */
   draw() {
-    const { before, only, mode } = this.#page.shown;
-    const isFromHere = this.#page.state.scene.volume || !["truth", "difference"].includes(mode);
-    const isShown = this.#isOn && !before && !only && isFromHere;
+    const { before, only } = this.#page.shown;
+    const isShown = this.#isOn && !before && !only && this.#page.isOfCamera;
     this.#cuts.held.forEach((held, index) => {
       if (held) this.#drawn[index] ??= this.#make(index);
       this.#drawn[index]?.group.toggleAttribute("hidden", !(isShown && held && this.#drawn[index].place(held)));

@@ -88,8 +88,10 @@ class Page extends ScenePage {
   #offerAgain(lost) {
     const said = "The server was started again, without the edits of this page. "
       + "New segments and looks come back with a scene that was saved: open its file.";
+    const { scene } = this.state;
     this.notices.offer(said, "Make the other edits again", () => {
-      super.makeEdits(lost);
+      const newer = difference(scene, this.state.scene).map(({ part, key }) => `${part} ${key}`);
+      super.makeEdits(lost.filter(({ part, key }) => !newer.includes(`${part} ${key}`)));
     });
   }
 

@@ -86,6 +86,11 @@ export class ScenePage {
     return this.#shown;
   }
 
+  /** Whether the picture is seen from the camera, and not from the nearest training view. */
+  get isOfCamera() {
+    return Boolean(this.state.scene.volume) || !["truth", "difference"].includes(this.#shown.mode);
+  }
+
   /** Show something else of the scene. */
   show(values) {
     Object.assign(this.#shown, values);
@@ -99,6 +104,7 @@ export class ScenePage {
   /** Draw a frame; while something moves, a fast one now and a whole one at rest. */
   draw(moving = false) {
     this.renderer.draw(this.camera, this.state.scene, { moving, ...this.#shown });
+    get("marks").toggleAttribute("hidden", !this.isOfCamera);
     for (const each of this.#marks) each.draw();
     clearTimeout(this.#resting);
     const still = Math.max(REST, 2 * (this.renderer.took ?? 0), this.time?.pause ?? 0);
