@@ -40,11 +40,18 @@ def empty(tmp_path, monkeypatch):
         ("surfels fit=paper fit.material_range=bounded", AMBIENT),
         ("surfels fit=quick fit.texture.texels=0", "fit.texture.texels: expected"),
         ("gaussians fit=gaussians_quick fit.gaussians.seeds.kind=voxels", HULL),
+        ("cuts fit=demo", "metric.cut_planes: expected at least 1 plane, got 0; experiment=cuts has 20"),
     ],
 )
 def test_a_verb_wants_a_fit_that_it_can_work_on(capsys, words, message):
     assert main([*words.split(), "dataset=sphere", "dataset.volume.size=16", "tracking=none"]) == 2
     assert message in capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.parametrize("verb", ["volume", "transfer", "views", "mesh"])
+def test_a_verb_of_a_volume_wants_a_data_set_with_one(capsys, verb):
+    assert main([verb, "dataset=vortex", "tf=TF01", "tracking=none"]) == 2
+    assert "data set vortex: starts from views, it has no volume" in capsys.readouterr().err.splitlines()[-1]
 
 
 @pytest.mark.parametrize(

@@ -175,6 +175,11 @@ def test_a_mistake_is_one_sentence(rows, words, message):
         GALLERY.inputs(compose((*ENGINE, *given, *([grid(rows)] if rows else ()))))
 
 
+def test_without_an_edit_the_scene_is_shown_as_it_is_fitted():
+    ((_, rows),) = grids("edits=[none]")
+    assert [place["scene"] for place in rows["front"] if place["show"] == "scene"] == ["quick/none"]
+
+
 def test_parts_that_an_edit_adds_can_be_changed():
     changes = "['TF02/lobe.opacity=0.5', 'background=#000000']"
     words = ("edits=[crimson]", grid(f"[{{edit: crimson, changes: {changes}}}]"))

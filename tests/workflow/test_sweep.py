@@ -136,6 +136,7 @@ def test_swept_values_are_told_in_full():
         (("fit.low=1,2",), "fit.low: no such key"),
         (("fit.low_pass=2,2",), "sweep.over: expected different variants, got 2 twice"),
         (("fit.low_pass=interval(0,1)",), "fit.low_pass=interval(0,1): expected several values, such as"),
+        (("fit.low_pass=glob(*)",), "fit.low_pass=glob(*): expected several values, such as"),
         (("sweep.name=x", "sweep.over=[fit.low_pass]"), "fit.low_pass: expected several values, such as"),
         (("fit.low_pass=2,6", "sweep=views"), "fit.low_pass=2,6: sweep=views has variants of its own"),
         ((*words_of(a=[]), "sweep.over=['fit.low_pass=2,6']"), "sweep.over: expected none beside"),

@@ -20,7 +20,7 @@ from hydra._internal.config_repository import CachingConfigRepository, ConfigRep
 from hydra._internal.config_search_path_impl import ConfigSearchPathImpl
 from hydra._internal.defaults_list import create_defaults_list
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override, OverrideType, Quote, QuotedString
+from hydra.core.override_parser.types import Override, OverrideType, Quote, QuotedString, ValueType
 from hydra.core.plugins import Plugins
 from hydra.errors import HydraException
 from hydra.plugins.config_source import ConfigResult
@@ -174,7 +174,8 @@ def several(word: str) -> list[str]:
 
     That is true instead of Hydra's True, and 100000 instead of 1e5 where an integer is expected.
     """
-    if not has_several(word) or not (parsed(word).is_choice_sweep() or parsed(word).is_range_sweep()):
+    enumerable = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
+    if not has_several(word) or parsed(word).value_type not in enumerable:
         raise ConfigError(
             f"{word}: expected several values, such as fit.low_pass=2,6 or fit.seed=range(3); "
             "a list stands in brackets, a text with a comma in quotes"

@@ -49,9 +49,12 @@ def page_steps(scene: Scene, steps: str | int = "all") -> PageSteps | None:
         steps: "all"; "one", that of the scene; or a number N, each N-th, of which one is that of the scene.
 
     Raises:
-        ArgumentError: if `steps` is none of these, or a file of a step cannot be read.
+        ArgumentError: if `steps` is none of these, or more than "all" without a series, or a file of a step
+            cannot be read.
     """
     if scene.series is None or scene.time is None:
+        if steps != "all":
+            raise ArgumentError(f"steps: expected a scene of a series in time for {steps!r:.100}, got another")
         return None
     total = len(scene.series.steps)
     every = {"all": 1, "one": total}.get(str(steps)) or (int(steps) if str(steps).isdecimal() else 0)

@@ -59,8 +59,8 @@ def page_volume(scene: Scene, budget: float = PAGE_VOLUME) -> PageVolume:
         ArgumentError: if the scene names no volume, it cannot be read or has several channels, or the budget
             is none.
     """
-    if not 0 < budget < np.inf:
-        raise ArgumentError(f"volume: expected a size in MB above 0, got {budget:g}")
+    if not isinstance(budget, int | float) or not 0 < budget < np.inf:
+        raise ArgumentError(f"volume: expected a size in MB above 0, got {budget!r}")
     source = volume_of(scene)
     if source.has_channels:
         raise ArgumentError(

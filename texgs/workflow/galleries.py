@@ -10,7 +10,7 @@ from texgs.config.project import members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.core.names import close
-from texgs.edit.method import method_of
+from texgs.edit.method import NO_METHOD, method_of
 from texgs.workflow.edits import added_parts, ancestry, chain
 from texgs.workflow.inputs import prepared_volume, sibling, with_recipe
 from texgs.workflow.locate import tf_names
@@ -111,7 +111,8 @@ def all_looks(config: Config) -> GridKeys:
     columns = [ShotKeys("volume", show="volume"), ShotKeys("as fitted")]
     for name in config.edits:
         able = takers(config, name, "gallery")
-        if method_of(compose((f"edit={name}",)).edit).is_look:
+        edit = compose((f"edit={name}",)).edit
+        if edit.method != NO_METHOD and method_of(edit).is_look:
             titles = [name] if len(able) == 1 else [f"{name}, {recipe}" for recipe in able]
             columns += [ShotKeys(title, name, recipe) for title, recipe in zip(titles, able, strict=True)]
     words = "The volume, the scene of the first recipe as fitted, and all its new looks."

@@ -11,7 +11,7 @@ from texgs.config.schema import NO_SWEEP, Config
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.edit.method import NO_METHOD
 from texgs.fitting.kinds import fit_specs
-from texgs.workflow.locate import tf_names, views_folder
+from texgs.workflow.locate import require_volume, tf_names, views_folder
 from texgs.workflow.stage import edit_folder, folder_of, made, plain
 from texgs.workflow.sweep import changes, fit_variant
 
@@ -56,6 +56,7 @@ def is_first_recipe(config: Config) -> bool:
 
 def prepared_volume(config: Config) -> dict[str, Path]:
     """Return what stage `volume` writes."""
+    require_volume(config.dataset)
     return {"volume": made("volume", config)}
 
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from texgs.config.dataset import BasicTF, Volume
+from texgs.config.dataset import BasicTF, Dataset, Volume
 from texgs.config.project import check_name
 from texgs.config.schema import Config
 from texgs.core.cache import cache_folder
@@ -12,16 +12,21 @@ from texgs.core.names import file_name
 from texgs.workflow.moments import in_time, matching
 
 
+def require_volume(dataset: Dataset) -> None:
+    """Require a data set that starts from a volume."""
+    if dataset.views_folder is not None:
+        raise ConfigError(
+            f"data set {dataset.name}: starts from views, it has no volume; texgs sheet shows them"
+        )
+
+
 def source_file(config: Config) -> Path | None:
     """Return the volume's file, or folder of slices; None if it is generated.
 
     A file that can be downloaded may be still to come; for others MissingDataError says how to get them.
     """
     dataset, volume = config.dataset, config.dataset.volume
-    if dataset.views_folder is not None:
-        raise ConfigError(
-            f"data set {dataset.name}: starts from views, it has no volume; texgs sheet shows them"
-        )
+    require_volume(dataset)
     if (volume.generator is None) == (volume.file is None):
         raise ConfigError(
             f"dataset.volume of {dataset.name}: expected a generator or a file, "

@@ -58,8 +58,6 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.scene.twin import Twin
     from texgs.workflow.stages.pse import chain
 
-    if not settings.planes:
-        raise ConfigError("metric.cut_planes: expected at least 1 plane, got 0; experiment=cuts has 20")
     scene = read_scene(inputs["scene"])
     device = torch_device(settings.fit.device)
     composed: Any = scene.open(device)
@@ -203,6 +201,13 @@ def applies(config: Config) -> bool:
     return is_asked and has_scene(config) and has_volume(config)
 
 
+def inputs_of(config: Config) -> dict[str, Path]:
+    """Return the scene and its volume, once there is a plane to cut by."""
+    if not config.metric.cut_planes:
+        raise ConfigError("metric.cut_planes: expected at least 1 plane, got 0; experiment=cuts has 20")
+    return scene_and_volume(config)
+
+
 STAGE = Stage(
     "cuts",
     order=145,
@@ -219,7 +224,7 @@ STAGE = Stage(
             "their centres, as other viewers of splats do."
         },
     ),
-    inputs=scene_and_volume,
+    inputs=inputs_of,
     work=work,
     applies=applies,
 )

@@ -118,7 +118,7 @@ STAGE = Stage(
         gpu=("fit",),
         shown={"mesh.png": "The isosurface of the volume, the mesh of the fit, and its distance from it."},
     ),
-    inputs=lambda config: {**model_of(last_phase(config))(config), **prepared_volume(config)},
+    inputs=lambda config: {**prepared_volume(config), **model_of(last_phase(config))(config)},
     work=work,
     applies=applies,
 )
