@@ -358,7 +358,7 @@ def test_words_are_one_step_or_none(scene):
     ("file", "options", "message"),
     [
         ("a.html", {"volume": "big"}, "volume: expected a size in MB above 0, got 'big'"),
-        ("a.html", {"steps": "one"}, "steps: expected a scene of a series in time for 'one', got another"),
+        ("a.html", {"steps": "one"}, "steps: expected a series in time for 'one', got another scene"),
         ("a.html", {"size": 1}, "options of html: no such key 'size'; expected steps, volume"),
         ("a.html", {"volume": 1.0}, "volume: expected the volume that the scene was made from, got none"),
         (

@@ -156,7 +156,7 @@ def test_steps_that_are_none_are_refused(scene, steps):
 def test_a_scene_without_a_series_has_none_of_it(scene):
     alone = replace(scene, series=None, time=None)
     assert page_steps(alone) is None
-    with pytest.raises(ArgumentError, match="^steps: expected a scene of a series in time for 'one', got"):
+    with pytest.raises(ArgumentError, match=r"^steps: expected a series in time for 'one', got"):
         page_steps(alone, "one")
     html = scene_page(alone, "x").text
     assert '"held"' not in html

@@ -54,7 +54,7 @@ def page_steps(scene: Scene, steps: str | int = "all") -> PageSteps | None:
     """
     if scene.series is None or scene.time is None:
         if steps != "all":
-            raise ArgumentError(f"steps: expected a scene of a series in time for {steps!r:.100}, got another")
+            raise ArgumentError(f"steps: expected a series in time for {steps!r:.100}, got another scene")
         return None
     total = len(scene.series.steps)
     every = {"all": 1, "one": total}.get(str(steps)) or (int(steps) if str(steps).isdecimal() else 0)
