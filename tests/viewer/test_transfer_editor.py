@@ -122,8 +122,12 @@ def test_points_and_functions_are_added_and_removed(chromium, sphere_file):
             page.locator("#transfer svg"),
             page.get_by_role("slider", name=re.compile("^Point . of")),
         )
-        page.get_by_role("button", name="high", exact=True).click()
+        name = page.get_by_role("button", name="high", exact=True)
+        name.press("Enter")
+        expect(name).to_be_focused()
         expect(points).to_have_count(3)
+        low, value, high = (float(points.nth(1).get_attribute(f"aria-value{x}")) for x in ("min", "now", "max"))
+        assert low <= value <= high
         editor.dblclick(position={"x": 10, "y": 10})
         expect(points).to_have_count(4)
         points.nth(0).dblclick()

@@ -1,6 +1,6 @@
 // Cameras that are kept, to go back to and to make a film through. They are a part of the page's link.
 
-import { element } from "./inputs.js";
+import { element, replaceButtons } from "./inputs.js";
 import { numbersIn } from "./link.js";
 
 const MOST = 20; // as the server has it
@@ -43,7 +43,7 @@ export class Bookmarks {
   #set(poses) {
     this.poses = poses;
     this.#keep.disabled = poses.length >= MOST;
-    this.#list.replaceChildren(...poses.map((pose, index) => this.#item(pose, index)));
+    replaceButtons(this.#list, poses.map((pose, index) => this.#item(pose, index)));
     this.#page.draw(); // which writes the link
   }
 

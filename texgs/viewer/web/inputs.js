@@ -41,6 +41,13 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
+/** Replace buttons, or items with some; the one in the place of that with the focus has it then, or the last. */
+export function replaceButtons(root, items) {
+  const buttons = () => [...root.querySelectorAll("button")], focused = buttons().indexOf(document.activeElement);
+  root.replaceChildren(...items);
+  if (focused >= 0) buttons().at(Math.min(focused, buttons().length - 1))?.focus();
+}
+
 /** With its first letter in upper case. */
 export function capital(text) {
   return text[0].toUpperCase() + text.slice(1);

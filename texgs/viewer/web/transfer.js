@@ -2,7 +2,7 @@
 // the volume at once, through an edit of the scene.
 
 import { added, colored, fresh, meanColor, moved, newName, removed, shifted } from "./functions.js";
-import { colorInput, element, fromHex, gesture, toHex } from "./inputs.js";
+import { colorInput, element, fromHex, gesture, replaceButtons, toHex } from "./inputs.js";
 import { TransferPicture } from "./transfer_picture.js";
 
 const FIRST = "#e69f00"; // of a new function
@@ -111,7 +111,7 @@ export class TransferEditor {
   // ---- Inputs -----------------------------------------------------------------
 
   #showNames() {
-    this.#parts.names.replaceChildren(...Object.entries(this.#all).map(([name, tf]) => {
+    replaceButtons(this.#parts.names, Object.entries(this.#all).map(([name, tf]) => {
       const isTried = name in this.#tried, swatch = element("span", { className: "swatch" });
       swatch.style.background = toHex(meanColor(tf));
       const title = `Edit ${name}, ${isTried ? "tried on the volume" : "as fitted"}`;

@@ -105,7 +105,8 @@ export class TransferPicture {
       const fill = toHex(key === "color" ? channels : at(tf.color, value));
       const state = key === chosen.key && index === chosen.index ? "chosen" : "";
       const circle = drawn("circle", { cx: this.#x(value), cy: y, r: RADIUS, fill, class: state, tabindex: 0,
-        role: "slider", "aria-label": `${what} ${index + 1} of ${name}`, "aria-valuenow": value });
+        role: "slider", "aria-label": `${what} ${index + 1} of ${name}`,
+        "aria-valuemin": this.range[0], "aria-valuemax": this.range[1], "aria-valuenow": value });
       Object.assign(circle.dataset, { key, index });
       return circle;
     });
