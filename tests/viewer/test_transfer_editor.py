@@ -126,7 +126,8 @@ def test_points_and_functions_are_added_and_removed(chromium, sphere_file):
         name.press("Enter")
         expect(name).to_be_focused()
         expect(points).to_have_count(3)
-        low, value, high = (float(points.nth(1).get_attribute(f"aria-value{x}")) for x in ("min", "now", "max"))
+        said = (points.nth(1).get_attribute(f"aria-value{each}") for each in ("min", "now", "max"))
+        low, value, high = map(float, said)
         assert low <= value <= high
         editor.dblclick(position={"x": 10, "y": 10})
         expect(points).to_have_count(4)
