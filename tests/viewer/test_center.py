@@ -14,9 +14,13 @@ BACKGROUND = "There is only background."
 
 
 def camera_of(page):
-    """The camera that the command of the view has."""
-    page.wait_for_timeout(800)
-    words = re.sub(r" -(\d)", r" =\1", page.locator("#options").inner_text()).split("--")[1:]
+    """The camera that the command of the view has, once it stays."""
+    options = page.locator("#options")
+    commands = ["", options.inner_text()]
+    while commands[-1] != commands[-2]:
+        page.wait_for_timeout(800)
+        commands.append(options.inner_text())
+    words = re.sub(r" -(\d)", r" =\1", commands[-1]).split("--")[1:]
     numbers = {name: [float(x.replace("=", "-")) for x in rest] for name, *rest in map(str.split, words)}
     angles = [numbers[name][0] for name in ("azimuth", "polar", "radius", "fov")]
     return orbit(*angles, *(int(numbers[name][0]) for name in ("width", "height")), numbers["target"])
@@ -26,7 +30,9 @@ def turns_around_what_is_seen(page, scene):
     """Double click on something and on the background; look at the command of the view before and after."""
     before, box = camera_of(page), page.locator("#picture").bounding_box()
     x, y = round(SEEN[0] * box["width"]), round(SEEN[1] * box["height"])
+    begun = page.locator("#options").inner_text()
     page.mouse.dblclick(box["x"] + x, box["y"] + y)
+    expect(page.locator("#options")).not_to_have_text(begun, timeout=WAIT)
     after = camera_of(page)
     torch.testing.assert_close(after.viewmat[:3, :3], before.viewmat[:3, :3], atol=1e-5, rtol=0)
     depth = scene.open().render(before, scene.light, scene.edits, outputs=("depth",)).depth
