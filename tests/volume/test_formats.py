@@ -105,6 +105,47 @@ def test_mrc_with_other_axes_is_refused(tmp_path):
         open_source(tmp_path / "v.mrc")
 
 
+@pytest.mark.parametrize("end", "<>")
+@pytest.mark.parametrize(("word", "flag", "is_signed"), [(27, 20140, True), (39, 1, True), (39, 0, False)])
+def test_bytes_of_mrc_have_a_sign_where_the_header_says_so(tmp_path, end, word, flag, is_signed):
+    values = np.arange(-60, 60, dtype=np.int8).reshape(4, 5, 6)
+    header = np.zeros(256, f"{end}i4")
+    header[[0, 1, 2, 7, 8, 9, 16, 17, 18]] = [6, 5, 4, 6, 5, 4, 1, 2, 3]
+    header[10:16] = np.array([6, 5, 4, 90, 90, 90], f"{end}f4").view(f"{end}i4")
+    header[52:54] = np.frombuffer(b"MAP DD\0\0" if end == "<" else b"MAP \x11\x11\0\0", f"{end}i4")
+    header[38], header[word] = 1146047817 if word == 39 else 0, flag
+    (tmp_path / "v.mrc").write_bytes(header.tobytes() + values.tobytes())
+    source = open_source(tmp_path / "v.mrc")
+    expected = values if is_signed else values.view(np.uint8)
+    assert source.dtype == expected.dtype
+    np.testing.assert_array_equal(source.slices(0, 4), expected)
+
+
+@pytest.mark.parametrize("name", ["v.mrc", "v.gipl"])
+def test_a_file_that_is_cut_off_is_refused_where_itk_would_fill_it(tmp_path, name):
+    sitk.WriteImage(sitk.GetImageFromArray(sample_values("int16")), path := tmp_path / name)
+    whole = path.read_bytes()
+    np.testing.assert_array_equal(open_source(path).slices(0, 11), sample_values("int16"))
+    path.write_bytes(whole[:-1])
+    with pytest.raises(ArgumentError, match=rf"cut off: expected {len(whole)} bytes, found {len(whole) - 1}"):
+        open_source(path).slices(0, 11)
+
+
+def test_axes_along_one_line_are_refused(tmp_path):
+    sitk.WriteImage(sitk.GetImageFromArray(sample_values("int16")), path := tmp_path / "v.mha")
+    path.write_bytes(path.read_bytes().replace(b"1 0 0 0 1 0 0 0 1", b"1 0 0 1 0 0 0 0 1"))
+    with pytest.raises(ArgumentError, match="expected three independent axes, got a singular matrix"):
+        open_source(path)
+
+
+@pytest.mark.parametrize(("kind", "text"), [("short", "40000"), ("uchar", "-5"), ("uint", "-1")])
+def test_numbers_in_text_that_do_not_fit_the_type_are_refused(tmp_path, kind, text):
+    header = f"NRRD0004\ntype: {kind}\ndimension: 3\nsizes: 2 2 2\nencoding: ascii\n\n"
+    (tmp_path / "v.nrrd").write_text(header + f"1 2 3 4 5 6 7 {text}\n")
+    with pytest.raises(ArgumentError, match=rf"expected samples of \w+, got {text}"):
+        open_source(tmp_path / "v.nrrd").slices(0, 2)
+
+
 def test_files_that_macos_leaves_are_no_slices(tmp_path):
     for number in (8, 9):
         tifffile.imwrite(tmp_path / f"s{number}.tif", np.full((4, 5), number, np.uint8))

@@ -112,9 +112,14 @@ def closest(directions: np.ndarray) -> AxisPermutation:
     """Find for each axis of space the stored axis that runs along it most nearly, and its sign.
 
     Directions [3, 3] are rows of unit length; where something is not finite, axes stay as they are stored.
+
+    Raises:
+        ArgumentError: if two axes run along one line, or all three in a plane.
     """
     if not np.isfinite(directions).all():
         return AS_STORED
+    if abs(np.linalg.det(directions)) < 1e-3:
+        raise ArgumentError(f"expected three independent axes, got a singular matrix: {directions.tolist()}")
     x, y, z = max(
         permutations(range(3)),
         key=lambda axes: sum(abs(directions[axis, along]) for along, axis in enumerate(axes)),

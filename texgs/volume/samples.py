@@ -72,13 +72,19 @@ def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
     """Unpack samples [Z, Y, X] of a type with byte order, as far as the header says and no further."""
     n_bytes = byte_count(dims, dtype)
     if stored.encoding == "text":
-        require_room(dims, dtype)
+        # What a narrow type cannot hold would begin again at its other end.
+        wide = dtype if dtype.kind == "f" or dtype.itemsize == 8 else np.dtype(np.int64)
+        require_room(dims, wide, n_bytes)
         with stored.path.open("rb") as file:
             file.seek(stored.offset + max(0, stored.skip))
-            values = np.fromfile(file, dtype, sep=" ")
+            values = np.fromfile(file, wide, sep=" ")
         if values.size != prod(dims):
             raise ArgumentError(f"expected {prod(dims)} samples, found {values.size}; is it cut off?")
-        return values.reshape(dims[::-1])
+        samples = values.astype(dtype)
+        if dtype.kind != "f" and (samples != values).any():
+            wrong = values[samples != values][0]
+            raise ArgumentError(f"expected samples of {dtype.name}, got {wrong}; is the header another's?")
+        return samples.reshape(dims[::-1])
     # The stream is in memory beside what it unpacks to, which is copied once from the library's own blocks.
     require_room(dims, dtype, stored.path.stat().st_size - stored.offset + n_bytes)
     # One byte more than there should be makes the library go to the end of its stream, and compare checksums.
