@@ -3,13 +3,20 @@ import pytest
 from scipy.stats import chisquare, kstest
 
 from texgs.core.camera import orbit
-from texgs.core.light import random_lights
+from texgs.core.errors import ArgumentError
+from texgs.core.light import Light, random_lights
 
 CAMERA = orbit(0, 0, 3, 30, 8, 8)
 
 
 def directions(lights):
     return np.stack([light.direction(CAMERA).numpy() for light in lights])
+
+
+@pytest.mark.parametrize("azimuth", [float("nan"), float("inf")])
+def test_an_azimuth_that_is_no_angle_is_refused(azimuth):
+    with pytest.raises(ArgumentError, match=f"light: expected an azimuth in degrees, got {azimuth}"):
+        Light("directional", azimuth)
 
 
 @pytest.mark.parametrize("seed", [(0,), (0, 2), (7, 1)])

@@ -120,7 +120,7 @@ NETWORKS = "expected the networks of a palette field"
         ("model", {"optics": {"low_pass": 2.0, "lens": 1}}, f"expected {SURFELS}"),
         ("model", {"optics": {"material": "wood"}}, "optics: expected values"),
         ("model", {"optics": {"low_pass": -1}}, "optics: expected values"),
-        ("model", {"optics": {"low_pass": "thin"}}, f"expected {SURFELS}"),
+        ("model", {"optics": {"low_pass": "thin"}}, "optics: expected values of texgs"),
         ("model", {"metadata": 3}, f"expected {SURFELS}"),
         ("model", {"tensors": {"means": None}}, "model: expected means, quats, scales, opacities"),
         ("model", {"tensors": {"texels": None}}, "expected tensor texels at stage texture, got"),

@@ -122,7 +122,7 @@ def test_a_file_that_is_named_twice_counts_once(tmp_path, capsys, monkeypatch):
 def test_the_verb_reads_whole_results_of_a_folder_and_names_others(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["tables", "mine"]) == 2
-    assert "no whole results below mine" in capsys.readouterr().err
+    assert "mine: expected a metrics file or a folder of results, got none" in capsys.readouterr().err
     for name, psnr in (("views", None), ("fit", 40.0)):
         folder = Path("mine", "scan", "TF01", name)
         work = claim(folder, {"settings": name})
@@ -152,7 +152,7 @@ def test_the_verb_reads_whole_results_of_a_folder_and_names_others(tmp_path, cap
 
 def test_results_of_two_folders_are_not_mixed(tmp_path):
     paths = []
-    for root in ("one", "two"):
+    for root in ("one", "scan/two"):  # a project may be named like its data
         shown = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")
         paths.append(tmp_path / root / "scan" / "TF01" / METRICS)
         paths[-1].parent.mkdir(parents=True)

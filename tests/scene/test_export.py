@@ -7,13 +7,14 @@ from tests.fields.surfels.ply_files import vertices
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import CAMERA, ball
 from texgs.core.errors import ArgumentError
+from texgs.core.geometry import quats_to_matrices
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texels import mean_texels, owners
 from texgs.scene.export import write_points
-from texgs.scene.joined import joined
+from texgs.scene.joined import joined, polydata_of
 
 EDITS = [PartEdit(palette=(0.9, 0.1, 0.4), opacity=0.6), PartEdit(visible=False), PartEdit(opacity=3.0)]
 
@@ -24,6 +25,17 @@ def plain(seed):
     first = p["texels"][p["offsets"]]
     p["texels"] = first.repeat_interleave(p["sizes"].long().prod(1), dim=0)
     return Surfels(p, ball(seed).shading)
+
+
+def test_normals_of_their_own_stay_in_a_scene():
+    one, other = ball(1), ball(2)
+    own = torch.randn(len(one), 4, generator=torch.Generator().manual_seed(0))
+    lit = Surfels({**one.parameters, "normals": own}, one.shading)
+    surfels = joined(Composition([lit, other]).parts, [PartEdit(), PartEdit()])
+    assert torch.equal(surfels.parameters["normals"], torch.cat([own, other.parameters["quats"]]))
+    expected = quats_to_matrices(surfels.parameters["normals"])[..., 2]
+    assert_close(torch.from_numpy(polydata_of(surfels).cell_data["Normals"]), expected)
+    assert "normals" not in joined(Composition([other]).parts, [PartEdit()]).parameters
 
 
 def test_owners_and_means_by_brute_force():

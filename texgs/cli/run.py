@@ -14,6 +14,7 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
 from types import FrameType
@@ -63,22 +64,24 @@ def snakemake(words: Sequence[str]) -> bool:
     try:
         from snakemake.cli import CliException, args_to_api, get_argument_parser, parse_args, parse_cores
         from snakemake.common import argparse as theirs
-        from snakemake.exceptions import print_exception
+        from snakemake.exceptions import WorkflowError, print_exception
 
         theirs.ArgumentParser.error = Parser.error
         sys.argv[:1] = ["snakemake"]  # what these parsers are of
         given, unknown = get_argument_parser().parse_known_intermixed_args(list(words))
     except RuntimeError as error:  # it looks for its own configuration in the user's home
         raise ArgumentError(f"HOME: snakemake needs a home folder ({error}); set HOME to one") from error
-    except CliException as error:
-        raise ArgumentError(f"{error} See snakemake --help.") from error
+    except (CliException, WorkflowError) as error:
+        raise ArgumentError(f"{str(error).rstrip('. ')}; see snakemake --help") from error
     require_pairs([word for word in words if word in (*given.targets, *unknown)])
+    require_free([word for word in words if word not in (*given.targets, *(given.config or ()))])
     require_targets(given.targets)
     chosen = [word for word in given.targets if WORD.fullmatch(word)]
     rest = [word for word in words if word not in chosen]
     sys.argv = ["snakemake", *rest]  # the Snakefile looks there
+    told = [*defaults(given), *located(rest)]
     try:
-        parser, options = parse_args([*defaults(given), *located(rest)])
+        parser, options = parse_args(told)
     except Exception as error:  # as the main of snakemake does
         print_exception(error)
         return False
@@ -154,6 +157,18 @@ def require_pairs(words: Sequence[str]) -> None:
             raise ArgumentError(f"{word}: expected {key}={after} in one word, got {word} alone")
 
 
+def require_free(words: Sequence[str]) -> None:
+    """Require that no option has taken an override for one of its values, as `--set-threads` takes many."""
+    from texgs.config.schema import Config
+    from texgs.workflow.plan import GROUPS
+
+    keys = {*GROUPS, *(each.name for each in fields(Config))}
+    for word in filter(WORD.fullmatch, words):
+        key, _, value = word.partition("=")
+        if key.partition(".")[0] in keys and not value.isdecimal():  # threads of a rule are a number
+            raise ArgumentError(f"{word}: the option before it takes it for a value of its own; put {word} first")
+
+
 def defaults(given: argparse.Namespace) -> list[str]:
     """Return options that hold where the user says nothing else: Snakefile of texgs, local profile.
 
@@ -172,12 +187,17 @@ def located(words: Sequence[str]) -> list[str]:
     """Return the words, with the path of a profile of texgs where only its name is given."""
     from texgs.config.project import PROFILES
 
-    return [
-        str(PROFILES / word)
-        if before == "--workflow-profile" and (PROFILES / word).is_dir() and not Path(word).exists()
-        else word
-        for before, word in zip(("", *words), words, strict=False)
-    ]
+    profile, located = "--workflow-profile", list[str]()
+    for word in words:
+        located += word.split("=", 1) if word.startswith(f"{profile}=") else [word]
+    for index, (option, name) in enumerate(pairwise(located), start=1):
+        if option != profile or name == "none" or Path(name).exists():
+            continue
+        if not (PROFILES / name).is_dir():
+            known = ", ".join(sorted(each.name for each in PROFILES.iterdir()))
+            raise ArgumentError(f"{profile}: expected {known} or a folder, got {name}")
+        located[index] = str(PROFILES / name)
+    return located
 
 
 def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:

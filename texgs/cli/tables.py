@@ -93,6 +93,8 @@ def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[L
         if each.is_file():
             paths.append(each)
             continue
+        if arguments.metrics and not each.is_dir():
+            raise ArgumentError(f"{each}: expected a metrics file or a folder of results, got none")
         files, outdated = earlier(str(each), Graph(), Checksums.load())
         paths += map(Path, files)
         left_out += [LeftOut(entry.what, entry.why, places) for entry, places in outdated.items()]

@@ -1,6 +1,7 @@
 """The one light of a view or of a scene."""
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Literal
 
 import numpy as np
@@ -21,6 +22,8 @@ class Light:
     def __post_init__(self) -> None:
         if self.kind not in ("headlight", "directional"):
             raise ArgumentError(f"light: expected headlight or directional, got {self.kind!r}")
+        if not isfinite(self.azimuth):
+            raise ArgumentError(f"light: expected an azimuth in degrees, got {self.azimuth:g}")
         if not abs(self.polar) <= 90:
             raise ArgumentError(f"light: expected a polar angle from -90 to 90 degrees, got {self.polar:g}")
 

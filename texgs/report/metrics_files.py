@@ -93,12 +93,18 @@ def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[Lef
     return records, [LeftOut(what, why, [])]
 
 
+def place_of(record: Record[Any]) -> tuple[str, ...]:
+    """Return the parts of a path from the folder of the data set on; a project may have the same name."""
+    parts, below = record.path.parts, {record.tf, "scene", "volume", "transfer", "gallery"}
+    places = [parts[index:] for index, part in enumerate(parts[:-1]) if part == record.dataset]
+    return next((each for each in places if each[1] in below), parts)
+
+
 def require_apart(records: Iterable[Record[Any]]) -> None:
     """Require that no two results are of the same job in different folders: numbers of both would mix."""
     known: dict[tuple[str, ...], Path] = {}
     for record in records:
-        parts = record.path.parts
-        place = parts[parts.index(record.dataset) :] if record.dataset in parts else parts
+        place = place_of(record)
         if (other := known.setdefault(place, record.path)) != record.path:
             raise ArgumentError(
                 f"{record.path}: expected results of one folder, got those of the same job in {other}, too; "

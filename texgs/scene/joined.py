@@ -35,15 +35,17 @@ def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
     Edits are one for each part, and behind it those of its segments; palette, opacity and visibility count.
     The model has one harmonic, that of the colour without light (palette + offset + mean texel).
     """
-    surfels = [_surfels(part, own) for part, own in zip(parts, by_part(parts, edits), strict=True)]
+    has_normals = any("normals" in part.model.parameters for part in parts)
+    by_model = zip(parts, by_part(parts, edits), strict=True)
+    surfels = [_surfels(part, own, has_normals) for part, own in by_model]
     together = {name: torch.cat([each[name] for each in surfels]) for name in surfels[0]}
     if not len(together["means"]):
         raise ArgumentError("models: expected at least one visible surfel, got none; show a model")
     return Surfels(together, parts[0].model.shading)
 
 
-def _surfels(part: Part, edits: Sequence[PartEdit]) -> dict[str, Tensor]:
-    """Return the raw parameters of a part's visible surfels."""
+def _surfels(part: Part, edits: Sequence[PartEdit], has_normals: bool) -> dict[str, Tensor]:
+    """Return the raw parameters of a part's visible surfels, where asked with normals of their own."""
     p = part.model.parameters
     colors = part.colored(edits).double()
     if "texels" in p:
@@ -51,6 +53,7 @@ def _surfels(part: Part, edits: Sequence[PartEdit]) -> dict[str, Tensor]:
     opacities = part.opacity(edits)
     surfels = {
         **{name: p[name] for name in ("means", "quats", "scales")},
+        **({"normals": p.get("normals", p["quats"])} if has_normals else {}),
         "opacities": opacities.clamp_max(MOST_OPAQUE).logit(),
         "sh": ((colors - 0.5) / Y00).float()[:, None],
     }
@@ -79,7 +82,8 @@ def polydata_of(model: Surfels, volume: SceneVolume | None = None) -> pyvista.Po
     rgba = torch.cat([color, opacities.reshape(-1, 1)], dim=1)
     mesh.cell_data["rgba"] = (255 * rgba).round().to(torch.uint8).cpu().numpy()
     mesh.cell_data["opacity"] = opacities.reshape(-1).cpu().numpy()
-    mesh.cell_data["Normals"] = turns[..., 2].cpu().numpy()
+    normals = quats_to_matrices(model.parameters.get("normals", quats))[..., 2]
+    mesh.cell_data["Normals"] = normals.cpu().numpy()
     mesh.set_active_scalars("rgba", preference="cell")
     return mesh
 

@@ -27,7 +27,7 @@ class Moment(NamedTuple):
 def matching(patterns: Iterable[str | Path]) -> list[Path]:
     """Return what paths with wildcards stand for, files or folders; each has to stand for some.
 
-    A path that is there stands for itself, and a folder that is there is no pattern, whatever is in its name.
+    What several of them stand for is there once. A path that is there stands for itself, and a folder that is there is no pattern, whatever is in its name.
     """
     files = []
     for pattern in map(str, patterns):
@@ -38,7 +38,7 @@ def matching(patterns: Iterable[str | Path]) -> list[Path]:
         if not matches:
             raise ArgumentError(f"expected files that are there, got {pattern}")
         files += matches
-    return files
+    return list(dict.fromkeys(files))
 
 
 def in_time(files: Sequence[Path]) -> list[Moment]:

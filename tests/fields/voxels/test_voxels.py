@@ -91,6 +91,32 @@ def test_the_lattice_of_equal_lattices_is_theirs():
         assert merged([grid, grid]).size == grid.size
 
 
+@pytest.mark.parametrize("ratio", [1.5, 2.0, 3.0, 5.0])
+@pytest.mark.parametrize("is_visible", [True, False])
+def test_a_finer_grid_leaves_no_holes_in_a_coarse_one(ratio, is_visible):
+    """In a block of one density, interpolation is exact at any spacing but at its faces."""
+
+    def block(half, density):
+        mask = torch.ones(16, 16, 16, dtype=torch.bool)
+        grid = voxel_grid(mask, [-half] * 3, 2 * half / 15, 0)
+        rows = pack_rows(torch.full((len(grid),), density), torch.zeros(len(grid), 1, 3))
+        return Voxels(grid.with_rows(torch.cat([grid.rows[:1], rows])))
+
+    coarse, fine = block(0.6, 3.0), block(0.6 / ratio, 1e-3)
+    edits = [PartEdit(), PartEdit(visible=is_visible)]
+    together = VoxelScene([coarse, fine]).render(CAMERA, edits=edits).alpha
+    alone = coarse.render(CAMERA).alpha
+    torch.testing.assert_close(together[18:22, 22:26], alone[18:22, 22:26], atol=0.03, rtol=0)
+
+
+def test_a_merged_lattice_has_at_most_1024_voxels_a_side():
+    long = voxel_grid(torch.ones(256, 8, 8, dtype=torch.bool), [0.0] * 3, 0.1, 0)
+    fine = voxel_grid(torch.ones(8, 8, 8, dtype=torch.bool), [0.0] * 3, 0.02, 0)
+    whole = merged([long, fine])
+    assert max(whole.size) == 1024
+    assert whole.spacing == pytest.approx(25.5 / 1023)
+
+
 def test_merging_makes_no_tensor_on_another_device_than_the_rows():
     grids = [noise(seed).grid for seed in range(2)]
     expected = merged(grids)

@@ -1,6 +1,5 @@
 """Files of basic models of surfels, at every stage of their fit."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -12,6 +11,7 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
+from texgs.core.names import is_number
 from texgs.core.tensor_file import read_tensor_file, require_json, write_tensor_file
 from texgs.fields.splats import GEOMETRY
 from texgs.fields.surfels.model import SHAPES, TEXTURE, Surfels
@@ -77,7 +77,7 @@ def _optics(stored: dict[str, Any]) -> ShadingModel:
     shading = ShadingModel(**stored)
     are_flags = isinstance(shading.local_viewer, bool) and isinstance(shading.facing, bool)
     known = shading.material in ("bounded", "paper") and are_flags
-    if not known or not 0 < float(shading.low_pass) < math.inf:
+    if not known or not is_number(shading.low_pass) or shading.low_pass <= 0:
         raise ArgumentError(f"optics: expected values of texgs {FORMAT} version {VERSION}, got {stored}")
     return shading
 

@@ -16,17 +16,21 @@ from texgs.fields.surfels.texels import owners
 
 FORMAT = "texgs-texture"
 VERSION = 1
+LAYOUT = {"texels": (3, torch.float32), "sizes": (2, torch.int32), "colors": (3, torch.float32)}
 
 
 def write_texture(path: str | Path, model: Surfels, metadata: Mapping[str, Any] | None = None) -> Path:
-    """Write texels and colours of a model, with the sizes of its textures to know it by, in one step.
+    """Write texels, in the order of their surfels, and colours of a model, in one step.
+
+    Sizes of the textures tell which model they are of.
 
     Metadata are JSON, such as what the style is.
     """
     if model.stage != "texture":
         raise ArgumentError(f"{path}: expected a model of stage texture, got {model.stage}")
     description = {"version": VERSION, "metadata": dict(metadata or {})}
-    tensors = {name: model.parameters[name] for name in ("texels", "colors", "sizes")}
+    p = model.parameters
+    tensors = {"texels": p["texels"][owners(p)[0]], "colors": p["colors"], "sizes": p["sizes"]}
     return write_tensor_file(path, FORMAT, description, tensors)
 
 
@@ -45,12 +49,15 @@ def with_texture(model: Surfels, path: str | Path) -> Surfels:
         if "colors" in texture:
             check.shape("colors", texture["colors"], "N 3", N=len(model))
     changed = {name: x.to(p[name].device) for name, x in texture.items() if name in ("texels", "colors")}
+    changed["texels"] = p["texels"].index_copy(0, owners(p)[0], changed["texels"])
     return replace(model, parameters={**p, **changed})
 
 
 def _require_texels(texture: Mapping[str, Tensor]) -> None:
-    shapes = [texture[name].shape[1:] for name in ("texels", "sizes") if name in texture]
-    if shapes != [(3,), (2,)] or len(texture["texels"]) != int(texture["sizes"].long().prod(1).sum()):
+    """Require texels and sizes, of the right type, that fit each other; colours only where there are some."""
+    given = {name: (*x.shape[1:], x.dtype) for name, x in texture.items()}
+    are_known = {"colors": (3, torch.float32), **given} == LAYOUT
+    if not are_known or len(texture["texels"]) != int(texture["sizes"].long().prod(1).sum()):
         raise ArgumentError("expected texels and sizes that fit each other; make it again")
 
 

@@ -17,6 +17,7 @@ from texgs.raster.voxels import March, render_view
 
 PIECE = 1 << 18  # voxels at a time
 SIDE = 8  # voxels that sides of a lattice are multiples of
+LARGEST = 1024  # voxels along a side of a lattice
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,8 @@ class VoxelScene(UnlitScene[Voxels]):
     def _merge(self, factors: tuple[float, ...]) -> Voxels:
         first, grids = self.fields[0], []
         for each, factor in zip(self.fields, factors, strict=True):
+            if factor == 0 and any(factors):
+                continue  # its voxels need no place
             density, sh = unpack_rows(each.grid.rows)
             grids.append(each.grid.with_rows(pack_rows(density * factor, sh)))
         return replace(first, grid=grids[0] if len(grids) == 1 else merged(grids))
@@ -102,18 +105,20 @@ class VoxelScene(UnlitScene[Voxels]):
 def merged(grids: Sequence[VoxelGrid]) -> VoxelGrid:
     """Merge grids to one in which densities add up, and colours are means weighted by them.
 
-    It has the finest of their spacings. Grids that have another lattice are interpolated at its voxels, which
-    blurs them by less than one.
+    It has the finest of their spacings, or that of LARGEST voxels along its longest side where this is wider.
+    Grids that have another lattice are interpolated at its voxels, which blurs them by less than one.
     """
-    spacing = min(grid.spacing for grid in grids)
     lower, upper = (torch.stack(ends) for ends in zip(*map(_bounds, grids), strict=True))  # [G, 3]
-    lower = lower.amin(0)
+    lower, upper = lower.amin(0), upper.amax(0)
+    spacing, longest = min(grid.spacing for grid in grids), float((upper - lower).max())
+    if round(longest / spacing, 3) > LARGEST - 1:
+        spacing = longest / (LARGEST - 1)
     # Extents are whole numbers of voxels but for rounding, where lattices are the same.
-    extents = ((upper.amax(0) - lower) / spacing).tolist()
+    extents = ((upper - lower) / spacing).tolist()
     size = [SIDE * ceil((round(extent, 3) + 1) / SIDE) for extent in extents]
     mask = torch.zeros(size, dtype=torch.bool, device=lower.device)
     for grid in grids:
-        _mark(mask, (grid.points() - lower) / spacing)
+        mask |= _reached(mask, (grid.points() - lower) / spacing, grid.spacing / spacing)
     degree = max(grid.degree for grid in grids)
     whole = voxel_grid(mask, lower.tolist(), spacing, degree)
     points = whole.points()
@@ -127,13 +132,24 @@ def _bounds(grid: VoxelGrid) -> tuple[Tensor, Tensor]:
     return lower, lower + grid.spacing * (grid.rows.new_tensor(grid.size) - 1)
 
 
-def _mark(mask: Tensor, places: Tensor) -> None:
-    """Set the eight voxels around places [n, 3] in a lattice."""
-    cell = places.floor().long()
-    most = cell.new_tensor(mask.shape) - 1
+def _reached(lattice: Tensor, places: Tensor, reach: float) -> Tensor:
+    """Return which voxels of a lattice [X, Y, Z] are less than `reach` from places [n, 3] along each axis.
+
+    Some that are a little farther are among them.
+    """
+    marked, cell = torch.zeros_like(lattice), places.floor().long()
+    most = cell.new_tensor(lattice.shape) - 1
     for offset in torch.cartesian_prod(*[cell.new_tensor([0, 1])] * 3):
         x, y, z = (cell + offset).clamp_min(0).minimum(most).unbind(1)
-        mask[x, y, z] = True
+        marked[x, y, z] = True
+    for axis in range(3):
+        near = marked.clone()
+        for step in range(1, min(ceil(round(reach, 3)), lattice.shape[axis])):
+            count = lattice.shape[axis] - step
+            near.narrow(axis, step, count).logical_or_(marked.narrow(axis, 0, count))
+            near.narrow(axis, 0, count).logical_or_(marked.narrow(axis, step, count))
+        marked = near
+    return marked
 
 
 def _blended(grids: Sequence[VoxelGrid], points: Tensor, degree: int) -> Tensor:

@@ -17,7 +17,7 @@ class GridStage:
     side: int = key(
         64, "voxels along the longest side of the box; twice those of the stage before", least=8, most=1024
     )
-    steps: int = key(100, "steps at this resolution", least=0)
+    steps: int = key(100, "steps at this resolution", least=1)
     total_variation: bool = key(True, "total variation is held down")
 
 
