@@ -166,7 +166,9 @@ def require_free(words: Sequence[str]) -> None:
     for word in filter(WORD.fullmatch, words):
         key, _, value = word.partition("=")
         if key.partition(".")[0] in keys and not value.isdecimal():  # threads of a rule are a number
-            raise ArgumentError(f"{word}: the option before it takes it for a value of its own; put {word} first")
+            raise ArgumentError(
+                f"{word}: the option before takes it for a value of its own; put {word} first"
+            )
 
 
 def defaults(given: argparse.Namespace) -> list[str]:

@@ -80,11 +80,11 @@ def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
             values = np.fromfile(file, wide, sep=" ")
         if values.size != prod(dims):
             raise ArgumentError(f"expected {prod(dims)} samples, found {values.size}; is it cut off?")
-        samples = values.astype(dtype)
-        if dtype.kind != "f" and (samples != values).any():
-            wrong = values[samples != values][0]
-            raise ArgumentError(f"expected samples of {dtype.name}, got {wrong}; is the header another's?")
-        return samples.reshape(dims[::-1])
+        stored_as = values.astype(dtype)
+        if dtype.kind != "f" and (wrong := stored_as != values).any():
+            got = values[wrong][0]
+            raise ArgumentError(f"expected samples of {dtype.name}, got {got}; is the header another's?")
+        return stored_as.reshape(dims[::-1])
     # The stream is in memory beside what it unpacks to, which is copied once from the library's own blocks.
     require_room(dims, dtype, stored.path.stat().st_size - stored.offset + n_bytes)
     # One byte more than there should be makes the library go to the end of its stream, and compare checksums.

@@ -27,7 +27,8 @@ class Moment(NamedTuple):
 def matching(patterns: Iterable[str | Path]) -> list[Path]:
     """Return what paths with wildcards stand for, files or folders; each has to stand for some.
 
-    What several of them stand for is there once. A path that is there stands for itself, and a folder that is there is no pattern, whatever is in its name.
+    What several of them stand for is there once. A path that is there stands for itself, and a folder that is
+    there is no pattern, whatever is in its name.
     """
     files = []
     for pattern in map(str, patterns):
