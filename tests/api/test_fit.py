@@ -12,6 +12,7 @@ import texgs
 from tests.fitting.short_fits import shorten
 from texgs.api.fit import compose_in, configuration
 from texgs.core.errors import ArgumentError, ConfigError, DeviceError
+from texgs.core.geometry import quats_to_matrices
 from texgs.core.io import write_json
 from texgs.metrics.quality import compare
 from texgs.scene.scene_file import read_scene
@@ -138,8 +139,11 @@ def test_surfels_as_polygons_lie_where_the_volume_does(scene):
     inside = scene.session.composition.parts[1].model.parameters["means"].numpy()
     physical = (inside + 0.5) * 19  # the volume goes from 0 to 19
     assert np.allclose(mesh.cell_centers().points[-len(inside) :], physical, atol=1e-3)
-    normals, corners = mesh.cell_data["Normals"][5], mesh.points[30:36] - mesh.points[30:36].mean(axis=0)
-    assert np.abs(corners @ normals).max() < 1e-4 * np.abs(corners).max()
+    p = scene.session.composition.parts[0].model.parameters
+    disc, lit = (quats_to_matrices(p[name])[5, :, 2].numpy() for name in ("quats", "normals"))
+    corners = mesh.points[30:36] - mesh.points[30:36].mean(axis=0)
+    assert np.abs(corners @ disc).max() < 1e-4 * np.abs(corners).max()
+    assert np.allclose(mesh.cell_data["Normals"][5], lit, atol=1e-6)
     scene["outer"].visible = False
     try:
         rest = scene.to_pyvista()

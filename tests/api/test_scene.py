@@ -366,6 +366,9 @@ def test_words_are_one_step_or_none(scene):
             {"kind": "mesh", "voxels": 1},
             "options of mesh: no such key 'voxels', did you mean voxel?",
         ),
+        ("a.ply", {"kind": "mesh", "voxel": "x"}, "voxel: expected a number, got 'x'"),
+        ("a.ply", {"kind": "mesh", "views": 12.5}, "views: expected a whole number from 1 on, got 12.5"),
+        ("a.ply", {"kind": "mesh", "size": "a"}, "size: expected a whole number from 1 on, got 'a'"),
         ("a.glb", {"voxel": 0.1}, "options of gltf: no such key 'voxel'; expected device"),
     ],
 )

@@ -271,6 +271,10 @@ def test_image_data_that_are_a_part_of_others_keep_their_place():
         (field(4, 4, 4), {"crop": (0, 4 / 2, 0, 4, 0, 4)}, "crop: expected 6 whole numbers, got"),
         ("a.raw", {"dims": 512, "dtype": "uint8"}, "dims: expected 3 whole numbers, got 512"),
         ("a.raw", {"dims": (8, 8, 16 / 2)}, r"dims: expected 3 whole numbers, got \[8, 8, 8.0\]"),
+        ("a.raw", {"dims": (2, 2, 2), "skip": "16"}, "skip: expected a whole number from 0 on, got '16'"),
+        ("a.nii", {"time": "0"}, "time: expected a whole number from 0 on, got '0'"),
+        (field(4, 4, 4), {"up": ["+y"]}, r"up: expected one of .*, got \['\+y'\]"),
+        (field(4, 4, 4), {"method": ["mean"]}, "method: expected one of"),
         ("a.txt", {"dims": (2, 2, 2), "column": 0}, "column: expected a whole number from 1 on, got 0"),
     ],
 )

@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Mapping, Sequence
-from numbers import Integral
 from operator import index
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from texgs.api.display import as_python
 from texgs.core.errors import ArgumentError, located
+from texgs.core.names import check_count
 from texgs.volume.axes import along, lattice
 from texgs.volume.grid import Grid, Triple
 
@@ -69,15 +69,10 @@ def keys_of_format(keys: Mapping[str, Any]) -> dict[str, Any]:
         plain["dims"] = whole("dims", plain["dims"], 3)
     if isinstance(plain.get("series"), int):
         plain["series"] = str(plain["series"])  # DICOM has text
-    if plain.get("column") is not None:
-        check_count("column", plain["column"])
+    for key, least in (("column", 1), ("skip", 0), ("time", 0)):
+        if plain.get(key) is not None:
+            check_count(key, plain[key], least)
     return plain
-
-
-def check_count(name: str, value: Any, least: int = 1) -> None:
-    """Require a whole number."""
-    if not isinstance(value, Integral) or value < least:
-        raise ArgumentError(f"{name}: expected a whole number from {least} on, got {value!r}")
 
 
 def of_array(data: Any) -> np.ndarray:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from itertools import count
 from math import isfinite
+from numbers import Integral
 from pathlib import Path
 from typing import SupportsFloat
 from unicodedata import category
@@ -118,3 +119,9 @@ def require_numbers(**values: object) -> None:
     for name, value in values.items():
         if not isinstance(value, SupportsFloat):
             raise ArgumentError(f"{name}: expected a number, got {value!r:.100}")
+
+
+def check_count(name: str, value: object, least: int = 1) -> None:
+    """Require a whole number, by the name of an argument."""
+    if not isinstance(value, Integral) or value < least:
+        raise ArgumentError(f"{name}: expected a whole number from {least} on, got {value!r:.100}")

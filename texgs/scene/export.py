@@ -11,6 +11,7 @@ import torch
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Frame
+from texgs.core.names import check_count, require_numbers
 from texgs.fields import files
 from texgs.fields.field import Field, Look
 from texgs.fields.gaussians.files import write_ply as write_gaussians
@@ -55,6 +56,11 @@ class Export:
     size: int = 512  # of these views, pixels
     drop_unseen: bool = False  # compact: no texture for surfels that no view sees
     device: torch.device | str = "cpu"
+
+    def __post_init__(self) -> None:
+        require_numbers(opacity=self.opacity, voxel=self.voxel)
+        check_count("views", self.views)
+        check_count("size", self.size)
 
     def cameras(self, frame: Frame) -> list[Camera]:
         """Return views of all that is framed."""

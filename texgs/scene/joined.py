@@ -64,8 +64,8 @@ def polydata_of(model: Surfels, volume: SceneVolume | None = None) -> pyvista.Po
     """Return surfels, see `joined`, as hexagons of 1.5 standard deviations.
 
     They lie in the coordinates of the volume, +y up; in world units where there is none. Cells have `rgba`
-    (uint8, straight alpha), `opacity` and `Normals`; colours are those without light, of the palette, offset
-    and mean texel.
+    (uint8, straight alpha), `opacity` and `Normals`, those that light sees; colours are those without light,
+    of the palette, offset and mean texel.
     """
     import pyvista
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from math import inf, prod
-from numbers import Integral
 from pathlib import Path
 from shutil import disk_usage
 from typing import Any, BinaryIO
@@ -12,7 +11,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 from texgs.core.memory import GIB
-from texgs.core.names import is_number
+from texgs.core.names import check_count, is_number
 from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
 from texgs.volume.nrrd_file import WORDS, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
@@ -175,11 +174,10 @@ def _check_keys(nan_value: float | None, reduce: int, method: str, up: str) -> N
     """Refuse what is out of range."""
     if nan_value is not None and not (is_number(nan_value) and abs(nan_value) <= np.finfo(np.float32).max):
         raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
-    if not isinstance(reduce, Integral) or reduce < 1:
-        raise ArgumentError(f"reduce: expected a whole number from 1 on, got {reduce!r}")
-    if method not in REDUCERS:
+    check_count("reduce", reduce)
+    if method not in [*REDUCERS]:
         raise ArgumentError(f"method: expected one of {', '.join(REDUCERS)}, got {method!r}")
-    if up not in UPRIGHT:
+    if up not in [*UPRIGHT]:
         raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up}")
 
 

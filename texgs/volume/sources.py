@@ -146,7 +146,7 @@ def _open_raw(
         raise ArgumentError(f"endian: expected little or big, got {endian!r}")
     try:
         stored = np.dtype(dtype).newbyteorder("<" if endian == "little" else ">")
-    except TypeError as error:
+    except (SyntaxError, TypeError) as error:
         raise ArgumentError(f"dtype: expected a name such as uint8 or float32, got {dtype!r}") from error
     check_lattice(dims, stored)
     size = path.stat().st_size
