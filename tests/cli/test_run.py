@@ -92,7 +92,7 @@ def test_a_dry_run_lists_each_job_where_that_is_asked_for(tmp_path):
             2,
             "run: dataset=sphere: the option before takes it",
         ),
-        (["-R", "views", "fit.seed=a"], 2, "run: fit.seed=a: the option before takes it"),
+        (["--set-threads", "edit=2", "fit.seed=3"], 2, "run: fit.seed=3: the option before takes it"),
         (["--resources", "mem_mb=100", "dataset=sphere"], 2, "which is not an integer; see snakemake --help"),
         (["--workflow-profile=slrum"], 2, "--workflow-profile: expected local, slurm or a folder, got slrum"),
         (["reprot"], 2, "texgs run: reprot: no such target, did you mean report?"),

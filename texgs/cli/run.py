@@ -164,8 +164,9 @@ def require_free(words: Sequence[str]) -> None:
 
     keys = {*GROUPS, *(each.name for each in fields(Config))}
     for word in filter(WORD.fullmatch, words):
-        key, _, value = word.partition("=")
-        if key.partition(".")[0] in keys and not value.isdecimal():  # threads of a rule are a number
+        key, _, value = word.lstrip("+~").partition("=")
+        is_of_rule = key in GROUPS and value.isdecimal()  # threads, such as edit=2
+        if key.partition(".")[0] in keys and not is_of_rule:
             raise ArgumentError(
                 f"{word}: the option before takes it for a value of its own; put {word} first"
             )

@@ -175,7 +175,7 @@ def _check_keys(nan_value: float | None, reduce: int, method: str, up: str) -> N
     if nan_value is not None and not (is_number(nan_value) and abs(nan_value) <= np.finfo(np.float32).max):
         raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
     check_count("reduce", reduce)
-    if method not in [*REDUCERS]:
+    if method not in [*REDUCERS]:  # a list, as others may have no hash
         raise ArgumentError(f"method: expected one of {', '.join(REDUCERS)}, got {method!r}")
     if up not in [*UPRIGHT]:
         raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up}")
