@@ -41,6 +41,12 @@ def test_overrides_are_given_once():
         overrides(["dataset=engine"], ["overrides=views=small"])
 
 
+@pytest.mark.parametrize("entry", ["engine", "x=1"])
+def test_what_snakemake_cannot_read_is_told(entry):
+    with pytest.raises(ArgumentError, match=f"--config: expected KEY=VALUE, such as fit=quick, got {entry}"):
+        overrides(["dataset=engine"], [entry])
+
+
 @pytest.mark.workflow
 @pytest.mark.parametrize(
     ("words", "profile"),

@@ -206,7 +206,12 @@ def located(words: Sequence[str]) -> list[str]:
 def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
     """Return the words as one entry of snakemake's `--config`, which reads values as YAML."""
     import yaml
+    from snakemake.cli import parse_config
 
+    try:
+        parse_config(config)
+    except ValueError as error:
+        raise ArgumentError(f"--config: expected KEY=VALUE, such as fit=quick, got {' '.join(config)}") from error
     if not words:
         return []
     if any(entry.startswith("overrides=") for entry in config):

@@ -25,7 +25,9 @@ OF_NUMBERS, OF_KINDS = "views", "kinds_of_views"  # the paper's sweep over numbe
 ONLY_SEEDS = "seeds"  # name of a sweep over nothing else, and of its only variant
 ELSEWHERE = {  # keys whose values have a list of their own
     **{key: f"sweep.{listed}" for key, listed in SEEDS.items()},
-    **dict.fromkeys(("edit", "edit.name"), "edits=[...]"),
+    **dict.fromkeys(("edit", "edit.name", "edits"), "edits=[...]"),
+    **dict.fromkeys(("dataset", "datasets"), "datasets=[...]"),
+    **{key: f"{key}=[...]" for key in ("fits", "experiments", "sweep.seeds", "sweep.edit_seeds")},
 }
 
 
@@ -187,13 +189,13 @@ def check_variants(by_variant: Mapping[str, Sequence[str]]) -> None:
         if not name:
             raise ConfigError("sweep.variants: expected a name for each variant, got an empty one")
         for change in listed:
+            if elsewhere := ELSEWHERE.get(key_of(change)):
+                raise ConfigError(f"sweep.variants.{name}: got {change}, whose values go to {elsewhere}")
             if group_of(change) not in (*OF_FITS, OF_EDITS):
                 raise ConfigError(
                     f"sweep.variants.{name}: expected overrides of views, fit, device or edit, got {change}; "
-                    "the rest is the same for all variants, and several data sets go to datasets=[...]"
+                    "the rest is the same for all variants"
                 )
-            if elsewhere := ELSEWHERE.get(key_of(change)):
-                raise ConfigError(f"sweep.variants.{name}: got {change}, whose values go to {elsewhere}")
 
 
 def check_seeds(config: Config) -> None:
