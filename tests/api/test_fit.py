@@ -1,6 +1,7 @@
 """Fits from Python: the stages of the workflow without a project, and the fit in seconds."""
 
 import json
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -97,6 +98,11 @@ def test_results_are_a_table(scene, folder):
     assert (row.dataset, row.recipe) == ("ball", "quick")
     with pytest.raises(ArgumentError, match="expected results of texgs run, got none"):
         texgs.results(folder / "nothing")
+    copy = folder / "copy" / "ball"
+    shutil.copytree(folder / "ball", copy)
+    with pytest.raises(ArgumentError, match="got those of the same job in"):
+        texgs.results(folder)
+    shutil.rmtree(copy.parent)
 
 
 def test_results_of_a_stage_need_nothing_but_their_folder(tmp_path):
@@ -173,13 +179,11 @@ def test_models_in_seconds(ball, monkeypatch, tmp_path):
         ({"seed": -1}, ArgumentError, "seed: expected a whole number from 0 on, got -1"),
         ({"size": 8}, ArgumentError, "size: expected a whole number of pixels, at least 16, got 8"),
         ({"size": "big"}, ArgumentError, "size: expected a whole number of pixels, at least 16, got 'big'"),
-        (
-            {"overrides": "views.step=3"},
-            ArgumentError,
-            "overrides: expected a list of words, got 'views.step=3'",
-        ),
+        ({"overrides": "views.step=3"}, ArgumentError, "overrides: expected a list of words such as"),
+        ({"overrides": [3]}, ArgumentError, "overrides: expected a list of words such as"),
         ({"overrides": ["views.trian=3"]}, ConfigError, "views.trian: no such key"),
         ({"functions": [TFS["inner"], TFS["inner"]]}, ArgumentError, "TF01 and TF02"),
+        ({"functions": {1: TFS["inner"]}}, ArgumentError, "functions: expected names that are words, got 1;"),
         ({"functions": {"1x": TFS["inner"]}}, ConfigError, "1x"),
         ({"functions": TFS["inner"].scaled(0, 9)}, ArgumentError, "expected a range within the data"),
         ({"recipe": "now", "functions": {"a/b": TFS["inner"]}}, ArgumentError, "functions"),

@@ -98,6 +98,8 @@ def test_slips_are_sentences(scene, tmp_path):
         scene.segment("spot", [1, 2, 3], model="TF01")
     with pytest.raises(ArgumentError, match=r"edit.parts: expected some of TF01, TF02, got TF03"):
         scene.style("glass", recipe="preview", parts="TF03")
+    with pytest.raises(ArgumentError, match=r"parts: expected .*, got"):
+        scene.style("glass", recipe="preview", parts=3)
     with pytest.raises(ArgumentError, match=r"width: expected a whole number of pixels, got 8\.5"):
         scene.render(width=8.5)
     with pytest.raises(ArgumentError, match="width: expected a number, got '200'"):

@@ -187,11 +187,12 @@ def test_a_channel_of_a_file_has_its_colour_and_window(tmp_path):
 
 def test_a_picture_is_what_the_caster_sees_over_the_background():
     volume = texgs.Volume(field(20, 21, 22))
-    picture = volume.render({"a": RED, "b": BLUE}, 10, 15, 40, 30, light=(50, 20), background="#ff8000")
+    light, background = np.array([50, 20]), np.array([1, 128 / 255, 0])
+    picture = volume.render({"a": RED, "b": BLUE}, 10, 15, 40, 30, light=light, background=background)
     lens = frame_of(volume.grid, [RED, BLUE]).lens(width=40, height=30)
     tf, caster = overlay({"a": RED, "b": BLUE}), Caster(volume.grid, Appearance())
     rgba = caster.cast(tf, orbit(10, 15, *lens), Light("directional", 50, 20)).rgba.double().numpy()
-    expected = rgba[..., :3] + (1 - rgba[..., 3:]) * np.array([1, 128 / 255, 0])
+    expected = rgba[..., :3] + (1 - rgba[..., 3:]) * background
     assert np.abs(np.asarray(picture) - 255 * expected.clip(0, 1)).max() <= 0.5001
 
 
@@ -258,6 +259,7 @@ def test_image_data_that_are_a_part_of_others_keep_their_place():
 @pytest.mark.parametrize(
     ("data", "keys", "message"),
     [
+        (field(4, 4, 4), {"name": 3}, "name: expected words, got 3"),
         (field(4, 4, 4), {"spacing": 2}, "spacing: expected three numbers x, y, z, got 2"),
         (field(4, 4, 4), {"nan_value": "0"}, "nan_value: expected a finite float32, got 0"),
         ([[1, 2], [3]], {}, r"data: expected an array \[Z, Y, X\], got list"),

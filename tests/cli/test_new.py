@@ -265,6 +265,11 @@ def test_z_of_nifti_points_up_and_keys_may_have_their_whole_name(conf, scan):
         (["{scan}", "--name", "a/b"], "--name: expected a letter"),
         (["{scan}", "dims=[1,2,3]"], "leave them out"),
         (["{scan}", "--count", "0"], "count"),
+        (["{scan}", "--count", "2", "--tf", "a.json"], "--count: expected none beside --tf"),
+        (["{scan}", "file=b.npy"], "in front, to be the only file"),
+        (["{scan}", "--series", "{scan}"], "expected two files at least"),
+        (["{scan}", "--series", "{scan}", "up=+z"], "up=+z: the option before takes it for a file"),
+        (["{scan}", "--tf", "a.json", "up=+z"], "up=+z: the option before takes it for a file"),
         *((["{scan}", "--name", name], "texgs new: --name: ") for name in NO_NAMES),
     ],
 )

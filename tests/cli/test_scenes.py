@@ -185,6 +185,7 @@ def test_a_mistake_in_an_edit_writes_nothing(request, capsys, of, word, message)
     [
         (["--frames", "0"], "--frames: expected at least 1, got 0"),
         (["--seconds", "0.01"], "--frames: expected at least 1, got 0.25"),
+        (["--seconds", "2", "--fps", "0"], "--fps: expected more than 0, got 0"),
         (["--transparent"], "--transparent: expected PNG without --compare and --caption, got "),
         (["--path", "orbit", "--output", "x.png"], "x.png: expected one frame, got 72; use .gif, .mp4 or"),
         (["--radius", "0"], "radius: expected more than 0, got 0"),
@@ -333,6 +334,10 @@ def test_pictures_go_into_no_result_of_the_workflow(scene, tmp_path, monkeypatch
     for verb in ("render", "check"):
         assert main([verb, "scene.yaml"]) == 2
         assert "--output: . is a result of the workflow, which makes it anew" in capsys.readouterr().err
+    assert main(["export", "scene.yaml", "--to", "scene.html"]) == 2
+    assert "--to: . is a result of the workflow, which makes it anew" in capsys.readouterr().err
+    assert main(["render", "scene.yaml", "--path", "orbit", "--output", str(tmp_path)]) == 2
+    assert f"--output: {tmp_path} is a result of the workflow" in capsys.readouterr().err
     (tmp_path / "own").mkdir()
     assert main(["render", "scene.yaml", "--width", "16", "--output", "own/a.png"]) == 0
 

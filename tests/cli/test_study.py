@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+import shutil
 from itertools import permutations
 
 import av
@@ -117,12 +118,21 @@ def test_the_seed_decides_the_order_and_the_id_is_that_of_the_clips(results, tmp
     [
         (["--edits", "arf_quick"], r"got only one of each \(engine arf_quick\); run edits of other methods"),
         (["--size", "8"], "--size: expected 64 to 1024 pixels, got 8"),
+        (["--frames", "0"], "--frames: expected at least 1, got 0"),
+        (["results=nothing"], "nothing: expected a folder of results, got none"),
     ],
 )
 def test_a_study_that_cannot_be_made_leaves_nothing(results, tmp_path, capsys, words, message):
     assert main(["study", *words, "--output", "out"]) == 2
     assert re.search(message, capsys.readouterr().err)
     assert not (tmp_path / "out").exists()
+
+
+def test_copies_of_results_are_not_asked_about(results, tmp_path, capsys):
+    shutil.copytree(results / "engine", results / "before" / "engine")
+    assert main(["study", *SMALL]) == 2
+    assert "got those of the same job in" in capsys.readouterr().err
+    assert not (results / "study").exists()
 
 
 def test_a_study_is_not_overwritten(results, capsys):

@@ -94,6 +94,10 @@ def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
     assert "Left out: data set wood: no file." in said.out
     assert "Left out: 1 metrics file: of another version of texgs" in said.err
     assert "## Table 1. Data sets" not in said.out, "tables without rows are not printed"
+    for option in ("--missing", "--study"):
+        for verb in ("tables", "report"):
+            assert main([verb, str(path), option, "nothing.json"]) == 2
+            assert f"{option}: expected a file that texgs" in capsys.readouterr().err
 
 
 def test_tables_of_a_folder_go_there(tmp_path, capsys, monkeypatch):

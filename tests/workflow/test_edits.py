@@ -149,6 +149,8 @@ def test_what_an_edit_by_hand_starts_from_is_told_at_once(tmp_path):
         match=r"lobe is not done yet; run texgs edit_segment dataset=engine results=.* edit=lobe first",
     ):
         require(words)
+    with pytest.raises(MissingDataError, match=r"edit_segment dataset=engine results=\S* edit=lobe first"):
+        require((*words[::2], "edit=glass", "edit.base=lobe", "edit.parts=[TF01]"))
     with pytest.raises(ConfigError, match=r"edit\.base: expected the file of a scene or one of"):
         require((*words, "edit.base=none-such"))
     with pytest.raises(ConfigError, match=r"edit\.parts: expected some of"):

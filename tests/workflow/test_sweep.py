@@ -127,7 +127,7 @@ def test_swept_values_are_told_in_full():
         ((*words_of(a=[]), "sweep.seeds=[]"), "sweep.seeds: expected at least one, got none"),
         ((*words_of(a=[]), "sweep.edit_seeds=[1,1]"), "sweep.edit_seeds: expected different seeds, got 1"),
         ((*words_of(a=[]), "fit.seed=3"), f"fit.seed: {SEEDS}, got fit.seed=3"),
-        (words_of(a=["dataset=sphere"]), "sweep.variants.a: got dataset=sphere, whose values go to datasets=[...]"),
+        (words_of(a=["dataset=sphere"]), "a: got dataset=sphere, whose values go to datasets=[...]"),
         (("results=x,y",), f"sweep.variants.x: {OVERRIDES}, got results=x"),
         (("dataset=engine,fuel",), "got dataset=engine, whose values go to datasets=[...]"),
         (words_of(a=["fit.seed=1"]), "sweep.variants.a: got fit.seed=1, whose values go to sweep.seeds"),

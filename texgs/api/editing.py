@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -223,9 +223,10 @@ class Editing:
         from texgs.viewer.looks import looks_of
 
         before, device = self.session.scene, self.session.composition.device
-        names = [parts] if isinstance(parts, str) else [*parts]
+        if isinstance(parts, str) or not isinstance(parts, Iterable):
+            parts = [parts]
         try:
-            edit = typed(Edit, {"name": method, "method": method, "parts": names, method: values})
+            edit = typed(Edit, {"name": method, "method": method, "parts": [*parts], method: values})
         except ValueMismatch as error:
             raise ArgumentError(str(error)) from error
         method_of(edit).of(edit).check()

@@ -72,8 +72,10 @@ def fit(
     if recipe not in recipes:
         known, hint = ", ".join(recipes), close(recipe, recipes)
         raise ArgumentError(f"recipe: expected one of {known}, got {recipe}{hint}")
-    if isinstance(overrides, str):
-        raise ArgumentError(f"overrides: expected a list of words, got {overrides!r}; put [] around it")
+    if isinstance(overrides, str) or not all(isinstance(each, str) for each in overrides):
+        raise ArgumentError(
+            f"overrides: expected a list of words such as 'views.width=400', got {overrides!r}"
+        )
     if recipe == NOW and overrides:
         raise ArgumentError(f"overrides: not for the recipe {NOW}; leave them out")
     torch_device(device)

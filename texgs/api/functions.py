@@ -54,6 +54,8 @@ def named(functions: AnyFunctions) -> dict[str, TransferFunction]:
     if not isinstance(functions, Mapping):
         functions = {f"TF{number:02d}": each for number, each in enumerate(functions, start=1)}
     for name, each in functions.items():
+        if not isinstance(name, str):
+            raise ArgumentError(f"functions: expected names that are words, got {name!r}; name it in quotes")
         if not isinstance(each, TransferFunction):
             raise ArgumentError(
                 f"{name}: expected a texgs.TransferFunction, got {type(each).__name__}; make one "

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.core.errors import ArgumentError
+from texgs.report.metrics_files import require_apart
 from texgs.report.results import plain
 from texgs.workflow.graph import current_records
 
@@ -24,7 +25,8 @@ def results(folder: str | Path = "results") -> pandas.DataFrame:
     comes from one that has been made anew since; these have no rows.
 
     Raises:
-        ArgumentError: if there are no results in the folder, or all are of another version of texgs.
+        ArgumentError: if there are no results in the folder, all are of another version of texgs, or two
+            folders in it have those of the same job.
     """
     import pandas
 
@@ -33,6 +35,7 @@ def results(folder: str | Path = "results") -> pandas.DataFrame:
         warnings.warn(f"left out: {entry}", stacklevel=2)
     if not records:
         raise ArgumentError(f"{folder}: expected results of texgs run, got none; name their folder")
+    require_apart(records)
     rows = []
     for record in records:
         facts = {name: getattr(record, name) for name in FACTS}

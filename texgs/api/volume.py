@@ -84,6 +84,8 @@ class Volume:
         folder: str | Path | None = None,
         **keys: Any,
     ) -> None:
+        if name is not None and not isinstance(name, str):
+            raise ArgumentError(f"name: expected words, got {name!r}")
         self.name = name = default_name(data) if name is None else name
         self._scratch = TemporaryDirectory(prefix="texgs-") if folder is None else None
         self.folder = Path(folder if folder is not None else self._scratch.name)  # type: ignore[union-attr]
@@ -170,8 +172,8 @@ class Volume:
         shown = named(self.suggest() if functions is None else functions)
         caster = Caster(self.grid, replace(Appearance(), step=step))
         view = camera_of(frame_of(self.grid, shown.values()), azimuth, polar, width, height)
-        rgba = caster.cast(overlays(shown), view, light_of(light)).rgba
-        behind = rgba.new_tensor(color("background", background))
+        rgba = caster.cast(overlays(shown), view, light_of(as_python(light))).rgba
+        behind = rgba.new_tensor(color("background", as_python(background)))
         return picture_of(quantized(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))
 
     def to_pyvista(self) -> pyvista.ImageData:

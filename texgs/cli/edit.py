@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.cli.options import add_device, add_lens, lens_of, option, require_own_place
+from texgs.cli.options import add_device, add_lens, lens_of, option, require_free, require_own_place
 from texgs.core.errors import ArgumentError, located
 from texgs.core.lens import Lens
 from texgs.core.names import SCENES, new_part_file, require_name
@@ -112,9 +112,10 @@ def run_series(arguments: argparse.Namespace) -> int:
     from texgs.workflow.moments import matching
     from texgs.workflow.series import make_series
 
+    require_free(arguments.files)
     with located("--files"):
         files = matching(arguments.files)
-    words = [f"dataset.volume.{word}" for word in arguments.overrides]
+    words = [f"dataset.volume.{word.removeprefix('dataset.volume.')}" for word in arguments.overrides]
     settings = compose(("dataset.volume.generator=null", *words)).dataset.volume if words else None
     scene, device = read_scene(arguments.scene), torch_device(arguments.device)
     print(make_series(scene, files, arguments.output, device, settings))
@@ -221,6 +222,9 @@ def clicks_of(arguments: argparse.Namespace, lens: Lens, device: torch.device) -
 def require_output(arguments: argparse.Namespace) -> None:
     """Require a name and a file for the segment and its scene, unless there is a preview only."""
     if arguments.preview:
+        if arguments.preview.suffix != ".png":
+            raise ArgumentError(f"--preview: expected a file that ends in .png, got {arguments.preview}")
+        require_own_place(arguments.preview, "--preview")
         return
     require_name(arguments.name, "--name")
     if not arguments.output:

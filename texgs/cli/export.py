@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.cli.options import add_device, option
+from texgs.cli.options import add_device, option, require_own_place
 from texgs.core.errors import ArgumentError
 from texgs.core.names import EXPORTS, SCENES
 from texgs.viewer import PAGE_VOLUME
@@ -71,6 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.source = only_scene(arguments.source)
     kind = kind_of(arguments)
     require_taken(arguments, kind)
+    require_own_place(arguments.to, "--to")
     scene = read_scene(arguments.source) if arguments.source.suffix in SCENES else None
     if kind == "html":
         print(of_page(arguments, scene))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.cli.new_tfs import with_tfs
+from texgs.cli.options import require_free
 from texgs.config.compose import compose
 from texgs.config.dataset_text import as_yaml, plain_tf, require_read
 from texgs.config.project import NO_NAME, check_name, name_of
@@ -63,14 +64,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Make a data set of the volume, with all its channels, and say what comes next."""
     from texgs.config.project import members, own_folder, shown
     from texgs.volume.sources import tells_superior
-    from texgs.volume.tf_files import read_tf
     from texgs.workflow.locate import series_files
     from texgs.workflow.series import moments_of
 
-    if arguments.count is not None and arguments.count < 1:
-        raise ArgumentError(f"--count: expected at least 1, got {arguments.count}")
-    for path in arguments.tf or ():
-        read_tf(path)  # a mistake in it is told before the volume is read
+    check_options(arguments)
     name = arguments.name or name_of(arguments.file)
     overrides = [word.removeprefix("dataset.volume.") for word in arguments.overrides]
     if "up" not in changed(overrides) and tells_superior(arguments.file):
@@ -85,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
     field, keys = array_of(given.dataset.volume), changed(overrides)
     channels = channels_of(given.dataset.volume, field)
-    if len(files) == 1 and not channels:
+    if len(files) == 1 and len(channels) == 1:
         moments_of(files, given.dataset.volume)  # of a file or folder that has several
     if field and "reduce" not in keys:
         given = reduced(given, field, len(channels))
@@ -100,6 +97,23 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"{shown(target)}: {count} {functions}{of} to edit; {picture} shows them")
     print(f"then: texgs run dataset={name} fit=quick")
     return 0
+
+
+def check_options(arguments: argparse.Namespace) -> None:
+    """Require options that go together, and files of functions without mistakes, before a volume is read."""
+    from texgs.volume.tf_files import read_tf
+
+    if arguments.count is not None and arguments.count < 1:
+        raise ArgumentError(f"--count: expected at least 1, got {arguments.count}")
+    if arguments.tf and arguments.count is not None:
+        raise ArgumentError("--count: expected none beside --tf, whose files are the functions; leave it out")
+    require_free([*arguments.series, *map(str, arguments.tf or ())])
+    if any(word.removeprefix("dataset.volume.").startswith("file=") for word in arguments.overrides):
+        raise ArgumentError(
+            f"file=...: expected {arguments.file}, in front, to be the only file; leave it out"
+        )
+    for path in arguments.tf or ():
+        read_tf(path)
 
 
 def array_of(volume: Volume) -> Source | None:

@@ -1,6 +1,7 @@
 """What the command lines of verbs share: how mistakes are told, options with a default, places, cameras."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -28,12 +29,22 @@ def option(parser: argparse.ArgumentParser, name: str, default: Any, words: str,
     parser.add_argument(name, **{"type": type(default), "default": default, "help": shown, **more})
 
 
-def require_own_place(output: Path) -> None:
+def require_own_place(output: Path, name: str = "--output") -> None:
     """Require an output outside of the folders of jobs, which are made anew with all that is in them."""
-    if (output.parent / METRICS).exists():
-        raise ArgumentError(
-            f"--output: {output.parent} is a result of the workflow, which makes it anew; choose another"
-        )
+    for folder in (output, output.parent):
+        if (folder / METRICS).exists():
+            raise ArgumentError(
+                f"{name}: {folder} is a result of the workflow, which makes it anew; choose another"
+            )
+
+
+def require_free(files: Sequence[str]) -> None:
+    """Require that no option that takes several files has taken a KEY=VALUE behind them."""
+    for word in files:
+        if "=" in word and not any(Path(word).parent.glob(Path(word).name)):
+            raise ArgumentError(
+                f"{word}: the option before takes it for a file of its own; put {word} in front of it"
+            )
 
 
 def add_device(parser: argparse.ArgumentParser) -> None:

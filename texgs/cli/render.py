@@ -177,6 +177,8 @@ def frames_of(arguments: argparse.Namespace) -> int:
     if arguments.seconds is not None:
         if not arguments.seconds > 0:
             raise ArgumentError(f"--seconds: expected more than 0, got {arguments.seconds:g}")
+        if not arguments.fps > 0:
+            raise ArgumentError(f"--fps: expected more than 0, got {arguments.fps:g}")
         count = arguments.seconds * arguments.fps
     if not 1 <= count <= MOST_FRAMES:
         bound = "at least 1" if count < 1 else f"at most {MOST_FRAMES}"

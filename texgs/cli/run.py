@@ -136,7 +136,7 @@ def target_names() -> list[str]:
     from texgs.workflow.stage_table import RULES
 
     own = (each.target for each in RULES.values() if each.target)
-    return [*dict.fromkeys(("all", "tables", "report", *own))]
+    return [*dict.fromkeys(("all", "downloads", "tables", "report", *own))]
 
 
 def require_targets(words: Sequence[str]) -> None:
@@ -211,7 +211,8 @@ def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
     try:
         parse_config(config)
     except ValueError as error:
-        raise ArgumentError(f"--config: expected KEY=VALUE, such as fit=quick, got {' '.join(config)}") from error
+        given = " ".join(config)
+        raise ArgumentError(f"--config: expected KEY=VALUE, such as fit=quick, got {given}") from error
     if not words:
         return []
     if any(entry.startswith("overrides=") for entry in config):

@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from texgs.cli.options import add_device, option
+from texgs.cli.tables import given_path
 from texgs.core.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -23,11 +24,13 @@ KEY, PAGE = "key.json", "ballot.html"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to compare, how to show it, and where to."""
-    parser.add_argument("results", nargs="?", type=Path, default=Path("results"), help="folder (results)")
+    parser.add_argument(
+        "results", nargs="?", type=given_path, default=Path("results"), help="folder (%(default)s)"
+    )
     parser.add_argument(
         "--edits", nargs="+", default=[], metavar="EDIT", help="edits to compare; default all with a new look"
     )
-    option(parser, "--output", Path("results/study"), "folder")
+    parser.add_argument("--output", type=Path, help="folder; default study in the results")
     option(parser, "--seed", 0, "random seed for the order of clips")
     option(parser, "--size", 384, "width and height of a clip, pixels")
     option(parser, "--frames", 150, "frames of a turn, 25 a second")
@@ -38,18 +41,24 @@ def run(arguments: argparse.Namespace) -> int:
     """Write ballot.html, then key.json; print the questions."""
     from texgs.core.check import torch_device
     from texgs.core.io import write_bytes
-    from texgs.report.metrics_files import below, read_known
+    from texgs.report.metrics_files import below, read_known, require_apart
     from texgs.study.ballot_page import ballot_page
     from texgs.study.questions import KINDS, Study, questions_of, write_key
 
-    key, page = arguments.output / KEY, arguments.output / PAGE
+    output = arguments.output or arguments.results / "study"
+    key, page = output / KEY, output / PAGE
     if key.exists():
         raise ArgumentError(
             f"{key}: there is a study already, whose ballots need it; choose another --output, or remove it"
         )
     if not LEAST <= arguments.size <= MOST:
         raise ArgumentError(f"--size: expected {LEAST} to {MOST} pixels, got {arguments.size}")
+    if arguments.frames < 1:
+        raise ArgumentError(f"--frames: expected at least 1, got {arguments.frames}")
+    if not arguments.results.is_dir():
+        raise ArgumentError(f"{arguments.results}: expected a folder of results, got none")
     records, old = read_known(below(arguments.results))
+    require_apart(records)
     for entry in old:
         print(f"Left out: {entry}", file=sys.stderr)
     questions = questions_of(records, arguments.edits, arguments.seed)

@@ -33,6 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.report.tables import tables_of
     from texgs.study.ballots import votes_beside
 
+    require_there(arguments)
     records, old = records_of(arguments)
     for entry in old:
         print(f"Left out: {entry}", file=sys.stderr)
@@ -57,6 +58,7 @@ def run_report(arguments: argparse.Namespace) -> int:
     from texgs.study.ballots import votes_beside
     from texgs.study.votes import shown
 
+    require_there(arguments)
     records, old = records_of(arguments)
     left_out, votes = [*read_left_out(arguments.missing), *old], votes_beside(study_of(arguments))
     given = given_tables(records, votes)
@@ -75,6 +77,14 @@ def results_of(arguments: argparse.Namespace) -> Path:
     """Return the folder of results that is given; where it is none or several, results."""
     folders = [each for each in arguments.metrics if each.is_dir()]
     return folders[0] if len(folders) == len(arguments.metrics) == 1 else Path("results")
+
+
+def require_there(arguments: argparse.Namespace) -> None:
+    """Require the files that options name."""
+    for name, writer in (("missing", "texgs run"), ("study", "texgs study")):
+        path: Path | None = getattr(arguments, name)
+        if path is not None and not path.is_file():
+            raise ArgumentError(f"--{name}: expected a file that {writer} has written, got {path}")
 
 
 def study_of(arguments: argparse.Namespace) -> Path:

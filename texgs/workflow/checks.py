@@ -1,6 +1,7 @@
 """Mistakes in the choice of a fit or an edit, told before any job runs and any earlier result goes."""
 
 import shlex
+from collections.abc import Callable
 
 from texgs.config.compose import compose
 from texgs.config.dataset import Dataset
@@ -8,12 +9,18 @@ from texgs.config.project import Words, members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError, MissingDataError, located
 from texgs.edit.method import NO_METHOD, method_of, methods
-from texgs.fields.kinds import kinds, require
+from texgs.fields.kinds import Kind, kinds, require
 from texgs.fields.surfels.material import require_material
 from texgs.fitting.kinds import fit_specs
-from texgs.workflow.edits import lineage, looks_of
+from texgs.workflow.edits import OF_ONE, lineage, looks_of
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.stage import Stage
+
+ABLE: dict[str, Callable[[Kind], bool]] = {  # kinds of field that a stage works on; others work on all
+    "mesh": lambda kind: bool(kind.depth),
+    "page": lambda kind: "html" in kind.exports,
+    **dict.fromkeys(("cuts", "steps"), lambda kind: kind.name == "surfels"),
+}
 
 
 def check_fit(config: Config) -> None:
@@ -93,11 +100,16 @@ def require_fit(stage: Stage, config: Config) -> None:
             f"fit.field: texgs {stage.name} fits {owner}, but fit={fit.name} has field {kind.name}; "
             f"run texgs {kind.phases[-1]} or choose another fit"
         )
-    if stage.place == "mesh" and not kinds()[fit.field].depth:
-        able = " or ".join(other.name for other in kinds().values() if other.depth)
+    able = [other.name for other in kinds().values() if ABLE.get(stage.name, bool)(other)]
+    if kind.name not in able:
         raise ConfigError(
-            f"fit.field: texgs mesh expects a fit of {able}, but fit={fit.name} has field {kind.name}; "
-            "choose another fit"
+            f"fit.field: texgs {stage.name} expects a fit of {' or '.join(able)}, but fit={fit.name} has "
+            f"field {kind.name}; choose another fit"
+        )
+    if stage.name == "steps" and not config.dataset.series and config.dataset.volume.steps < 2:
+        raise ConfigError(
+            f"dataset.series of {config.dataset.name}: expected the steps of a series in time, got none; "
+            "choose another data set, such as dataset=rings"
         )
     check_fit(config)
 
@@ -128,7 +140,7 @@ def require_edit(stage: Stage, words: Words) -> None:
     if config.edit.base is not None and not scene_before(config).is_file():
         name, before = chain[-2]
         verb = method_of(compose(before).edit).stage
-        same = shlex.join([word for word in words if not word.startswith("edit=")])
+        same = shlex.join([word for word in words if not word.startswith(("edit=", *OF_ONE))])
         raise MissingDataError(
             f"edit.base: {name} is not done yet; run texgs {verb} {same} edit={name} first"
         )

@@ -157,8 +157,10 @@ def place_of(config: Config, shot: ShotKeys, where: str) -> Place:
         known = known_edits(config)
         shot = replace(shot, edit=next((name for name in instead if name in known), shot.edit))
     for name, given in (("view", shot.view), ("light", shot.light)):
-        if len(given) not in (0, 2):
-            raise ConfigError(f"{where}.{name}: expected azimuth and polar angle, got {given}")
+        if len(given) not in (0, 2) or not all(-90 <= polar <= 90 for polar in given[1:]):
+            raise ConfigError(
+                f"{where}.{name}: expected azimuth and polar angle, from -90 to 90 degrees, got {given}"
+            )
     if shot.box and not is_inside(shot.box):
         raise ConfigError(f"{where}.box: expected left, top and side, from 0 to 1, got {shot.box}")
     of_fit, edit = fit_of(config, shot, where), str(shot.edit)

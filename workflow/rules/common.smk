@@ -49,8 +49,8 @@ BESIDE = {  # what tables and the report show beside the jobs of this run
     "earlier": list(PLAN.earlier),
     "of_earlier": list(PLAN.earlier.values()),
     "left_out": PLAN.left_out,
-    "study": f"{STUDY}/key.json",
-    "ballots": sorted(map(str, STUDY.glob("votes/*.csv"))),
+    "ballots": (BALLOTS := sorted(map(str, STUDY.glob("votes/*.csv")))),
+    "study": ["--study", f"{STUDY}/key.json"] if BALLOTS else [],
 }
 config["captions"] = {
     each.name: each.shown for each in RULES.values()

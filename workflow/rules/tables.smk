@@ -16,7 +16,7 @@ rule tables:
         folder=subpath(output[0], parent=True),
     shell:
         "texgs tables {input.metrics:q} {params.earlier:q} --missing {params.left_out:q} "
-        "--study {params.study:q} --output {params.folder:q} 2>&1 | tee {log:q}"
+        "{params.study:q} --output {params.folder:q} 2>&1 | tee {log:q}"
 
 
 rule report:
@@ -32,4 +32,4 @@ rule report:
         code=code_digest("texgs.cli.tables"),
     shell:
         "texgs report {input.metrics:q} {params.earlier:q} --missing {params.left_out:q} "
-        "--study {params.study:q} --output {output:q} 2>&1 | tee {log:q}"
+        "{params.study:q} --output {output:q} 2>&1 | tee {log:q}"
