@@ -159,6 +159,7 @@ def test_models_of_a_comparison_are_those_of_the_last_phases_of_all_recipes():
         ("[{fov_y: 180}]", "", "fov_y: expected less than 180, got 180"),
         ("[{show: volum}]", "", "show: expected one of scene, volume, error, got volum, did you mean volume"),
         ("[{changes: ['TF03.opacity=1']}]", "", "changes: expected PART.KEY=VALUE with one of TF01"),
+        ("[{changes: ['TF01.opacty=1']}]", "", "got TF01.opacty=1, did you mean opacity"),
         ("[{changes: [opaque]}]", "", "changes: expected PART.KEY=VALUE with one of"),
         ("[{edit: gold, changes: ['TF02/lobe.opacity=1']}]", "edits=[gold,lobe]", "TF02, got TF02/"),
         ("[{title: a}, {title: a}]", "", "expected rows with different titles, got 'a' twice"),

@@ -221,16 +221,26 @@ def known_edits(config: Config) -> list[str]:
 
 
 def check_changes(config: Config, shot: ShotKeys, where: str) -> None:
-    """Require of changes that the parts are there which they change."""
+    """Require of changes that the parts are there which they change, and of parts their keys."""
+    if not shot.changes:
+        return
+    from texgs.scene.scene_file import SEGMENT_KEYS
+
     parts = models = tf_names(config)
     clicked = f"dataset.part.model='{config.dataset.part.model}'"
     for edit in ancestry(str(shot.edit), clicked) if shot.edit != AS_FITTED else ():
         parts = [*parts, *added_parts(edit, models)]
     for change in shot.changes:
         name, is_change, _ = change.partition("=")
-        part = name.rpartition(".")[0] or name
+        part, dot, key = name.rpartition(".") if "." in name else (name, "", "")
         if not is_change or part not in (*parts, *ANYWHERE):
             raise ConfigError(
                 f"{where}.changes: expected PART.KEY=VALUE with one of {', '.join(parts)}, got "
                 f"{change}{close(part, parts)}"
+            )
+        if dot and part not in ANYWHERE and key not in SEGMENT_KEYS:
+            expected = ", ".join(SEGMENT_KEYS)
+            raise ConfigError(
+                f"{where}.changes: expected {part} with one of {expected}, got {change}"
+                f"{close(key, SEGMENT_KEYS)}"
             )
