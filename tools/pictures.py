@@ -2,7 +2,8 @@
 
 `python -m tools.pictures NAME...` makes these, without names all of them, and enters them in
 benchmarks/results/index.csv. Runs go on in build/pictures where they stopped; TEXGS_DATA names the folder of
-the paper's views, without which three pictures cannot be made, and VGG-16 and a browser are needed for some.
+the paper's views, without which four pictures cannot be made (those of methods show TF01, when it is alone
+there), and VGG-16 and a browser are needed for some.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ DOCS, RUNS = ROOT / "docs", ROOT / "build" / "pictures"
 PROGRAM = Path(sys.executable).with_name("texgs")
 STYLES = ("strokes", "glass", "marble", "weave", "dots", "waves")
 METHODS = (  # of the paper's tables, by their authors' iterations: hours
-    "galleries dataset=engine views.width=400 views.height=400 fits=[default,gaussians,plenoxels_quick]"
+    "galleries dataset=vortex fit.reduce=2 fits=[default,gaussians,plenoxels_quick]"
     " edit.looks=true edit.image.lambda_s=1 edit.text.guidance=filters edit.in2n.guidance=filters"
     " edit.igs2gs.guidance=filters"
 )
@@ -136,7 +137,7 @@ class Picture(NamedTuple):
     code: str = ""  # what its run shows, see benchmarks/results.py
 
 
-GALLERY = "engine/gallery/*/gallery.png"
+GALLERY = "vortex/gallery/*/gallery.png"
 FIT = "volume views surfels shading texture"
 PICTURES = {
     "workflow": Picture(workflow_picture.draw, "demo", f"{FIT} compose pse image text segment edit_metrics"),

@@ -49,7 +49,7 @@ def fit(
         volume: to fit.
         functions: basic transfer functions, by name or in order, whose ranges do not overlap; default those
             suggested. With the recipe `now` ranges may overlap.
-        recipe: "now" (some 20 seconds a function), "quick", "default", "paper" or another file of conf/fit.
+        recipe: "now" (about a minute a function), "quick", "default", "paper" or another file of conf/fit.
         size: of the views, pixels.
         seed: of all random numbers.
         device: "cpu" or "cuda".

@@ -44,7 +44,7 @@ FIRST_VERBS = {
 LATER_VERBS = {
     "edit": "change colours, opacities and lights of a scene",
     "series": "follow the models of a scene through the volumes of a series in time",
-    "model": "fit a model of a transfer function that a scene tries, in seconds",
+    "model": "fit a model of a transfer function that a scene tries, in about a minute",
     "segment": "segment a model of a scene by clicks, to edit a part of it",
     "view": "look at a scene and edit it in the browser",
     "render": "render a scene to PNG, GIF or MP4",
