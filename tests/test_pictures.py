@@ -10,6 +10,7 @@ from PIL import Image
 from benchmarks.results import DOCS, RESULTS, parts
 from tests.scene.balls import write_balls
 from texgs.core.checksum import Checksums
+from texgs.core.io import write_json
 from texgs.workflow.graph import drawn
 from texgs.workflow.sweep import as_sweep
 from tools import pictures
@@ -41,14 +42,14 @@ def runs(tmp_path_factory):
     """Folders of results with a small scene or picture wherever the plan of a run has one."""
     folder = tmp_path_factory.mktemp("runs")
     balls = write_balls(tmp_path_factory.mktemp("balls"))
-    for tf in ("TF01", "TF04_400"):
-        views = folder / "data" / "vortex" / tf / "transforms_train.json"
-        views.parent.mkdir(parents=True)
-        views.write_text("{}")
+    jobs = []
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setenv("TEXGS_DATA", str(folder / "data"))
-        jobs = [job for name in {PICTURES[each].source for each in OF_RUNS} for job in planned(name)]
+        for name in {PICTURES[each].source for each in OF_RUNS}:
+            for tf in ["TF01"] if name in ("image", "text") else ["TF01", "TF04_400"]:
+                write_json(folder / f"data_{name}" / "vortex" / tf / "transforms_train.json", {})
+            patch.setenv("TEXGS_DATA", str(folder / f"data_{name}"))
+            jobs += planned(name)
     for place in map(folder.joinpath, jobs):
         if {place.name, place.parent.name} & {"edits", "comparison", "gallery", "compose", "pse", "sheet"}:
             shutil.copytree(balls.parent, place)

@@ -144,7 +144,7 @@ def require_targets(words: Sequence[str]) -> None:
     from texgs.workflow.stage_table import RULES
 
     for word in words:
-        if word in RULES and word not in target_names():
+        if word in ("download", *RULES) and word not in target_names():
             raise ArgumentError(no_target(word))
 
 
