@@ -25,7 +25,7 @@ KEY, PAGE = "key.json", "ballot.html"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to compare, how to show it, and where to."""
     parser.add_argument(
-        "results", nargs="?", type=given_path, default=Path("results"), help="folder (%(default)s)"
+        "results", nargs="?", type=given_path, default=Path("results"), help="folder (results)"
     )
     parser.add_argument(
         "--edits", nargs="+", default=[], metavar="EDIT", help="edits to compare; default all with a new look"
