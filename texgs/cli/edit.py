@@ -64,7 +64,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run_model(arguments: argparse.Namespace) -> int:
-    """Fit a model of a function that a scene tries, in about a minute, into the scene; or keep it in a data set."""
+    """Fit a model of a function that a scene tries, into the scene; or keep the function in a data set."""
     from texgs.config.kept_function import keep
     from texgs.core.check import torch_device
     from texgs.edit.function_model import models_of, overlap_of, tried, with_model
