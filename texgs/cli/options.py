@@ -41,7 +41,7 @@ def require_own_place(output: Path, name: str = "--output") -> None:
 def require_free(files: Sequence[str]) -> None:
     """Require that no option that takes several files has taken a KEY=VALUE behind them."""
     for word in files:
-        if "=" in word and not any(Path(word).parent.glob(Path(word).name)):
+        if "=" in word and not Path(word).is_absolute() and not any(Path().glob(word)):
             raise ArgumentError(
                 f"{word}: the option before takes it for a file of its own; put {word} in front of it"
             )
