@@ -203,6 +203,22 @@ def test_a_mistake_in_a_rendering(scene, tmp_path, capsys, monkeypatch, words, m
     assert not (tmp_path / "x.mp4").exists()
 
 
+@pytest.mark.parametrize(
+    ("verb", "words", "message"),
+    [
+        ("series", ["--files", "a_*.nrrd", "up=+z", "--output", "s"], "up=+z: the option before takes"),
+        (
+            "segment",
+            ["--model", "TF01", "--point", "1,1", "--preview", "a.jpg"],
+            "--preview: expected a file",
+        ),
+    ],
+)
+def test_a_file_of_another_kind_is_refused(scene, tmp_path, capsys, monkeypatch, verb, words, message):
+    monkeypatch.chdir(tmp_path)
+    assert message in refused(capsys, verb, scene, *words)
+
+
 def test_a_picture_is_not_replaced_by_a_scene(scene, tmp_path, capsys):
     picture = tmp_path / "new.png"
     assert render(scene, picture) == 0

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.cli.options import add_device, add_lens, lens_of, option, require_free, require_own_place
+from texgs.cli.options import add_device, add_lens, lens_of, option, require_only_files, require_own_place
 from texgs.core.errors import ArgumentError, located
 from texgs.core.lens import Lens
 from texgs.core.names import SCENES, new_part_file, require_name
@@ -112,7 +112,7 @@ def run_series(arguments: argparse.Namespace) -> int:
     from texgs.workflow.moments import matching
     from texgs.workflow.series import make_series
 
-    require_free(arguments.files)
+    require_only_files(arguments.files)
     with located("--files"):
         files = matching(arguments.files)
     words = [f"dataset.volume.{word.removeprefix('dataset.volume.')}" for word in arguments.overrides]

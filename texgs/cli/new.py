@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.cli.new_tfs import with_tfs
-from texgs.cli.options import require_free
+from texgs.cli.options import require_only_files
 from texgs.config.compose import compose
 from texgs.config.dataset_text import as_yaml, plain_tf, require_read
 from texgs.config.project import NO_NAME, check_name, name_of
@@ -107,7 +107,7 @@ def check_options(arguments: argparse.Namespace) -> None:
         raise ArgumentError(f"--count: expected at least 1, got {arguments.count}")
     if arguments.tf and arguments.count is not None:
         raise ArgumentError("--count: expected none beside --tf, whose files are the functions; leave it out")
-    require_free([*arguments.series, *map(str, arguments.tf or ())])
+    require_only_files([*arguments.series, *map(str, arguments.tf or ())])
     if any(word.removeprefix("dataset.volume.").startswith("file=") for word in arguments.overrides):
         raise ArgumentError(
             f"file=...: expected {arguments.file}, in front, to be the only file; leave it out"

@@ -38,7 +38,7 @@ def require_own_place(output: Path, name: str = "--output") -> None:
             )
 
 
-def require_free(files: Sequence[str]) -> None:
+def require_only_files(files: Sequence[str]) -> None:
     """Require that no option that takes several files has taken a KEY=VALUE behind them."""
     for word in files:
         if "=" in word and not Path(word).is_absolute() and not any(Path().glob(word)):
