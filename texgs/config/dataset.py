@@ -30,6 +30,9 @@ class Volume:
     variable: str | None = key(
         None, "array to read, by its path in the file, where Zarr, HDF5, NetCDF or VTK has several"
     )
+    image: str | None = key(
+        None, "name or number of the image to read, from 0, where TIFF has several, as positions of a stage"
+    )
     channel: str | None = key(None, "label or number of the channel to read, from 0, where there are several")
     time: int = key(0, "step to read or make, from 0, where there are several", least=0)
     steps: int = key(1, "steps of a generated field that changes in time: rings or flame", least=1)

@@ -110,7 +110,7 @@ def source(volume: Volume, path: Path | None) -> Source:
     said: dict[str, Any] = {name: values and tuple(values) for name, values in given.items()}
     said |= {"dtype": volume.dtype, "endian": volume.endian, "skip": volume.skip}
     said |= {"series": volume.series, "variable": volume.variable, "column": volume.column}
-    said |= {"channel": volume.channel, "time": volume.time}
+    said |= {"image": volume.image, "channel": volume.channel, "time": volume.time}
     return open_source(path, **said)
 
 
