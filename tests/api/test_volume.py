@@ -5,6 +5,7 @@ import io
 import numpy as np
 import pytest
 import pyvista
+import xarray
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
@@ -21,8 +22,6 @@ from texgs.volume.framing import frame_of
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlay
 from texgs.volume.render import Appearance
-
-xarray = pytest.importorskip("xarray", reason="needs xarray: pip install '.[dev]'")
 
 RED = texgs.TransferFunction([[0.5, 0.0], [1.0, 0.5]], [[0.5, 1.0, 0.0, 0.0]])
 BLUE = texgs.TransferFunction([[0.0, 0.0], [0.2, 0.1], [0.4, 0.0]], [[0.0, 0.0, 0.0, 1.0]])

@@ -3,7 +3,9 @@
 import h5py
 import numpy as np
 import pytest
+import xarray
 
+import texgs
 from tests.volume.volume_files import sample_values, whole
 from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.volume.prepare import prepare
@@ -169,11 +171,13 @@ def test_a_layer_takes_a_quarter_of_the_free_memory_at_most(tmp_path, monkeypatc
     with h5py.File(path, "w") as file:
         file.create_dataset("v", data=VALUES, chunks=(11, 4, 4))
     read, item = [], h5py.Dataset.__getitem__
-    monkeypatch.setattr(h5py.Dataset, "__getitem__", lambda self, at: read.append(at[0]) or item(self, at))
+    monkeypatch.setattr(
+        h5py.Dataset, "__getitem__", lambda self, at: read.append(at[0].indices(11)[:2]) or item(self, at)
+    )
     for planes in (1, 3):
         monkeypatch.setattr("texgs.volume.layers.free_memory", lambda n=planes: 4 * n * VALUES[0].nbytes + 3)
         np.testing.assert_array_equal(whole(path), VALUES)
-        assert read == [slice(low, min(low + planes, 11)) for low in range(0, 11, planes)]
+        assert read == [(low, min(low + planes, 11)) for low in range(0, 11, planes)]
         read.clear()
 
 
@@ -204,3 +208,151 @@ def test_a_file_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path
     ):
         whole(path)
     assert capfd.readouterr() == ("", "")
+
+
+def write_virtual(folder):
+    """Three parts of four slices each, in files beside that of the whole."""
+    layout = h5py.VirtualLayout((12, 12, 13), "u2")
+    values = np.concatenate([VALUES, VALUES[:1]])
+    for k in range(3):
+        write(folder / f"part{k}.h5", data=values[4 * k : 4 * k + 4])
+        layout[4 * k : 4 * k + 4] = h5py.VirtualSource(f"part{k}.h5", "data", (4, 12, 13))
+    with h5py.File(folder / "whole.h5", "w") as file:
+        file.create_virtual_dataset("entry/data", layout)
+        file["again"] = h5py.ExternalLink("whole.h5", "entry/data")
+    return folder / "whole.h5", values
+
+
+def test_a_virtual_array_needs_all_of_its_parts(tmp_path):
+    path, values = write_virtual(tmp_path)
+    np.testing.assert_array_equal(whole(path), values)
+    write(tmp_path / "part1.h5", other=VALUES[:4])
+    with pytest.raises(
+        ArgumentError, match=r"/entry/data: expected data in its part part1\.h5, found none; is it whole"
+    ):
+        open_source(path)
+    (tmp_path / "part1.h5").unlink()
+    with pytest.raises(ArgumentError, match=r"/entry/data: expected its part part1\.h5, which is not there"):
+        open_source(path)
+
+
+def test_arrays_behind_links_are_found_once_and_those_that_are_missing_are_told(tmp_path):
+    write(tmp_path / "far.h5", data=VALUES, deep__inner=VALUES + 1)
+    with h5py.File(tmp_path / "v.h5", "w") as file:
+        file["entry/frames"] = h5py.ExternalLink("far.h5", "data")
+        file["entry/default"] = h5py.SoftLink("/entry/frames")
+        file["entry/cycle"] = h5py.SoftLink("/entry")
+    for keys in ({"variable": "entry/frames"}, {"variable": "entry/default"}):
+        np.testing.assert_array_equal(whole(tmp_path / "v.h5", **keys), VALUES)
+    with h5py.File(tmp_path / "v.h5", "a") as file:
+        file["entry/more"] = h5py.ExternalLink("far.h5", "deep")
+        file["entry/lost"] = h5py.ExternalLink("gone.h5", "data")
+    np.testing.assert_array_equal(whole(tmp_path / "v.h5", variable="entry/more/inner"), VALUES + 1)
+    source = open_source(tmp_path / "v.h5", variable="entry/frames")
+    assert source.note == "entry/lost links to gone.h5, which is not there"
+    for path, variable in ((tmp_path / "v.h5", "entry/lost"), (tmp_path / "w.h5", None)):
+        with h5py.File(tmp_path / "w.h5", "w") as file:
+            file["entry/lost"] = h5py.ExternalLink("gone.h5", "data")
+        with pytest.raises(ArgumentError, match=r"entry/lost links to gone\.h5, which is not there; put it"):
+            open_source(path, variable=variable)
+
+
+def test_chunks_that_were_never_written_are_told(tmp_path):
+    with h5py.File(tmp_path / "v.h5", "w") as file:
+        array = file.create_dataset("v", VALUES.shape, "u2", chunks=(1, 12, 13), fillvalue=5)
+        array[:4] = VALUES[:4]
+    source = open_source(tmp_path / "v.h5")
+    assert source.note == "7 of 11 chunks were never written and count as 5"
+    np.testing.assert_array_equal(source.slices(3, 5), [VALUES[3], np.full((12, 13), 5)])
+
+
+def test_points_of_netcdf_that_were_never_written_are_missing(tmp_path):
+    netCDF4 = pytest.importorskip("netCDF4", reason="netCDF4, which writes the file, is not installed")
+    for dtype in ("f4", "f8", "i2", "i4"):
+        path = tmp_path / f"{dtype}.nc"
+        with netCDF4.Dataset(path, "w") as file:
+            for name, size in zip("zyx", VALUES.shape, strict=True):
+                file.createDimension(name, size)
+            file.createVariable("t", dtype, ("z", "y", "x"))[:9] = VALUES[:9]
+        np.testing.assert_array_equal(whole(path)[:9], VALUES[:9])
+        assert np.isnan(whole(path)[9:]).all()
+
+
+def test_a_file_that_another_program_writes(tmp_path, monkeypatch):
+    path = write(tmp_path / "v.h5", v=VALUES)
+    monkeypatch.setattr("h5py.File", lambda *a, **k: (_ for _ in ()).throw(BlockingIOError(11, "locked")))
+    with pytest.raises(ArgumentError, match="got one that is locked; close it there, or set HDF5_USE_FILE_L"):
+        open_source(path)
+
+
+@pytest.mark.parametrize(
+    ("names", "attributes", "order"),
+    [
+        (("lon", "lat", "lev"), ({}, {}, {}), (2, 1, 0)),
+        (("p", "q", "r"), ({"axis": "X"}, {"axis": "Y"}, {"axis": "Z"}), (2, 1, 0)),
+        (("p", "q", "r"), ({"units": "degrees_north"}, {"units": "degrees_east"}, {}), (2, 0, 1)),
+        (("p", "q", "r"), ({"standard_name": "projection_x_coordinate"}, {"axis": "Y"}, {}), (2, 1, 0)),
+        (("northing", "q", "r"), ({"axis": "Y"}, {"positive": "up"}, {}), (1, 0, 2)),
+        (("x", "y", "other"), ({}, {}, {}), (2, 1, 0)),
+        (("depth", "height", "width"), ({}, {}, {}), (0, 1, 2)),
+        (("p", "q", "r"), ({}, {}, {}), (0, 1, 2)),
+        (("time", "height", "width"), ({}, {}, {}), None),
+        (("frames", "height", "width"), ({}, {}, {}), "frames, height, width are taken for z, y, x"),
+        (("p", "q", "r"), ({}, {"axis": "Z"}, {}), "axes p, q, r are taken for z, y, x, as they are stored"),
+    ],
+)
+def test_axes_are_those_of_their_attributes_or_names(tmp_path, names, attributes, order):
+    """`order`: places of z, y, x among the axes as they are stored; or what is told of a guess."""
+    values = VALUES[:4, :5, :6]
+    with h5py.File(tmp_path / "v.h5", "w") as file:
+        array = file.create_dataset("v", data=values)
+        for k, (name, more) in enumerate(zip(names, attributes, strict=True)):
+            file[name] = np.arange(values.shape[k], dtype=float)
+            file[name].make_scale(name)
+            file[name].attrs.update(more)
+            array.dims[k].attach_scale(file[name])
+    if order is None:
+        with pytest.raises(ArgumentError, match="expected three axes of space besides time and channel, got"):
+            open_source(tmp_path / "v.h5")
+        return
+    source = open_source(tmp_path / "v.h5")
+    guess, order = (order, (0, 1, 2)) if isinstance(order, str) else ("", order)
+    assert guess in source.note
+    assert bool(guess) == ("are taken for" in source.note)
+    np.testing.assert_array_equal(source.slices(0, source.dims[2]), values.transpose(order))
+    places = {
+        name: (name, np.arange(n), more)
+        for name, n, more in zip(names, values.shape, attributes, strict=True)
+    }
+    volume = texgs.Volume(xarray.DataArray(values, places, names))
+    np.testing.assert_array_equal(volume.grid.values, values.transpose(order))
+
+
+@pytest.mark.parametrize(
+    ("said", "missing"),
+    [
+        ({"missing_value": np.array([3.0, 5.0])}, lambda v: (v == 3) | (v == 5)),
+        ({"missing_value": "7", "_FillValue": np.float64(3)}, lambda v: (v == 3) | (v == 7)),
+        ({"valid_range": np.array([2.0, 90.0])}, lambda v: (v < 2) | (v > 90)),
+        ({"valid_min": 4}, lambda v: v < 4),
+        ({"valid_max": "8e1"}, lambda v: v > 80),
+    ],
+)
+@pytest.mark.parametrize("dtype", ["int32", "float32"])
+def test_codes_of_missing_samples_and_the_range_of_valid_ones(tmp_path, said, missing, dtype):
+    path = write(tmp_path / "v.h5", v=VALUES.astype(dtype))
+    with h5py.File(path, "a") as file:
+        file["v"].attrs.update(said)
+    np.testing.assert_array_equal(whole(path), np.where(missing(VALUES), np.nan, VALUES))
+
+
+def test_scales_may_be_text_and_a_valid_range_of_whole_numbers_is_of_packed_samples(tmp_path):
+    path = write(tmp_path / "v.h5", v=VALUES.astype("i2"))
+    with h5py.File(path, "a") as file:
+        file["v"].attrs.update({"scale_factor": "0.5", "add_offset": "10", "valid_range": np.array([4, 90])})
+    inside = (VALUES >= 4) & (VALUES <= 90)
+    np.testing.assert_allclose(whole(path), np.where(inside, 10 + 0.5 * VALUES, np.nan))
+    with h5py.File(path, "a") as file:
+        file["v"].attrs["scale_factor"] = "half"
+    with pytest.raises(ArgumentError, match="scale_factor: expected a number, got half; correct the file"):
+        open_source(path)

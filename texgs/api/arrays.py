@@ -1,6 +1,5 @@
-"""Grids from objects of other libraries, which are known by what they can: none of these is imported."""
+"""Sources from objects of other libraries, which are known by what they can: none of these is imported."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from operator import index
 from typing import Any
@@ -10,18 +9,20 @@ import numpy as np
 from texgs.api.display import as_python
 from texgs.core.errors import ArgumentError, located
 from texgs.core.names import check_count
-from texgs.volume.axes import along, lattice
 from texgs.volume.grid import Grid, Triple
+from texgs.volume.layers import LayerSource
+from texgs.volume.slabs import ArraySource, Source
 
-AXES = "zyx"
 
-
-def grid_of(data: Any, spacing: Sequence[float] | None, origin: Sequence[float] | None) -> Grid:
-    """Return the grid of an array [Z, Y, X], an ImageData of PyVista or a DataArray of xarray.
+def source_of(
+    data: Any, name: str, spacing: Sequence[float] | None, origin: Sequence[float] | None
+) -> Source:
+    """Return an array [Z, Y, X], an ImageData of PyVista or a DataArray of xarray as a source.
 
     Args:
-        data: PyVista's have point data, of which the active scalars count. Dimensions of xarray named x, y
-            and z are put in their order, and their coordinates say where samples lie.
+        data: PyVista's have point data, of which the active scalars count. Those of xarray are read as files
+            with labels are, see `texgs.volume.axes.axes_of`.
+        name: for messages.
         spacing: x, y, z, in place of the object's own.
         origin: the same.
 
@@ -38,7 +39,7 @@ def grid_of(data: Any, spacing: Sequence[float] | None, origin: Sequence[float] 
         values, steps, first = of_image_data(data)
     else:
         values, steps, first = of_array(data), (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
-    return Grid(values, said[0] or steps, said[1] or first)
+    return ArraySource(Grid(values, said[0] or steps, said[1] or first), name)
 
 
 def three(name: str, numbers: Sequence[float] | None) -> Triple | None:
@@ -110,22 +111,13 @@ def of_image_data(image: Any) -> tuple[np.ndarray, Triple, Triple]:
     return values.reshape(z, y, x, *values.shape[1:]), tuple(image.spacing), (first[0], first[1], first[2])
 
 
-def of_data_array(array: Any, spacing: Triple | None, origin: Triple | None) -> Grid:
-    """Return the grid of xarray's data, with what its coordinates and their units tell, as those of files."""
+def of_data_array(array: Any, spacing: Triple | None, origin: Triple | None) -> Source:
+    """Return xarray's data as a source, with what labels and attributes tell, as of those in files."""
     names = [str(name) for name in array.dims]
     if len(names) != 3:
         raise ArgumentError(
             f"DataArray: expected three dimensions, got {', '.join(names) or 'none'}; select one of each "
             "other, as by .isel(time=0)"
         )
-    if {name.lower() for name in names} == set(AXES):
-        array = array.transpose(*sorted(array.dims, key=lambda name: AXES.index(str(name).lower())))
-    places = [array.coords.get(name) for name in array.dims]
-    numbers = [None if each is None or each.dtype.kind not in "iuf" else each for each in places]
-    axes = [along(*row) for row in zip(map(str, array.dims), array.shape, numbers, strict=True)]
     with located("DataArray"):
-        steps, first, remark = lattice(axes[::-1], spacing, origin)
-    if remark:
-        warnings.warn(f"DataArray: {remark}", stacklevel=4)
-    flips = tuple(slice(None, None, -1 if axis.step < 0 else 1) for axis in axes)
-    return Grid(np.asarray(array.values)[flips], steps, first)
+        return LayerSource("DataArray", array, (spacing, origin), chunks=array.encoding.get("chunksizes"))

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from texgs.api.arrays import grid_of, keys_of_format, three, whole
+from texgs.api.arrays import keys_of_format, source_of, three, whole
 from texgs.api.display import as_python, camera_of, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
 from texgs.config.project import check_name, name_of
@@ -28,7 +28,7 @@ from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
 from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
-from texgs.volume.slabs import ArraySource, Source
+from texgs.volume.slabs import Source
 from texgs.volume.sources import open_source, tells_superior
 from texgs.volume.suggest import suggest
 from texgs.volume.summaries import Summary, write_summaries
@@ -96,7 +96,7 @@ class Volume:
             hint = close(next(iter(keys)), signature(Volume).parameters)
             raise ArgumentError(f"{', '.join(keys)}: not for arrays{hint or '; leave them out'}")
         else:
-            source = ArraySource(grid_of(data, spacing, origin), name)
+            source = source_of(data, name, spacing, origin)
         if source.note:
             warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
         self._channel = source.channel

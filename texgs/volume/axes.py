@@ -1,19 +1,29 @@
-"""Axes of arrays in files: which are those of space, how samples lie along them, and one index of others."""
+"""Axes of arrays with labels: which are those of space, how samples lie along them, one index of others."""
 
+from __future__ import annotations
+
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import ONES, ZEROS, Triple
 
+if TYPE_CHECKING:
+    import xarray
+
 UNEVEN = 0.01  # of the mean distance: coordinates are often rounded to float32
 COMPONENTS = (2, 3, 4)  # sizes of a last axis without a name that is none of space
 POWERS = {"nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3}
-METRES = {unit: 10.0**n for prefix, n in POWERS.items() for unit in (f"{prefix}meter", f"{prefix[:1]}m")}
-METRES |= {"um": 1e-6, "µm": 1e-6, "angstrom": 1e-10}
+WORDS = ("meter", "metre", "meters", "metres")
+METRES = {prefix + word: 10.0**n for prefix, n in POWERS.items() for word in WORDS}
+METRES |= {f"{prefix[:1]}m": 10.0**n for prefix, n in POWERS.items() if prefix != "micro"}
+METRES |= dict.fromkeys(("um", "µm", "μm", "micron", "microns"), 1e-6) | {"angstrom": 1e-10}
+# What CF and cf_xarray call axes, and the letters that they have here.
+LETTERS = {"X": "x", "longitude": "x", "Y": "y", "latitude": "y", "Z": "z", "vertical": "z", "T": "t"}
 PRESSURES = ("Pa", "hPa", "kPa", "mbar", "millibar", "dbar", "decibar", "bar")
 
 
@@ -37,43 +47,75 @@ class Axis:
     step: float = 1.0  # below 0 where coordinates fall
     is_even: bool = True
     channels: tuple[Channel, ...] = ()  # one for each sample, or none
+    letter: str = ""  # x, y, z or t, where the file says along which of them it runs
 
     @property
     def kind(self) -> str:
         """Return time, channel or space, by the name, or a unit such as "days since 2000-01-01"."""
-        if self.name.lower() in ("t", "time") or " since " in self.unit:
+        if self.letter == "t" or self.name.lower() in ("t", "time") or " since " in self.unit:
             return "time"
         return "channel" if self.name.lower() in ("c", "channel") else "space"
 
 
-def nameless(shape: Sequence[int]) -> list[Axis]:
-    """Return axes of an array that tells nothing about them: (t, (c,)) z, y, x, or z, y, x and components."""
+def nameless(shape: Sequence[int]) -> list[str]:
+    """Return names of the axes of an array that tells none: (t, (c,)) z, y, x, or z, y, x and components."""
     known = {4: "zyxc" if shape[-1] in COMPONENTS else "tzyx", 5: "tczyx"}
-    names = "?" * len(shape) if sum(n > 1 for n in shape) == 3 else known.get(len(shape), "?" * len(shape))
-    return [Axis(name, n) for name, n in zip(names, shape, strict=True)]
+    is_volume = sum(n > 1 for n in shape) == 3
+    return [*("" if is_volume else known.get(len(shape), ""))] or [f"?{k}" for k in range(len(shape))]
 
 
-def along(name: str, size: int, scale: Any = None) -> Axis:
-    """Return an axis with its coordinates, where there is an array of them, and their unit.
+def axes_of(field: xarray.DataArray) -> list[Axis]:
+    """Return the axes of an array with labels, in the order they are stored.
+
+    Attributes tell which of them run along x, y, z and time, as CF has them: `axis`, `standard_name`, `units`
+    of degrees and `positive`; else names do, such as lon or depth. cf_xarray knows both.
+    """
+    import cf_xarray
+    import xarray
+
+    known = dict.fromkeys(field.dims, "")
+    for criterion, pattern in cf_xarray.criteria.regex.items():
+        if letter := LETTERS.get(criterion):
+            known |= {name: letter for name in known if pattern.fullmatch(str(name).lower())}
+    labels = xarray.Dataset(coords=field.coords).cf  # an accessor keeps what it is of, and so its file open
+    for criterion, names in {**labels.axes, **labels.coordinates}.items():
+        if letter := LETTERS.get(criterion):
+            known |= {name: letter for name in names if name in known}
+    places = {name: field.coords[name] for name in known if name in field.coords}
+    return [along(str(name), field.sizes[name], places.get(name), known[name]) for name in known]
+
+
+def along(name: str, size: int, places: xarray.DataArray | None = None, letter: str = "") -> Axis:
+    """Return an axis with its coordinates, where it has numbers, and their unit.
 
     Coordinates that count downwards, as depth and pressure do, are those of the axis upwards with the other
     sign.
     """
-    if size < 2 or getattr(scale, "shape", ()) != (size,):
-        return Axis(name, size)
-    places = np.array(scale[:], np.float64)
-    unit, positive = told(scale, "units"), told(scale, "positive")
+    if size < 2 or places is None or places.dtype.kind not in "iuf":
+        is_date = places is not None and places.dtype.kind in "mM"
+        return Axis(name, size, letter="t" if is_date else letter)
+    numbers = np.array(places, np.float64)
+    unit, positive = (str(places.attrs.get(key, "")) for key in ("units", "positive"))
     if positive.lower() == "down" or (unit in PRESSURES and not positive):
-        places = -places
-    step = float(places[-1] - places[0]) / (size - 1)
-    is_even = bool(np.abs(np.diff(places) - step).max() <= UNEVEN * abs(step))
-    return Axis(name, size, unit, float(places[0]), step, is_even)
+        numbers = -numbers
+    step = float(numbers[-1] - numbers[0]) / (size - 1)
+    is_even = bool(np.abs(np.diff(numbers) - step).max() <= UNEVEN * abs(step))
+    return Axis(name, size, unit, float(numbers[0]), step, is_even, letter=letter)
 
 
-def told(scale: Any, name: str) -> str:
-    """Return an attribute of coordinates as text, whichever library reads them; empty where there is none."""
-    value = getattr(scale, name, b"") or getattr(scale, "attrs", {}).get(name, "")  # of SciPy, of others
-    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
+def upright(axes: Sequence[Axis]) -> tuple[list[int], str]:
+    """Return which of three axes of space are z, y and x, and a remark where that is a guess.
+
+    Two that are known tell the third one. Else they are z, y, x in the order they are stored.
+    """
+    counts = Counter(axis.letter for axis in axes)
+    known = {axis.letter: k for k, axis in enumerate(axes) if axis.letter and counts[axis.letter] == 1}
+    rest = [k for k in range(3) if k not in known.values()]
+    if len(known) > 1:
+        return [known[letter] if letter in known else rest[0] for letter in "zyx"], ""
+    is_guess = any(axes[k].letter != "zyx"[k] for k in known.values())
+    names = ", ".join(axis.name for axis in axes)
+    return [0, 1, 2], f"axes {names} are taken for z, y, x, as they are stored" if is_guess else ""
 
 
 def picked(axes: Sequence[Axis], channel: str | None, time: int | None) -> list[int | slice]:
@@ -113,7 +155,9 @@ def lattice(
     units = [axis.unit for axis in axes]
     is_length = all(unit in METRES for unit in units)
     if len({*units} - {""}) > 1 and not is_length:
-        remark = f"units along x, y, z are {', '.join(units)}, so that samples are 1 apart"
+        remark = (
+            f"units along x, y, z are {', '.join(x or 'none' for x in units)}, so that samples are 1 apart"
+        )
         return spacing or ONES, origin or ZEROS, "" if spacing else remark
     if spacing is None and (uneven := [axis.name for axis in axes if not axis.is_even]):
         raise ArgumentError(f"expected even distances along {', '.join(uneven)}; resample, or set spacing")

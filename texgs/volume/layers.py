@@ -1,81 +1,93 @@
-"""Arrays inside of files as sources: chosen by their path, decoded, and read in layers of whole chunks."""
+"""Arrays with labels as sources: decoded as CF says, by xarray, and read in layers of whole chunks.
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+Files are opened by the libraries of their formats: xarray's own engines give up on a group of HDF5 with a
+link to nowhere or a type that NetCDF lacks, and on one of Zarr in which a single array has no labels.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
-from texgs.volume.axes import Axis, Channel, lattice, picked
+from texgs.volume.axes import Axis, Channel, axes_of, lattice, picked, upright
 from texgs.volume.grid import Triple, require_room
 from texgs.volume.slabs import SLAB_BYTES, Source, step_note
 
+if TYPE_CHECKING:
+    import xarray
+
 SHARE = 4  # one layer takes this part of the free memory at most
 LISTED = 8  # arrays in a message
-CODED = ("scale_factor", "add_offset", "_FillValue", "missing_value")  # attributes of CF: samples to decode
+EVERYTHING = (-np.inf, np.inf)
+# Attributes of CF: what stands for missing samples; how packed ones are scaled; which are valid; and others.
+CODES, PACKED = ("_FillValue", "missing_value"), {"scale_factor", "add_offset"}
+NUMBERS = (*CODES, *PACKED, "valid_min", "valid_max", "valid_range")
 UNSIGNED = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
-
-
-@dataclass(frozen=True, eq=False)
-class StoredArray:
-    """An array in a file, whichever library reads it."""
-
-    read: Callable[[tuple[int | slice, ...]], Any]  # samples at an index
-    dtype: np.dtype
-    axes: Sequence[Axis]
-    chunks: Sequence[int]  # samples along each axis that are stored in one piece
-    attributes: Mapping[str, Any]
-    note: str = ""  # for the user
+CF = (*NUMBERS, UNSIGNED, "axis", "standard_name", "long_name", "units", "positive")
 
 
 class LayerSource(Source):
     """A scalar field in an array, of a step of time and of a channel.
 
-    Axes are z, y, x in the order they are stored, unless their names say otherwise, and run upwards with
-    coordinates. What is read is layers of whole chunks along z. One stays in memory, so that slabs in order
-    read every chunk once; only where a layer takes more than a quarter of the free memory, it is read in
-    parts, and its chunks once for each. `given` replaces spacing and origin.
+    Axes are z, y, x as `upright` has them, and run upwards with coordinates. What is read is layers of whole
+    chunks along z. One stays in memory, so that slabs in order read every chunk once; only where a layer
+    takes more than a quarter of the free memory, it is read in parts, and its chunks once for each.
+
+    Args:
+        name: of the file, for messages.
+        field: as it is stored, read where it is indexed; attributes of CF say how to decode it.
+        given: spacing and origin that replace those of the axes.
+        channel: label or number of one of several.
+        time: step of several.
+        axes: where they are not those of the labels.
+        chunks: samples along each axis that are stored in one piece.
+        note: for the user.
     """
 
     def __init__(
         self,
-        path: Path,
-        stored: StoredArray,
+        name: str | Path,
+        field: xarray.DataArray,
         given: tuple[Triple | None, Triple | None],
         channel: str | None = None,
         time: int | None = None,
+        *,
+        axes: Sequence[Axis] | None = None,
+        chunks: Sequence[int] | None = None,
+        note: str = "",
     ) -> None:
-        self._path, self._stored = path, stored
-        self._index = picked(stored.axes, channel, time)
+        self._name, axes = name, axes or axes_of(field)
+        self._index = picked(axes, channel, time)
         space = [k for k, index in enumerate(self._index) if isinstance(index, slice)]
-        names = {stored.axes[k].name.lower(): k for k in space}
-        order = [names[name] for name in "zyx"] if {*names} == {*"zyx"} else space
-        self._z, self._turn = order[0], [space.index(k) for k in order]
-        z, y, x = (stored.axes[k] for k in order)
+        self._turn, guess = upright([axes[k] for k in space])
+        z, y, x = (axes[space[k]] for k in self._turn)
+        self._z = space[self._turn[0]]
         self._signs = [-1 if axis.step < 0 else 1 for axis in (z, y, x)]
-        numbers = {name: np.ravel(stored.attributes.get(name, "")) for name in CODED}
-        self._coded = {k: v[0] for k, v in numbers.items() if v.size == 1 and v.dtype.kind in "iuf"}
         spacing, origin, remark = lattice((x, y, z), *given)
-        unsigned = np.ravel(stored.attributes.get(UNSIGNED, "")).astype(str)[0].lower() == "true"
-        self._is_unsigned = unsigned and stored.dtype.kind == "i"
-        kept = np.dtype(f"u{stored.dtype.itemsize}") if self._is_unsigned else stored.dtype
-        dtype = np.dtype(np.float32) if self._coded else kept
-        super().__init__(path.name, (x.size, y.size, z.size), dtype, spacing, origin)
-        for axis, index in zip(stored.axes, self._index, strict=True):
+        self._samples, self._valid = decoded(field)
+        is_float = [each.dtype.kind == "f" for each in (field, self._samples)]
+        is_masked = is_float == [False, True] or self._valid != EVERYTHING
+        dtype = np.dtype(np.float32) if is_masked else self._samples.dtype
+        super().__init__(Path(name).name, (x.size, y.size, z.size), dtype, spacing, origin)
+        for axis, index in zip(axes, self._index, strict=True):
             if axis.kind == "time":
                 self.n_steps = axis.size
             elif axis.kind == "channel" and isinstance(index, int):
                 self.channels = axis.channels or (Channel(),) * axis.size
                 self.channel = self.channels[index]
-        self.note = "; ".join(filter(None, (stored.note, step_note(time or 0, self.n_steps), remark)))
-        plane, chunk = x.size * y.size * stored.dtype.itemsize, stored.chunks[self._z]
+        self.note = "; ".join(filter(None, (note, step_note(time or 0, self.n_steps), guess, remark)))
+        plane, chunk = x.size * y.size * self.dtype.itemsize, chunks[self._z] if chunks else 1
         most = max(1, free_memory() // (SHARE * plane))
         self._depth = min(chunk * max(1, SLAB_BYTES // (chunk * plane)), most)  # slices in a layer
-        require_room((x.size, y.size, self._depth), stored.dtype)
+        require_room((x.size, y.size, self._depth), self.dtype)
         self._first, self._layer = -1, np.empty(0)  # index of its first slice, and the layer in memory
 
     def slices(self, start: int, stop: int) -> np.ndarray:
@@ -86,7 +98,11 @@ class LayerSource(Source):
         parts = [
             self._part(first, max(low, first), min(high, first + self._depth))[::sign] for first in firsts
         ]
-        return self._decoded(np.concatenate(parts)[:, :: signs[0], :: signs[1]])
+        values = np.concatenate(parts)[:, :: signs[0], :: signs[1]]
+        if self._valid != EVERYTHING:
+            values = np.where((values < self._valid[0]) | (values > self._valid[1]), np.nan, values)
+        with np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
+            return values.astype(self.dtype, copy=False)
 
     def _part(self, first: int, low: int, high: int) -> np.ndarray:
         """Return slices low to high - 1, as they are stored, of the layer that begins with `first`."""
@@ -94,25 +110,10 @@ class LayerSource(Source):
             self._first, self._layer = -1, np.empty(0)  # gives its memory back before the next one is read
             index = list(self._index)
             index[self._z] = slice(first, min(first + self._depth, self.dims[2]))
-            with reading_as("an array that is whole", where=f"{self._path}: "):
-                self._layer = np.asarray(self._stored.read(tuple(index))).transpose(self._turn)
+            with reading_as("an array that is whole", where=f"{self._name}: "):
+                self._layer = self._samples[tuple(index)].values.transpose(self._turn)
             self._first = first
         return self._layer[low - first : high - first]
-
-    def _decoded(self, values: np.ndarray) -> np.ndarray:
-        """Return samples of the source's type: packed ones by scale and offset, NaN for missing ones."""
-        codes = [np.asarray(self._coded[name]) for name in CODED[2:] if name in self._coded]
-        if values.dtype.kind == "f":  # a code may be written with more digits than samples have
-            with np.errstate(over="ignore"):
-                codes = [code.astype(values.dtype) for code in codes]
-        missing = [values == code for code in codes]
-        values = values.view(values.dtype.str.replace("i", "u")) if self._is_unsigned else values
-        scale, offset = (self._coded.get(name) for name in CODED[:2])
-        if scale is not None or offset is not None:
-            values = values * np.float64(1 if scale is None else scale) + (offset or 0)
-        with np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
-            values = values.astype(self.dtype, copy=False)
-        return np.where(np.any(missing, axis=0), self.dtype.type(np.nan), values) if missing else values
 
 
 def one_of(arrays: Mapping[str, Any], variable: str | None) -> str:
@@ -134,3 +135,82 @@ def one_of(arrays: Mapping[str, Any], variable: str | None) -> str:
         "dataset.volume.variable: expected an array of real numbers with three axes or more, got "
         f"{got}; choose one of {', '.join(each or '/' for each in fields[:LISTED]) or 'another file'}{more}"
     )
+
+
+def lazy(array: Any, names: Sequence[str], places: Mapping[str, Any]) -> xarray.DataArray:
+    """Return an array of h5py or Zarr with labels, whose samples are read when it is indexed.
+
+    `places` are arrays with the coordinates [n] of some of its axes.
+    """
+    import xarray
+
+    coords = {name: (name, each[:], attributes_of(each)) for name, each in places.items()}
+    samples = xarray.core.indexing.LazilyIndexedArray(_backend()(array))
+    return xarray.DataArray(samples, coords, names, attrs=attributes_of(array))
+
+
+@cache
+def _backend() -> type:
+    """Return the class of arrays in files that xarray indexes; made late, as xarray takes half a second."""
+    from xarray.backends import BackendArray
+    from xarray.core.indexing import IndexingSupport, explicit_indexing_adapter
+
+    class StoredArray(BackendArray):
+        def __init__(self, array: Any) -> None:
+            self.array, self.shape, self.dtype = array, array.shape, array.dtype
+
+        def __getitem__(self, key: Any) -> Any:
+            read = self.array.__getitem__
+            return explicit_indexing_adapter(key, self.shape, IndexingSupport.BASIC, read)
+
+    return StoredArray
+
+
+def attributes_of(array: Any) -> dict[str, Any]:
+    """Return the attributes of CF that an array of h5py or Zarr has, with bytes as text."""
+    said = {key: np.ravel(array.attrs[key]) for key in CF if key in array.attrs}
+    is_text = {key for key, values in said.items() if values.dtype.kind in "SUO" and values.size == 1}
+    words = {key: said[key][0] for key in is_text}
+    return said | {k: v.decode(errors="replace") if isinstance(v, bytes) else v for k, v in words.items()}
+
+
+def decoded(field: xarray.DataArray) -> tuple[xarray.Variable, tuple[float, float]]:
+    """Return samples, still to be read, as attributes of CF say they are, and the range that is valid.
+
+    Packed ones are scaled; NaN stands for each code of missing ones. Numbers may be written as text.
+    """
+    import xarray
+
+    said = {key: numbers(key, field) for key in NUMBERS if np.size(field.attrs.get(key, ())) > 0}
+    coding: dict[str, Any] = {key: said[key] for key in CODES if key in said}
+    coding |= {key: float(said[key][0]) for key in PACKED if key in said}
+    if str(field.attrs.get(UNSIGNED, "")).lower() == "true" and field.dtype.kind == "i":
+        coding[UNSIGNED] = "true"
+    samples = field.variable.copy(deep=False)
+    samples.attrs = coding
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", xarray.SerializationWarning)  # of several codes
+        samples = xarray.decode_cf(xarray.Dataset({"field": samples}), decode_times=False)["field"].variable
+    return samples, valid_range(said)
+
+
+def valid_range(said: Mapping[str, np.ndarray]) -> tuple[float, float]:
+    """Return the least and the largest valid sample, after decoding; whole numbers are of packed samples."""
+    low, high = said.get("valid_range", EVERYTHING)
+    low, high = said.get("valid_min", [low])[0], said.get("valid_max", [high])[0]
+    if not said.keys() & PACKED or np.asarray(high).dtype.kind == "f":
+        return float(low), float(high)
+    scale, offset = said.get("scale_factor", [1.0])[0], said.get("add_offset", [0.0])[0]
+    first, last = sorted((float((low - 0.5) * scale + offset), float((high + 0.5) * scale + offset)))
+    return first, last
+
+
+def numbers(key: str, field: xarray.DataArray) -> np.ndarray:
+    """Return the numbers [n] of an attribute; codes as samples have them, which may have fewer digits."""
+    values = np.ravel(field.attrs[key])
+    try:
+        values = values if values.dtype.kind in "iuf" else values.astype(np.float64)
+    except ValueError:
+        raise ArgumentError(f"{key}: expected a number, got {field.attrs[key]}; correct the file") from None
+    with np.errstate(over="ignore"):
+        return values.astype(field.dtype) if key in CODES and field.dtype.kind == "f" else values
