@@ -47,7 +47,7 @@ def _classic(path: Path, variable: str | None) -> tuple[Any, dict[str, Any]]:
     import xarray
 
     file = xarray.open_dataset(path, engine="scipy", decode_cf=False, cache=False)
-    field = file[one_of(dict(file.variables), variable)]
+    field = file[one_of({str(name): file[name] for name in file.variables}, variable)]
     return field.assign_attrs(never_written(field) | field.attrs), {}
 
 
