@@ -304,7 +304,6 @@ def test_more_than_one_component_is_refused(tmp_path):
     WRITERS["packed.vti"](tmp_path / "v.vti", colors)
     tifffile.imwrite(tmp_path / "v.tif", colors, photometric="rgb")
     tifffile.imwrite(tmp_path / "one.tif", colors[0], photometric="rgb")
-    tifffile.imwrite(tmp_path / "channels.tif", colors[..., 0][:3], imagej=True, metadata={"axes": "CYX"})
     flat = {"kinds": ["RGB-color", "domain", "domain"]}
     nrrd.write(str(tmp_path / "flat.nrrd"), colors[0], flat, index_order="C")
     nrrd.write(str(tmp_path / "v.nrrd"), colors, {"kinds": ["RGB-color"] + 3 * ["domain"]}, index_order="C")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.axes import Channel
+from texgs.volume.axes import Axis, Channel
 from texgs.volume.grid import ONES, ZEROS, Dims, Grid, Triple, byte_count, check_lattice
 
 SLAB_BYTES = 1 << 23  # reads of this size run at the disk's speed, and memory stays small
@@ -25,6 +25,15 @@ class Source(ABC):
         check_lattice(dims, dtype, spacing, origin)
         self.name, self.dims, self.spacing, self.origin = name, dims, spacing, origin
         self.dtype = dtype.newbyteorder("=")  # that of this machine
+
+    def take(self, axes: Sequence[Axis], index: Sequence[int | slice]) -> None:
+        """Keep what an index of axes has chosen of steps and channels, and how many there are."""
+        for axis, place in zip(axes, index, strict=False):
+            if isinstance(place, int) and axis.size > 1 and axis.kind == "time":
+                self.n_steps, self.note = axis.size, step_note(place, axis.size)
+            elif isinstance(place, int) and axis.size > 1:
+                self.channels = axis.channels or (Channel(),) * axis.size
+                self.channel = self.channels[place]
 
     @abstractmethod
     def slices(self, start: int, stop: int) -> np.ndarray:

@@ -25,13 +25,15 @@ from texgs.volume.grid import (
 from texgs.volume.netcdf import open_netcdf
 from texgs.volume.ome_zarr import is_zarr, open_zarr
 from texgs.volume.slabs import ArraySource, RawSource, Source, require_step, size_text, step_note
+from texgs.volume.slice_names import tiffs_in
 from texgs.volume.text_columns import ColumnSource
-from texgs.volume.tiff import open_tiff, tiffs_in
+from texgs.volume.tiff import open_tiff
 
 # Tried in this order where the size of a plain file does not fit the type given.
 COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
 DEFAULTS = {"endian": "little", "skip": 0, "time": 0}  # of keys, which every format may be given
 IN_FILES = ("variable", "channel", "time")  # keys of an array among others
+IN_PAGES = ("image", "channel", "time")  # keys of an image of TIFF
 
 
 def open_source(
@@ -44,10 +46,11 @@ def open_source(
     """Open a volume without reading its samples where the format allows that.
 
     Formats: .raw, .bin, .dat (plain samples, described by the arguments); .npy (an array [Z, Y, X]); .tif,
-    .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs in natural order; a folder of
-    DICOM slices; .nrrd, .nhdr; .mhd, .mha; .nii, .nii.gz; .mrc; .gipl; .slc; .vti and .vtk (image data, point
-    arrays); .nc, .nc4 (NetCDF); .h5, .hdf5; a folder of Zarr, or its .zip, .ozx; .txt, .txt.gz (a line
-    per sample). x is the fastest axis throughout, unless an array has axes with the names x, y, z.
+    .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs that numbers in their names
+    count; a folder of DICOM slices; .nrrd, .nhdr; .mhd, .mha; .nii, .nii.gz; .mrc; .gipl; .slc; .vti and .vtk
+    (image data, point arrays); .nc, .nc4 (NetCDF); .h5, .hdf5; a folder of Zarr, or its .zip, .ozx; .txt,
+    .txt.gz (a line per sample). x is the fastest axis throughout, unless an array has axes with the names
+    x, y, z.
     Axes are permuted and flipped to the closest ones of physical space where the format tells about it:
     R, A, S of NIfTI; L, P, S of DICOM. They are not resampled where they are oblique.
 
@@ -58,8 +61,8 @@ def open_source(
         keys: what only some formats take, see `KEYS`: `dims`, samples along x, y, z; `dtype`, numpy's name of
             the sample type, such as "uint16"; `endian`, "little" or "big"; `skip`, bytes before the first
             sample; `series`, number or UID of one of several; `variable`, the path of an array in the file;
-            `channel`, its label or number, from 0; `time`, a step, from 0 (the default), of arrays, of
-            NIfTI and of DICOM; `column`, from 1.
+            `image`, name or number, from 0, of one of several of TIFF; `channel`, its label or number, from
+            0; `time`, a step, from 0 (the default), of arrays, TIFF, NIfTI and DICOM; `column`, from 1.
 
     Raises:
         ArgumentError, ShapeError: if the file is missing, cannot be read, is unknown, damaged or no scalar
@@ -98,7 +101,7 @@ def _suffix(path: Path) -> str:
 
 def holds_arrays(path: Path) -> bool:
     """Return whether a file is of a format of arrays, which are read as needed and may have channels."""
-    return _opener(path)[1] == IN_FILES
+    return "channel" in _opener(path)[1]
 
 
 def tells_superior(path: Path) -> bool:
@@ -114,7 +117,7 @@ def _opener(path: Path) -> tuple[Callable[..., Source] | None, tuple[str, ...]]:
         return OPENERS.get(suffix), KEYS.get(suffix, ())
     if is_zarr(path) or suffix == ".zarr":
         return open_zarr, IN_FILES
-    return (open_tiff, ()) if tiffs_in(path) else (open_foreign, ("series", "time"))
+    return (open_tiff, IN_PAGES) if tiffs_in(path) else (open_foreign, ("series", "time"))
 
 
 def _open(path: Path, spacing: Triple | None, origin: Triple | None, said: dict[str, Any]) -> Source:
@@ -228,6 +231,7 @@ OPENERS: dict[str, Callable[..., Source]] = {
 }
 KEYS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((".raw", ".bin", ".dat"), ("dims", "dtype", "endian", "skip")),
+    **dict.fromkeys((".tif", ".tiff"), IN_PAGES),
     **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5", ".zip", ".ozx"), IN_FILES),
     **dict.fromkeys((".txt", ".txt.gz"), ("dims", "column")),
     **dict.fromkeys((".nii", ".nii.gz"), ("time",)),

@@ -1,0 +1,131 @@
+"""Images of TIFF files: which one is read, its axes, and what OME and ImageJ tell about it."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import prod
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.axes import METRES, Axis, Channel
+from texgs.volume.grid import Triple
+
+
+def file_of(page: Any) -> Path:
+    """Return the file that a page is in: an OME-TIFF may be in several."""
+    return Path(page.parent.filehandle.path)
+
+
+def images_in(tiff: Any) -> list[Any]:
+    """Return the images of a file as series of pages; planes that are alike are slices, but none of OME."""
+    import tifffile
+
+    groups: dict[Any, list[Any]] = {}
+    for number, series in enumerate(tiff.series):
+        plane = series.keyframe
+        is_loose = series.kind == "generic" or (series.kind != "ome" and series.size == prod(plane.shape))
+        groups.setdefault((plane.shape, series.dtype) if is_loose else number, []).append(series)
+    for key, group in groups.items():
+        if len(group) > 1:
+            pages = sorted((page for series in group for page in series), key=lambda page: page.treeindex)
+            axes = f"I{pages[0].keyframe.axes}"
+            groups[key] = [tifffile.TiffPageSeries(pages, (len(pages), *key[0]), key[1], axes)]
+    return [group[0] for group in groups.values()]
+
+
+def is_set(images: Sequence[Any], files: Sequence[Path]) -> bool:
+    """Return whether files are those of one OME-TIFF, which has to be in a folder of its own."""
+    names = {file_of(page).name for image in images for page in image if page is not None}
+    others = [file.name for file in files if file.name not in names]
+    if len(names) > 1 and others:
+        raise ArgumentError(
+            f"{files[0].name} and {others[0]}: expected the files of one OME-TIFF, the second is not of it; "
+            "move it away"
+        )
+    return len(names) > 1
+
+
+def chosen(images: Sequence[Any], wanted: str | None, tiff: Any) -> tuple[Any, str]:
+    """Return the image of a name or number, and a note of what was taken without one.
+
+    That is the only volume, or the only one with pages in an open file, which may be None.
+    """
+    volumes = {str(k): image for k, image in enumerate(images) if is_volume(image)} or {"0": images[0]}
+    names = [image.name for image in volumes.values()]
+    named = {image.name: image for image in volumes.values() if names.count(image.name) == 1 and image.name}
+    if found := (volumes | named).get(str(wanted)):
+        return found, ""
+    here = {k: each for k, each in volumes.items() if any(page and page.parent is tiff for page in each)}
+    for known, why in ((volumes, "the only volume"), (here, "the only one with pages in this file")):
+        if wanted is None and len(known) == 1:
+            number, image = next(iter(known.items()))
+            return image, f"image {number} of {len(images)}, {why}" if len(images) > 1 else ""
+    sizes = (f"{image.name} {' x '.join(map(str, image.shape[::-1]))}".strip() for image in volumes.values())
+    listed = ", ".join(map("{} ({})".format, volumes, sizes))
+    raise ArgumentError(f"dataset.volume.image: expected one of {listed}, got {wanted or 'none'}")
+
+
+def is_volume(image: Any) -> bool:
+    """Return whether an image has three axes besides channels, and is no smaller copy of another one."""
+    sizes = zip(image.axes, image.shape, strict=True)
+    return sum(n > 1 and axis not in "CS" for axis, n in sizes) > 2 and not image.keyframe.is_reduced
+
+
+def axes_of(image: Any, labels: Sequence[str]) -> tuple[list[Axis], str]:
+    """Return the axes of an image before Y and X, and a remark where time takes the place of z."""
+    letters, shape = image.get_axes(squeeze=False).rstrip("S"), image.get_shape(squeeze=False)
+    if not letters.endswith("YX"):
+        raise ArgumentError(f"expected pages with Y and X, got the axes {letters}; store it again so")
+    known = {"C": tuple(map(Channel, labels))}
+    axes = [Axis(name, n, channels=known.get(name, ())) for name, n in zip(letters[:-2], shape, strict=False)]
+    is_long = {axis.kind for axis in axes if axis.size > 1}
+    if "space" in is_long or "time" not in is_long:
+        return axes, ""
+    axes = [replace(axis, name="z") if axis.kind == "time" else axis for axis in axes]
+    return axes, "its steps of time are taken for slices, as there are no others"
+
+
+def told_of(image: Any, tiff: Any, images: Sequence[Any]) -> tuple[Triple | None, list[str]]:
+    """Return the spacing x, y, z, in the unit of x, as OME or ImageJ tells, and OME's labels of channels."""
+    if tiff.is_ome:
+        root = ElementTree.fromstring(tiff.ome_metadata)
+        if (other := root.find("{*}BinaryOnly")) is not None:
+            raise ArgumentError(
+                f"expected a whole OME-TIFF, got a part of {other.get('MetadataFile')}; open that one, or "
+                "make one file of all, by bfconvert of Bio-Formats, say"
+            )
+        known = root.findall("{*}Image")
+        alike = [each for each in known if each.get("Name") == image.name]
+        if len(alike) == 1 or len(known) == len(images):
+            described = alike[0] if len(alike) == 1 else known[list(images).index(image)]
+            pixels = described.find("{*}Pixels")
+            labels = [each.get("Name", "") for each in pixels.findall("{*}Channel")]
+            return _of_ome(pixels.attrib), labels
+        return None, []
+    depth = (tiff.imagej_metadata or {}).get("spacing")
+    tags = [image.keyframe.tags.get(name) for name in ("XResolution", "YResolution")]
+    if not depth or not all(tag and tag.value[0] for tag in tags):
+        return None, []
+    dx, dy = (tag.value[1] / tag.value[0] for tag in tags)  # pixels in a unit
+    return (dx, dy, abs(float(depth))), []  # below 0 for slices from the top down, by ImageJ
+
+
+def _of_ome(pixels: Mapping[str, str]) -> Triple | None:
+    """Return the spacing of an image by OME, in the unit of x; None if it does not tell all three."""
+    units = [METRES.get(pixels.get(f"PhysicalSize{axis}Unit", "µm"), 0.0) for axis in "XYZ"]
+    x, y, z = (
+        float(pixels.get(f"PhysicalSize{axis}", 0)) * unit for axis, unit in zip("XYZ", units, strict=True)
+    )
+    return (x / units[0], y / units[0], z / units[0]) if min(x, y, z) > 0 else None
+
+
+def require_pages(image: Any, pages: Sequence[Any]) -> None:
+    """Require pages of an image that are there: an OME-TIFF may be in several files."""
+    if lost := sum(page is None for page in pages):
+        folder = file_of(image.keyframe).parent
+        names = dict.fromkeys(re.findall(r'FileName="([^"]+)"', image.parent.ome_metadata or ""))
+        absent = [name for name in names if not (folder / name).exists()]
+        files = f"{', '.join(absent[:3])} of the same OME-TIFF" if absent else "the file with all of them"
+        raise ArgumentError(f"{lost} of {len(pages)} slices are missing; put {files} beside this file")
