@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import nibabel
 import numpy as np
+import tifffile
 import torch
 from PIL import Image
 from pydicom.uid import generate_uid
@@ -153,6 +154,16 @@ def slices(folder: Path) -> Path:
     return folder / "slices"
 
 
+def hyperstack(folder: Path, **kind: Any) -> Path:
+    """Two steps of two channels, twice in one file where it is OME-TIFF."""
+    axes, shape = ("TCZYX", (2, 2, 3, 12, 13)) if "ome" in kind else ("TZCYX", (2, 3, 2, 12, 13))
+    values = np.concatenate([sample_values()[:3]] * 4)
+    with tifffile.TiffWriter(folder / "v.tif", **kind) as file:
+        for _ in range(2 if "ome" in kind else 1):
+            file.write(values.reshape(shape), metadata={"axes": axes}, compression="zlib")
+    return folder / "v.tif"
+
+
 def tf_ours(folder: Path) -> Path:
     return write_json(folder / "tf.json", {"format": "texgs-tf", "version": 1, **TENT.to_dict()})
 
@@ -285,6 +296,8 @@ READERS: dict[str, Reader] = {
         for name in ("v.txt", "v.txt.gz")
     },
     "slices": Reader(slices, read_volume, "slices/0.tif"),
+    "ome": Reader(partial(hyperstack, ome=True), partial(read_volume, image="1", channel="1", time=1)),
+    "imagej": Reader(partial(hyperstack, imagej=True), partial(read_volume, channel="0", time=1)),
     "tf ours": Reader(tf_ours, read_function),
     "tf ParaView": Reader(lambda folder: preset(folder, ColorSpace="Diverging", Points=RAMP), read_function),
     "views json": Reader(views, read_view_set, "transforms_train.json"),

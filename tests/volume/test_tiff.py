@@ -14,6 +14,7 @@ from tests.volume.volume_files import assert_holds, sample_values, whole
 from texgs.core.errors import ArgumentError
 from texgs.volume.slabs import RawSource
 from texgs.volume.sources import open_source
+from texgs.volume.tiff import complaints_raised
 
 A = sample_values()[:6]  # [6, 12, 13]
 B = A[::-1] + 1000
@@ -158,25 +159,52 @@ def test_axes_that_are_none_of_a_volume_are_named(tmp_path):
         open_source(tmp_path / "turned.tif")
 
 
-def split(folder: Path, n: int = 3) -> list[Path]:
-    """An OME-TIFF of six slices in three files, two in each."""
-    names = [f"part_{k}.ome.tif" for k in range(n)]
-    ids = [f"urn:uuid:{uuid.UUID(int=k + 1)}" for k in range(n)]
-    planes = "".join(
-        f'<TiffData IFD="{z % 2}" FirstZ="{z}" FirstC="0" FirstT="0" PlaneCount="1">'
-        f'<UUID FileName="{names[z // 2]}">{ids[z // 2]}</UUID></TiffData>'
-        for z in range(6)
-    )
+def ome(own: str, images: str) -> dict[str, object]:
+    """Arguments of tifffile for a file of an OME-TIFF in several."""
+    space = 'xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"'
+    xml = f'<?xml version="1.0"?><OME {space} UUID="{own}">{images}</OME>'
+    return {"description": xml, "metadata": None, "photometric": "minisblack"}
+
+
+def ome_image(name: str, depth: float, planes: str) -> str:
     size = 'SizeX="13" SizeY="12" SizeZ="6" SizeC="1" SizeT="1" PhysicalSizeX="1" PhysicalSizeY="1"'
+    return (
+        f'<Image ID="Image:{name}" Name="{name}"><Pixels ID="Pixels:{name}" DimensionOrder="XYZCT" '
+        f'Type="uint16" {size} PhysicalSizeZ="{depth}"><Channel ID="C:0" SamplesPerPixel="1"/>{planes}'
+        "</Pixels></Image>"
+    )
+
+
+def plane_in(name: str, index: int, page: int, z: int) -> str:
+    return (
+        f'<TiffData IFD="{page}" FirstZ="{z}" FirstC="0" FirstT="0" PlaneCount="1">'
+        f'<UUID FileName="{name}">urn:uuid:{uuid.UUID(int=index + 1)}</UUID></TiffData>'
+    )
+
+
+def split(folder: Path) -> list[Path]:
+    """An OME-TIFF of six slices in three files, two in each."""
+    names = [f"part_{k}.ome.tif" for k in range(3)]
+    planes = "".join(plane_in(names[z // 2], z // 2, z % 2, z) for z in range(6))
     for k, name in enumerate(names):
-        xml = (
-            f'<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06" '
-            f'UUID="{ids[k]}"><Image ID="Image:0"><Pixels ID="Pixels:0" DimensionOrder="XYZCT" Type="uint16" '
-            f'{size} PhysicalSizeZ="3"><Channel ID="C:0" SamplesPerPixel="1"/>{planes}</Pixels></Image></OME>'
-        )
-        part = A[2 * k : 2 * k + 2]
-        tifffile.imwrite(folder / name, part, description=xml, metadata=None, photometric="minisblack")
+        told = ome(f"urn:uuid:{uuid.UUID(int=k + 1)}", ome_image("one", 3, planes))
+        tifffile.imwrite(folder / name, A[2 * k : 2 * k + 2], **told)
     return [folder / name for name in names]
+
+
+def test_of_positions_in_a_file_each_the_one_in_the_file_is_read(tmp_path):
+    names = ["left.ome.tif", "right.ome.tif"]
+    planes = ["".join(plane_in(name, k, z, z) for z in range(6)) for k, name in enumerate(names)]
+    both = "".join(ome_image(*each) for each in zip(("left", "right"), (2, 4), planes, strict=True))
+    for k, (name, values) in enumerate(zip(names, (A, B), strict=True)):
+        tifffile.imwrite(tmp_path / name, values, **ome(f"urn:uuid:{uuid.UUID(int=k + 1)}", both))
+    assert_holds(tmp_path / names[1], B, (1, 1, 4))
+    assert open_source(tmp_path / names[1]).note == "image 1 of 2, the only one with pages in this file"
+    assert_holds(tmp_path / names[1], A, (1, 1, 2), image="left")
+    with pytest.raises(ArgumentError, match=r"volume.image: expected one of 0 \(left .*\), 1 \(right .*none"):
+        open_source(tmp_path)
+    (tmp_path / names[0]).unlink()
+    assert_holds(tmp_path / names[1], B, (1, 1, 4))
 
 
 def test_an_ome_tiff_in_several_files_is_whole_from_any_of_them_and_from_their_folder(tmp_path):
@@ -199,15 +227,18 @@ def test_a_missing_file_of_an_ome_tiff_is_named(tmp_path):
 
 
 def test_a_part_of_an_ome_tiff_without_metadata_names_the_file_that_has_them(tmp_path):
-    xml = (
-        '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06">'
-        '<BinaryOnly MetadataFile="all.companion.ome" UUID="urn:uuid:1"/></OME>'
-    )
-    tifffile.imwrite(tmp_path / "v.ome.tif", A, description=xml, metadata=None, photometric="minisblack")
+    told = ome("urn:uuid:2", '<BinaryOnly MetadataFile="all.companion.ome" UUID="urn:uuid:1"/>')
+    tifffile.imwrite(tmp_path / "v.ome.tif", A, **told)
     with pytest.raises(
         ArgumentError, match=r"got a part of all.companion.ome; open that one, or make one file"
     ):
         open_source(tmp_path / "v.ome.tif")
+
+
+def test_what_tifffile_only_warns_of_is_an_error_where_samples_are_lost():
+    expected = pytest.raises(ArgumentError, match=r"cut off, tifffile says: MMStack series is missing files")
+    with expected, complaints_raised():
+        tifffile.logger().warning("MMStack series is missing files. Returning subset (1, 2) of (2, 2)")
 
 
 @pytest.mark.parametrize("tag", ["StripOffsets", "StripByteCounts"])
@@ -283,17 +314,19 @@ def test_a_gap_in_one_of_the_channels_is_named(tmp_path):
         open_source(folder_of(tmp_path / "v", planes))
 
 
-@pytest.mark.skipif(find_spec("imagecodecs") is None, reason="needs imagecodecs: pip install 'texgs[tiff]'")
-@pytest.mark.parametrize("options", [{}, {"tiffinfo": {317: 2}}])
-def test_lzw_is_read_with_the_extra(tmp_path, options):
+@pytest.mark.skipif(find_spec("imagecodecs") is None, reason="needs imagecodecs: pip install '.[tiff]'")
+@pytest.mark.parametrize("predictor", [1, 2])
+def test_lzw_is_read_with_the_extra(tmp_path, predictor):
     planes = [Image.fromarray(plane) for plane in A.astype(np.uint8)]
     more = {"save_all": True, "append_images": planes[1:], "compression": "tiff_lzw"}
-    planes[0].save(tmp_path / "v.tif", **more, **options)
+    planes[0].save(tmp_path / "v.tif", **more, tiffinfo={317: predictor})
+    with tifffile.TiffFile(tmp_path / "v.tif") as file:
+        assert (file.pages[5].compression, file.pages[5].predictor) == (5, predictor)
     assert_holds(tmp_path / "v.tif", A)
 
 
 def test_lzw_without_the_extra_names_it(tmp_path, monkeypatch):
     Image.fromarray(A[0].astype(np.uint8)).save(tmp_path / "v.tif", compression="tiff_lzw")
     monkeypatch.setattr("texgs.volume.tiff.find_spec", lambda name: None)
-    with pytest.raises(ArgumentError, match=r'got LZW; save them so, or pip install "texgs\[tiff\]"'):
+    with pytest.raises(ArgumentError, match=r"got LZW; save them so, or pip install '.\[tiff\]'"):
         open_source(tmp_path / "v.tif")

@@ -144,7 +144,7 @@ def _page_type(page: Any) -> tuple[tuple[int, int], np.dtype]:
     if page.compression not in READABLE and find_spec("imagecodecs") is None:
         raise ArgumentError(
             f"expected samples that are uncompressed or deflated, got {page.compression.name}; save them so, "
-            'or pip install "texgs[tiff]"'
+            "or pip install '.[tiff]'"
         )
     require_room((page.imagewidth, page.imagelength, PAGES), np.dtype(page.dtype))
     return (page.imagelength, page.imagewidth), np.dtype(page.dtype)

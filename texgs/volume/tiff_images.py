@@ -78,8 +78,9 @@ def axes_of(image: Any, labels: Sequence[str]) -> tuple[list[Axis], str]:
     letters, shape = image.get_axes(squeeze=False).rstrip("S"), image.get_shape(squeeze=False)
     if not letters.endswith("YX"):
         raise ArgumentError(f"expected pages with Y and X, got the axes {letters}; store it again so")
-    known = {"C": tuple(map(Channel, labels))}
-    axes = [Axis(name, n, channels=known.get(name, ())) for name, n in zip(letters[:-2], shape, strict=False)]
+    known = {("C", len(labels)): tuple(map(Channel, labels))} if all(labels) else {}
+    sizes = zip(letters[:-2], shape, strict=False)
+    axes = [Axis(name, n, channels=known.get((name, n), ())) for name, n in sizes]
     is_long = {axis.kind for axis in axes if axis.size > 1}
     if "space" in is_long or "time" not in is_long:
         return axes, ""
