@@ -101,7 +101,7 @@ def told_of(image: Any, tiff: Any, images: Sequence[Any]) -> tuple[Triple | None
         alike = [each for each in known if each.get("Name") == image.name]
         if len(alike) == 1 or len(known) == len(images):
             described = alike[0] if len(alike) == 1 else known[list(images).index(image)]
-            pixels = described.find("{*}Pixels")
+            pixels = described.findall("{*}Pixels")[0]
             labels = [each.get("Name", "") for each in pixels.findall("{*}Channel")]
             return _of_ome(pixels.attrib), labels
         return None, []
