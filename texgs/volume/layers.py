@@ -17,9 +17,9 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
-from texgs.volume.axes import Axis, Channel, axes_of, lattice, picked, upright
+from texgs.volume.axes import Axis, axes_of, lattice, picked, upright
 from texgs.volume.grid import Triple, require_room
-from texgs.volume.slabs import SLAB_BYTES, Source, step_note
+from texgs.volume.slabs import SLAB_BYTES, Source
 
 if TYPE_CHECKING:
     import xarray
@@ -77,13 +77,8 @@ class LayerSource(Source):
         is_masked = is_float == [False, True] or self._valid != EVERYTHING
         dtype = np.dtype(np.float32) if is_masked else self._samples.dtype
         super().__init__(Path(name).name, (x.size, y.size, z.size), dtype, spacing, origin)
-        for axis, index in zip(axes, self._index, strict=True):
-            if axis.kind == "time":
-                self.n_steps = axis.size
-            elif axis.kind == "channel" and isinstance(index, int):
-                self.channels = axis.channels or (Channel(),) * axis.size
-                self.channel = self.channels[index]
-        self.note = "; ".join(filter(None, (note, step_note(time or 0, self.n_steps), guess, remark)))
+        self.take(axes, self._index)
+        self.note = "; ".join(filter(None, (note, self.note, guess, remark)))
         plane, chunk = x.size * y.size * self.dtype.itemsize, chunks[self._z] if chunks else 1
         most = max(1, free_memory() // (SHARE * plane))
         self._depth = min(chunk * max(1, SLAB_BYTES // (chunk * plane)), most)  # slices in a layer

@@ -31,7 +31,7 @@ class Source(ABC):
         for axis, place in zip(axes, index, strict=False):
             if isinstance(place, int) and axis.size > 1 and axis.kind == "time":
                 self.n_steps, self.note = axis.size, step_note(place, axis.size)
-            elif isinstance(place, int) and axis.size > 1:
+            elif isinstance(place, int) and axis.kind == "channel":
                 self.channels = axis.channels or (Channel(),) * axis.size
                 self.channel = self.channels[place]
 
