@@ -57,3 +57,25 @@ else:
         assert platform.libc_ver()[0] != "glibc"
         pytest.skip("the C library is not glibc")
     assert faults[0] < 0.5 * faults[1]
+
+
+def test_what_is_in_a_cycle_goes_before_the_libraries_that_it_is_of(tmp_path):
+    """HDF5 crashes at its end where a property list of a virtual data set is still there."""
+    code = """
+import h5py
+from texgs.core.process import collect_rarely
+collect_rarely()
+layout = h5py.VirtualLayout((4,), "u2")
+layout[:] = h5py.VirtualSource("part.h5", "data", (4,))
+class Node: pass
+node = Node()
+node.itself = node
+with h5py.File("all.h5", "w") as file:
+    file.create_virtual_dataset("data", layout)
+with h5py.File("all.h5") as file:
+    node.properties = file["data"].id.get_create_plist()
+del node
+print("done")
+"""
+    run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert (run.stdout, run.returncode) == ("done\n", 0)

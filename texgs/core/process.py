@@ -25,14 +25,15 @@ def waiting() -> dict[str, str]:
 
 
 def collect_rarely() -> None:
-    """Let the garbage collector look only where many objects are new, and not at the end of this process.
+    """Let the garbage collector look only where many objects are new, and once at the end of this process.
 
     Large libraries make millions of objects that stay. By default the collector goes through them again and
-    again during imports, and once more at the end: a third of the time of a short command. For programs, not
-    for libraries to call.
+    again during imports, and some times more at the end: a third of the time of a short command. For programs,
+    not for libraries to call.
     """
     gc.set_threshold(NEW_OBJECTS)
     atexit.register(gc.freeze)
+    atexit.register(gc.collect)  # before that: HDF5 crashes where it has to close what is in a cycle itself
 
 
 def keep_freed_memory() -> bool:
