@@ -118,6 +118,31 @@ def test_a_reader_that_goes_away_is_no_error(words):
     assert done.stderr == ""
 
 
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(("words", "code"), [(["init", "project"], 0), (["--help"], 0), (["rnu"], 2)])
+def test_streams_that_are_closed_are_no_error(tmp_path, closed, words, code):
+    """As cron, or a program with windows, may leave them."""
+    command = ["sh", "-c", f'exec "$@" {closed}', "sh", sys.executable, "-m", "texgs.cli.main", *words]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, "Traceback" in done.stderr) == (code, False)
+    assert (tmp_path / "project" / "conf").exists() == ("init" in words)
+
+
+def test_no_file_gets_the_number_of_a_closed_stream(tmp_path):
+    """Else what a library or a child writes to the stream would be written into that file."""
+    code = """
+import os, subprocess
+from texgs.cli.main import open_closed_streams
+open_closed_streams()
+with open("precious", "wb"):
+    subprocess.run(["sh", "-c", "echo of a child; echo of a child >&2"], check=True)
+    os.write(1, b"of a library")
+"""
+    command = ["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", sys.executable, "-c", code]
+    assert subprocess.run(command, cwd=tmp_path).returncode == 0
+    assert (tmp_path / "precious").read_bytes() == b""
+
+
 ASCII = {"PYTHONIOENCODING": "ascii", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 
 

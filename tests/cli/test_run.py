@@ -154,6 +154,25 @@ def test_a_run_that_is_interrupted_says_that_it_goes_on(tmp_path):
     assert "Error in rule" not in err, "jobs that were interrupted have no fault"
 
 
+@pytest.mark.workflow
+@pytest.mark.parametrize(("words", "also"), [(["-n"], None), (["-n"], subprocess.STDOUT), ([], None)])
+def test_jobs_go_on_where_nobody_reads_their_output(tmp_path, words, also):
+    """As `| head -0` leaves it; the run tells by its exit code what has come of it."""
+    read, write = os.pipe()
+    os.close(read)
+    words = ["run", "--cores", "1", *words, "tracking=none", *TINY.split(), "volumes"]
+    done = subprocess.run(
+        [*TEXGS, *words], cwd=tmp_path, stdout=write, stderr=also or subprocess.PIPE, text=True, timeout=300
+    )
+    os.close(write)
+    assert done.returncode == 141, done.stderr
+    assert "roken pipe" not in (done.stderr or "")
+    is_real = "-n" not in words
+    assert bool(list(tmp_path.glob("results/turbulence/volume/metrics.json"))) == is_real
+    if is_real:
+        assert "1 of 1 slab" in (tmp_path / "results/logs/turbulence/volume.log").read_text()
+
+
 def test_a_user_without_a_home_folder_is_told_so(monkeypatch):
     monkeypatch.setattr("pwd.getpwuid", {}.__getitem__)
     for name in ("HOME", "XDG_CONFIG_HOME"):

@@ -131,6 +131,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is None:
         own_process()
     words = list(sys.argv[1:] if argv is None else argv)
+    try:
+        return outcome(words)
+    except BrokenPipeError:  # as `| head` leaves it
+        leave_broken_pipes()
+        return 141
+
+
+def outcome(words: Sequence[str]) -> int:
+    """Run the verb and return the exit code, with a sentence on stderr for what went wrong."""
     verb = next(iter(words), "")
     try:
         try:
@@ -147,13 +156,33 @@ def main(argv: Sequence[str] | None = None) -> int:
         end = "goes on with what is not done" if goes_on else "starts again"
         print(f"texgs {verb}: interrupted; the same command {end}", file=sys.stderr)
         return 130
-    except BrokenPipeError:  # as `| head` leaves it; what is still in the buffer goes nowhere
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141
+
+
+def leave_broken_pipes() -> None:
+    """Let what is still in the buffer of a stream that nobody reads go nowhere."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def open_closed_streams() -> None:
+    """Open streams that this process was started without, as by `>&-`: to nowhere, also for its children.
+
+    Else the next file that is opened gets the number of the stream, and what others write there.
+    """
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+        os.set_inheritable(number, True)
+    os.close(number)
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
 
 
 def own_process() -> None:
     """Set up what holds for the whole process."""
+    open_closed_streams()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # its run ends as killed
     for stream in (sys.stdout, sys.stderr):  # what a terminal cannot show is no reason to stop
         if isinstance(stream, io.TextIOWrapper):

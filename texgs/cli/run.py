@@ -82,6 +82,8 @@ def snakemake(words: Sequence[str]) -> bool:
     told = [*defaults(given), *located(rest)]
     try:
         parser, options = parse_args(told)
+    except BrokenPipeError:  # of the terminal's side, as `| head` leaves it
+        raise
     except Exception as error:  # as the main of snakemake does
         print_exception(error)
         return False
@@ -107,6 +109,8 @@ def told_errors(targets: Sequence[str] = ()) -> Iterator[None]:
         unknown = targets if isinstance(error, MissingRuleException) else ()
         for target in (each for each in unknown if f" {each} " in str(error)):
             raise ArgumentError(no_target(target)) from error
+        if isinstance(error, BrokenPipeError):
+            raise error
         if isinstance(error, OSError) and error.strerror:
             troubles.append(error)
         else:

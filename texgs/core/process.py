@@ -28,7 +28,7 @@ def collect_rarely() -> None:
     """Let the garbage collector look only where many objects are new, and once at the end of this process.
 
     Large libraries make millions of objects that stay. By default the collector goes through them again and
-    again during imports, and some times more at the end: a third of the time of a short command. For programs,
+    again during imports, and more than once at the end: a third of the time of a short command. For programs,
     not for libraries to call.
     """
     gc.set_threshold(NEW_OBJECTS)

@@ -153,8 +153,10 @@ if PLAN.tracking is not None:
     }
 CLIENT = fork_client.__file__
 SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())
+# A job goes on where nobody reads its output any more, and so does its log: tee would end with a signal, or where
+# it is BSD's, at its end with an error.
 shell.prefix(
-    "set -euo pipefail; "
+    "set -euo pipefail; trap '' PIPE; tee() {{ command tee \"$@\" || true; }}; "
     f'texgs() {{{{ {SETTING} {shlex.quote(sys.executable)} -PSE {shlex.quote(CLIENT)} "$@"; }}}}; '
 )
 # One command for all stages. Snakemake removes the log of an earlier attempt.
