@@ -16,9 +16,10 @@ def ctrl_c():
 
 @pytest.fixture(autouse=True)
 def _handler_stays():
-    before = signal.getsignal(signal.SIGINT)
+    """That of Python, which has none where SIGINT is ignored, as in a job started in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
-    assert signal.getsignal(signal.SIGINT) is before
+    assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
 
 
 def test_it_ends_a_loop_at_its_next_item():

@@ -80,9 +80,8 @@ def test_of_features_it_is_the_distance_of_sorted_projections_and_so_is_its_grad
     ours, others = ((directions[2] @ x).sort(1).values for x in rows)
     expected = (ours - others).square().mean() / (directions.flatten(0, 1) @ rows[1]).var(1).mean()
     torch.testing.assert_close(distance.double(), expected, rtol=1e-4, atol=0)
-    gradients = [torch.autograd.grad(x, features)[0] for x in (distance, expected)]
-    scale = float(gradients[1].abs().max())  # values that float32 cannot tell apart change places
-    torch.testing.assert_close(*gradients, rtol=0, atol=1e-3 * scale)
+    found, wanted = (torch.autograd.grad(x, features)[0] for x in (distance, expected))
+    assert (found - wanted).norm() < 0.01 * wanted.norm()  # two that float32 cannot tell apart change places
 
 
 def test_a_style_is_at_no_distance_and_a_constant_of_its_mean_at_one():

@@ -108,8 +108,8 @@ def test_what_other_programs_read_has_the_edits_of_segments():
     edits = [PartEdit(palette=(0, 1, 0)), PartEdit(opacity=0.5)]
     result, expected = joined(scene.parts, edits), joined(split.parts, edits)
     for mask, part in ((~HALF, slice(75)), (HALF, slice(75, 150))):
-        for name, values in result.parameters.items():
-            assert torch.equal(values[mask], expected.parameters[name][part]), name
+        for name, values in result.parameters.items():  # torch rounds the last few in another way, those
+            assert_close(values[mask], expected.parameters[name][part])  # that fill no vector of the CPU
 
 
 @pytest.mark.parametrize(
