@@ -1,5 +1,9 @@
 """`texgs init` and `texgs new`: a project whose files compose, and data sets from volume files."""
 
+import os
+import subprocess
+import sys
+
 import h5py
 import nibabel
 import numpy as np
@@ -306,6 +310,25 @@ def test_a_path_that_no_configuration_can_hold_is_refused(conf, scan, tmp_path, 
     (line,) = capsys.readouterr().err.splitlines()
     assert line.endswith("rename it")
     assert not conf.exists()
+
+
+@pytest.mark.parametrize("name", ["\u626b\u63cf.npy", "42.npy", "volume.npy"])
+def test_a_file_whose_name_is_none_for_a_data_set_says_what_to_do(conf, scan, tmp_path, capsys, name):
+    scan.rename(tmp_path / name)
+    assert main(["new", name]) == 2
+    assert capsys.readouterr().err.startswith(f"texgs new: {name}: pass --name: ")
+    assert main(["new", name, "--name", "mine"]) == 0
+
+
+def test_where_python_reads_ascii_alone_a_path_in_utf8_is_not_to_be_renamed(conf, scan, tmp_path):
+    scan.rename(tmp_path / "\u00fc.npy")
+    ascii_alone = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    command = [sys.executable, "-m", "texgs.cli.main", "new", b"\xc3\xbc.npy", "--name", "mine"]
+    done = subprocess.run(command, cwd=tmp_path, env=ascii_alone, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.endswith("expected a path that Python reads as UTF-8; set PYTHONUTF8=1\n")
+    done = subprocess.run(command, cwd=tmp_path, env={**ascii_alone, "PYTHONUTF8": "1"}, capture_output=True)
+    assert done.returncode == 0
 
 
 def test_tfs_of_a_narrow_range_far_from_zero_keep_their_digits(conf, tmp_path):

@@ -173,6 +173,24 @@ def test_jobs_go_on_where_nobody_reads_their_output(tmp_path, words, also):
         assert "1 of 1 slab" in (tmp_path / "results/logs/turbulence/volume.log").read_text()
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["-n"], "SNAKEMAKE_PROFILE={profile}: argument --executor/-e: invalid choice: 'nowhere'"),
+        (
+            ["-n", "--profile", "none", "--executor", "there"],
+            "argument --executor/-e: invalid choice: 'there'",
+        ),
+        (["-n", "--bogus"], "unrecognized arguments: --bogus"),
+    ],
+)
+def test_a_profile_of_another_program_is_named(tmp_path, words, told):
+    (tmp_path / "config.yaml").write_text("executor: nowhere\n")
+    done = texgs(tmp_path, "run", *words, env={**os.environ, "SNAKEMAKE_PROFILE": str(tmp_path)})
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith(f"snakemake: {told.format(profile=tmp_path)}")
+
+
 def test_a_user_without_a_home_folder_is_told_so(monkeypatch):
     monkeypatch.setattr("pwd.getpwuid", {}.__getitem__)
     for name in ("HOME", "XDG_CONFIG_HOME"):

@@ -131,15 +131,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is None:
         own_process()
     words = list(sys.argv[1:] if argv is None else argv)
-    try:
-        return outcome(words)
-    except BrokenPipeError:  # as `| head` leaves it
-        leave_broken_pipes()
-        return 141
-
-
-def outcome(words: Sequence[str]) -> int:
-    """Run the verb and return the exit code, with a sentence on stderr for what went wrong."""
     verb = next(iter(words), "")
     try:
         try:
@@ -156,28 +147,18 @@ def outcome(words: Sequence[str]) -> int:
         end = "goes on with what is not done" if goes_on else "starts again"
         print(f"texgs {verb}: interrupted; the same command {end}", file=sys.stderr)
         return 130
-
-
-def leave_broken_pipes() -> None:
-    """Let what is still in the buffer of a stream that nobody reads go nowhere."""
-    for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except BrokenPipeError:
+    except BrokenPipeError:  # as `| head` leaves it; what is still in the buffers goes nowhere
+        for stream in (sys.stdout, sys.stderr):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        return 141
 
 
 def open_closed_streams() -> None:
-    """Open streams that this process was started without, as by `>&-`: to nowhere, also for its children.
-
-    Else the next file that is opened gets the number of the stream, and what others write there.
-    """
+    """Open a stream that was closed, as by `>&-`, to nowhere: else another file has its number."""
     while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(number, True)
+        setattr(sys, ("stdin", "stdout", "stderr")[number], os.fdopen(number, "rww"[number], closefd=False))
     os.close(number)
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
 
 
 def own_process() -> None:

@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     given = configuration(name, arguments.file, overrides)
     given = replace(given, dataset=replace(given.dataset, series=[*map(absolute, arguments.series)]))
     files, folder = series_files(given), own_folder() / "dataset"
-    check_name("--name", name)
+    check_name("--name" if arguments.name else f"{arguments.file.name}: pass --name", name)
     if name in members("dataset") and not arguments.force:
         is_own = (folder / f"{name}.yaml").exists()
         there, do = ("is there", "replace") if is_own else ("is a data set of texgs", "hide")
@@ -182,7 +182,8 @@ def absolute(file: str | Path) -> str:
     if "${" in path:
         raise ArgumentError(f"{path}: expected a path without ${{, which stands for another key; rename it")
     if any("\ud800" <= letter <= "\udfff" for letter in path):
-        raise ArgumentError(f"{path!r}: expected a path in UTF-8; rename it")
+        do = "rename it" if sys.getfilesystemencoding() == "utf-8" else "set PYTHONUTF8=1"
+        raise ArgumentError(f"{path!r}: expected a path that Python reads as UTF-8; {do}")
     return path
 
 

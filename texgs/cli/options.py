@@ -15,12 +15,12 @@ LENS = Lens()
 class Parser(argparse.ArgumentParser):
     """Tells a mistake in one sentence, without the usage."""
 
-    def error(self, message: str) -> NoReturn:
+    def error(self, message: str, where: str = "") -> NoReturn:
         """End with code 2; of an option that is misspelt, hint at the one that is like it."""
         unknown = message.partition("unrecognized arguments: ")[2].partition("=")[0].split()
         is_option = bool(unknown) and unknown[0].startswith("-")
         hint = close(unknown[0], self._option_string_actions) if is_option else ""
-        self.exit(2, f"{self.prog}: {message}{hint or f'; see {self.prog} --help'}\n")
+        self.exit(2, f"{self.prog}: {where}{message}{hint or f'; see {self.prog} --help'}\n")
 
 
 def option(parser: argparse.ArgumentParser, name: str, default: Any, words: str, **more: Any) -> None:

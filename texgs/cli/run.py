@@ -7,6 +7,7 @@ options and targets of snakemake, such as --dry-run or results/report.html.
 
 import argparse
 import logging
+import os
 import re
 import shlex
 import signal
@@ -15,6 +16,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
+from functools import partialmethod
 from itertools import pairwise
 from pathlib import Path
 from types import FrameType
@@ -64,7 +66,7 @@ def snakemake(words: Sequence[str]) -> bool:
     try:
         from snakemake.cli import CliException, args_to_api, get_argument_parser, parse_args, parse_cores
         from snakemake.common import argparse as theirs
-        from snakemake.exceptions import WorkflowError, print_exception
+        from snakemake.exceptions import WorkflowError
 
         theirs.ArgumentParser.error = Parser.error
         sys.argv[:1] = ["snakemake"]  # what these parsers are of
@@ -80,13 +82,12 @@ def snakemake(words: Sequence[str]) -> bool:
     rest = [word for word in words if word not in chosen]
     sys.argv = ["snakemake", *rest]  # the Snakefile looks there
     told = [*defaults(given), *located(rest)]
+    if not unknown and {*(given.profile or ())} == {profile := os.environ.get("SNAKEMAKE_PROFILE")}:
+        theirs.ArgumentParser.error = partialmethod(Parser.error, where=f"SNAKEMAKE_PROFILE={profile}: ")
     try:
         parser, options = parse_args(told)
-    except BrokenPipeError:  # of the terminal's side, as `| head` leaves it
-        raise
-    except Exception as error:  # as the main of snakemake does
-        print_exception(error)
-        return False
+    except (CliException, WorkflowError) as error:
+        raise ArgumentError(f"{str(error).rstrip('. ')}; see snakemake --help") from error
     options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
     if options.cores is None and options.jobs is None:
         options.cores = parse_cores("all")
@@ -103,29 +104,26 @@ def told_errors(targets: Sequence[str] = ()) -> Iterator[None]:
     from snakemake.api import SnakemakeApi
     from snakemake.exceptions import MissingRuleException
 
-    troubles, printed = list[OSError](), SnakemakeApi.print_exception
+    printed = SnakemakeApi.print_exception
 
     def note(api: SnakemakeApi, error: Exception) -> None:
         unknown = targets if isinstance(error, MissingRuleException) else ()
         for target in (each for each in unknown if f" {each} " in str(error)):
             raise ArgumentError(no_target(target)) from error
-        if isinstance(error, BrokenPipeError):
+        if isinstance(error, BrokenPipeError):  # as `| head` leaves it
             raise error
         if isinstance(error, OSError) and error.strerror:
-            troubles.append(error)
-        else:
-            printed(api, error)
+            place = error.filename or f"{tempfile.gettempdir()}, the temporary folder"
+            raise ArgumentError(
+                f"{place}: the run cannot work there ({error.strerror}); make room, or choose another folder"
+            ) from error
+        printed(api, error)
 
     SnakemakeApi.print_exception = note
     try:
         yield
     finally:
         SnakemakeApi.print_exception = printed
-    for error in troubles:
-        place = error.filename or f"{tempfile.gettempdir()}, the temporary folder"
-        raise ArgumentError(
-            f"{place}: the run cannot work there ({error.strerror}); make room, or choose another folder"
-        ) from error
 
 
 def no_target(word: str) -> str:
