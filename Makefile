@@ -7,12 +7,13 @@ unexport PYTHONDONTWRITEBYTECODE # tests and jobs start hundreds of processes
 NATIVE := $(shell find texgs/raster/csrc -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.txt')
 FORMATTED := $(filter-out %.txt,$(NATIVE)) $(shell find tests -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh')
 
-.PHONY: help install test test-all test-cluster bench lint demo lock clean
+.PHONY: help install test test-all test-cpus test-cluster bench lint demo lock clean
 
 help:
 	@echo "make demo      from a small generated volume to an edited scene and results/report.html"
 	@echo "make test      test all but what the next one adds; ARGS='-k name' picks some of all tests"
 	@echo "make test-all  all of them: also whole runs, commands of the documentation, browser, wheel, emulated CUDA"
+	@echo "make test-cpus  numerical tests as x86-64 CPUs without AVX-512 run them, and without AVX2"
 	@echo "make test-cluster  run the cluster profile on a real SLURM on this machine, where that is installed"
 	@echo "make bench     measure speed and memory, write JSON under benchmarks/"
 	@echo "make lint      ruff, mypy, clang-format, snakefmt, snakemake --lint and the import layers"
@@ -36,6 +37,14 @@ endif
 
 test-all: $(VENV)/installed
 	$(WORKERS)
+
+# There PyTorch rounds, and NumPy orders what is alike, in another way. Kernels: tests/raster/test_instruction_sets.py.
+NUMERICAL := -m "not ($(SLOW))" $(addprefix tests/,fields metrics scene)
+test-cpus: $(VENV)/installed
+	TEXGS_ISA=avx2 ATEN_CPU_CAPABILITY=avx2 NPY_DISABLE_CPU_FEATURES="X86_V4 AVX512_ICL AVX512_SPR" \
+	$(WORKERS) $(NUMERICAL) $(addprefix tests/,edit fitting volume)
+	TEXGS_ISA=portable ATEN_CPU_CAPABILITY=default NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR" \
+	$(WORKERS) $(NUMERICAL)
 
 # Opt-in: it starts the daemons of SLURM. Without them it is skipped and says what to install.
 test-cluster: $(VENV)/installed
