@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from filecmp import cmp
 from html import escape
 from inspect import signature
@@ -30,7 +30,7 @@ from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import Source
 from texgs.volume.sources import open_source, tells_superior
-from texgs.volume.suggest import suggest
+from texgs.volume.suggest import suggested
 from texgs.volume.summaries import Summary, write_summaries
 
 if TYPE_CHECKING:
@@ -139,10 +139,7 @@ class Volume:
 
     def suggest(self, count: int | None = None) -> Functions:
         """Return basic transfer functions by name: `count` of the histogram, what shows, or a channel's."""
-        known = self.summary
-        low, high = known.minimum, known.maximum
-        suggested = suggest(known.histogram, low, high, count, self._channel)
-        return Functions({name: tf.rounded(low, high) for name, tf in suggested.items()}, known)
+        return Functions(suggested(asdict(self.summary), count, self._channel), self.summary)
 
     def render(
         self,

@@ -86,7 +86,7 @@ def prepare_channels(
 
     write_atomic(target, write)
     pairs = zip(open_prepared(target), tallies, strict=True)
-    return [summarize(each, tally.minimum, tally.maximum) for each, tally in pairs]
+    return [summarize(each, tally.minimum, tally.maximum, (tally.low, tally.high)) for each, tally in pairs]
 
 
 def _first_of(sources: Sequence[Source]) -> Source:
@@ -110,6 +110,7 @@ class _Tally:
     def __init__(self, name: str) -> None:
         self.name = name
         self.minimum, self.maximum = inf, -inf
+        self.low, self.high = inf, -inf  # that a sample and its neighbour along x or y share
         self.varies, self.sample = False, None  # before samples become those of the file
         self.n_bad = 0
         self.first: tuple[int, ...] = ()  # x, y, z of the first bad sample, in the source
@@ -137,6 +138,9 @@ class _Tally:
         """Widen the range by a block, and return it."""
         self.minimum = min(self.minimum, float(block.min()))
         self.maximum = max(self.maximum, float(block.max()))
+        for pair in ((block[:, 1:], block[:, :-1]), (block[:, :, 1:], block[:, :, :-1])):
+            self.low = min(self.low, float(np.maximum(*pair).min()))
+            self.high = max(self.high, float(np.minimum(*pair).max()))
         return block
 
     def check(self) -> None:

@@ -1,8 +1,9 @@
 """Basic transfer functions for a volume whose user has none, from its histogram."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,11 +29,31 @@ SHELLS = 3  # classes of a histogram without peaks but the background
 ALONE = 0.3  # opacity of the only function
 FEW = 32  # a histogram with no more values than this holds labels
 SMOOTHING = 0.02  # standard deviation, as a fraction of the range
+FINE = 0.01  # the same, beside the background, where there are many voxels
 RARE = 2e-4  # of the voxels outside the most frequent bin: a bin with fewer is empty ...
 NOISE = 8.0  # ... and so is one with fewer voxels than this
 DIP = 0.3  # a valley is this much (natural log of counts) below the peaks on both sides: 26 percent
 BROAD = 0.03  # width (of the range) times share (of the foreground) that makes the tail of a peak a class
 BELOW = 0.1  # of the foreground's voxels, that makes values below the background worth showing
+
+
+def suggested(
+    summary: Mapping[str, Any], count: int | None = None, channel: Channel | None = None
+) -> dict[str, TransferFunction]:
+    """Propose functions, see `suggest`, for a channel of a volume, see `Summary`, with short numbers."""
+    known = summary.get("robust") or summary
+    low, high = known["minimum"], known["maximum"]
+    if known.get("scale") != "log":
+        basic = suggest(known["histogram"], low, high, count, channel)
+    else:
+        logs = suggest(known["histogram"], np.log(low), np.log(high), count)
+        basic = {name: tf.with_points(*map(_exponential, (tf.opacity, tf.color))) for name, tf in logs.items()}
+    return {name: tf.rounded(low, high) for name, tf in basic.items()}
+
+
+def _exponential(points: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
+    """Return points [value, ...] that were on the logarithm of values."""
+    return [(float(np.exp(value)), *rest) for value, *rest in points]
 
 
 def suggest(
@@ -112,20 +133,22 @@ def _materials(counts: Array, count: int | None) -> list[Class]:
     return sorted(peaks + _divided(tails, weights, max(SHELLS - len(peaks), len(tails))))
 
 
-def _smooth_log(counts: Array) -> Array:
+def _smooth_log(counts: Array, deviation: float = SMOOTHING) -> Array:
     """Return the logarithm of the counts after a Gaussian filter; a floor below the rare keeps noise flat."""
     from scipy.ndimage import gaussian_filter1d
 
-    smooth = gaussian_filter1d(counts, SMOOTHING * len(counts))
+    smooth = gaussian_filter1d(counts, deviation * len(counts))
     return np.log(smooth + RARE * (counts.sum() - counts.max()) + NOISE)
 
 
 def _classes(counts: Array, log: Array, dip: float) -> tuple[list[Class], list[Class]]:
     """Return classes that the histogram shows, and those that are only a tail of the background."""
-    mode = int(counts.argmax())
+    mode = int(counts.argmax() if counts[-1] > 0.5 * counts.sum() else counts[:-1].argmax())
     basins = list(pairwise([0, *_valleys(log, dip), len(log)]))
     low, high = next(c for c in basins if c[0] <= mode < c[1])
-    left, right = mode + 1 - _foot(log[low : mode + 1][::-1]), mode + _foot(log[mode:high])
+    fine = _smooth_log(counts, FINE)
+    left = mode + 1 - min([_foot(log[low : mode + 1][::-1]), *_valleys(fine[low : mode + 1][::-1], dip)[:1]])
+    right = mode + min([_foot(log[mode:high]), *_valleys(fine[mode:high], dip)[:1]])
     foreground = counts[:left].sum() + counts[right:].sum()
     lowest = 0 if counts[:left].sum() >= BELOW * foreground else right
 

@@ -1,4 +1,4 @@
-"""What is in a prepared volume: lattice, range and histogram, of each channel; volume.json beside it."""
+"""What is in a prepared volume: lattice, range and histograms, of each channel; volume.json beside it."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -6,13 +6,10 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from texgs.core.io import read_json, write_json
 from texgs.volume.grid import Dims, Triple
-from texgs.volume.slabs import Source, slab_bounds
-
-BINS = 256
+from texgs.volume.histograms import Ends, Histogram, counted, robust_histogram
+from texgs.volume.slabs import Source
 
 
 @dataclass(frozen=True)
@@ -26,6 +23,8 @@ class Summary:
     minimum: float
     maximum: float
     histogram: tuple[int, ...]  # counts in 256 equal bins over [minimum, maximum]
+    robust: Histogram | None = None  # what functions are suggested from, where that is not all values
+    note: str = ""  # for the user
 
     @property
     def voxels(self) -> int:
@@ -33,26 +32,12 @@ class Summary:
         return prod(self.dims)
 
 
-def summarize(source: Source, minimum: float, maximum: float) -> Summary:
-    """Summarize a volume whose range is known; reads it once."""
-    counts = np.zeros(BINS, dtype=np.int64)
-    for start, stop in slab_bounds(source, 0, source.dims[2]):
-        counts += histogram(source.slices(start, stop), minimum, maximum)
+def summarize(source: Source, minimum: float, maximum: float, shared: Ends = (0, 0)) -> Summary:
+    """Summarize a volume whose range is known, and that which neighbours share; reads it once or few times."""
+    whole = counted(source, minimum, maximum)
+    robust, note = robust_histogram(source, whole, shared)
     lattice = (source.dims, source.dtype.name, source.spacing, source.origin)
-    return Summary(*lattice, minimum, maximum, tuple(counts.tolist()))
-
-
-def histogram(values: np.ndarray, minimum: float, maximum: float) -> np.ndarray:
-    """Return counts [256] in equal bins over [minimum, maximum]; the last bin includes its end."""
-    if values.dtype.kind in "iu" and values.dtype.itemsize <= 2:
-        # Counting every level first is ten times as fast.
-        info = np.iinfo(values.dtype)
-        counts = np.bincount(values.ravel().astype(np.intp) - info.min, minlength=info.max - info.min + 1)
-        levels = np.arange(info.min, info.max + 1)
-        return np.histogram(levels, BINS, (minimum, maximum), weights=counts)[0]
-    # There may be fewer than 256 numbers of the samples' type in their range, but not in [0, 1].
-    fractions = (values.astype(np.float64) - minimum) / (float(maximum) - float(minimum))
-    return np.histogram(fractions, BINS, (0, 1))[0]
+    return Summary(*lattice, minimum, maximum, whole.histogram, robust, note)
 
 
 def summary_file(volume: Path) -> Path:
