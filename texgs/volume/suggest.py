@@ -29,7 +29,7 @@ SHELLS = 3  # classes of a histogram without peaks but the background
 ALONE = 0.3  # opacity of the only function
 FEW = 32  # a histogram with no more values than this holds labels
 SMOOTHING = 0.02  # standard deviation, as a fraction of the range
-FINE = 0.01  # the same, beside the background, where there are many voxels
+FINE = 0.006  # the same beside the background, or half of the distance of bins that hold any
 RARE = 2e-4  # of the voxels outside the most frequent bin: a bin with fewer is empty ...
 NOISE = 8.0  # ... and so is one with fewer voxels than this
 DIP = 0.3  # a valley is this much (natural log of counts) below the peaks on both sides: 26 percent
@@ -133,22 +133,35 @@ def _materials(counts: Array, count: int | None) -> list[Class]:
     return sorted(peaks + _divided(tails, weights, max(SHELLS - len(peaks), len(tails))))
 
 
-def _smooth_log(counts: Array, deviation: float = SMOOTHING) -> Array:
-    """Return the logarithm of the counts after a Gaussian filter; a floor below the rare keeps noise flat."""
+def _smooth_log(counts: Array) -> Array:
+    """Return the logarithm of the counts after a Gaussian filter; a floor below the rare keeps noise flat.
+
+    The filter is finer beside the background where a wide one would spread this over a peak, such as the
+    lung's beside air.
+    """
     from scipy.ndimage import gaussian_filter1d
 
-    smooth = gaussian_filter1d(counts, deviation * len(counts))
-    return np.log(smooth + RARE * (counts.sum() - counts.max()) + NOISE)
+    floor, mode = RARE * (counts.sum() - counts.max()) + NOISE, _mode(counts)
+    widths = SMOOTHING * len(counts), max(FINE * len(counts), 0.5 * len(counts) / np.count_nonzero(counts))
+    wide, fine = (np.log(gaussian_filter1d(counts, width) + floor) for width in widths)
+    for log, finer in ((wide[mode:], fine[mode:]), (wide[mode::-1], fine[mode::-1])):
+        end = [*_valleys(log, DIP), len(log)][0]
+        if any(valley < _foot(log[:end]) for valley in _valleys(finer[:end], DIP)):
+            log[:end] = finer[:end]
+    return wide
+
+
+def _mode(counts: Array) -> int:
+    """Return the most frequent bin, but the last only if most voxels are there: objects may be saturated."""
+    return int(counts.argmax() if counts[-1] > 0.5 * counts.sum() else counts[:-1].argmax())
 
 
 def _classes(counts: Array, log: Array, dip: float) -> tuple[list[Class], list[Class]]:
     """Return classes that the histogram shows, and those that are only a tail of the background."""
-    mode = int(counts.argmax() if counts[-1] > 0.5 * counts.sum() else counts[:-1].argmax())
+    mode = _mode(counts)
     basins = list(pairwise([0, *_valleys(log, dip), len(log)]))
     low, high = next(c for c in basins if c[0] <= mode < c[1])
-    fine = _smooth_log(counts, FINE)
-    left = mode + 1 - min([_foot(log[low : mode + 1][::-1]), *_valleys(fine[low : mode + 1][::-1], dip)[:1]])
-    right = mode + min([_foot(log[mode:high]), *_valleys(fine[mode:high], dip)[:1]])
+    left, right = mode + 1 - _foot(log[low : mode + 1][::-1]), mode + _foot(log[mode:high])
     foreground = counts[:left].sum() + counts[right:].sum()
     lowest = 0 if counts[:left].sum() >= BELOW * foreground else right
 
