@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
 from io import BytesIO
 from typing import TYPE_CHECKING
 
@@ -34,7 +33,7 @@ class Functions(dict[str, TransferFunction]):
         """Return a figure of matplotlib: opacities and colours over the number of voxels, on a log axis."""
         from texgs.volume.tf_plot import plot
 
-        return plot({"": asdict(self._summary)}, self)
+        return plot({"": vars(self._summary)}, self)
 
     def _repr_png_(self) -> bytes:
         """Return the plot, for notebooks."""

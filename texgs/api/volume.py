@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from filecmp import cmp
 from html import escape
 from inspect import signature
@@ -97,14 +97,14 @@ class Volume:
             raise ArgumentError(f"{', '.join(keys)}: not for arrays{hint or '; leave them out'}")
         else:
             source = source_of(data, name, spacing, origin)
-        if source.note:
-            warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
         self._channel = source.channel
         if up is None:
             up = "+z" if isinstance(data, str | Path) and tells_superior(Path(data)) else "+y"
         crop, nan_value = whole("crop", crop, 6), as_python(nan_value)
         how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": nan_value}
         self.summary = self._prepared(source, how)
+        if source.note:
+            warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         write_summaries(self.file, [self.summary], [""])
 
@@ -139,7 +139,7 @@ class Volume:
 
     def suggest(self, count: int | None = None) -> Functions:
         """Return basic transfer functions by name: `count` of the histogram, what shows, or a channel's."""
-        return Functions(suggested(asdict(self.summary), count, self._channel), self.summary)
+        return Functions(suggested(vars(self.summary), count, self._channel), self.summary)
 
     def render(
         self,

@@ -93,22 +93,21 @@ def basic_tfs(
     """Return TFs from files, or suggested for a channel or from the histogram in a summary."""
     import numpy as np
 
-    from texgs.volume.suggest import looks_like_labels, suggest
+    from texgs.volume.suggest import looks_like_labels, suggested
     from texgs.volume.tf_files import read_tf
     from texgs.volume.transfer import check_disjoint
 
     low, high = summary["minimum"], summary["maximum"]
     if not files:
         histogram = np.array(summary["histogram"])
-        suggested = suggest(histogram, low, high, count, channel)
-        if looks_like_labels(histogram, high - low):
+        if not summary.get("robust") and looks_like_labels(histogram, high - low):
             sys.stderr.write(
                 f"{of}: values are in {np.count_nonzero(histogram)} of {len(histogram)} parts of [{low:g}, "
                 f"{high:g}], and are taken for labels. Between two of them rays see those in between, as "
                 "thin shells. If one stands for missing samples, write NaN in its place and add "
                 "nan_value=...\n"
             )
-        return {name: tf.rounded(low, high) for name, tf in suggested.items()}
+        return suggested(summary, count, channel)
     basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
     check_disjoint(basic)
     for path, tf in zip(files, basic.values(), strict=True):

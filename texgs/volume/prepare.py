@@ -18,6 +18,7 @@ from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.summaries import Summary, summarize
 
 Bounds = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
+WHOLE = 2**24  # up to which float32 has all whole numbers
 Step = tuple[int, int, int]  # channel, and a slab: slices [start, stop)
 Progress = Callable[[Iterable[Step], int], Iterable[Step]]
 
@@ -86,7 +87,13 @@ def prepare_channels(
 
     write_atomic(target, write)
     pairs = zip(open_prepared(target), tallies, strict=True)
-    return [summarize(each, tally.minimum, tally.maximum, (tally.low, tally.high)) for each, tally in pairs]
+    summaries = [summarize(each, t.minimum, t.maximum, (t.low, t.high)) for each, t in pairs]
+    notes = [source.note, *(each.note for each in summaries)]
+    largest = max(-tallies[0].minimum, tallies[0].maximum)
+    if source.dtype.kind in "iu" and dtype.kind == "f" and largest > WHOLE:
+        notes.append(f"whole numbers above {WHOLE} are rounded, so that labels may become equal")
+    source.note = "; ".join(dict.fromkeys(filter(None, notes)))
+    return summaries
 
 
 def _first_of(sources: Sequence[Source]) -> Source:
@@ -110,7 +117,7 @@ class _Tally:
     def __init__(self, name: str) -> None:
         self.name = name
         self.minimum, self.maximum = inf, -inf
-        self.low, self.high = inf, -inf  # that a sample and its neighbour along x or y share
+        self.low, self.high = inf, -inf  # of values that a sample shares with one beside it, along x or y
         self.varies, self.sample = False, None  # before samples become those of the file
         self.n_bad = 0
         self.first: tuple[int, ...] = ()  # x, y, z of the first bad sample, in the source

@@ -1,6 +1,6 @@
 """Basic transfer functions for a volume whose user has none, from its histogram."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from numbers import Integral
 from typing import Any
@@ -38,22 +38,13 @@ BELOW = 0.1  # of the foreground's voxels, that makes values below the backgroun
 
 
 def suggested(
-    summary: Mapping[str, Any], count: int | None = None, channel: Channel | None = None
+    known: Mapping[str, Any], count: int | None = None, channel: Channel | None = None
 ) -> dict[str, TransferFunction]:
-    """Propose functions, see `suggest`, for a channel of a volume, see `Summary`, with short numbers."""
-    known = summary.get("robust") or summary
-    low, high = known["minimum"], known["maximum"]
-    if known.get("scale") != "log":
-        basic = suggest(known["histogram"], low, high, count, channel)
-    else:
-        logs = suggest(known["histogram"], np.log(low), np.log(high), count)
-        basic = {name: tf.with_points(*map(_exponential, (tf.opacity, tf.color))) for name, tf in logs.items()}
+    """Propose functions with short numbers from the robust histogram of a `Summary`, see `suggest`."""
+    known = known.get("robust") or known
+    low, high, scale = known["minimum"], known["maximum"], known.get("scale", "linear")
+    basic = suggest(known["histogram"], low, high, count, channel, scale)
     return {name: tf.rounded(low, high) for name, tf in basic.items()}
-
-
-def _exponential(points: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
-    """Return points [value, ...] that were on the logarithm of values."""
-    return [(float(np.exp(value)), *rest) for value, *rest in points]
 
 
 def suggest(
@@ -62,6 +53,7 @@ def suggest(
     maximum: float,
     count: int | None = None,
     channel: Channel | None = None,
+    scale: str = "linear",
 ) -> dict[str, TransferFunction]:
     """Propose basic transfer functions with disjoint supports: TF01, TF02, ... in ascending order of value.
 
@@ -70,7 +62,8 @@ def suggest(
     falls, at thresholds of least variance (Otsu 1979) on the log histogram. Where values are in at most 32
     of the bins, apart, they are taken for labels, the lowest for background. Higher values are more opaque.
 
-    The histogram counts voxels in equal bins over [minimum, maximum]; two of them are not 0. There are
+    The histogram counts voxels in equal bins over [minimum, maximum], or over the logarithms of these where
+    its scale is "log"; two of them are not 0. There are
     `count` functions, fewer where there are fewer values; by default what shows, at most 5. Of a channel with
     a window it is one by default, see `windowed`.
     """
@@ -78,6 +71,8 @@ def suggest(
         raise ArgumentError(f"count: expected a whole number from 1 on, got {count!r}")
     if count is None and channel and (shown := windowed(channel, minimum, maximum)):
         return {"TF01": shown}
+    to, back = (np.log, np.exp) if scale == "log" else (float, float)
+    minimum, maximum = float(to(minimum)), float(to(maximum))
     counts = np.asarray(histogram, dtype=np.float64)
     values = minimum + (np.arange(len(counts)) + 0.5) * (maximum - minimum) / len(counts)
     present = counts > 0
@@ -90,7 +85,7 @@ def suggest(
     edges = np.concatenate([[minimum], (values[1:] + values[:-1]) / 2, [maximum]])
     opacities = np.geomspace(0.08, 0.6, len(classes)) if len(classes) > 1 else [ALONE]
     return {
-        f"TF{i + 1:02d}": _trapezoid(edges[start], edges[stop], opacities[i], i, (minimum, maximum))
+        f"TF{i + 1:02d}": _trapezoid(edges[start], edges[stop], opacities[i], i, (minimum, maximum), back)
         for i, (start, stop) in enumerate(classes)
     }
 
@@ -228,10 +223,11 @@ def _variance(weights: Array) -> float:
 
 
 def _trapezoid(
-    low: float, high: float, opacity: float, i: int, data: tuple[float, float]
+    low: float, high: float, opacity: float, i: int, data: tuple[float, float], back: Callable[[float], float]
 ) -> TransferFunction:
     """Let opacity rise over a quarter of the range and fall over another, but not at the ends of the data."""
     ramp = (high - low) / 4
     rise = ((low, opacity),) if low <= data[0] else ((low, 0.0), (low + ramp, opacity))
     fall = ((high, opacity),) if high >= data[1] else ((high - ramp, opacity), (high, 0.0))
-    return TransferFunction(opacity=(*rise, *fall), color=((low, *COLORS[i % len(COLORS)]),))
+    points = tuple((float(back(value)), alpha) for value, alpha in (*rise, *fall))
+    return TransferFunction(opacity=points, color=((points[0][0], *COLORS[i % len(COLORS)]),))

@@ -1,15 +1,27 @@
 """What is in a prepared volume: lattice, range and histograms, of each channel; volume.json beside it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import prod
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from texgs.core.io import read_json, write_json
 from texgs.volume.grid import Dims, Triple
-from texgs.volume.histograms import Ends, Histogram, counted, robust_histogram
-from texgs.volume.slabs import Source
+from texgs.volume.slabs import Source, slab_bounds
+from texgs.volume.suggest import looks_like_labels
+
+Counted = dict[str, Any]  # minimum, maximum, histogram, and its scale: "linear" or "log"
+Ends = tuple[float, float]
+
+BINS = 256
+FENCE = 1.0  # times the range that neighbours share: what is farther out are outliers ...
+RARE, FEW = 1e-3, 8  # ... where they are less of the samples outside the most frequent bin, or not more
+GAP = 1 / 8  # of the range, empty above padding
+AIR = (-1100.0, -900.0)  # Hounsfield units
+DECADES = 1e4  # largest value over the median, from which on logarithms are counted
 
 
 @dataclass(frozen=True)
@@ -23,21 +35,89 @@ class Summary:
     minimum: float
     maximum: float
     histogram: tuple[int, ...]  # counts in 256 equal bins over [minimum, maximum]
-    robust: Histogram | None = None  # what functions are suggested from, where that is not all values
-    note: str = ""  # for the user
+    robust: Counted | None = None  # what functions are suggested from, where that is another histogram
 
     @property
     def voxels(self) -> int:
         """Number of samples."""
         return prod(self.dims)
 
+    @property
+    def note(self) -> str:
+        """Say how many samples are left out where functions are suggested; nothing where none are."""
+        if not self.robust or not (left_out := self.voxels - sum(self.robust["histogram"])):
+            return ""
+        ends = f"[{self.robust['minimum']:g}, {self.robust['maximum']:g}]"
+        return f"{left_out} samples outside {ends} are taken for outliers or padding by suggested functions"
 
-def summarize(source: Source, minimum: float, maximum: float, shared: Ends = (0, 0)) -> Summary:
-    """Summarize a volume whose range is known, and that which neighbours share; reads it once or few times."""
+
+def summarize(source: Source, minimum: float, maximum: float, shared: Ends = (0.0, 0.0)) -> Summary:
+    """Summarize a volume whose range is known, and that which neighbours share; reads it once or more."""
     whole = counted(source, minimum, maximum)
-    robust, note = robust_histogram(source, whole, shared)
     lattice = (source.dims, source.dtype.name, source.spacing, source.origin)
-    return Summary(*lattice, minimum, maximum, whole.histogram, robust, note)
+    return Summary(*lattice, minimum, maximum, whole["histogram"], robust_histogram(source, whole, shared))
+
+
+def robust_histogram(source: Source, whole: Counted, shared: Ends) -> Counted | None:
+    """Return the histogram that functions are suggested from; None where that is the whole one.
+
+    A sample is far out of the range that neighbours share only where none beside it is like it. Few of these
+    are outliers, as hot pixels are. Far below a CT in air lies padding. Decades are counted by logarithms.
+    """
+    found, margin = whole, FENCE * (shared[1] - shared[0])
+    if margin > 0 and (shared[0] - margin > whole["minimum"] or shared[1] + margin < whole["maximum"]):
+        inner = _counted_within(source, shared[0] - margin, shared[1] + margin)
+        inside = sum(inner["histogram"])
+        if prod(source.dims) - inside <= max(FEW, RARE * (inside - max(inner["histogram"]))):
+            found = inner
+    low, high = found["minimum"], found["maximum"]
+    first, second = np.flatnonzero(found["histogram"])[:2]
+    if low < AIR[0] and second - first > GAP * BINS:
+        rest = _counted_within(source, np.nextafter(low, high), high)
+        mode = np.linspace(rest["minimum"], high, BINS)[np.argmax(rest["histogram"])]
+        found = rest if AIR[0] < mode < AIR[1] else found
+    elif source.dtype.kind == "f" and 0 < low < high / DECADES:
+        logs = counted(source, low, high, "log")
+        below = int(BINS * (1 - np.log(DECADES) / np.log(high / low)))
+        found = logs if 2 * sum(logs["histogram"][:below]) > prod(source.dims) else found
+    is_whole = found is whole or looks_like_labels(np.array(found["histogram"]), high - low)
+    return None if is_whole else found
+
+
+def _counted_within(source: Source, low: float, high: float) -> Counted:
+    """Count the samples within bounds, over the range that they have."""
+    inside = (slab[(slab >= low) & (slab <= high)] for slab in slabs(source))
+    ends = [(float(part.min()), float(part.max())) for part in inside if part.size]
+    return counted(source, min(ends)[0], max(high for _, high in ends))
+
+
+def counted(source: Source, minimum: float, maximum: float, scale: str = "linear") -> Counted:
+    """Count samples in equal bins over a range, or over its logarithms ("log"); reads the volume once."""
+    counts = np.zeros(BINS, dtype=np.int64)
+    for slab in slabs(source):
+        if scale == "log":
+            counts += histogram(np.log(slab[slab > 0], dtype=np.float64), np.log(minimum), np.log(maximum))
+        else:
+            counts += histogram(slab, minimum, maximum)
+    return {"minimum": minimum, "maximum": maximum, "histogram": tuple(counts.tolist()), "scale": scale}
+
+
+def slabs(source: Source) -> Iterator[np.ndarray]:
+    """Yield all samples, slab by slab."""
+    return (source.slices(*bounds) for bounds in slab_bounds(source, 0, source.dims[2]))
+
+
+def histogram(values: np.ndarray, minimum: float, maximum: float) -> np.ndarray:
+    """Return counts [256] in equal bins over [minimum, maximum]; the last bin includes its end."""
+    if values.dtype.kind in "iu" and values.dtype.itemsize <= 2:
+        # Counting every level first is ten times as fast.
+        info = np.iinfo(values.dtype)
+        counts = np.bincount(values.ravel().astype(np.intp) - info.min, minlength=info.max - info.min + 1)
+        levels = np.arange(info.min, info.max + 1)
+        return np.histogram(levels, BINS, (minimum, maximum), weights=counts)[0]
+    # There may be fewer than 256 numbers of the samples' type in their range, but not in [0, 1].
+    fractions = (values.astype(np.float64) - minimum) / (float(maximum) - float(minimum))
+    return np.histogram(fractions, BINS, (0, 1))[0]
 
 
 def summary_file(volume: Path) -> Path:

@@ -1,4 +1,4 @@
-"""A picture of transfer functions over the histogram of their volume."""
+"""A picture of transfer functions over the histogram of their volume, and of what they show."""
 
 from __future__ import annotations
 
@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from texgs.core.camera import orbit
 from texgs.core.figures import new_figure, words
+from texgs.core.light import Light
+from texgs.volume.caster import Caster
+from texgs.volume.framing import frame_of
+from texgs.volume.grid import Grid
+from texgs.volume.overlay import overlays
+from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
 if TYPE_CHECKING:
@@ -16,6 +23,7 @@ if TYPE_CHECKING:
 
 SIZE, DPI = (10.0, 4.5), 100  # inches, dots per inch: plots by themselves have 1000 x 450 pixels
 SAMPLES = 512
+CAST, INCHES = 160, 1.9  # pixels of a side of a cast, height of the row of them
 
 
 def plot(
@@ -24,18 +32,35 @@ def plot(
     title: str = "",
     size: tuple[float, float] = SIZE,
     dpi: float = DPI,
+    casts: Mapping[str, np.ndarray] | None = None,
 ) -> Figure:
     """Return a figure of basic transfer functions over the histograms of a volume's channels, see `Summary`.
 
     Opacity is the height of each coloured area; the grey area is the number of voxels, on a log axis, of
-    integers as if each bin held equally many. Channels are one below the other, with their labels.
+    integers as if each bin held equally many. Channels are one below the other, with their labels; casts of
+    functions are the last row.
     """
-    figure = new_figure(size[0], size[1] * len(channels), dpi)
+    heights = [*[size[1]] * len(channels), *[INCHES] * bool(casts)]
+    figure = new_figure(size[0], sum(heights), dpi)
+    rows = figure.subplots(len(heights), squeeze=False, height_ratios=heights)[:, 0]
     for number, (label, summary) in enumerate(channels.items()):
         own = {name: tf for name, tf in basic.items() if tf.channel == number}
         above = ", ".join(filter(None, (title, label)))
-        _fill(figure.add_subplot(len(channels), 1, number + 1), summary, own, above)
+        _fill(rows[number], {**summary, **(summary.get("robust") or {})}, own, above)
+    if casts:
+        rows[-1].imshow(np.concatenate([*casts.values()], axis=1))
+        rows[-1].set(xticks=CAST * (np.arange(len(casts)) + 0.5), xticklabels=map(words, casts), yticks=[])
+        rows[-1].set_frame_on(False)
     return figure
+
+
+def casts_of(grid: Grid, basic: Mapping[str, TransferFunction]) -> dict[str, np.ndarray]:
+    """Return small pictures [S, S, 3] over white of what each function shows, and all of them."""
+    caster, light = Caster(grid, Appearance()), Light("headlight")
+    camera = orbit(30.0, 20.0, *frame_of(grid, basic.values()).lens(width=CAST, height=CAST))
+    shown = {name: [tf] for name, tf in basic.items()} | {"all": overlays(basic)}
+    casts = {name: caster.cast(tfs, camera, light, by_cell=False).rgba.numpy() for name, tfs in shown.items()}
+    return {name: (rgba[..., :3] + 1 - rgba[..., 3:]).clip(0, 1) for name, rgba in casts.items()}
 
 
 def _fill(
@@ -54,6 +79,8 @@ def _fill(
     low, high = min(lows), max(highs)
     margin = 0.02 * (high - low)  # so that nothing lies on the frame
     opacity.set(xlim=(low - margin, high + margin), xlabel="value", title=words(title))
+    if summary.get("scale") == "log":
+        opacity.set(xscale="log", xlim=(low, high))
     opacity.set(ylim=(0, 1.12), yticks=np.linspace(0, 1, 6), ylabel="opacity")
 
 
@@ -63,7 +90,8 @@ def _bins(summary: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     Of integers, bins that can hold none are left out, and counts are those of the mean number of integers.
     """
     counts = np.asarray(summary["histogram"], dtype=np.float64)
-    edges = np.linspace(summary["minimum"], summary["maximum"], len(counts) + 1)
+    spaced = np.geomspace if summary.get("scale") == "log" else np.linspace
+    edges = spaced(summary["minimum"], summary["maximum"], len(counts) + 1)
     if np.dtype(summary["dtype"]).kind not in "iu":
         return counts, edges
     firsts = np.ceil(edges)  # integers of the bins

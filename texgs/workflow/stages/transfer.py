@@ -1,9 +1,11 @@
 """Stage `transfer`: compare a data set's basic TFs with its values, plot them, and export them."""
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from texgs.config.dataset import BasicTF
+from texgs.core.memory import free_memory
 from texgs.report.results import Result
 from texgs.workflow.inputs import has_volume, prepared_volume
 from texgs.workflow.stage import Outcome, Rule, Stage, read
@@ -28,20 +30,25 @@ class Settings(OfDataset):
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
-    """Write transfer.png, the histogram with the basic TFs over it, and each TF for ParaView.
+    """Write transfer.png, the histogram with the basic TFs over it and casts of them, and TFs for ParaView.
 
     It reads `volume`, the volume.nrrd; volume.json is beside it.
     """
     from texgs.core.figures import write_figure
+    from texgs.volume.nrrd_file import open_grid
     from texgs.volume.summaries import read_summaries
     from texgs.volume.tf_files import write_paraview
-    from texgs.volume.tf_plot import plot
+    from texgs.volume.tf_plot import casts_of, plot
     from texgs.volume.transfer import check_disjoint
 
     basic = basic_tfs_of(inputs["volume"], settings.basic_tfs, settings.tf_values)
     check_disjoint(basic)
     channels = read_summaries(inputs["volume"])
-    write_figure(output / "transfer.png", plot(channels, basic, settings.title))
+    has_room = inputs["volume"].stat().st_size <= free_memory()
+    if not has_room:
+        sys.stderr.write(f"{settings.dataset}: too large for the memory that is free to picture its TFs\n")
+    casts = casts_of(open_grid(inputs["volume"]), basic) if has_room else None
+    write_figure(output / "transfer.png", plot(channels, basic, settings.title, casts=casts))
     for name, tf in basic.items():
         write_paraview(output / f"{name}.paraview.json", tf, f"{settings.dataset} {name}")
     ranges = {name: list(tf.support) for name, tf in basic.items()}

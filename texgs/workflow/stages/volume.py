@@ -44,10 +44,10 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     volume, target = settings.volume, output / "volume.nrrd"
     channels = [replace(volume, channel=channel) for channel in settings.channels] or [volume]
     fields = [source(channel, inputs.get("source")) for channel in channels]
-    if fields[0].note:
-        sys.stderr.write(f"{settings.dataset}: {fields[0].note}\n")
     shown = partial(progress, title=f"{settings.dataset}: volume", unit="slab")
     summaries = prepared(volume, fields, target, shown)
+    if fields[0].note:
+        sys.stderr.write(f"{settings.dataset}: {fields[0].note}\n")
     write_summaries(target, summaries, settings.channels)
     ends = min(each.minimum for each in summaries), max(each.maximum for each in summaries)
     whole = replace(summaries[0], minimum=ends[0], maximum=ends[1])
