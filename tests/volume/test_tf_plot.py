@@ -5,8 +5,9 @@ import pytest
 from PIL import Image
 
 from texgs.core.figures import write_figure
+from texgs.volume.grid import Grid
 from texgs.volume.summaries import histogram
-from texgs.volume.tf_plot import plot
+from texgs.volume.tf_plot import CAST, casts_of, plot
 from texgs.volume.transfer import TransferFunction
 
 pytest.importorskip("matplotlib")
@@ -90,3 +91,47 @@ def test_pyplot_is_left_alone(tmp_path):
     before = "matplotlib.pyplot" in sys.modules
     written(tmp_path / "plot.png", [1], 0, 1, {})
     assert ("matplotlib.pyplot" in sys.modules) == before
+
+
+def balls():
+    """Two balls side by side, of -100 and of 100."""
+    z, y, x = np.mgrid[:20, :20, :40]
+    left, right = ((x - middle) ** 2 + (y - 9.5) ** 2 + (z - 9.5) ** 2 < 64 for middle in (9.5, 29.5))
+    return Grid((100.0 * right - 100.0 * left).astype(np.float32))
+
+
+def test_casts_show_what_each_function_does_and_all_of_them(tmp_path):
+    red = TransferFunction(((-100, 0.9), (-60, 0.9)), ((-100, 1, 0, 0),))
+    blue = TransferFunction(((60, 0.9), (100, 0.9)), ((60, 0, 0, 1),))
+    casts = casts_of(balls(), {"a$": red, "b": blue})
+    assert list(casts) == ["a$", "b", "all"]
+    assert all(cast.shape == (CAST, CAST, 3) and 0 <= cast.min() < cast.max() <= 1 for cast in casts.values())
+    for channel, name, other in ((0, "a$", "b"), (2, "b", "a$")):
+        seen = {
+            key: int((cast[..., channel] > 1.5 * cast[..., 2 - channel]).sum()) for key, cast in casts.items()
+        }
+        assert seen[name] > 1000
+        assert seen[other] == 0
+        assert seen["all"] > 0.5 * seen[name]
+    path = write_figure(
+        tmp_path / "plot.png", plot({"": known([1, 2], -100, 100)}, {"a$": red, "b": blue}, casts=casts)
+    )
+    picture = Image.open(path)
+    assert picture.size == (1000, 640)
+    picture.crop((0, 450, 1000, 640)).save(tmp_path / "row.png")
+    assert area(tmp_path / "row.png", (255, 255, 255), 10) < 190_000 - 2000
+
+
+def test_a_robust_histogram_takes_the_place_of_the_whole_one():
+    """Also on a logarithmic axis."""
+    inner = {"minimum": 1e-6, "maximum": 1.0, "histogram": [5, 1, 2, 3], "scale": "log"}
+    tf = TransferFunction(((1e-3, 0.0), (1.0, 0.5)), ((1e-3, 1, 0, 0),))
+    for robust in (inner, {**inner, "minimum": 0, "scale": "linear"}):
+        opacity, voxels = plot({"": {**known([9, 1], 0, 1e9), "robust": robust}}, {"TF": tf}).axes
+        (stairs,) = voxels.patches
+        heights, edges, _ = stairs.get_data()
+        assert list(heights) == [5, 1, 2, 3]
+        spaced = np.geomspace(1e-6, 1, 5) if robust is inner else np.linspace(0, 1, 5)
+        np.testing.assert_allclose(edges, spaced)
+        assert opacity.get_xscale() == robust["scale"]
+        assert opacity.get_xlim()[1] < 1.1
