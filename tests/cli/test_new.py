@@ -9,6 +9,7 @@ import nibabel
 import numpy as np
 import pytest
 import yaml
+from PIL import Image
 
 from tests.volume.zarr_files import LABELS, all_axes, axes_of, write_image
 from texgs.cli import new, new_tfs
@@ -206,6 +207,15 @@ def test_what_memory_does_not_hold_is_made_smaller(conf, tmp_path, monkeypatch, 
     assert compose(("dataset=asked",)).dataset.volume.reduce == 2, "of what is left"
     assert main(["new", "big.h5", "--name", "asked", "--force", "crop=[0,12,0]"]) == 2
     assert "crop: expected six integers x0, x1, y0, y1, z0, z1, got [0, 12, 0]" in capsys.readouterr().err
+
+
+def test_the_picture_shows_what_functions_show_where_memory_is_enough(conf, scan, monkeypatch, capsys):
+    assert main(["new", str(scan), "--name", "shown"]) == 0
+    monkeypatch.setattr("texgs.workflow.stages.transfer.free_memory", lambda: 1000)
+    assert main(["new", str(scan), "--name", "large"]) == 0
+    assert "large: too large for the memory that is free to picture its TFs\n" in capsys.readouterr().err
+    pictures = [Image.open(f"results/{name}/transfer/transfer.png") for name in ("shown", "large")]
+    assert [picture.size for picture in pictures] == [(1000, 640), (1000, 450)]
 
 
 def test_channels_count_for_the_memory(conf, scan, monkeypatch):

@@ -86,11 +86,17 @@ def prepare_channels(
             tally.check()
 
     write_atomic(target, write)
-    pairs = zip(open_prepared(target), tallies, strict=True)
+    return _summaries(source, target, tallies)
+
+
+def _summaries(source: Source, target: Path, tallies: Sequence["_Tally"]) -> list[Summary]:
+    """Summarize the channels of a written file; the source's note says what users should know."""
+    written = open_prepared(target)
+    pairs = zip(written, tallies, strict=True)
     summaries = [summarize(each, t.minimum, t.maximum, (t.low, t.high)) for each, t in pairs]
     notes = [source.note, *(each.note for each in summaries)]
     largest = max(-tallies[0].minimum, tallies[0].maximum)
-    if source.dtype.kind in "iu" and dtype.kind == "f" and largest > WHOLE:
+    if source.dtype.kind in "iu" and written[0].dtype.kind == "f" and largest > WHOLE:
         notes.append(f"whole numbers above {WHOLE} are rounded, so that labels may become equal")
     source.note = "; ".join(dict.fromkeys(filter(None, notes)))
     return summaries

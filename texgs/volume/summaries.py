@@ -45,10 +45,10 @@ class Summary:
     @property
     def note(self) -> str:
         """Say how many samples are left out where functions are suggested; nothing where none are."""
-        if not self.robust or not (left_out := self.voxels - sum(self.robust["histogram"])):
+        if not self.robust or not (n_outside := self.voxels - sum(self.robust["histogram"])):
             return ""
         ends = f"[{self.robust['minimum']:g}, {self.robust['maximum']:g}]"
-        return f"{left_out} samples outside {ends} are taken for outliers or padding by suggested functions"
+        return f"suggested functions are for {ends}; outliers or padding, left out: {n_outside}"
 
 
 def summarize(source: Source, minimum: float, maximum: float, shared: Ends = (0.0, 0.0)) -> Summary:
