@@ -64,9 +64,11 @@ def robust_histogram(source: Source, whole: Counted, shared: Ends) -> Counted | 
     A sample is far out of the range that neighbours share only where none beside it is like it. Few of these
     are outliers, as hot pixels are. Far below a CT in air lies padding. Decades are counted by logarithms.
     """
-    found, margin = whole, FENCE * (shared[1] - shared[0])
-    if margin > 0 and (shared[0] - margin > whole["minimum"] or shared[1] + margin < whole["maximum"]):
-        inner = _counted_within(source, shared[0] - margin, shared[1] + margin)
+    found, low, high = whole, whole["minimum"], whole["maximum"]
+    margin = FENCE * (shared[1] - shared[0])
+    fences = max(low, shared[0] - margin), min(high, shared[1] + margin)
+    if margin > 0 and fences != (low, high):
+        inner = _counted_within(source, *fences)
         inside = sum(inner["histogram"])
         if prod(source.dims) - inside <= max(FEW, RARE * (inside - max(inner["histogram"]))):
             found = inner
