@@ -6,83 +6,75 @@ Which series, which of its steps in time, and whether their slices are a lattice
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+import pydicom
 import SimpleITK as sitk
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.dicom_phases import ALL, FileSeries, phases_of
-from texgs.volume.grid import require_room
-from texgs.volume.itk_image import require_volume, sentence
+from texgs.volume.dicom_samples import samples_of, without_padding
+from texgs.volume.dicom_slice import TIMES, Slice, advised, slices_in
+from texgs.volume.grid import dims_of
+from texgs.volume.itk_image import sentence
 from texgs.volume.slabs import require_step
 
-OF_SERIES = "0020|0011", "0008|103e", "0020|0100"  # tags: number, description and position in time
-PLACE, ORIENTATION = "0020|0032", "0020|0037"  # and of a slice
-# Tags that order slices at one place in time: the first does whose values differ at each place.
-TIMES = {"0020|0100": "temporal position", "0018|1060": "trigger time", "0020|0012": "acquisition number"}
+OF_SERIES = ["SeriesNumber", "SeriesDescription", "TemporalPositionIdentifier", "Modality"]
 UNEVEN = 0.05  # of the distance of slices: how much one may differ, as places are rounded in files
 TILT = 0.01  # of the distance of the outer slices: how far one may be shifted across it
 ROUNDING = 0.01  # mm; and of the widest gap: slices that are closer are at one place
 MAGIC, PIXELS = b"DICM", b"\xe0\x7f\x10\x00"  # of a file with 128 bytes before it; the tag of its samples
 
 
-class Slice(NamedTuple):
-    """One file of a series."""
-
-    path: Path
-    sizes: tuple[int, ...]
-    spacing: tuple[float, ...]
-    place: np.ndarray  # [3] of the first sample, mm: to the left, the back and the head
-    directions: np.ndarray  # [3, 3] in rows: along a row of samples, along a column, and from slice to slice
-    pixel_id: int
-    n_components: int
-    times: tuple[str, ...]  # what it says for `TIMES`
-
-    @property
-    def height(self) -> float:
-        """Where the slice is along the normal of its plane."""
-        return float(self.place @ self.directions[2])
-
-
-def read_dicom(folder: Path, series: str | None, time: int) -> tuple[dict[str, Any], np.ndarray]:
+def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any], np.ndarray]:
     """Read lattice and samples [Z, Y, X], rescaled by slope and intercept, of a step of a series."""
     sitk.ProcessObject.GlobalWarningDisplayOff()
     try:
-        slices, n_steps, note = step_at(folder, series, time)
-        step, first = slice_distance(slices), slices[0]
-        pixel_ids = {each.pixel_id for each in slices}
-        pixel_id = sitk.sitkFloat64 if len(pixel_ids) > 1 else pixel_ids.pop()
-        dims, dtype = require_volume([*first.sizes[:2], len(slices)], pixel_id, first.n_components)
-        require_room(dims, dtype)
-        reader = sitk.ImageSeriesReader()
-        reader.SetFileNames([str(each.path) for each in slices])
-        reader.SetOutputPixelType(pixel_id)
-        values = sitk.GetArrayFromImage(reader.Execute())
+        slices, distance, n_steps, note = step_at(path, series, time)
+        values = samples_of(slices)
     except RuntimeError as error:
         raise ArgumentError(sentence(error)) from error
+    first = slices[0]
     lattice = {
-        "dims": dims,
+        "dims": dims_of(values.shape),
         "dtype": values.dtype.name,
-        "spacing": (*first.spacing[:2], step),
+        "spacing": (*first.spacing, distance),
         "origin": first.place.tolist(),
         "directions": first.directions.tolist(),
         "n_steps": n_steps,
-        "note": note,
+        "note": "; ".join(filter(None, (note, first.note, without_padding(values, slices)))),
     }
     return lattice, values
 
 
-def step_at(folder: Path, series: str | None, time: int) -> tuple[list[Slice], int, str]:
-    """Return the slices of a step, how many steps there are, and what there is to say about them."""
-    every = series_in(folder)
+def step_at(path: Path, series: str | None, time: int) -> tuple[list[Slice], float, int, str]:
+    """Return the slices of a step, their distance, how many steps there are, and what to say of them."""
+    every, note = series_in(path) if path.is_dir() else [of_frames(path)], ""
     if series == ALL and len(every) > 1:
         phases, note = phases_of(every)
         require_step(time, len(phases))
-        return slices_of(phases[time]), len(phases), note
-    steps = steps_of(slices_of(chosen(every, series)))
-    require_step(time, len(steps))
-    return steps[time], len(steps), ""
+        slices, n_steps = slices_of(phases[time]), len(phases)
+    else:
+        slices = slices_of(chosen(every, series))
+        with advised(slices[0].frame is not None):
+            steps = steps_of(slices)
+        require_step(time, len(steps))
+        slices, n_steps = steps[time], len(steps)
+    with advised(slices[0].frame is not None):
+        return slices, slice_distance(slices), n_steps, note
+
+
+def of_frames(path: Path) -> FileSeries:
+    """Return a file of many frames as a series."""
+    if is_foreign(path):
+        raise ArgumentError("expected a file of DICOM, got another")
+    if len(slices_in(path)) < 2:
+        folder = path.absolute().parent
+        raise ArgumentError(
+            f"expected a file of many frames, got one slice of a series; open its folder, {folder}"
+        )
+    return FileSeries("", "", "", "", [str(path)], ())
 
 
 def series_in(folder: Path) -> list[FileSeries]:
@@ -90,9 +82,13 @@ def series_in(folder: Path) -> list[FileSeries]:
     every, reader = [], sitk.ImageSeriesReader
     for uid in reader.GetGDCMSeriesIDs(str(folder)):
         files = reader.GetGDCMSeriesFileNames(str(folder), uid)
-        first, lattice = header(Path(files[0])), lattice_of(Path(files[0]), len(files))
-        number, description, position = (tag(first, each) for each in OF_SERIES)
-        every.append(FileSeries(number, description, position, uid, files, lattice))
+        first = pydicom.dcmread(files[0], stop_before_pixels=True, force=True, specific_tags=OF_SERIES)
+        number, description, position, kind = (str(first.get(each) or "") for each in OF_SERIES)
+        every.append(
+            FileSeries(
+                number, description or kind, position, uid, files, lattice_of(Path(files[0]), len(files))
+            )
+        )
     names = {Path(file).name for each in every for file in each.files}
     unlisted = [path for path in sorted(folder.iterdir()) if path.name not in names]
     if foreign := next((path.name for path in unlisted if is_foreign(path)), None):
@@ -100,17 +96,21 @@ def series_in(folder: Path) -> list[FileSeries]:
     if damaged := next((path.name for path in unlisted if is_slice(path)), None):
         raise ArgumentError(f"{damaged}: cut off or damaged; put the whole slice there, or take it away")
     if not every:
-        raise ArgumentError("expected a folder of DICOM slices or TIFFs (.tif, .tiff), found none in it")
+        below = ", ".join(sorted(path.name for path in unlisted if path.is_dir()))
+        advice = f"; open the folder with the slices, in {below}" if below else ""
+        raise ArgumentError(
+            f"expected a folder of DICOM slices or TIFFs (.tif, .tiff), found none in it{advice}"
+        )
     return every
 
 
 def lattice_of(file: Path, count: int) -> tuple[float, ...]:
     """Return that of a series as `FileSeries` has it, rounded to 0.001 mm."""
     try:
-        first = slice_of(file)
-    except ArgumentError:  # a report, say, that has no place
+        first, *others = slices_in(file)
+    except (ArgumentError, KeyError):  # a report, say, that has no place
         return ()
-    numbers = count, *first.sizes[:2], *first.spacing[:2], *first.place, *first.directions.flat
+    numbers = count * (1 + len(others)), *first.sizes, *first.spacing, *first.place, *first.directions.flat
     return tuple(round(float(each), 3) for each in numbers)
 
 
@@ -128,7 +128,8 @@ def chosen(every: Sequence[FileSeries], series: str | None) -> FileSeries:
 
 def slices_of(series: FileSeries) -> list[Slice]:
     """Return the slices of a series, sorted by height."""
-    return sorted((slice_of(Path(file)) for file in series.files), key=lambda each: each.height)
+    slices = [each for file in series.files for each in slices_in(Path(file))]
+    return sorted(slices, key=lambda each: each.height)
 
 
 def is_slice(path: Path) -> bool:
@@ -145,26 +146,6 @@ def is_foreign(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         return file.read(132)[128:] != MAGIC
-
-
-def slice_of(path: Path) -> Slice:
-    """Read the header of a slice."""
-    reader = header(path)
-    place, axes = (
-        [float(number) for number in tag(reader, name).split("\\") if number] for name in (PLACE, ORIENTATION)
-    )
-    if (len(place), len(axes)) != (3, 6):
-        raise ArgumentError(f"{path.name}: expected a slice with its position and orientation, found none")
-    if len(reader.GetSize()) > 2 and reader.GetSize()[2] != 1:
-        raise ArgumentError(f"{path.name}: expected one slice per file, got {reader.GetSize()[2]} frames")
-    row, column = np.reshape(axes, (2, 3))
-    directions = np.stack([row, column, np.cross(row, column)])
-    if not np.allclose(directions @ directions.T, np.eye(3), atol=1e-3):
-        raise ArgumentError(f"{path.name}: expected rows and columns at right angles, got {axes}")
-    kind, times = (reader.GetPixelIDValue(), reader.GetNumberOfComponents()), (tag(reader, t) for t in TIMES)
-    return Slice(
-        path, reader.GetSize(), reader.GetSpacing(), np.array(place), directions, *kind, tuple(times)
-    )
 
 
 def steps_of(slices: list[Slice]) -> list[list[Slice]]:
@@ -192,17 +173,17 @@ def steps_of(slices: list[Slice]) -> list[list[Slice]]:
 def time_tag(places: list[list[Slice]]) -> tuple[int, str]:
     """Return index and name of the tag that tells all slices at one place apart."""
     lacking = ""
-    for index, name in enumerate(TIMES.values()):
+    for index, name in enumerate(TIMES):
         values = [[each.times[index] for each in place] for place in places]
         if all("" not in some and len({*map(float, some)}) == len(some) for some in values):
             return index, name
-        without = [each.path.name for place in places for each in place if not each.times[index]]
+        without = [each.name for place in places for each in place if not each.times[index]]
         if 0 < len(without) < sum(map(len, places)):
             lacking += f"; {without[0]} has no {name}"
     first, second = next(place for place in places if len(place) > 1)[:2]
     raise ArgumentError(
-        f"{first.path.name} and {second.path.name}: expected slices at different places, got two at one, and "
-        f"no {' or '.join(TIMES.values())} that tells such slices apart{lacking}"
+        f"{first.name} and {second.name}: expected slices at different places, got two at one, and "
+        f"no {' or '.join(TIMES)} that tells such slices apart{lacking}"
     )
 
 
@@ -212,16 +193,14 @@ def slice_distance(slices: list[Slice]) -> float:
     if len(slices) < 2:
         raise ArgumentError("expected at least 2 slices, got 1")
     for each in slices:
-        is_like = each.sizes[:2] == first.sizes[:2] and np.allclose(each.spacing[:2], first.spacing[:2])
+        is_like = each.sizes == first.sizes and np.allclose(each.spacing, first.spacing)
         if not is_like or not np.allclose(each.directions, first.directions, atol=1e-3):
-            raise ArgumentError(
-                f"{each.path.name}: expected size, spacing and orientation of {first.path.name}"
-            )
+            raise ArgumentError(f"{each.name}: expected size, spacing and orientation of {first.name}")
         shift = np.abs(first.directions[:2] @ (each.place - first.place)).max()
         if shift > TILT * (each.height - first.height) + ROUNDING:
             raise ArgumentError(
-                f"{each.path.name}: expected slices behind each other, got one {shift:.3g} mm "
-                f"beside {first.path.name}; correct the tilt of the gantry first"
+                f"{each.name}: expected slices behind each other, got one {shift:.3g} mm "
+                f"beside {first.name}; correct the tilt of the gantry first"
             )
     gaps = np.diff([each.height for each in slices])
     step = float(np.sort(gaps)[(len(gaps) - 1) // 2])
@@ -231,20 +210,7 @@ def slice_distance(slices: list[Slice]) -> float:
             is_missing = count > 1 and abs(gap - count * step) <= UNEVEN * step
             found = f"{count - 1} missing" if is_missing else "another"
             raise ArgumentError(
-                f"{before.path.name} and {after.path.name}: expected slices {step:.6g} mm apart, got "
+                f"{before.name} and {after.name}: expected slices {step:.6g} mm apart, got "
                 f"{gap:.6g} mm: {found}; complete the series, or resample it"
             )
     return float(slices[-1].height - first.height) / (len(slices) - 1)
-
-
-def header(path: Path) -> sitk.ImageFileReader:
-    """Return a reader that has read a header."""
-    reader = sitk.ImageFileReader()
-    reader.SetFileName(str(path))
-    reader.ReadImageInformation()
-    return reader
-
-
-def tag(reader: sitk.ImageFileReader, name: str) -> str:
-    """Return the text of a tag; empty where there is none."""
-    return str(reader.GetMetaData(name)).strip() if reader.HasMetaDataKey(name) else ""

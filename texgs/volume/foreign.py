@@ -24,6 +24,7 @@ from texgs.volume.samples import stored_samples, unpacked
 from texgs.volume.slabs import ArraySource, RawSource, Source, step_note
 
 BY_VTK = (".vti", ".vtk", ".slc")
+DICOM = (".dcm", ".ima")  # suffixes of files; slices without are read in their folder
 TAIL = 1024  # bytes; more than the end tag and whatever blanks an editor left behind it
 SECONDS, RATE = 60.0, 1e6  # how long reading may take: at least, and bytes per second of a large file
 LONGEST_LINE = 1 << 20  # bytes of what the process says before the samples
@@ -166,7 +167,7 @@ def image_of(
     from texgs.volume.dicom import read_dicom
     from texgs.volume.itk_image import read_itk
 
-    if path.is_dir():
+    if path.is_dir() or path.suffix.lower() in DICOM:
         return read_dicom(path, keys["series"], keys["time"])
     return read_itk(path, is_header_only)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
-from texgs.volume.foreign import open_foreign
+from texgs.volume.foreign import DICOM, open_foreign
 from texgs.volume.grid import (
     ONES,
     ZEROS,
@@ -107,7 +107,8 @@ def holds_arrays(path: Path) -> bool:
 def tells_superior(path: Path) -> bool:
     """Return whether z points to the head by a volume's format: of NIfTI, and of a folder of DICOM."""
     opener, _ = _opener(path)
-    return opener is _open_nifti or (path.is_dir() and opener is open_foreign)
+    is_dicom = opener is open_foreign and (path.is_dir() or _suffix(path) in DICOM)
+    return opener is _open_nifti or is_dicom
 
 
 def _opener(path: Path) -> tuple[Callable[..., Source] | None, tuple[str, ...]]:
@@ -225,6 +226,7 @@ OPENERS: dict[str, Callable[..., Source]] = {
     **dict.fromkeys((".nii", ".nii.gz"), _open_nifti),
     **dict.fromkeys((".nrrd", ".nhdr", ".mhd", ".mha", ".mrc", ".gipl"), open_foreign),  # by SimpleITK
     **dict.fromkeys((".vti", ".vtk", ".slc"), open_foreign),  # by VTK
+    **dict.fromkeys(DICOM, open_foreign),
     **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5"), open_netcdf),
     **dict.fromkeys((".zip", ".ozx"), open_zarr),
     **dict.fromkeys((".txt", ".txt.gz"), ColumnSource),
@@ -236,4 +238,5 @@ KEYS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((".txt", ".txt.gz"), ("dims", "column")),
     **dict.fromkeys((".nii", ".nii.gz"), ("time",)),
     **dict.fromkeys((".vti", ".vtk"), ("variable",)),
+    **dict.fromkeys(DICOM, ("time",)),
 }
