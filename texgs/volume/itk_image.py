@@ -20,9 +20,7 @@ NRRD_SPACES = {
     "las": TO_RIGHT_FRONT,
     "3d-left-handed": (-1.0, 1.0, 1.0),
 }
-HEADERS = {".gipl": 256, ".mrc": 1024}  # bytes before the samples; .mrc says how many more there are
-VERSIONS = (20140, 20141)  # of MRC, in which bytes have a sign
-IMOD = 1146047817  # a word of headers by IMOD, with flags behind it
+GIPL_HEADER = 256  # bytes before the samples
 SOURCE_LINE = re.compile(r"^.*?(?:sitk::ERROR|ITK ERROR|itk::ERROR): (?:\w+\(0x[0-9a-f]+\): )?", re.DOTALL)
 
 
@@ -33,13 +31,10 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
     reader.SetFileName(str(path))
     try:
         reader.ReadImageInformation()
-        suffix, words = path.suffix.lower(), mrc_header(path) if path.suffix.lower() == ".mrc" else None
-        sizes = list(reader.GetSize())
+        suffix, sizes = path.suffix.lower(), list(reader.GetSize())
         dims, dtype = require_volume(sizes, reader.GetPixelIDValue(), reader.GetNumberOfComponents())
-        if words is not None and has_signed_bytes(words):
-            dtype = np.dtype("int8")
-        if suffix in HEADERS:
-            require_bytes(path, HEADERS[suffix] + (words[23] if words else 0) + byte_count(dims, dtype))
+        if suffix == ".gipl":
+            require_bytes(path, GIPL_HEADER + byte_count(dims, dtype))
         fields = read_fields(path)[0] if suffix in NRRD else {}
         signs = np.array(NRRD_SPACES.get(fields.get("space", "").lower(), (1.0, 1.0, 1.0)))
         lattice: dict[str, Any] = {
@@ -56,35 +51,9 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
         if is_header_only:
             return lattice, None
         require_room(dims, dtype)
-        return lattice, sitk.GetArrayFromImage(reader.Execute()).view(dtype)
+        return lattice, sitk.GetArrayFromImage(reader.Execute())
     except RuntimeError as error:
         raise ArgumentError(sentence(error)) from error
-
-
-def mrc_header(path: Path) -> list[int]:
-    """Return the words of an MRC file's header in its byte order.
-
-    Its columns, rows and sections have to be along x, y and z: ITK takes all for such.
-    """
-    with path.open("rb") as file:
-        stored = file.read(1024)
-    both = [np.frombuffer(stored, f"{end}i4", len(stored) // 4).tolist() for end in "<>"]
-    words = next((each for each in both if sorted(each[16:19]) == [1, 2, 3]), both[0])
-    if sorted(words[16:19]) == [1, 2, 3] != words[16:19]:
-        got = ", ".join("xyz"[axis - 1] for axis in words[16:19])
-        raise ArgumentError(
-            f"expected columns, rows and sections along x, y, z, got {got}; write it again in that order"
-        )
-    return words
-
-
-def has_signed_bytes(words: list[int]) -> bool:
-    """Return whether an MRC file says that its bytes are int8: by the format of 2014, or by a flag of IMOD.
-
-    ITK takes all for uint8, and writes such without saying so.
-    """
-    by_imod = words[38] == IMOD and words[39] & 1 == 1
-    return words[3] == 0 and (words[27] in VERSIONS or by_imod)
 
 
 def require_bytes(path: Path, expected: int) -> None:

@@ -22,6 +22,7 @@ from texgs.volume.grid import (
     dims_of,
     require_room,
 )
+from texgs.volume.mrc import MAPS, open_mrc
 from texgs.volume.netcdf import open_netcdf
 from texgs.volume.ome_zarr import is_zarr, open_zarr
 from texgs.volume.slabs import ArraySource, RawSource, Source, require_step, size_text, step_note
@@ -224,7 +225,8 @@ OPENERS: dict[str, Callable[..., Source]] = {
     **dict.fromkeys((".tif", ".tiff"), open_tiff),
     ".npy": _open_npy,
     **dict.fromkeys((".nii", ".nii.gz"), _open_nifti),
-    **dict.fromkeys((".nrrd", ".nhdr", ".mhd", ".mha", ".mrc", ".gipl"), open_foreign),  # by SimpleITK
+    **dict.fromkeys((".nrrd", ".nhdr", ".mhd", ".mha", ".gipl"), open_foreign),  # by SimpleITK
+    **dict.fromkeys((*MAPS, *(f"{suffix}.gz" for suffix in MAPS)), open_mrc),
     **dict.fromkeys((".vti", ".vtk", ".slc"), open_foreign),  # by VTK
     **dict.fromkeys(DICOM, open_foreign),
     **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5"), open_netcdf),

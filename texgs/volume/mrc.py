@@ -1,0 +1,92 @@
+"""MRC files and maps of cryo-EM, as sources."""
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import reading_as
+from texgs.volume.grid import (
+    AS_STORED,
+    ONES,
+    AxisPermutation,
+    Grid,
+    Triple,
+    check_lattice,
+    permuted_values,
+    require_room,
+)
+from texgs.volume.slabs import ArraySource, RawSource, Source
+
+MAPS = (".mrc", ".map", ".ccp4", ".rec")  # suffixes
+VERSIONS = (20140, 20141)  # of MRC, in which bytes have a sign
+IMOD = 1146047817  # a word of headers by IMOD, with flags behind it
+
+
+def open_mrc(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
+    """Open a map whose columns, rows and sections may be along any axes; read on demand if uncompressed."""
+    import mrcfile
+
+    with reading_as("an MRC file"), warnings.catch_warnings(action="ignore"):
+        with mrcfile.open(path, permissive=True, header_only=True) as file:
+            header = file.header
+        dtype, offset = type_of(header), header.nbytes + int(header.nsymbt)
+        dims = (int(header.nx), int(header.ny), int(header.nz))
+        check_lattice(dims, dtype)
+        if mrcfile.utils.spacegroup_is_volume_stack(header.ispg) and header.mz < header.nz:
+            raise ArgumentError(
+                f"expected one volume, got a stack of {header.nz // header.mz}; take it apart"
+            )
+        if path.suffix.lower() == ".gz":
+            require_room(dims, dtype)
+            with mrcfile.open(path, permissive=True) as file:
+                values = file.data
+            if values is None:
+                raise ArgumentError(
+                    "the file is cut off or damaged: it has fewer samples than its header says"
+                )
+            values = values.view(dtype)
+        else:
+            values = RawSource(path, dims, dtype, offset).mapped()
+        axes, steps, first, note = lattice_of(header)
+        lattice = (spacing or steps, origin or first)
+        if axes == AS_STORED and isinstance(values, np.memmap):
+            source: Source = RawSource(path, dims, dtype, offset, *lattice)
+        else:
+            source = ArraySource(Grid(permuted_values(values, axes), *lattice), path.name)
+        source.note = "" if spacing else note
+        return source
+
+
+def type_of(header: Any) -> np.dtype:
+    """Return the type of samples with its byte order; bytes have a sign where version or IMOD say so."""
+    from mrcfile.utils import data_dtype_from_header
+
+    dtype = data_dtype_from_header(header)
+    word, flags = np.frombuffer(header.extra2.tobytes()[40:48], header.mode.dtype)
+    has_sign = header.nversion in VERSIONS or (word == IMOD and flags & 1)
+    return dtype if has_sign or dtype != np.int8 else np.dtype(np.uint8)
+
+
+def lattice_of(header: Any) -> tuple[AxisPermutation, Triple, Triple, str]:
+    """Return where the axes x, y, z come from, spacing and origin along them, and what is to say of these."""
+    stored = [int(header[name]) - 1 for name in ("mapc", "mapr", "maps")]
+    if sorted(stored) != [0, 1, 2]:
+        raise ArgumentError(f"expected columns, rows and sections along x, y, z, got axes {stored}")
+    x, y, z = (stored.index(axis) for axis in range(3))
+    angles = [float(each) for each in header.cellb.item()]
+    if not all(abs(angle - 90) < 0.01 or angle == 0 for angle in angles):
+        raise ArgumentError(f"expected axes at right angles, got {angles}; resample the map")
+    cell, intervals = header.cella.item(), [int(header[name]) for name in ("mx", "my", "mz")]
+    is_told = min(cell) > 0 and min(intervals) > 0
+    dx, dy, dz = (a / n for a, n in zip(cell, intervals, strict=True)) if is_told else ONES
+    starts = [int(header[name]) for name in ("nxstart", "nystart", "nzstart")]
+    first = header.origin.item()
+    if not any(first):
+        first = (starts[x] * dx, starts[y] * dy, starts[z] * dz)
+    note = (
+        "" if is_told else "MRC tells no spacing, so that samples are 1 apart; dataset.volume.spacing sets it"
+    )
+    return ((x, 1), (y, 1), (z, 1)), (dx, dy, dz), first, note
