@@ -20,8 +20,8 @@ def source_of(
     """Return an array [Z, Y, X], an ImageData of PyVista or a DataArray of xarray as a source.
 
     Args:
-        data: PyVista's have point data, of which the active scalars count. Those of xarray are read as files
-            with labels are, see `texgs.volume.axes.axes_of`.
+        data: of PyVista's arrays the active scalars count, else the first one of points, or else of cells. Those
+            of xarray are read as files with labels are, see `texgs.volume.axes.axes_of`.
         name: for messages.
         spacing: x, y, z, in place of the object's own.
         origin: the same.
@@ -35,7 +35,7 @@ def source_of(
         raise ArgumentError(f"data: expected one array, got a Dataset of {names}; choose one by its name")
     if hasattr(data, "dims") and hasattr(data, "coords"):
         return of_data_array(data, *said)
-    if hasattr(data, "GetDirectionMatrix"):
+    if hasattr(data, "GetFieldData"):  # of VTK
         values, steps, first = of_image_data(data)
     else:
         values, steps, first = of_array(data), (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
@@ -89,26 +89,18 @@ def of_array(data: Any) -> np.ndarray:
 
 
 def of_image_data(image: Any) -> tuple[np.ndarray, Triple, Triple]:
-    """Return samples [Z, Y, X], spacing and origin of PyVista's or VTK's image data."""
+    """Return samples [Z, Y, X], spacing and origin of PyVista's or VTK's image data or rectilinear grid."""
     from pyvista import wrap
 
-    image = wrap(image)
-    if not np.array_equal(np.reshape(image.direction_matrix, (3, 3)), np.eye(3)):
+    from texgs.volume.vtk_image import field_of
+
+    values, steps, (x, y, z), directions, _ = field_of(wrap(image), None)
+    if not np.array_equal(directions, np.eye(3)):
         raise ArgumentError(
             "ImageData: expected axes along x, y, z, got others; write it to a .vti file and open that, or "
             "resample it"
         )
-    name = image.active_scalars_name or next(iter(image.point_data.keys()), None)
-    if name not in image.point_data:
-        raise ArgumentError(
-            f"ImageData: expected scalars at points, got {len(image.cell_data)} arrays of cells; use "
-            "image.cell_data_to_point_data()"
-        )
-    values = np.asarray(image.point_data[name])
-    x, y, z = (int(size) for size in image.dimensions)
-    first = [0.0, 0.0, 0.0]
-    image.TransformIndexToPhysicalPoint(list(image.extent[::2]), first)
-    return values.reshape(z, y, x, *values.shape[1:]), tuple(image.spacing), (first[0], first[1], first[2])
+    return values, steps, (x, y, z)
 
 
 def of_data_array(array: Any, spacing: Triple | None, origin: Triple | None) -> Source:

@@ -23,9 +23,8 @@ from texgs.volume.headers import METAIMAGE, NRRD
 from texgs.volume.samples import stored_samples, unpacked
 from texgs.volume.slabs import ArraySource, RawSource, Source, step_note
 
-BY_VTK = (".vti", ".vtk", ".slc")
+BY_VTK = (".vti", ".vtr", ".vts", ".pvti", ".pvtr", ".vtk", ".slc")
 DICOM = (".dcm", ".ima")  # suffixes of files; slices without are read in their folder
-TAIL = 1024  # bytes; more than the end tag and whatever blanks an editor left behind it
 SECONDS, RATE = 60.0, 1e6  # how long reading may take: at least, and bytes per second of a large file
 LONGEST_LINE = 1 << 20  # bytes of what the process says before the samples
 COMPLAINT = re.compile(r"error|fail|cannot|corrupt|unexpected", re.IGNORECASE)
@@ -47,8 +46,6 @@ def open_foreign(
     """
     suffix, keys = path.suffix.lower(), {"series": series, "time": time, "variable": variable}
     with reading_as(_kind(path)):
-        if suffix == ".vti":
-            _check_end(path)
         stored = stored_samples(path) if suffix in (*NRRD, *METAIMAGE) else None
         reply, values = _ask(path, keys, is_header_only=stored is not None)
         nx, ny, nz = reply["dims"]
@@ -78,14 +75,6 @@ def open_foreign(
 def _kind(path: Path) -> str:
     """Return what a file should be, for messages."""
     return "a folder of DICOM slices" if path.is_dir() else f"a {path.suffix.lower()} file"
-
-
-def _check_end(path: Path) -> None:
-    """Refuse an XML file that is cut off: VTK reads uncompressed samples past its end without a word."""
-    with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - TAIL))
-        if b"</VTKFile>" not in file.read():
-            raise ArgumentError("the file is cut off or no .vti file: expected </VTKFile> at its end")
 
 
 def _ask(path: Path, keys: dict[str, Any], is_header_only: bool) -> tuple[dict[str, Any], np.ndarray]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
-from texgs.volume.foreign import DICOM, open_foreign
+from texgs.volume.foreign import BY_VTK, DICOM, open_foreign
 from texgs.volume.grid import (
     ONES,
     ZEROS,
@@ -227,7 +227,7 @@ OPENERS: dict[str, Callable[..., Source]] = {
     **dict.fromkeys((".nii", ".nii.gz"), _open_nifti),
     **dict.fromkeys((".nrrd", ".nhdr", ".mhd", ".mha", ".gipl"), open_foreign),  # by SimpleITK
     **dict.fromkeys((*MAPS, *(f"{suffix}.gz" for suffix in MAPS)), open_mrc),
-    **dict.fromkeys((".vti", ".vtk", ".slc"), open_foreign),  # by VTK
+    **dict.fromkeys(BY_VTK, open_foreign),
     **dict.fromkeys(DICOM, open_foreign),
     **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5"), open_netcdf),
     **dict.fromkeys((".zip", ".ozx"), open_zarr),
@@ -239,6 +239,6 @@ KEYS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5", ".zip", ".ozx"), IN_FILES),
     **dict.fromkeys((".txt", ".txt.gz"), ("dims", "column")),
     **dict.fromkeys((".nii", ".nii.gz"), ("time",)),
-    **dict.fromkeys((".vti", ".vtk"), ("variable",)),
+    **dict.fromkeys(BY_VTK, ("variable",)),
     **dict.fromkeys(DICOM, ("time",)),
 }
