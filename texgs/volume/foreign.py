@@ -18,6 +18,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError, OutOfMemoryError, TexgsError
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
+from texgs.volume.extra_axis import extra_axis, one_volume
 from texgs.volume.grid import AS_STORED, Grid, Triple, byte_count, closest, permuted_values, require_room
 from texgs.volume.headers import METAIMAGE, NRRD
 from texgs.volume.samples import stored_samples, unpacked
@@ -37,6 +38,7 @@ def open_foreign(
     series: str | None = None,
     time: int = 0,
     variable: str | None = None,
+    channel: str | None = None,
 ) -> Source:
     """Open image data with its axes along the closest ones of space, so that nothing is mirrored.
 
@@ -44,10 +46,20 @@ def open_foreign(
     those of the file; `series` is the number or UID of one of several in a folder of DICOM slices, `time` the
     step of one that has several volumes, and `variable` the name of a point array of VTK's image data.
     """
-    suffix, keys = path.suffix.lower(), {"series": series, "time": time, "variable": variable}
+    suffix, keys = (
+        path.suffix.lower(),
+        {"series": series, "time": time, "variable": variable, "channel": channel},
+    )
     with reading_as(_kind(path)):
         stored = stored_samples(path) if suffix in (*NRRD, *METAIMAGE) else None
-        reply, values = _ask(path, keys, is_header_only=stored is not None)
+        extra = extra_axis(path) if stored is not None else None
+        if suffix in (*NRRD, *METAIMAGE):
+            for key, is_said in (("time", time > 0), ("channel", channel is not None)):
+                if is_said and (extra is None or extra.key != key):
+                    raise ArgumentError(f"dataset.volume.{key}: there is no such axis; leave it out")
+        index = extra.index(keys[extra.key]) if extra else 0
+        with one_volume(path, extra) as header:
+            reply, values = _ask(header, keys, is_header_only=stored is not None)
         nx, ny, nz = reply["dims"]
         dims, axes = (nx, ny, nz), closest(np.array(reply["directions"]))
         dx, dy, dz = spacing or (reply["spacing"][axis] for axis, _ in axes)
@@ -58,14 +70,18 @@ def open_foreign(
         )
         if stored is not None:
             dtype = np.dtype(reply["dtype"]).newbyteorder(">" if stored.is_big_endian else "<")
+            every = (nx, ny, nz * (extra.size if extra else 1))
             if stored.encoding != "raw":
-                values = unpacked(stored, dims, dtype)
+                values = unpacked(stored, every, dtype)
             else:
-                first = stored.path.stat().st_size - byte_count(dims, dtype)
+                first = stored.path.stat().st_size - byte_count(every, dtype)
                 offset = stored.offset if stored.offset >= 0 else first
-                if axes == AS_STORED:
+                if axes == AS_STORED and extra is None:
                     return RawSource(stored.path, dims, dtype, offset, (dx, dy, dz), (x, y, z))
-                values = RawSource(stored.path, dims, dtype, offset).mapped()
+                values = RawSource(stored.path, every, dtype, offset).mapped()
+            if extra is not None:
+                values = extra.picked(values, index)
+                reply["n_steps"] = extra.size if extra.key == "time" else 1
         source = ArraySource(Grid(permuted_values(values, axes), (dx, dy, dz), (x, y, z)), path.name)
         source.n_steps = reply.get("n_steps", 1)
         source.note = "; ".join(filter(None, (step_note(time, source.n_steps), reply.get("note"))))

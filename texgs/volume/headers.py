@@ -7,6 +7,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.names import named_file
 
 NRRD, METAIMAGE = (".nrrd", ".nhdr"), (".mhd", ".mha")  # suffixes
+ANALYZE = (".hdr", ".img")  # of ANALYZE and NIfTI in two files, each of which may be given for both
 LONGEST_HEADER = 1 << 20  # bytes; a foreign file may hold no line break for gigabytes
 
 
@@ -35,7 +36,10 @@ def read_fields(path: Path) -> tuple[dict[str, str], int]:
 
 def samples_of(header: Path) -> Path | None:
     """Return the file with the samples of a header; None where it is no such header, or there is none."""
-    if header.suffix.lower() not in (*NRRD, *METAIMAGE):
+    if (suffix := header.suffix.lower()) in ANALYZE:
+        path = header.with_suffix(next(each for each in ANALYZE if each != suffix))
+        return path if path.is_file() else None
+    if suffix not in (*NRRD, *METAIMAGE):
         return None
     try:
         path = samples_file(header, read_fields(header)[0])
@@ -52,4 +56,10 @@ def samples_file(header: Path, fields: dict[str, str]) -> Path:
         return header
     if name.startswith("LIST") or "%" in name:
         raise ArgumentError(f"expected one file of samples, got one per slice ({key}: {name}); join them")
-    return named_file(key, header.parent, name)
+    path = named_file(key, header.parent, name)
+    if path.exists():
+        return path
+    # Windows has another separator of folders, and no case of letters.
+    path = named_file(key, header.parent, name.replace("\\", "/"))
+    beside = path.parent.iterdir() if path.parent.is_dir() else ()
+    return next((each for each in beside if each.name.lower() == path.name.lower()), path)

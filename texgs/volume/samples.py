@@ -16,6 +16,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Dims, byte_count, require_room
 from texgs.volume.headers import METAIMAGE, read_fields, samples_file
+from texgs.volume.pointers import require_itself
 
 NUMBERS = ("elementspacing", "elementsize", "offset", "position", "origin", "transformmatrix", "rotation")
 ENCODINGS = {"raw": "raw", "gzip": "gzip", "gz": "gzip", "bzip2": "bzip2", "bz2": "bzip2"} | dict.fromkeys(
@@ -39,6 +40,7 @@ def stored_samples(path: Path) -> StoredSamples | None:
     samples = samples_file(path, fields)
     if not samples.is_file():
         raise ArgumentError(f"no such file with samples: {samples}")
+    require_itself(samples)
     offset = end if samples == path else 0
     if path.suffix.lower() in METAIMAGE:
         for name in NUMBERS:  # ITK takes 1 where a word is no number

@@ -22,9 +22,11 @@ from texgs.volume.grid import (
     dims_of,
     require_room,
 )
+from texgs.volume.headers import METAIMAGE, NRRD
 from texgs.volume.mrc import MAPS, open_mrc
 from texgs.volume.netcdf import open_netcdf
 from texgs.volume.ome_zarr import is_zarr, open_zarr
+from texgs.volume.pointers import require_itself, require_packing
 from texgs.volume.slabs import ArraySource, RawSource, Source, require_step, size_text, step_note
 from texgs.volume.slice_names import tiffs_in
 from texgs.volume.text_columns import ColumnSource
@@ -33,6 +35,13 @@ from texgs.volume.tiff import open_tiff
 # Tried in this order where the size of a plain file does not fit the type given.
 COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
 DEFAULTS = {"endian": "little", "skip": 0, "time": 0}  # of keys, which every format may be given
+HDF5 = (".nc", ".nc4", ".h5", ".hdf5", ".hdf", ".nxs", ".ims")
+ORIENTED = ("sform_code", "qform_code", "goodRASFlag")  # of headers of NIfTI and MGH: 0 for none
+BY_NIBABEL = (".nii", ".nii.gz", ".hdr", ".img", ".mgh", ".mgz")
+IMARIS = (
+    "Imaris pads arrays with zeros, and tells size and extent by text that is not read: dataset.volume.crop "
+    "and spacing set them"
+)
 IN_FILES = ("variable", "channel", "time")  # keys of an array among others
 IN_PAGES = ("image", "channel", "time")  # keys of an image of TIFF
 
@@ -78,6 +87,11 @@ def open_source(
             return _open(path, spacing, origin, said)
     except FileNotFoundError as error:
         path = Path(error.filename or path)
+        if path.is_symlink():
+            target = path.readlink()
+            raise ArgumentError(
+                f"{path}: a link to {target}, which is not there; get it, as by git annex get"
+            ) from error
         raise ArgumentError(f"{path}: no such file or folder; looked for {path.absolute()}") from error
     except OSError as error:
         path = Path(error.filename or path)
@@ -87,11 +101,14 @@ def open_source(
 def _try_to_read(path: Path) -> None:
     """Raise where that is not possible; the readers of the formats say it each in other words."""
     if path.is_dir():
-        next(path.iterdir(), None)
+        files = (each for each in path.iterdir() if not each.name.startswith(".") and not each.is_dir())
+        if first := min(files, default=None):
+            with located(first.name):
+                require_itself(first)
     elif path.exists() and not path.is_file():
         raise ArgumentError("expected a file or a folder, got a named pipe, a device or a socket")
     else:
-        path.open("rb").close()
+        require_packing(path, OPENERS)
 
 
 def _suffix(path: Path) -> str:
@@ -125,6 +142,10 @@ def _opener(path: Path) -> tuple[Callable[..., Source] | None, tuple[str, ...]]:
 def _open(path: Path, spacing: Triple | None, origin: Triple | None, said: dict[str, Any]) -> Source:
     """Open a file by its suffix, or a folder of slices; `said` are keys that only some formats take."""
     opener, takes = _opener(path)
+    if path.name.upper() == "DICOMDIR":
+        raise ArgumentError(
+            "expected a volume, got a list of files of DICOM; open the folder of a series below it"
+        )
     if opener is None:
         raise ArgumentError(
             f"unknown suffix {_suffix(path)!r}; expected {', '.join(OPENERS)}, or a folder of slices or Zarr"
@@ -162,22 +183,29 @@ def _open_raw(
     return RawSource(path, dims, stored, skip, spacing or ONES, origin or ZEROS)
 
 
-def _open_npy(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
-    """Open a NumPy array [Z, Y, X]."""
-    with reading_as("a .npy file"):
+def _open_npy(
+    path: Path, spacing: Triple | None, origin: Triple | None, variable: str | None = None
+) -> Source:
+    """Open a NumPy array [Z, Y, X], or one of an archive."""
+    with reading_as(f"a {path.suffix.lower()} file"):
         values = np.load(path, mmap_mode="r", allow_pickle=False)
-    if not isinstance(values, np.memmap):
-        raise ArgumentError("expected one array in a .npy file, got an archive or a pickle")
+        if isinstance(values, np.lib.npyio.NpzFile):
+            with values as arrays:
+                name = variable or (arrays.files[0] if len(arrays.files) == 1 else "none")
+                if name not in arrays.files:
+                    known = ", ".join(arrays.files)
+                    raise ArgumentError(f"dataset.volume.variable: expected one of {known}, got {name}")
+                values = arrays[name]
     lattice = (spacing or ONES, origin or ZEROS)
-    if values.flags.c_contiguous:
+    if isinstance(values, np.memmap) and values.flags.c_contiguous:
         return RawSource(path, dims_of(values.shape), values.dtype, values.offset, *lattice)
     return ArraySource(Grid(values, *lattice), path.name)
 
 
 def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: int = 0) -> Source:
-    """Open a NIfTI image, its axes permuted and flipped to the closest R, A, S; mapped if uncompressed.
+    """Open an image of NIfTI, ANALYZE or MGH, its axes permuted and flipped to the closest R, A, S.
 
-    Of several along a fourth axis one step is read. By nibabel: ITK knows neither NIfTI-2 nor axes that are
+    It is mapped if it is not compressed. Of several along a fourth axis one step is read. By nibabel: ITK knows neither NIfTI-2 nor axes that are
     not at right angles.
     """
     import nibabel
@@ -185,7 +213,9 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time:
 
     with reading_as("a NIfTI file"), LoggingOutputSuppressor():
         image = nibabel.load(path)
-        if not isinstance(image, nibabel.Nifti1Image | nibabel.Nifti2Image):
+        if not isinstance(
+            image, nibabel.AnalyzeImage | nibabel.MGHImage
+        ):  # NIfTI is one of ANALYZE to nibabel
             raise ArgumentError(f"expected a NIfTI image, got {type(image).__name__}")
         stored = image.get_data_dtype()
         if stored.fields:
@@ -195,7 +225,7 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time:
         shape = image.shape[:3] + tuple(size for size in rest if size != 1)
         x, y, z = dims_of(shape)[::-1]
         check_lattice((x, y, z), stored)
-        codes = [int(image.header[f"{form}_code"]) for form in ("sform", "qform")]
+        codes = [int(image.header[name]) for name in ORIENTED if name in image.header]
         # Method 1 of the standard: nibabel would mirror x.
         told = image.affine if any(codes) else np.diag([*image.header.get_zooms()[:3], 1.0])
         turn = nibabel.io_orientation(told)
@@ -213,9 +243,17 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time:
     source = ArraySource(Grid(values.T, spacing or (dx, dy, dz), origin or first), path.name)
     source.n_steps, source.note = n_steps, step_note(time, n_steps)
     if not any(codes):
+        kind = "NIfTI" if isinstance(image, nibabel.Nifti1Pair) else "ANALYZE"
         source.note = "; ".join(
-            filter(None, (source.note, "NIfTI tells no orientation: axes are taken as stored"))
+            filter(None, (source.note, f"{kind} tells no orientation: axes are taken as stored"))
         )
+    return source
+
+
+def _open_imaris(path: Path, spacing: Triple | None, origin: Triple | None, **keys: Any) -> Source:
+    """Open an array of Imaris as one of HDF5."""
+    source = open_netcdf(path, spacing, origin, **keys)
+    source.note = "; ".join(filter(None, (source.note, "" if spacing else IMARIS)))
     return source
 
 
@@ -223,22 +261,25 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time:
 OPENERS: dict[str, Callable[..., Source]] = {
     **dict.fromkeys((".raw", ".bin", ".dat"), _open_raw),
     **dict.fromkeys((".tif", ".tiff"), open_tiff),
-    ".npy": _open_npy,
-    **dict.fromkeys((".nii", ".nii.gz"), _open_nifti),
-    **dict.fromkeys((".nrrd", ".nhdr", ".mhd", ".mha", ".gipl"), open_foreign),  # by SimpleITK
+    **dict.fromkeys((".npy", ".npz"), _open_npy),
+    **dict.fromkeys(BY_NIBABEL, _open_nifti),
+    **dict.fromkeys((*NRRD, *METAIMAGE, ".gipl"), open_foreign),  # by SimpleITK
     **dict.fromkeys((*MAPS, *(f"{suffix}.gz" for suffix in MAPS)), open_mrc),
     **dict.fromkeys(BY_VTK, open_foreign),
     **dict.fromkeys(DICOM, open_foreign),
-    **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5"), open_netcdf),
+    **dict.fromkeys(HDF5, open_netcdf),
+    ".ims": _open_imaris,
     **dict.fromkeys((".zip", ".ozx"), open_zarr),
     **dict.fromkeys((".txt", ".txt.gz"), ColumnSource),
 }
 KEYS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((".raw", ".bin", ".dat"), ("dims", "dtype", "endian", "skip")),
     **dict.fromkeys((".tif", ".tiff"), IN_PAGES),
-    **dict.fromkeys((".nc", ".nc4", ".h5", ".hdf5", ".zip", ".ozx"), IN_FILES),
+    **dict.fromkeys((*HDF5, ".zip", ".ozx"), IN_FILES),
     **dict.fromkeys((".txt", ".txt.gz"), ("dims", "column")),
-    **dict.fromkeys((".nii", ".nii.gz"), ("time",)),
+    **dict.fromkeys(BY_NIBABEL, ("time",)),
+    ".npz": ("variable",),
     **dict.fromkeys(BY_VTK, ("variable",)),
     **dict.fromkeys(DICOM, ("time",)),
+    **dict.fromkeys((*NRRD, *METAIMAGE), ("channel", "time")),
 }

@@ -1,0 +1,98 @@
+"""The axis that NRRD and MetaImage may have besides x, y and z: time, channels, or layers of labels."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import numpy as np
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.headers import METAIMAGE, NRRD, read_fields
+from texgs.volume.slabs import require_step
+
+OF_SPACE = ("domain", "space")  # kinds of axes of NRRD
+SEQUENCE = ".seq.nrrd"  # of 3D Slicer, whose list is one of steps in time
+WORD = re.compile(r'\([^)]*\)|"[^"]*"|\S+')  # of a field of NRRD: a vector is one, and so is a text
+# Fields of NRRD with a word for each axis; of MetaImage with a number.
+PER_AXIS = ("sizes", "kinds", "spacedirections", "spacings", "thicknesses", "axismins", "axismaxs")
+PER_AXIS += ("centers", "centerings", "labels", "units")
+NUMBERS = ("dimsize", "elementspacing", "elementsize", "offset", "position", "origin", "centerofrotation")
+MATRICES = ("transformmatrix", "rotation", "orientation")
+
+
+class ExtraAxis(NamedTuple):
+    """Which axis it is, from the fastest; its size; and the key that chooses one of it."""
+
+    place: int
+    size: int
+    key: str
+
+    def index(self, said: int | str | None) -> int:
+        """Return which one the key chooses: by default the first step in time, but no channel."""
+        if self.key == "time":
+            require_step(int(said or 0), self.size)
+        elif str(said) not in map(str, range(self.size)):
+            known = f"0 to {self.size - 1}, as there are {self.size} components per sample"
+            raise ArgumentError(f"dataset.volume.channel: expected one of {known}, got {said or 'none'}")
+        return int(said or 0)
+
+    def picked(self, values: np.ndarray, index: int) -> np.ndarray:
+        """Return the samples [Z, Y, X] at an index, from those of all in the order of the file."""
+        z, y, x = values.shape
+        shape = [z // self.size, y, x]
+        shape.insert(3 - self.place, self.size)
+        return np.moveaxis(values.reshape(shape), 3 - self.place, 0)[index]
+
+
+def extra_axis(path: Path) -> ExtraAxis | None:
+    """Return the axis that a file has besides those of space; None where there is none, or more than one."""
+    fields, _ = read_fields(path)
+    if path.suffix.lower() in METAIMAGE:
+        count, sizes = int(fields.get("elementnumberofchannels", "1")), fields.get("dimsize", "").split()
+        if count > 1:
+            return ExtraAxis(0, count, "channel") if len(sizes) == 3 else None
+        return ExtraAxis(3, int(sizes[3]), "time") if len(sizes) == 4 else None
+    sizes = fields.get("sizes", "").split()
+    kinds = fields.get("kinds", "").split() or WORD.findall(fields.get("spacedirections", ""))
+    others = [k for k, kind in enumerate(kinds) if kind not in OF_SPACE and kind[0] != "("]
+    if len(sizes) != 4 or len(others) > 1:
+        return None
+    place = others[0] if others else 3
+    is_time = not kinds or kinds[place] == "time" or path.name.lower().endswith(SEQUENCE)
+    return ExtraAxis(place, int(sizes[place]), "time" if is_time or not others else "channel")
+
+
+@contextmanager
+def one_volume(path: Path, axis: ExtraAxis | None) -> Iterator[Path]:
+    """Give a header of the volume at one place of the axis: ITK has other rules for the fourth axis."""
+    if axis is None:
+        yield path
+        return
+    head = path.read_bytes()[: read_fields(path)[1]].decode("latin-1")
+    with TemporaryDirectory() as folder:
+        header = Path(folder) / path.name
+        lines = [bare(line, axis.place, path.suffix.lower() in NRRD) for line in head.splitlines()]
+        header.write_text("\n".join([*lines, "", ""]), encoding="latin-1")
+        yield header
+
+
+def bare(line: str, place: int, is_nrrd: bool) -> str:
+    """Return a line of a header without what it says of an axis."""
+    name, mark, value = line.partition(":" if is_nrrd else "=")
+    key, words = name.replace(" ", "").strip().lower(), WORD.findall(value)
+    if key == "datafile":
+        return "#"
+    if key in ("dimension", "ndims"):
+        words = ["3"]
+    elif key == "elementnumberofchannels":
+        words = ["1"]
+    elif key in PER_AXIS if is_nrrd else key in NUMBERS and len(words) == 4:
+        del words[place]
+    elif key in MATRICES and len(words) == 16:
+        words = [word for k, word in enumerate(words) if k < 12 and k % 4 < 3]
+    else:
+        return line
+    return f"{name}{mark} {' '.join(words)}"
