@@ -133,11 +133,22 @@ def test_what_is_no_volume_is_refused(data, words):
         texgs.Volume(data)
 
 
-def test_cells_and_turned_axes_of_pyvista_are_refused():
-    image = pyvista.ImageData(dimensions=(4, 4, 4))
-    image.cell_data["density"] = np.arange(27.0)
-    with pytest.raises(ArgumentError, match="cell_data_to_point_data"):
-        texgs.Volume(image)
+def test_cells_and_even_grids_of_pyvista_are_volumes():
+    values = field(3, 4, 5)
+    image = pyvista.ImageData(dimensions=(6, 5, 4), spacing=(1, 2, 3))
+    image.cell_data["density"] = values.ravel()
+    grid = pyvista.RectilinearGrid(np.arange(5.0), 2 * np.arange(4.0), 3 * np.arange(3.0))
+    grid["density"] = values.ravel()
+    for data, origin in ((image, (0.5, 1, 1.5)), (grid, (0, 0, 0))):
+        volume = texgs.Volume(data)
+        np.testing.assert_array_equal(volume.grid.values, values)
+        assert (volume.grid.spacing, volume.grid.origin) == ((1, 2, 3), origin)
+
+
+def test_other_data_and_turned_axes_of_pyvista_are_refused():
+    for data, name in ((pyvista.Sphere(), "PolyData"), (pyvista.MultiBlock(), "MultiBlock")):
+        with pytest.raises(ArgumentError, match=rf"expected image data .*, got {name}; resample it"):
+            texgs.Volume(data)
     turned = texgs.Volume(field(3, 4, 5)).to_pyvista()
     turned.direction_matrix = [[0, 1, 0], [1, 0, 0], [0, 0, 1]]
     with pytest.raises(ArgumentError, match="expected axes along x, y, z"):

@@ -95,39 +95,14 @@ def test_nifti_without_orientation_is_as_stored(tmp_path):
     np.testing.assert_array_equal(source.slices(0, 11), itk)
 
 
-def test_mrc_with_other_axes_is_refused(tmp_path):
-    sitk.WriteImage(sitk.GetImageFromArray(sample_values("int16")), tmp_path / "v.mrc")
-    np.testing.assert_array_equal(open_source(tmp_path / "v.mrc").slices(0, 11), sample_values("int16"))
-    data = bytearray((tmp_path / "v.mrc").read_bytes())
-    data[64:76] = np.array([3, 2, 1], "<i4").tobytes()
-    (tmp_path / "v.mrc").write_bytes(data)
-    with pytest.raises(ArgumentError, match=r"rows and sections along x, y, z, got z, y, x; write it again"):
-        open_source(tmp_path / "v.mrc")
-
-
-@pytest.mark.parametrize("end", "<>")
-@pytest.mark.parametrize(("word", "flag", "is_signed"), [(27, 20140, True), (39, 1, True), (39, 0, False)])
-def test_bytes_of_mrc_have_a_sign_where_the_header_says_so(tmp_path, end, word, flag, is_signed):
-    values = np.arange(-60, 60, dtype=np.int8).reshape(4, 5, 6)
-    header = np.zeros(256, f"{end}i4")
-    header[[0, 1, 2, 7, 8, 9, 16, 17, 18]] = [6, 5, 4, 6, 5, 4, 1, 2, 3]
-    header[10:16] = np.array([6, 5, 4, 90, 90, 90], f"{end}f4").view(f"{end}i4")
-    header[52:54] = np.frombuffer(b"MAP DD\0\0" if end == "<" else b"MAP \x11\x11\0\0", f"{end}i4")
-    header[38], header[word] = 1146047817 if word == 39 else 0, flag
-    (tmp_path / "v.mrc").write_bytes(header.tobytes() + values.tobytes())
-    source = open_source(tmp_path / "v.mrc")
-    expected = values if is_signed else values.view(np.uint8)
-    assert source.dtype == expected.dtype
-    np.testing.assert_array_equal(source.slices(0, 4), expected)
-
-
 @pytest.mark.parametrize("name", ["v.mrc", "v.gipl"])
 def test_a_file_that_is_cut_off_is_refused_where_itk_would_fill_it(tmp_path, name):
     sitk.WriteImage(sitk.GetImageFromArray(sample_values("int16")), path := tmp_path / name)
     whole = path.read_bytes()
     np.testing.assert_array_equal(open_source(path).slices(0, 11), sample_values("int16"))
     path.write_bytes(whole[:-1])
-    with pytest.raises(ArgumentError, match=rf"cut off: expected {len(whole)} bytes, found {len(whole) - 1}"):
+    message = rf"cut off: expected .*{len(whole)} bytes, found {len(whole) - 1}"
+    with pytest.raises(ArgumentError, match=message):
         open_source(path).slices(0, 11)
 
 
@@ -319,12 +294,11 @@ def test_more_than_one_component_is_refused(tmp_path):
             open_source(path)
 
 
-@pytest.mark.parametrize("shape", [(12, 13), (2, 11, 12, 13)])
+@pytest.mark.parametrize("shape", [(12, 13), (2, 2, 11, 12, 13)])
 def test_other_than_three_axes_is_refused(tmp_path, shape):
     values = np.zeros(shape, np.uint8)
     nrrd.write(str(tmp_path / "v.nrrd"), values, index_order="C")
-    five = np.stack([values.T] * 2, axis=-1) if len(shape) > 3 else values.T  # a fourth one is time
-    nibabel.save(nibabel.Nifti1Image(five, np.eye(4)), tmp_path / "v.nii")
+    nibabel.save(nibabel.Nifti1Image(values.T, np.eye(4)), tmp_path / "v.nii")
     tifffile.imwrite(tmp_path / "v.tif", values, photometric="minisblack")
     np.save(tmp_path / "v.npy", values)
     (tmp_path / "v.mha").write_text(
@@ -360,9 +334,8 @@ def test_other_types_are_refused(tmp_path):
     [
         ("DATASET POLYDATA\nPOINTS 1 float\n0 0 0\n", r"expected image data .*, got PolyData"),
         (
-            "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 3\nORIGIN 0 0 0\nSPACING 1 1 1\n"
-            "CELL_DATA 8\nSCALARS v float\nLOOKUP_TABLE default\n1 2 3 4 5 6 7 8\n",
-            "expected point data, found none; convert cell data",
+            "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 3\nORIGIN 0 0 0\nSPACING 1 1 1\n",
+            "expected data of points or cells, found none",
         ),
     ],
 )
