@@ -14,10 +14,13 @@ from typing import Any
 import h5py
 import nibabel
 import numpy as np
+import pyvista
+import SimpleITK
 import tifffile
 import torch
 from PIL import Image
 from pydicom.uid import generate_uid
+from vtkmodules.vtkIOParallelXML import vtkXMLPImageDataWriter
 from zarr.codecs import BloscCodec
 
 from tests.config.kept import project
@@ -27,10 +30,14 @@ from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_release_texture import release_run
 from tests.study.test_ballots import STUDY, ballot
 from tests.volume.test_dicom import write_series as write_slices
+from tests.volume.test_dicom_frames import frame, write_enhanced
+from tests.volume.test_extra_axis import VALUES as STEPS
+from tests.volume.test_extra_axis import write_nrrd
+from tests.volume.test_mrc import write as write_map
 from tests.volume.test_netcdf import FIELD, write_netcdf
 from tests.volume.test_text_columns import LINES, write_lines
 from tests.volume.test_tf_files import RAMP, TENT, preset
-from tests.volume.volume_files import WRITERS, sample_values
+from tests.volume.volume_files import WRITERS, image_data, sample_values
 from tests.volume.zarr_files import axes_of, write_image, zipped
 from texgs.config.kept_function import keep
 from texgs.core.camera import orbit
@@ -107,6 +114,58 @@ def dicom_phases(folder: Path) -> Path:
         uid = generate_uid(entropy_srcs=[str(step)])
         write_slices(folder / "slices", sample_values()[:4] + step, number=step, uid=uid)
     return folder / "slices"
+
+
+def dicom_frames(folder: Path) -> Path:
+    """Five frames with a slope each."""
+    return write_enhanced(folder / "v.dcm", sample_values()[:5], [frame(z, 1 + z) for z in range(5)])
+
+
+def map_of_cells(name: str, folder: Path) -> Path:
+    """With columns along z, and sections along x."""
+    write_map(folder / name, sample_values("int16"), mapc=3, mapr=2, maps=1)
+    return folder / name
+
+
+def mgh(folder: Path) -> Path:
+    nibabel.save(nibabel.MGHImage(sample_values("int16").T, np.eye(4)), folder / "v.mgz")
+    return folder / "v.mgz"
+
+
+def pair(folder: Path) -> Path:
+    nibabel.save(nibabel.AnalyzeImage(sample_values("int16").T, np.eye(4)), folder / "v.img")
+    return folder / "v.hdr"
+
+
+def archive(folder: Path) -> Path:
+    np.savez_compressed(folder / "v.npz", a=sample_values(), b=sample_values() + 1)
+    return folder / "v.npz"
+
+
+def four_axes(name: str, folder: Path) -> Path:
+    if name.endswith("nrrd"):
+        write_nrrd(folder / name, 0, "list", "gzip")
+    else:
+        SimpleITK.WriteImage(SimpleITK.GetImageFromArray(STEPS, isVector=False), folder / name)
+    return folder / name
+
+
+def vtk_cells(name: str, folder: Path) -> Path:
+    places = [np.arange(size + 1.0) for size in (13, 12, 11)]
+    grid = pyvista.RectilinearGrid(*places)
+    grid.cell_data["density"] = sample_values().ravel()
+    grid.save(folder / name)
+    return folder / name
+
+
+def pieces(folder: Path) -> Path:
+    writer = vtkXMLPImageDataWriter()
+    writer.SetFileName(str(folder / "v.pvti"))
+    writer.SetInputData(image_data(sample_values()))
+    writer.SetNumberOfPieces(2)
+    writer.SetEndPiece(1)
+    writer.Write()
+    return folder / "v.pvti"
 
 
 def nifti_in_time(folder: Path) -> Path:
@@ -278,6 +337,20 @@ READERS: dict[str, Reader] = {
     "dicom phases samples": Reader(
         dicom_phases, partial(read_volume, series="all", time=1), "slices/00-1.ima"
     ),
+    "dicom frames samples": Reader(dicom_frames, read_volume),
+    **{name: Reader(partial(map_of_cells, name), read_volume) for name in ("v.map", "v.map.gz")},
+    "map inside": Reader(
+        partial(map_of_cells, "v.map.gz"), read_volume, None, gzip.decompress, gzip.compress
+    ),
+    "mgz": Reader(mgh, read_volume),
+    "mgz inside": Reader(mgh, read_volume, None, gzip.decompress, gzip.compress),
+    "analyze": Reader(pair, read_volume),
+    "npz": Reader(archive, partial(read_volume, variable="b")),
+    "layers of.nrrd": Reader(partial(four_axes, "v.seg.nrrd"), partial(read_volume, channel="1")),
+    "steps of.mha": Reader(partial(four_axes, "v.mha"), partial(read_volume, time=1)),
+    **{f"cells.{kind}": Reader(partial(vtk_cells, f"v.{kind}"), read_volume) for kind in ("vtr", "vtk")},
+    "pieces.pvti": Reader(pieces, read_volume),
+    "piece of pieces.vti": Reader(pieces, read_volume, "v_1.vti"),
     "plain.slc": Reader(partial(slc, 0), read_volume),
     "packed.slc": Reader(partial(slc, 1), read_volume),
     "netcdf": Reader(lambda folder: write_netcdf(folder / "v.nc", {"t": FIELD}), read_volume),

@@ -1,5 +1,6 @@
 import gzip
 
+import h5py
 import nibabel
 import nrrd
 import numpy as np
@@ -18,6 +19,7 @@ from tests.volume.volume_files import (
     write_image,
 )
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.volume.headers import samples_of
 from texgs.volume.slabs import RawSource
 from texgs.volume.sources import open_source
 
@@ -404,3 +406,53 @@ def test_byte_orders_have_two_names(tmp_path, endian):
     (tmp_path / "a.raw").write_bytes(bytes(16))
     with pytest.raises(ArgumentError, match="endian: expected little or big, got"):
         open_source(tmp_path / "a.raw", dims=(2, 2, 2), dtype="uint16", endian=endian)
+
+
+@pytest.mark.parametrize("name", ["v.mgz", "v.mgh", "v.img", "v.hdr"])
+@pytest.mark.parametrize("codes", ORIENTATIONS[:3])
+def test_other_images_of_the_brain_have_the_axes_of_nifti(tmp_path, name, codes):
+    image, _, _, expected = stored_as(codes)
+    kind = nibabel.MGHImage if name.startswith("v.m") else nibabel.Nifti1Pair
+    nibabel.save(kind(np.asarray(image.dataobj), image.affine), tmp_path / name.replace("hdr", "img"))
+    assert_holds(tmp_path / name, expected, (2, 3, 4), (10, 20, 30))
+    assert open_source(tmp_path / name).note == ""
+
+
+def test_analyze_tells_no_orientation(tmp_path):
+    image = nibabel.AnalyzeImage(sample_values("int16").T, None)
+    image.header.set_zooms((0.5, 2.0, 3.0))
+    nibabel.save(image, tmp_path / "v.img")
+    for name in ("v.img", "v.hdr"):
+        assert_holds(tmp_path / name, sample_values("int16"), (0.5, 2, 3))
+        assert open_source(tmp_path / name).note == "ANALYZE tells no orientation: axes are taken as stored"
+        other = {".img": ".hdr", ".hdr": ".img"}[name[1:]]
+        assert samples_of(tmp_path / name) == tmp_path / f"v{other}"
+
+
+def test_one_array_of_an_archive_of_numpy(tmp_path):
+    values = sample_values()
+    np.savez_compressed(tmp_path / "one.npz", values)
+    np.savez(tmp_path / "two.npz", a=values, b=values + 1)
+    assert_holds(tmp_path / "one.npz", values)
+    assert_holds(tmp_path / "two.npz", values + 1, variable="b")
+    with pytest.raises(ArgumentError, match=r"dataset.volume.variable: expected one of a, b, got none$"):
+        open_source(tmp_path / "two.npz")
+
+
+@pytest.mark.parametrize("suffix", [".hdf", ".nxs", ".ims"])
+def test_hdf5_has_other_names(tmp_path, suffix):
+    with h5py.File(tmp_path / f"v{suffix}", "w") as file:
+        for channel in range(2):
+            file[f"DataSet/Channel {channel}/Data"] = sample_values() + channel
+    assert_holds(tmp_path / f"v{suffix}", sample_values() + 1, variable="DataSet/Channel 1/Data")
+    note = open_source(tmp_path / f"v{suffix}", variable="DataSet/Channel 1/Data").note
+    assert note.startswith("Imaris pads arrays with zeros") is (suffix == ".ims")
+
+
+@pytest.mark.parametrize("name", ["data\\Scan.raw", "data\\SCAN.RAW", "data/scan.raw"])
+def test_names_of_windows_in_a_header(tmp_path, name):
+    (tmp_path / "data").mkdir()
+    sample_values().tofile(tmp_path / "data" / "Scan.raw")
+    text = "NDims = 3\nDimSize = 13 12 11\nElementType = MET_USHORT\nElementDataFile = "
+    (tmp_path / "v.mhd").write_text(text + name)
+    assert_holds(tmp_path / "v.mhd", sample_values())

@@ -96,7 +96,7 @@ def series_in(folder: Path) -> list[FileSeries]:
     if damaged := next((path.name for path in unlisted if is_slice(path)), None):
         raise ArgumentError(f"{damaged}: cut off or damaged; put the whole slice there, or take it away")
     if not every:
-        below = ", ".join(sorted(path.name for path in unlisted if path.is_dir()))
+        below = ", ".join([path.name for path in unlisted if path.is_dir()][:3])
         advice = f"; open the folder with the slices, in {below}" if below else ""
         raise ArgumentError(
             f"expected a folder of DICOM slices or TIFFs (.tif, .tiff), found none in it{advice}"

@@ -1,0 +1,96 @@
+"""NRRD and MetaImage with an axis besides those of space, as pynrrd and SimpleITK write them."""
+
+import nrrd
+import numpy as np
+import pytest
+import SimpleITK as sitk
+
+from tests.volume.volume_files import assert_holds, sample_values, whole
+from texgs.core.errors import ArgumentError
+from texgs.volume.sources import open_source
+
+VALUES = np.stack([sample_values(), sample_values() + 100, sample_values() + 200])  # [T, Z, Y, X]
+STEPS = np.array([[0.5, 0, 0], [0, 2.0, 0], [0, 0, 3.0]])
+NONE = [[np.nan] * 3]
+pytestmark = pytest.mark.subprocess
+
+
+def write_nrrd(path, place, kind, encoding, **fields):
+    """Write with the axis at a place from the fastest."""
+    kinds, directions = ["domain"] * 3, list(STEPS)
+    kinds.insert(place, kind)
+    directions.insert(place, NONE[0])
+    header = {"space": "left-posterior-superior", "space directions": np.array(directions), "kinds": kinds}
+    header |= {"space origin": [4, 5, 6], "encoding": encoding, **fields}
+    nrrd.write(str(path), np.moveaxis(VALUES, 0, 3 - place).copy(), header, index_order="C")
+
+
+@pytest.mark.parametrize("place", range(4))
+@pytest.mark.parametrize("encoding", ["raw", "gzip"])
+@pytest.mark.parametrize("name", ["v.nrrd", "v.nhdr"])
+def test_one_of_the_axis_is_read_wherever_it_is(tmp_path, place, encoding, name):
+    write_nrrd(tmp_path / name, place, "time", encoding)
+    for time in range(3):
+        assert_holds(tmp_path / name, VALUES[time], (0.5, 2, 3), (4, 5, 6), time=time)
+        assert open_source(tmp_path / name, time=time).note.startswith(f"step {time} of 3")
+    with pytest.raises(ArgumentError, match=r"dataset.volume.time: expected one of 0 to 2, got 3$"):
+        open_source(tmp_path / name, time=3)
+    with pytest.raises(ArgumentError, match=r"dataset.volume.channel: there is no such axis; leave it out"):
+        open_source(tmp_path / name, channel="1")
+
+
+@pytest.mark.parametrize("kind", ["list", "vector", "RGB-color"])
+def test_channels_and_layers_have_to_be_chosen(tmp_path, kind):
+    write_nrrd(tmp_path / "v.seg.nrrd", 0, kind, "gzip")
+    with pytest.raises(
+        ArgumentError, match=r"channel: expected one of 0 to 2, as there are 3 components .*none"
+    ):
+        open_source(tmp_path / "v.seg.nrrd")
+    assert_holds(tmp_path / "v.seg.nrrd", VALUES[2], (0.5, 2, 3), channel="2")
+    assert open_source(tmp_path / "v.seg.nrrd", channel="2").note == ""
+
+
+def test_a_list_of_a_sequence_is_one_in_time(tmp_path):
+    write_nrrd(tmp_path / "v.seq.nrrd", 0, "list", "gzip")
+    assert_holds(tmp_path / "v.seq.nrrd", VALUES[1], (0.5, 2, 3), time=1)
+
+
+def test_a_last_axis_of_which_nothing_is_told_is_time(tmp_path):
+    nrrd.write(str(tmp_path / "v.nrrd"), VALUES, {"spacings": [1, 2, 3, np.nan]}, index_order="C")
+    assert_holds(tmp_path / "v.nrrd", VALUES[0], (1, 2, 3))
+
+
+@pytest.mark.parametrize("name", ["v.mha", "v.mhd"])
+@pytest.mark.parametrize("is_compressed", [False, True])
+def test_steps_and_components_of_metaimage(tmp_path, name, is_compressed):
+    steps = sitk.GetImageFromArray(VALUES, isVector=False)
+    steps.SetSpacing((0.5, 2, 3, 9))
+    steps.SetOrigin((4, 5, 6, 7))
+    turned = np.eye(4)
+    turned[:2, :2] = [[0, 1], [1, 0]]
+    steps.SetDirection(turned.ravel().tolist())
+    sitk.WriteImage(steps, tmp_path / name, is_compressed)
+    for time in range(3):
+        expected = VALUES[time].transpose(0, 2, 1)  # x and y change places
+        assert_holds(tmp_path / name, expected, (2, 0.5, 3), (4, 5, 6), time=time)
+    colours = sitk.GetImageFromArray(np.moveaxis(VALUES, 0, 3).copy(), isVector=True)
+    sitk.WriteImage(colours, tmp_path / name, is_compressed)
+    np.testing.assert_array_equal(whole(tmp_path / name, channel="1"), VALUES[1])
+    with pytest.raises(ArgumentError, match="as there are 3 components per sample, got none"):
+        open_source(tmp_path / name)
+
+
+def test_a_step_that_is_not_there_any_more(tmp_path):
+    write_nrrd(tmp_path / "v.nrrd", 3, "time", "raw")
+    content = (tmp_path / "v.nrrd").read_bytes()
+    (tmp_path / "v.nrrd").write_bytes(content[:-1])
+    with pytest.raises(ArgumentError, match="the file is cut off"):
+        open_source(tmp_path / "v.nrrd")
+
+
+def test_two_axes_more_are_refused(tmp_path):
+    nrrd.write(str(tmp_path / "v.nrrd"), np.zeros((2, 2, 3, 3, 3), np.uint8), index_order="C")
+    sitk.WriteImage(sitk.GetImageFromArray(np.zeros((2, 3, 3, 3, 2)), isVector=True), tmp_path / "v.mha")
+    for name in ("v.nrrd", "v.mha"):
+        with pytest.raises(ArgumentError, match=r"expected (3 axes|a scalar volume)"):
+            open_source(tmp_path / name)
