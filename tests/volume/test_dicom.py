@@ -96,6 +96,8 @@ def test_one_of_several_series_is_chosen(tmp_path):
         np.testing.assert_array_equal(whole(tmp_path, series=choice), sample_values()[:4] + 1)
     with pytest.raises(ArgumentError, match="got 0 series for '7'"):
         open_source(tmp_path, series="7")
+    write_series(tmp_path, sample_values()[:5] + 2, uid=generate_uid(), number=0)
+    np.testing.assert_array_equal(whole(tmp_path, series="0"), sample_values()[:5] + 2)
 
 
 @pytest.mark.parametrize(

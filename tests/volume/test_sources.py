@@ -77,13 +77,13 @@ def test_plain_file_that_shrinks_while_it_is_read(tmp_path):
 
 def test_mistakes_in_the_path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for name in ("v.dcm", "v.raw.gz"):
+    for name in ("v.doc", "v.raw.gz"):
         Path(name).touch()
     np.save("v.npy", sample_values())
     Path("empty").mkdir()
     for name, dims, message in [
         ("none.vti", None, f"none.vti: no such file or folder; looked for {tmp_path}/none.vti"),
-        ("v.dcm", None, r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .* or a folder of slices"),
+        ("v.doc", None, r"unknown suffix '.doc'; expected .raw, .*, .nii.gz, .* or a folder of slices"),
         ("v.raw.gz", None, r"unknown suffix '.raw.gz'"),
         ("empty", None, r"expected a folder of DICOM slices or TIFFs \(.tif, .tiff\), found none"),
         ("v.npy", DIMS, "dims: not for this format; leave them out"),

@@ -15,7 +15,7 @@ import SimpleITK as sitk
 from texgs.core.errors import ArgumentError
 from texgs.volume.dicom_phases import ALL, FileSeries, phases_of
 from texgs.volume.dicom_samples import samples_of, without_padding
-from texgs.volume.dicom_slice import TIMES, Slice, advised, slices_in
+from texgs.volume.dicom_slice import TIMES, Slice, advised, said_in, slices_in
 from texgs.volume.grid import dims_of
 from texgs.volume.itk_image import sentence
 from texgs.volume.slabs import require_step
@@ -82,8 +82,9 @@ def series_in(folder: Path) -> list[FileSeries]:
     every, reader = [], sitk.ImageSeriesReader
     for uid in reader.GetGDCMSeriesIDs(str(folder)):
         files = reader.GetGDCMSeriesFileNames(str(folder), uid)
-        first = pydicom.dcmread(files[0], stop_before_pixels=True, force=True, specific_tags=OF_SERIES)
-        number, description, position, kind = (str(first.get(each) or "") for each in OF_SERIES)
+        header = pydicom.dcmread(files[0], stop_before_pixels=True, force=True, specific_tags=OF_SERIES)
+        first = said_in([header])
+        number, description, position, kind = (str(first.get(each, "")) for each in OF_SERIES)
         every.append(
             FileSeries(
                 number, description or kind, position, uid, files, lattice_of(Path(files[0]), len(files))

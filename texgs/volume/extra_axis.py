@@ -17,8 +17,10 @@ OF_SPACE = ("domain", "space")  # kinds of axes of NRRD
 SEQUENCE = ".seq.nrrd"  # of 3D Slicer, whose list is one of steps in time
 WORD = re.compile(r'\([^)]*\)|"[^"]*"|\S+')  # of a field of NRRD: a vector is one, and so is a text
 # Fields of NRRD with a word for each axis; of MetaImage with a number.
-PER_AXIS = ("sizes", "kinds", "spacedirections", "spacings", "thicknesses", "axismins", "axismaxs")
-PER_AXIS += ("centers", "centerings", "labels", "units")
+PER_AXIS = (
+    *("sizes", "kinds", "spacedirections", "spacings", "thicknesses", "axismins", "axismaxs"),
+    *("centers", "centerings", "labels", "units"),
+)
 NUMBERS = ("dimsize", "elementspacing", "elementsize", "offset", "position", "origin", "centerofrotation")
 MATRICES = ("transformmatrix", "rotation", "orientation")
 
@@ -30,15 +32,6 @@ class ExtraAxis(NamedTuple):
     size: int
     key: str
 
-    def index(self, said: int | str | None) -> int:
-        """Return which one the key chooses: by default the first step in time, but no channel."""
-        if self.key == "time":
-            require_step(int(said or 0), self.size)
-        elif str(said) not in map(str, range(self.size)):
-            known = f"0 to {self.size - 1}, as there are {self.size} components per sample"
-            raise ArgumentError(f"dataset.volume.channel: expected one of {known}, got {said or 'none'}")
-        return int(said or 0)
-
     def picked(self, values: np.ndarray, index: int) -> np.ndarray:
         """Return the samples [Z, Y, X] at an index, from those of all in the order of the file."""
         z, y, x = values.shape
@@ -47,7 +40,21 @@ class ExtraAxis(NamedTuple):
         return np.moveaxis(values.reshape(shape), 3 - self.place, 0)[index]
 
 
-def extra_axis(path: Path) -> ExtraAxis | None:
+def extra_axis(path: Path, time: int, channel: str | None) -> tuple[ExtraAxis | None, int]:
+    """Return the axis of a file that is none of space, and which of it is chosen: by default the first step."""
+    axis = axis_of(path)
+    for key, is_said in (("time", time > 0), ("channel", channel is not None)):
+        if is_said and (axis is None or axis.key != key):
+            raise ArgumentError(f"dataset.volume.{key}: there is no such axis; leave it out")
+    if axis is not None and axis.key == "time":
+        require_step(time, axis.size)
+    elif axis is not None and channel not in map(str, range(axis.size)):
+        known = f"0 to {axis.size - 1}, as there are {axis.size} components per sample"
+        raise ArgumentError(f"dataset.volume.channel: expected one of {known}, got {channel or 'none'}")
+    return axis, int(channel or time)
+
+
+def axis_of(path: Path) -> ExtraAxis | None:
     """Return the axis that a file has besides those of space; None where there is none, or more than one."""
     fields, _ = read_fields(path)
     if path.suffix.lower() in METAIMAGE:

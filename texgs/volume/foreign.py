@@ -19,9 +19,18 @@ from texgs.core.errors import ArgumentError, OutOfMemoryError, TexgsError
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
 from texgs.volume.extra_axis import extra_axis, one_volume
-from texgs.volume.grid import AS_STORED, Grid, Triple, byte_count, closest, permuted_values, require_room
+from texgs.volume.grid import (
+    AS_STORED,
+    Dims,
+    Grid,
+    Triple,
+    byte_count,
+    closest,
+    permuted_values,
+    require_room,
+)
 from texgs.volume.headers import METAIMAGE, NRRD
-from texgs.volume.samples import stored_samples, unpacked
+from texgs.volume.samples import StoredSamples, stored_samples, unpacked
 from texgs.volume.slabs import ArraySource, RawSource, Source, step_note
 
 BY_VTK = (".vti", ".vtr", ".vts", ".pvti", ".pvtr", ".vtk", ".slc")
@@ -46,18 +55,10 @@ def open_foreign(
     those of the file; `series` is the number or UID of one of several in a folder of DICOM slices, `time` the
     step of one that has several volumes, and `variable` the name of a point array of VTK's image data.
     """
-    suffix, keys = (
-        path.suffix.lower(),
-        {"series": series, "time": time, "variable": variable, "channel": channel},
-    )
+    suffix, keys = path.suffix.lower(), {"series": series, "time": time, "variable": variable}
     with reading_as(_kind(path)):
         stored = stored_samples(path) if suffix in (*NRRD, *METAIMAGE) else None
-        extra = extra_axis(path) if stored is not None else None
-        if suffix in (*NRRD, *METAIMAGE):
-            for key, is_said in (("time", time > 0), ("channel", channel is not None)):
-                if is_said and (extra is None or extra.key != key):
-                    raise ArgumentError(f"dataset.volume.{key}: there is no such axis; leave it out")
-        index = extra.index(keys[extra.key]) if extra else 0
+        extra, index = extra_axis(path, time, channel) if stored is not None else (None, 0)
         with one_volume(path, extra) as header:
             reply, values = _ask(header, keys, is_header_only=stored is not None)
         nx, ny, nz = reply["dims"]
@@ -70,15 +71,11 @@ def open_foreign(
         )
         if stored is not None:
             dtype = np.dtype(reply["dtype"]).newbyteorder(">" if stored.is_big_endian else "<")
-            every = (nx, ny, nz * (extra.size if extra else 1))
-            if stored.encoding != "raw":
-                values = unpacked(stored, every, dtype)
-            else:
-                first = stored.path.stat().st_size - byte_count(every, dtype)
-                offset = stored.offset if stored.offset >= 0 else first
-                if axes == AS_STORED and extra is None:
-                    return RawSource(stored.path, dims, dtype, offset, (dx, dy, dz), (x, y, z))
-                values = RawSource(stored.path, every, dtype, offset).mapped()
+            if (stored.encoding, axes, extra) == ("raw", AS_STORED, None):
+                return _raw(stored, dims, dtype, (dx, dy, dz), (x, y, z))
+            every = (nx, ny, nz * extra.size) if extra else dims
+            is_raw = stored.encoding == "raw"
+            values = _raw(stored, every, dtype).mapped() if is_raw else unpacked(stored, every, dtype)
             if extra is not None:
                 values = extra.picked(values, index)
                 reply["n_steps"] = extra.size if extra.key == "time" else 1
@@ -86,6 +83,12 @@ def open_foreign(
         source.n_steps = reply.get("n_steps", 1)
         source.note = "; ".join(filter(None, (step_note(time, source.n_steps), reply.get("note"))))
         return source
+
+
+def _raw(stored: StoredSamples, dims: Dims, dtype: np.dtype, *lattice: Triple) -> RawSource:
+    """Return samples as a source that reads them on demand; spacing and origin follow."""
+    before = stored.offset if stored.offset >= 0 else stored.path.stat().st_size - byte_count(dims, dtype)
+    return RawSource(stored.path, dims, dtype, before, *lattice)
 
 
 def _kind(path: Path) -> str:

@@ -55,12 +55,13 @@ def open_source(
 ) -> Source:
     """Open a volume without reading its samples where the format allows that.
 
-    Formats: .raw, .bin, .dat (plain samples, described by the arguments); .npy (an array [Z, Y, X]); .tif,
-    .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs that numbers in their names
-    count; a folder of DICOM slices; .nrrd, .nhdr; .mhd, .mha; .nii, .nii.gz; .mrc; .gipl; .slc; .vti and .vtk
-    (image data, point arrays); .nc, .nc4 (NetCDF); .h5, .hdf5; a folder of Zarr, or its .zip, .ozx; .txt,
-    .txt.gz (a line per sample). x is the fastest axis throughout, unless an array has axes with the names
-    x, y, z.
+    Formats: .raw, .bin, .dat (plain samples, described by the arguments); .npy, .npz (an array [Z, Y, X]);
+    .tif, .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs that numbers count; a folder
+    of DICOM slices, or .dcm, .ima with many frames; .nrrd, .nhdr; .mhd, .mha; .nii, .nii.gz, .hdr, .img,
+    .mgh, .mgz; .mrc, .map, .ccp4, .rec, also with .gz; .gipl; .slc; .vti, .vtr, .pvti, .pvtr and .vtk (arrays of
+    points or cells); .nc, .nc4, .h5, .hdf5, .hdf, .nxs, .ims; a folder of Zarr, or its .zip, .ozx; .txt,
+    .txt.gz (a line per sample). x is the fastest axis throughout, unless an array has labels that say where its
+    axes run.
     Axes are permuted and flipped to the closest ones of physical space where the format tells about it:
     R, A, S of NIfTI; L, P, S of DICOM. They are not resampled where they are oblique.
 
@@ -72,7 +73,8 @@ def open_source(
             the sample type, such as "uint16"; `endian`, "little" or "big"; `skip`, bytes before the first
             sample; `series`, number or UID of one of several; `variable`, the path of an array in the file;
             `image`, name or number, from 0, of one of several of TIFF; `channel`, its label or number, from
-            0; `time`, a step, from 0 (the default), of arrays, TIFF, NIfTI and DICOM; `column`, from 1.
+            0; `time`, a step, from 0 (the default), of arrays, TIFF, NIfTI, NRRD, MetaImage and DICOM;
+            `column`, from 1.
 
     Raises:
         ArgumentError, ShapeError: if the file is missing, cannot be read, is unknown, damaged or no scalar
@@ -213,9 +215,7 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time:
 
     with reading_as("a NIfTI file"), LoggingOutputSuppressor():
         image = nibabel.load(path)
-        if not isinstance(
-            image, nibabel.AnalyzeImage | nibabel.MGHImage
-        ):  # NIfTI is one of ANALYZE to nibabel
+        if not isinstance(image, nibabel.AnalyzeImage | nibabel.MGHImage):  # the former has NIfTI below it
             raise ArgumentError(f"expected a NIfTI image, got {type(image).__name__}")
         stored = image.get_data_dtype()
         if stored.fields:
@@ -241,12 +241,9 @@ def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time:
     dx, dy, dz = (float(step) for step in nibabel.affines.voxel_sizes(affine))
     first = (float(affine[0, 3]), float(affine[1, 3]), float(affine[2, 3]))
     source = ArraySource(Grid(values.T, spacing or (dx, dy, dz), origin or first), path.name)
-    source.n_steps, source.note = n_steps, step_note(time, n_steps)
-    if not any(codes):
-        kind = "NIfTI" if isinstance(image, nibabel.Nifti1Pair) else "ANALYZE"
-        source.note = "; ".join(
-            filter(None, (source.note, f"{kind} tells no orientation: axes are taken as stored"))
-        )
+    kind = "NIfTI" if isinstance(image, nibabel.Nifti1Pair) else "ANALYZE"
+    remark = "" if any(codes) else f"{kind} tells no orientation: axes are taken as stored"
+    source.n_steps, source.note = n_steps, "; ".join(filter(None, (step_note(time, n_steps), remark)))
     return source
 
 

@@ -58,7 +58,8 @@ def field_of(image: Any, variable: str | None) -> tuple[np.ndarray, Triple, list
         uneven = [name for name, each in zip("xyz", gaps, strict=True) if np.ptp(each) > UNEVEN * each[0]]
         if uneven:
             raise ArgumentError(f"expected even distances along {', '.join(uneven)}; resample it to an image")
-        first, spacing = [each[0] for each in places], tuple(float(each.mean()) for each in gaps)
+        dx, dy, dz = (float(each.mean()) for each in gaps)
+        first, spacing = [float(each[0]) for each in places], (dx, dy, dz)
     else:
         kind = type(image).__name__
         raise ArgumentError(f"expected image data (structured points), got {kind}; resample it to an image")
