@@ -50,7 +50,7 @@ def test_packing_that_the_name_does_not_say(tmp_path):
     WRITERS["plain.nii"](tmp_path / "v.nii", sample_values())
     content = (tmp_path / "v.nii").read_bytes()
     (tmp_path / "plain.nii.gz").write_bytes(content)
-    with pytest.raises(ArgumentError, match=r"packed by gzip, got another; .*, rename it to plain\.nii$"):
+    with pytest.raises(ArgumentError, match=r"expected gzip, got another file; .*, rename it to plain\.nii$"):
         open_source(tmp_path / "plain.nii.gz")
     (tmp_path / "v.nii").write_bytes(gzip.compress(content))
     with pytest.raises(ArgumentError, match=r"is not packed, got gzip; rename it to v\.nii\.gz$"):

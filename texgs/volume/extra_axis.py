@@ -41,7 +41,7 @@ class ExtraAxis(NamedTuple):
 
 
 def extra_axis(path: Path, time: int, channel: str | None) -> tuple[ExtraAxis | None, int]:
-    """Return the axis of a file that is none of space, and which of it is chosen: by default the first step."""
+    """Return the axis that is none of space, and which of it is chosen: by default the first step."""
     axis = axis_of(path)
     for key, is_said in (("time", time > 0), ("channel", channel is not None)):
         if is_said and (axis is None or axis.key != key):

@@ -22,18 +22,14 @@ def require_itself(path: Path) -> bytes:
 
 
 def require_packing(path: Path, suffixes: Container[str]) -> None:
-    """Require gzip where the suffix says so and, where both are among the suffixes, only there."""
+    """Require gzip where the suffix says so, and only there, of formats that have suffixes for both."""
     is_packed, suffix = require_itself(path).startswith(GZIP), path.suffix.lower()
-    if suffix == ".gz" and not is_packed:
-        raise ArgumentError(
-            f"expected a file packed by gzip, got another; if it is whole, rename it to {path.stem}"
-        )
+    if suffix == ".gz" and not is_packed and Path(path.stem).suffix.lower() + suffix in suffixes:
+        raise ArgumentError(f"expected gzip, got another file; if it is whole, rename it to {path.stem}")
     if is_packed and suffix + ".gz" in suffixes:
         raise ArgumentError(f"expected a file that is not packed, got gzip; rename it to {path.name}.gz")
     if suffix == ".zip" and is_zipfile(path):
         with ZipFile(path) as archive:
             names = archive.namelist()
         if not any(name.endswith(OF_ZARR) for name in names):
-            raise ArgumentError(
-                f"expected a zip of Zarr, got one of {', '.join(names[:3])} ...; unpack it first"
-            )
+            raise ArgumentError(f"expected a zip of Zarr, got one of {', '.join(names[:3])} ...; unpack it")
