@@ -48,7 +48,7 @@ def extra_axis(path: Path, time: int, channel: str | None) -> tuple[ExtraAxis | 
             raise ArgumentError(f"dataset.volume.{key}: there is no such axis; leave it out")
     if axis is not None and axis.key == "time":
         require_step(time, axis.size)
-    elif axis is not None and channel not in map(str, range(axis.size)):
+    elif axis is not None and channel not in [str(k) for k in range(axis.size)]:
         known = f"0 to {axis.size - 1}, as there are {axis.size} components per sample"
         raise ArgumentError(f"dataset.volume.channel: expected one of {known}, got {channel or 'none'}")
     return axis, int(channel or time)
