@@ -20,8 +20,8 @@ def source_of(
     """Return an array [Z, Y, X], an ImageData of PyVista or a DataArray of xarray as a source.
 
     Args:
-        data: of PyVista's arrays the active scalars count, else the first one of points, or else of cells. Those
-            of xarray are read as files with labels are, see `texgs.volume.axes.axes_of`.
+        data: of PyVista's arrays the active scalars count, else the first one of points, or else of cells.
+            Those of xarray are read as files with labels are, see `texgs.volume.axes.axes_of`.
         name: for messages.
         spacing: x, y, z, in place of the object's own.
         origin: the same.
