@@ -59,8 +59,8 @@ def open_source(
     .tif, .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs that numbers count; a
     folder of DICOM slices, or .dcm, .ima with many frames; .nrrd, .nhdr; .mhd, .mha; .nii, .nii.gz, .hdr,
     .img, .mgh, .mgz; .mrc, .map, .ccp4, .rec, also with .gz; .gipl; .slc; .vti, .vtr, .pvti, .pvtr and .vtk
-    (arrays of points or cells); .nc, .nc4, .h5, .hdf5, .hdf, .nxs, .ims; a folder of Zarr, or its .zip, .ozx; .txt,
-    .txt.gz (a line per sample). x is the fastest axis throughout, unless an array has labels
+    (arrays of points or cells); .nc, .nc4, .h5, .hdf5, .hdf, .nxs, .ims; a folder of Zarr, or its .zip, .ozx;
+    .txt, .txt.gz (a line per sample). x is the fastest axis throughout, unless an array has labels
     that say where its axes run.
     Axes are permuted and flipped to the closest ones of physical space where the format tells about it:
     R, A, S of NIfTI; L, P, S of DICOM. They are not resampled where they are oblique.
