@@ -23,7 +23,7 @@ from texgs.core.checksum import Checksums, combined, sha256
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, remove_scratch, write_json
 from texgs.core.names import METRICS, POINTS, SLICES
-from texgs.volume.headers import samples_of
+from texgs.volume.parts import parts_of
 
 STAMP = ".job.json"
 FILES = ".files.json"
@@ -186,9 +186,9 @@ def require_own(output: Path) -> None:
 def fingerprint(path: Path, checksums: Checksums) -> str:
     """Return the checksum of an input: of the result that it belongs to, with the identity of its job.
 
-    A file from elsewhere counts with its contents. A header counts with its samples as well, a folder with
-    its slices or all files, and the transforms_train.json of views from elsewhere with all images and points
-    beside it.
+    A file from elsewhere counts with its contents. One that is in parts, such as a header and its samples,
+    counts with all of them, a folder with its slices or all files, and the transforms_train.json of views
+    from elsewhere with all images and points beside it.
     """
     folder = path.parent
     made_files = recorded(folder)
@@ -203,8 +203,8 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
     elif path.is_dir():
         files = [each for each in path.rglob("*") if each.is_file()]  # chunks and DICOM have any suffix
         members = [each for each in files if each.suffix.lower() in SLICES] or files
-    elif samples := samples_of(path):
-        return combined([(path.name, checksums.of(path)), (samples.name, checksums.of(samples))])
+    elif parts := parts_of(path):
+        return combined((each.name, checksums.of(each)) for each in (path, *parts))
     else:
         return checksums.of(path)
     return combined(
