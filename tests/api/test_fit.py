@@ -19,6 +19,7 @@ from texgs.metrics.quality import compare
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.origins import Origins
 from texgs.volume.cameras import spiral
+from texgs.volume.placement import Placement
 from texgs.workflow.result import claim, publish
 
 TFS = {
@@ -228,3 +229,18 @@ def test_a_recipe_that_was_edited_meanwhile_is_read_again(ball, monkeypatch, tmp
         recipe.write_text(f"defaults: [quick]\nname: mine\nshading: {{iterations: {iterations}}}\n")
         config = configuration(ball, TFS, ("fit=mine",), tmp_path)
         assert config.fit.shading.iterations == iterations
+
+
+@pytest.mark.parametrize("recipe", ["now", "quick"])
+def test_a_scene_of_a_turned_volume_knows_where_its_file_lies(tmp_path, monkeypatch, recipe):
+    """Also where the workflow reads the prepared volume again, which is upright already."""
+    shorten(monkeypatch, frequency=1, surfels=300, iterations=20)
+    z, y, x = np.indices((12, 14, 20))
+    values = np.exp(-(((x - 8) / 6) ** 2 + ((y - 6) / 3) ** 2 + ((z - 7) / 2) ** 2)).astype(np.float32)
+    volume = texgs.Volume(values, spacing=(1, 2, 3), origin=(7, 8, 9), up="+z", name="scan")
+    tf = texgs.TransferFunction([[0.2, 0.0], [0.3, 0.8], [1.0, 0.8]], [[0.3, 0.2, 0.4, 0.9]])
+    overrides = () if recipe == "now" else SMALL
+    made = texgs.fit(volume, {"a": tf}, recipe, size=64, folder=tmp_path, overrides=overrides)
+    assert made.session.scene.space.matrix == Placement.of(volume.grid).matrix
+    places = made.to_pyvista().points
+    assert np.abs(np.median(places, axis=0) - [7 + 8, 8 + 6 * 2, 9 + 7 * 3]).max() < 2.5

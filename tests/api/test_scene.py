@@ -371,7 +371,7 @@ def test_words_are_one_step_or_none(scene):
         ("a.ply", {"kind": "mesh", "voxel": "x"}, "voxel: expected a number, got 'x'"),
         ("a.ply", {"kind": "mesh", "views": 12.5}, "views: expected a whole number from 1 on, got 12.5"),
         ("a.ply", {"kind": "mesh", "size": "a"}, "size: expected a whole number from 1 on, got 'a'"),
-        ("a.glb", {"voxel": 0.1}, "options of gltf: no such key 'voxel'; expected device"),
+        ("a.glb", {"voxel": 0.1}, "options of gltf: no such key 'voxel'; expected space, device"),
     ],
 )
 def test_options_of_exports_are_checked(scene, tmp_path, file, options, message):

@@ -1,7 +1,7 @@
 """Volumes with several channels: one file, a cast of all that they show together, and what frames them."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -229,7 +229,7 @@ def test_one_channel_is_summarized_as_ever(tmp_path):
     volume = tmp_path / "volume.nrrd"
     summary = prepare(ArraySource(ball(8)), volume)
     write_summaries(volume, [summary], ["DAPI"])
-    assert json.loads((tmp_path / "volume.json").read_text()) == json.loads(json.dumps(vars(summary)))
+    assert json.loads((tmp_path / "volume.json").read_text()) == json.loads(json.dumps(asdict(summary)))
     (tf,) = basic_tfs_of(volume, {"a": BasicTF([[0, 0], [1, 1]], [[0, 1, 1, 1]], "DAPI")}, "data").values()
     assert tf.channel == 0
 

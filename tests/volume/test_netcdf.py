@@ -135,6 +135,7 @@ def test_spacing_and_origin_are_those_of_coordinates_in_the_unit_of_x(tmp_path):
     places = (2 + 0.5 * np.arange(4), 100 * np.arange(5), -7 + 300 * np.arange(6))
     source = open_source(write_axes(tmp_path / "v.nc", places, ("km", "m", "meter")))
     assert (source.spacing, source.origin, source.note) == ((300, 100, 500), (-7, 0, 2000), "")
+    assert source.space.unit == "meter"
     np.testing.assert_array_equal(source.slices(0, 4), FIELD)
 
 
@@ -163,7 +164,7 @@ def test_uneven_coordinates_are_refused_unless_a_spacing_is_given(tmp_path):
 def test_units_that_cannot_be_compared_are_told(tmp_path):
     path = write_axes(tmp_path / "v.nc", [np.arange(n) * 3 for n in (4, 5, 6)], ("hPa", "degrees", "degrees"))
     source = open_source(path)
-    assert (source.spacing, source.origin) == ((1, 1, 1), (0, 0, 0))
+    assert (source.spacing, source.origin, source.space.unit) == ((1, 1, 1), (0, 0, 0), "")
     assert source.note == "units along x, y, z are degrees, degrees, hPa, so that samples are 1 apart"
 
 

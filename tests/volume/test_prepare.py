@@ -78,10 +78,11 @@ def test_any_job_agrees_with_numpy_at_world_positions(tmp_path_factory, job, up,
     grid = open_grid(path)
     assert (grid.dims, grid.values.dtype) == (summary.dims, values.dtype)
     start = np.array(origin) + (np.array([x0, y0, z0]) + 0.5 * (reduce - 1)) * spacing
+    np.testing.assert_array_equal(grid.space.axes, np.stack([WORLD[up](*row) for row in np.eye(3)], axis=1))
     for z, y, x in np.ndindex(*expected.shape):
-        place = WORLD[up](*(start + np.array([x, y, z]) * reduce * spacing))
-        index = np.rint((np.array(place) - grid.origin) / grid.spacing).astype(int)
-        np.testing.assert_allclose(grid.origin + index * grid.spacing, place, atol=1e-9)
+        place = start + np.array([x, y, z]) * reduce * spacing
+        index = np.rint(np.array(grid.space.axes) @ (place - grid.origin) / grid.spacing).astype(int)
+        np.testing.assert_allclose(grid.space.place(grid.origin, index * grid.spacing), place, atol=1e-9)
         assert grid.values[tuple(index[::-1])] == expected[z, y, x]
 
 

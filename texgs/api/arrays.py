@@ -9,9 +9,10 @@ import numpy as np
 from texgs.api.display import as_python
 from texgs.core.errors import ArgumentError, located
 from texgs.core.names import check_count
-from texgs.volume.grid import Grid, Triple
+from texgs.volume.grid import ONES, ZEROS, Grid, Triple
 from texgs.volume.layers import LayerSource
 from texgs.volume.slabs import ArraySource, Source
+from texgs.volume.space import UNTOLD, Space
 
 
 def source_of(
@@ -36,10 +37,10 @@ def source_of(
     if hasattr(data, "dims") and hasattr(data, "coords"):
         return of_data_array(data, *said)
     if hasattr(data, "GetFieldData"):  # of VTK
-        values, steps, first = of_image_data(data)
+        values, steps, first, space = of_image_data(data)
     else:
-        values, steps, first = of_array(data), (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
-    return ArraySource(Grid(values, said[0] or steps, said[1] or first), name)
+        values, steps, first, space = of_array(data), ONES, ZEROS, UNTOLD
+    return ArraySource(Grid(values, said[0] or steps, said[1] or first, space=space), name)
 
 
 def three(name: str, numbers: Sequence[float] | None) -> Triple | None:
@@ -88,19 +89,16 @@ def of_array(data: Any) -> np.ndarray:
         ) from error
 
 
-def of_image_data(image: Any) -> tuple[np.ndarray, Triple, Triple]:
-    """Return samples [Z, Y, X], spacing and origin of PyVista's or VTK's image data or rectilinear grid."""
+def of_image_data(image: Any) -> tuple[np.ndarray, Triple, Triple, Space]:
+    """Return samples [Z, Y, X], spacing, origin and axes of image data or an even grid of PyVista or VTK."""
     from pyvista import wrap
 
     from texgs.volume.vtk_image import field_of
 
     values, steps, (x, y, z), directions, _ = field_of(wrap(image), None)
-    if not np.array_equal(directions, np.eye(3)):
-        raise ArgumentError(
-            "ImageData: expected axes along x, y, z, got others; write it to a .vti file and open that, or "
-            "resample it"
-        )
-    return values, steps, (x, y, z)
+    if np.linalg.det(directions) <= 0:
+        raise ArgumentError("ImageData: expected axes that are not mirrored; write a .vti file and open that")
+    return values, steps, (x, y, z), Space.along(np.asarray(directions))
 
 
 def of_data_array(array: Any, spacing: Triple | None, origin: Triple | None) -> Source:

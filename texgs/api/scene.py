@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -149,7 +150,7 @@ class Scene(Editing):
             ArgumentError: if the ending is unknown or another kind's, an option is, or the scene cannot be
                 written so.
         """
-        from texgs.scene.export import OF_MODELS, Export, export_scene, taken
+        from texgs.scene.export import OF_MODELS, Export, export_scene, remarks, taken
         from texgs.viewer.page_volume import page_volume
         from texgs.viewer.standalone import write_page
 
@@ -169,7 +170,10 @@ class Scene(Editing):
             volume = None if size is None else page_volume(scene, size)
             write_page(path, scene, path.stem, volume=volume, **options)
             return path
-        return export_scene(path, scene, Export(chosen, **options))
+        export = Export(chosen, **options)
+        for remark in remarks(scene, export):
+            warnings.warn(f"{path}: {remark}", stacklevel=2)
+        return export_scene(path, scene, export)
 
     # ---- Notebooks ------------------------------------------------------------
 
@@ -212,7 +216,7 @@ class Scene(Editing):
         scene, composed = self.session.scene, self.session.composition
         if not isinstance(composed, Composition):
             raise ArgumentError("to_pyvista: expected a scene of surfels, got another kind; fit surfels")
-        return polydata_of(joined(composed.parts, scene.edits), scene.volume)
+        return polydata_of(joined(composed.parts, scene.edits), scene.space)
 
     def __repr__(self) -> str:
         """Return the parts, and what is edited about them."""

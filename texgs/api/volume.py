@@ -12,6 +12,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from texgs.api.arrays import keys_of_format, source_of, three, whole
 from texgs.api.display import as_python, camera_of, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
@@ -174,12 +176,13 @@ class Volume:
         return picture_of(quantized(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))
 
     def to_pyvista(self) -> pyvista.ImageData:
-        """Return image data of PyVista, +y up, in the units of the volume; the samples are not copied."""
+        """Return image data of PyVista in the space of the volume's file; the samples are not copied."""
         import pyvista
 
         image = pyvista.ImageData(
             dimensions=self.grid.dims, spacing=self.grid.spacing, origin=self.grid.origin
         )
+        image.direction_matrix = np.array(self.grid.space.axes).T
         image.point_data[self.name] = self.grid.values.reshape(-1)
         return image
 

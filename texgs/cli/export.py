@@ -17,9 +17,10 @@ if TYPE_CHECKING:
     from texgs.scene.scene import Scene, SceneModel
 
 ENDINGS = list(dict.fromkeys(ending for endings in EXPORTS.values() for ending in endings))
+SPACES = ("file", "world")
 DEFAULTS = {ending: next(kind for kind in EXPORTS if ending in EXPORTS[kind]) for ending in ENDINGS}
 BAKED = "Surfels have one colour each, the mean of their texture, with the light of the scene as harmonics"
-NUMBERS = ("opacity", "voxel", "views", "size", "drop_unseen", "device")  # arguments that `Export` has, too
+OPTIONS = ("opacity", "voxel", "views", "size", "drop_unseen", "space", "device")  # that `Export` has, too
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,8 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=EXPORTS,
         help="3dgs or 2dgs for viewers of Gaussians, release as the paper's code has them, points with "
         "colours, mesh, vtp, polygons for ParaView, compact, html, a page that shows and edits the scene, or "
-        "with light in the colours "
-        "usd (OpenUSD), gltf (KHR_gaussian_splatting) or spz; default by the ending, 3dgs for .ply",
+        "with light in the colours usd (OpenUSD), gltf (KHR_gaussian_splatting) or spz; default by the end",
     )
     parser.add_argument(
         "--model",
@@ -58,13 +58,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--drop-unseen", action="store_true", help="compact: no texture for surfels that none of --views sees"
     )
+    words = "coordinates: those of the volume's file, such as a patient's mm (default of points, mesh, vtp "
+    words += "and gltf), or of the world, in which the volume is centred and its longest side is 1"
+    parser.add_argument("--space", choices=SPACES, help=words)
     add_device(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
     from texgs.fields.files import open_field
-    from texgs.scene.export import OF_CLOUDS, Export, export_model, export_scene, require_other, uncut
+    from texgs.scene.export import OF_CLOUDS, Export, export_model, export_scene, remarks, require_other
     from texgs.scene.scene_file import only_scene, read_scene
 
     if arguments.source.is_dir():
@@ -76,15 +79,16 @@ def run(arguments: argparse.Namespace) -> int:
     if kind == "html":
         print(of_page(arguments, scene))
         return 0
-    export = Export(kind, **{name: getattr(arguments, name) for name in NUMBERS})
+    export = Export(kind, **{name: getattr(arguments, name) for name in OPTIONS})
+    export = replace(export, known=scene.space if scene else None)
     if kind in OF_CLOUDS:
         shown = as_scene(arguments, scene)
         print(export_scene(arguments.to, shown, export))
-        print("; ".join(filter(None, (BAKED, uncut(shown)))), file=sys.stderr)
+        print("; ".join([BAKED, *remarks(shown, export)]), file=sys.stderr)
         return 0
     if scene is not None and arguments.model is None:
         print(export_scene(arguments.to, scene, export))
-        if note := uncut(scene):
+        for note in remarks(scene, export):
             print(f"{arguments.to}: {note}", file=sys.stderr)
         return 0
     require_other(arguments.to, scene or as_scene(arguments, None))
@@ -129,7 +133,7 @@ def require_taken(arguments: argparse.Namespace, kind: str) -> None:
     for name in ("volume", "steps"):
         if getattr(arguments, name) is not None and kind != "html":
             raise ArgumentError(f"--{name}: expected --to a page, .html, got {arguments.to}; leave it out")
-    for name in NUMBERS:
+    for name in OPTIONS:
         if name not in taken(kind) and getattr(arguments, name) != getattr(Export, name):
             able = " or ".join(each for each in TAKES if name in TAKES[each])
             raise ArgumentError(

@@ -1,5 +1,6 @@
 """What PLY files of 2DGS and 3DGS have in common: raw geometry and harmonics, a property for each number."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
@@ -12,6 +13,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 from texgs.core.ply_file import TYPES
 from texgs.raster.shading import DEGREES
+
+Told = Mapping[str, object] | None  # what a file says besides, by keys
 
 
 def splat_columns(p: Mapping[str, Tensor], normals: Tensor, sh: Tensor) -> dict[str, Tensor]:
@@ -38,16 +41,23 @@ def colored(places: Tensor, colors: Tensor) -> dict[str, Tensor]:
     return dict(zip(("x", "y", "z", "red", "green", "blue"), values, strict=True))
 
 
-def write_columns(path: str | Path, columns: Mapping[str, Tensor], faces: np.ndarray | None = None) -> Path:
+def write_columns(
+    path: str | Path,
+    columns: Mapping[str, Tensor],
+    faces: np.ndarray | None = None,
+    told: Told = None,
+) -> Path:
     """Create or replace a binary PLY file of vertices, and of triangles [F, 3] if there are any, in one step.
 
-    Properties are float32, or bytes where columns are.
+    Properties are float32, or bytes where columns are. What is told is in comments.
     """
     types = {name: "uchar" if column.dtype == torch.uint8 else "float" for name, column in columns.items()}
     vertices = np.empty(len(columns["x"]), [(name, TYPES[kind]) for name, kind in types.items()])
     for name, column in columns.items():
         vertices[name] = column.detach().numpy()
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
+    header = ["ply", "format binary_little_endian 1.0"]
+    header += [f"comment {key}: {json.dumps(value)}" for key, value in (told or {}).items()]
+    header += [f"element vertex {len(vertices)}"]
     header += [f"property {kind} {name}" for name, kind in types.items()]
     blocks = [vertices.astype(vertices.dtype.newbyteorder("<"))]
     if faces is not None:

@@ -1,6 +1,7 @@
 """Changes of a scene as words, such as TF01.palette=#ff8800 or light=headlight.
 
-Those of cuts are cut=x,0.1, cut=-z,64v, cut=1,1,0,0.2, cut.box=-1,-1,-1,1,1,0 and cut.faces=unlit.
+Those of cuts are cut=x,0.1, cut=-z,64v, cut=1,1,0,0.2, cut.box=-1,-1,-1,1,1,0 and cut.faces=unlit; in the
+space of the volume's file cut=S,-12mm and cut=-S,64v.
 """
 
 import re
@@ -9,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from texgs.core.cuts import AXES, NO_CUTS, Box, Cuts, Plane, along
@@ -24,6 +26,7 @@ from texgs.volume.nrrd_file import open_grid
 
 NUMBERED = re.compile(r"cut\.([1-9])=")
 PLANE = "AXIS,POSITION with x, -x, y, -y, z or -z, or NX,NY,NZ,OFFSET"
+TOWARDS = "RASLPIXYZ"  # axes of the space of a volume's file
 BOX = "X0,Y0,Z0,X1,Y1,Z1"
 LOOKS = ("style", "picture", "instruction")  # what people look for here, too
 VOXELS = "v"  # behind a position along an axis that counts samples, the first of which is 0
@@ -72,16 +75,21 @@ def _apply(session: Session, word: str) -> None:
 
 def _require_through(session: Session, cuts: Cuts) -> None:
     """Require of each new plane that it takes away some of the models, and of a box that it leaves some."""
+    scene = session.scene
     for plane in cuts.half_spaces:
-        if plane in session.scene.cuts.half_spaces:
+        if plane in scene.cuts.half_spaces:
             continue
         composed = session.composition
-        low, high = span_of(models_of(composed), session.scene.framed(composed), plane.normal)
+        low, high = span_of(models_of(composed), scene.framed(composed), plane.normal)
         if plane.offset < low or (plane.offset > high and plane in cuts.planes):
-            normal = ",".join(f"{each + 0.0:.3g}" for each in plane.normal)
+            normal, space, in_file = ",".join(f"{each + 0.0:.3g}" for each in plane.normal), scene.space, ""
+            if space is not None:
+                first = float(space.turn @ plane.normal @ space.points(np.zeros(3)))
+                ends = (f"{first + space.scale * end:.4g}" for end in (low, high))
+                in_file = f" ({' to '.join(ends)} {space.unit} in the file)".replace("  ", " ")
             raise ArgumentError(
-                f"expected a cut through the models, which lie from {low:.3g} to {high:.3g} along {normal}, "
-                f"got {plane.offset:.3g}; samples are counted as in 64v"
+                f"expected a cut through the models, which lie from {low:.3g} to {high:.3g}{in_file} along "
+                f"{normal}, got {plane.offset:.3g}; samples are counted as in 64v"
             )
 
 
@@ -158,8 +166,33 @@ def _plane(scene: Scene, text: str) -> Plane:
     if len(words) == 2 and len(axis) == 1 and axis in AXES:
         sign, number = -1.0 if words[0].startswith("-") else 1.0, AXES.index(axis)
         return Plane(along(number, sign), sign * _places(scene, [words[1]], [number], PLANE)[0])
+    if len(words) == 2 and len(axis) == 1 and axis in TOWARDS:
+        return _in_space(scene, axis, -1.0 if words[0].startswith("-") else 1.0, words[1])
     numbers = _places(scene, words, [None] * 4, PLANE)
     return Plane(numbers[:3], numbers[3])
+
+
+def _in_space(scene: Scene, letter: str, sign: float, text: str) -> Plane:
+    """Return the plane at a place of the file's space, or at a sample, both counted towards a letter."""
+    space = scene.space
+    towards = None if space is None else space.axis(letter)
+    if space is None or towards is None:
+        known = "a scene with the space of its volume's file" if space is None else f"an axis of {space.name}"
+        raise ArgumentError(f"expected {known}, got {letter}; x, y and z are those of the world")
+    normal = space.turn.T @ towards
+    if text.endswith(VOXELS):  # of the axis that runs there most nearly
+        own = int(np.abs(towards).argmax())
+        axis, way = space.nearest[own]
+        (place,) = _places(scene, [text], [axis], PLANE)
+        return Plane(along(axis, sign * way * towards[own]), sign * place)
+    try:
+        place = float(text.removesuffix(space.unit)) - float(towards @ space.points(np.zeros(3)))
+    except ValueError:
+        unit = space.unit or "units of the file"
+        raise ArgumentError(
+            f"expected {letter},POSITION in {unit} or samples as in 64v, got {text}"
+        ) from None
+    return Plane((sign * normal).tolist(), sign * place / space.scale)
 
 
 def _places(scene: Scene, words: Sequence[str], axes: Sequence[int | None], form: str) -> list[float]:

@@ -1,11 +1,12 @@
 """A scene as clouds of splats for other programs: one colour a surfel, with the light in its harmonics."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 import torch
+from scipy.spatial.transform import Rotation
 from torch import Tensor
 from torch.nn.functional import normalize
 
@@ -23,6 +24,7 @@ from texgs.fields.surfels.texels import untextured
 from texgs.raster.reference.shading import harmonics
 from texgs.scene.scene import Scene
 from texgs.volume.cameras import icosphere_of
+from texgs.volume.placement import Placement
 
 THIN = 1e-6  # standard deviation of a surfel along its normal, world units
 DIRECTIONS = 92  # from which the light on a surfel is looked at
@@ -36,7 +38,7 @@ class Cloud:
     name: str
     is_flat: bool  # surfels: the third axis is their normal
     antialiased: bool  # small ones stay faint, see texgs.raster.Options; surfels do
-    means: np.ndarray  # [N, 3] world units
+    means: np.ndarray  # [N, 3] world units, or those of the space that it is placed in
     quats: np.ndarray  # [N, 4] wxyz, unit length
     scales: np.ndarray  # [N, 3] standard deviations, world units
     opacities: np.ndarray  # [N] in [0, 1]
@@ -57,6 +59,29 @@ def clouds_of(scene: Scene) -> list[Cloud]:
     if not visible:
         raise ArgumentError("models: expected at least one visible splat, got none; show a model")
     return visible
+
+
+def placed(cloud: Cloud, space: Placement) -> Cloud:
+    """Return a cloud of the world in a space, whose axes have to be at right angles.
+
+    Gaussians look the same from behind, so that a mirror of one is a turn of it.
+    """
+    turn = space.turn
+    if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-3):
+        raise ArgumentError("space: expected axes at right angles, got oblique ones; export to the world")
+    rotation = Rotation.from_matrix(-turn if space.is_mirrored else turn)
+    quats = (rotation * Rotation.from_quat(np.roll(cloud.quats, -1, axis=1))).as_quat()
+    views, count = icosphere_of(DIRECTIONS, Lens(radius=FAR)), cloud.sh.shape[1]
+    ways = normalize(torch.stack([camera.position for camera in views]).double(), dim=1)
+    before, after = (harmonics(x)[:, :count] for x in (ways, ways @ torch.from_numpy(turn.T)))
+    moved = torch.linalg.lstsq(after, before).solution.numpy()  # [K, K]
+    changed = {
+        "means": space.points(cloud.means),
+        "quats": np.roll(quats, 1, axis=1),
+        "scales": space.scale * cloud.scales,
+        "sh": np.einsum("kj,njc->nkc", moved, cloud.sh),
+    }
+    return replace(cloud, **{name: values.astype(np.float32) for name, values in changed.items()})
 
 
 @torch.no_grad()

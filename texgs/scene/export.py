@@ -1,7 +1,7 @@
 """Files of a scene or a model for other programs: splats, points or a mesh; or a compact model file."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import cast
@@ -18,7 +18,7 @@ from texgs.fields.gaussians.files import write_ply as write_gaussians
 from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
 from texgs.fields.kinds import Kind, kinds
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.ply_columns import colored, write_columns
+from texgs.fields.ply_columns import Told, colored, write_columns
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.compact import seen_surfels, write_compact
 from texgs.fields.surfels.composition import Composition, Part
@@ -28,20 +28,24 @@ from texgs.raster import Render
 from texgs.raster.shading import Y00
 from texgs.scene.bounds import bounds_of
 from texgs.scene.clouds import clouds_of
+from texgs.scene.clouds import placed as placed_cloud
 from texgs.scene.gltf import write_gltf
 from texgs.scene.joined import joined, write_vtp
-from texgs.scene.mesh import fuse, write_mesh
+from texgs.scene.mesh import fuse, placed, write_mesh
 from texgs.scene.scene import Scene
 from texgs.scene.spz import write_spz
 from texgs.scene.usd import write_usd
 from texgs.volume.cameras import icosphere_of
+from texgs.volume.placement import Placement
 
 OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
-OF_CLOUDS = {"usd": write_usd, "gltf": write_gltf, "spz": write_spz}  # of scenes, with their light
+OF_CLOUDS = ("usd", "gltf", "spz")  # of scenes, with their light
+IN_FILE = ("points", "mesh", "vtp", "gltf")  # that are in the space of the volume's file by default
 TAKES = {  # by kind: options of Export that count for it, besides the device
-    "points": ("opacity",),
-    "mesh": ("voxel", "views", "size"),
+    "points": ("opacity", "space"),
+    "mesh": ("voxel", "views", "size", "space"),
     "compact": ("views", "size", "drop_unseen"),
+    **dict.fromkeys(("vtp", *OF_CLOUDS), ("space",)),
 }
 
 
@@ -56,8 +60,12 @@ class Export:
     size: int = 512  # of these views, pixels
     drop_unseen: bool = False  # compact: no texture for surfels that no view sees
     device: torch.device | str = "cpu"
+    space: str | None = None  # file, that of the scene's volume, or world; default: see `IN_FILE`
+    known: Placement | None = None  # that of the scene's volume
 
     def __post_init__(self) -> None:
+        if self.space not in (None, "file", "world"):
+            raise ArgumentError(f"space: expected file or world, got {self.space!r}")
         require_numbers(opacity=self.opacity, voxel=self.voxel)
         check_count("views", self.views)
         check_count("size", self.size)
@@ -66,6 +74,22 @@ class Export:
         """Return views of all that is framed."""
         placed = icosphere_of(self.views, frame.lens().square(self.size), "--views")
         return [camera.to(self.device) for camera in placed]
+
+    @property
+    def target(self) -> Placement | None:
+        """The space that places are moved to; None for the world."""
+        if self.space == "file" and self.known is None:
+            raise ArgumentError(
+                "space: expected a scene that knows the space of its volume's file, got none; export it to "
+                "the world, or make it again by texgs compose"
+            )
+        is_moved = self.kind in IN_FILE if self.space is None else self.space == "file"
+        return self.known if is_moved else None
+
+    @property
+    def told(self) -> Told:
+        """What the file says of the space that the scene knows."""
+        return None if self.known is None else self.known.told(self.target is not None)
 
 
 def require_export(field: Kind, kind: str) -> None:
@@ -90,9 +114,11 @@ def require_other(path: Path, scene: Scene) -> None:
         raise ArgumentError(f"{path}: expected a new file, got one that the scene reads; choose another")
 
 
-def uncut(scene: Scene) -> str:
-    """Return what is to be told of a file of a scene, if anything: no kind holds cuts."""
-    return "its cuts are left out" if scene.cuts else ""
+def remarks(scene: Scene, export: Export) -> list[str]:
+    """Return what is to be told of a file of a scene: no kind holds cuts."""
+    is_lost = export.kind in IN_FILE and export.space is None and scene.space is None
+    lost = "in world units: the scene knows no space of a file; texgs compose writes it where there is one"
+    return ["its cuts are left out"] * bool(scene.cuts) + [lost] * is_lost
 
 
 def export_scene(path: Path, scene: Scene, export: Export) -> Path:
@@ -106,17 +132,21 @@ def export_scene(path: Path, scene: Scene, export: Export) -> Path:
     for entry in scene.models.values():
         field = files.kind_of(entry.file)
         require_export(field, export.kind)
+    export = replace(export, known=scene.space)
+    space, told = export.target, export.told
     if export.kind in OF_CLOUDS:
-        return OF_CLOUDS[export.kind](path, clouds_of(scene))
+        clouds = [cloud if space is None else placed_cloud(cloud, space) for cloud in clouds_of(scene)]
+        if export.kind == "usd":
+            return write_usd(path, clouds, told, space)
+        return write_spz(path, clouds) if export.kind == "spz" else write_gltf(path, clouds, told)
     composed, edits = scene.open(export.device), scene.edits
     if export.kind == "mesh":
         look: Look = "unshaded" if "unlit" in field.can else "shaded"
         render = partial(composed.render, edits=edits, look=look)
         return _write_fused(path, export, export.cameras(scene.framed(composed)), render, field.depth)
     if isinstance(composed, JoinedGaussians):
-        return write_gaussians(path, composed.edited(edits))
-    model = joined(cast(Composition, composed).parts, edits)
-    return write_vtp(path, model, scene.volume) if export.kind == "vtp" else _write(path, export, model)
+        return write_gaussians(path, composed.edited(edits), told)
+    return _write(path, export, joined(cast(Composition, composed).parts, edits))
 
 
 def export_model(path: Path, model: Field, export: Export) -> Path:
@@ -130,7 +160,7 @@ def export_model(path: Path, model: Field, export: Export) -> Path:
             render = partial(Composition([model]).render, look="unshaded")
         return _write_fused(path, export, cameras, render, field.depth)
     if isinstance(model, Gaussians):
-        return write_gaussians(path, model)
+        return write_gaussians(path, model, export.told)
     return _write(path, export, cast(Surfels, model))
 
 
@@ -140,10 +170,11 @@ def _write(path: Path, export: Export, model: Surfels) -> Path:
         cameras = export.cameras(bounds_of([model])) if export.drop_unseen else []
         return write_compact(path, model, seen_surfels(model, cameras) if cameras else None)
     if export.kind == "vtp":
-        return write_vtp(path, joined([Part(model)], [PartEdit()]) if model.stage != "surfels" else model)
+        plain = joined([Part(model)], [PartEdit()]) if model.stage != "surfels" else model
+        return write_vtp(path, plain, export.target, export.told)
     if export.kind == "points":
-        return write_points(path, model, export.opacity)
-    return write_surfels(path, model, export.kind)
+        return write_points(path, model, export.opacity, export.target, export.told)
+    return write_surfels(path, model, export.kind, export.told)
 
 
 def _write_fused(
@@ -155,10 +186,17 @@ def _write_fused(
     def shown(camera: Camera) -> Render:
         return render(camera, background=black, outputs=(depth,))
 
-    return write_mesh(path, fuse(shown, cameras, export.voxel))
+    mesh, space = fuse(shown, cameras, export.voxel), export.target
+    return write_mesh(path, mesh if space is None else placed(mesh, space), export.told)
 
 
-def write_points(path: str | Path, model: Surfels, least_opacity: float = 0.5) -> Path:
+def write_points(
+    path: str | Path,
+    model: Surfels,
+    least_opacity: float = 0.5,
+    space: Placement | None = None,
+    told: Told = None,
+) -> Path:
     """Create or replace a PLY point cloud in one step: means, and colours without light as 8-bit numbers.
 
     Surfels need an opacity to become a point. Before shading, colours are those of the constant harmonic.
@@ -174,4 +212,7 @@ def write_points(path: str | Path, model: Surfels, least_opacity: float = 0.5) -
             "at most; lower the limit"
         )
     color = (0.5 + Y00 * model.parameters["sh"][:, 0])[opaque]
-    return write_columns(path, colored(means[opaque], color.clamp(0, 1).mul(255).round()))
+    places = means[opaque]
+    if space is not None:
+        places = torch.from_numpy(space.points(places.cpu().numpy()))
+    return write_columns(path, colored(places, color.clamp(0, 1).mul(255).round()), told=told)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from texgs.core.io import write_bytes
+from texgs.fields.ply_columns import Told
 from texgs.raster.shading import Y00
 from texgs.scene.clouds import Cloud
 
@@ -20,7 +21,7 @@ POINTS, FLOAT, VERTICES = 0, 5126, 34962  # a mode, a type of numbers and a targ
 TYPES = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4"}
 
 
-def write_gltf(path: str | Path, clouds: Sequence[Cloud]) -> Path:
+def write_gltf(path: str | Path, clouds: Sequence[Cloud], told: Told = None) -> Path:
     """Create or replace a .glb file in one step.
 
     Each model is a node and a mesh with its name. Programs without the extension show points. Source: the
@@ -45,7 +46,7 @@ def write_gltf(path: str | Path, clouds: Sequence[Cloud]) -> Path:
         out["nodes"].append({"name": cloud.name, "mesh": len(out["meshes"])})
         out["meshes"].append({"name": cloud.name, "primitives": [primitive]})
     description = {
-        "asset": {"version": "2.0", "generator": "texgs"},
+        "asset": {"version": "2.0", "generator": "texgs", **({"extras": {**told}} if told else {})},
         "extensionsUsed": [EXTENSION],
         "scene": 0,
         "scenes": [{"nodes": [*range(len(clouds))]}],

@@ -15,13 +15,13 @@ from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.io import write_bytes
 from texgs.fields.part_edit import MOST_OPAQUE, PartEdit
+from texgs.fields.ply_columns import Told
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.composition import Part, by_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import mean_texels
 from texgs.raster.shading import Y00
-from texgs.scene.twin import SceneVolume
-from texgs.volume.nrrd_file import open_grid
+from texgs.volume.placement import Placement
 
 if TYPE_CHECKING:
     import pyvista
@@ -60,10 +60,10 @@ def _surfels(part: Part, edits: Sequence[PartEdit], has_normals: bool) -> dict[s
     return {name: x[opacities > 0] for name, x in surfels.items()}
 
 
-def polydata_of(model: Surfels, volume: SceneVolume | None = None) -> pyvista.PolyData:
+def polydata_of(model: Surfels, space: Placement | None = None) -> pyvista.PolyData:
     """Return surfels, see `joined`, as hexagons of 1.5 standard deviations.
 
-    They lie in the coordinates of the volume, +y up; in world units where there is none. Cells have `rgba`
+    They lie in a file's space, or in the world where there is none. Cells have `rgba`
     (uint8, straight alpha), `opacity` and `Normals`, those that light sees; colours are those without light,
     of the palette, offset and mean texel.
     """
@@ -75,31 +75,31 @@ def polydata_of(model: Surfels, volume: SceneVolume | None = None) -> pyvista.Po
     corners = REACH * torch.stack([angles.cos(), angles.sin()], dim=1)
     offsets = torch.einsum("nij,sj,nj->nsi", turns[..., :2], corners, scales)
     points = (means[:, None] + offsets).reshape(-1, 3).cpu().numpy()
+    normals = quats_to_matrices(model.parameters.get("normals", quats))[..., 2].cpu().numpy()
     numbers = np.arange(len(points)).reshape(-1, SIDES)
+    if space is not None:
+        points, normals = space.points(points), (normals @ space.turn.T).astype(np.float32)
+        numbers = numbers[:, ::-1] if space.is_mirrored else numbers
     faces = np.concatenate([np.full((len(numbers), 1), SIDES), numbers], axis=1)
-    mesh = pyvista.PolyData(in_volume(points, volume), faces=faces.ravel())
+    mesh = pyvista.PolyData(points, faces=faces.ravel())
     color = (0.5 + Y00 * model.parameters["sh"][:, 0]).clamp(0, 1)
     rgba = torch.cat([color, opacities.reshape(-1, 1)], dim=1)
     mesh.cell_data["rgba"] = (255 * rgba).round().to(torch.uint8).cpu().numpy()
     mesh.cell_data["opacity"] = opacities.reshape(-1).cpu().numpy()
-    normals = quats_to_matrices(model.parameters.get("normals", quats))[..., 2]
-    mesh.cell_data["Normals"] = normals.cpu().numpy()
+    mesh.cell_data["Normals"] = normals
     mesh.set_active_scalars("rgba", preference="cell")
     return mesh
 
 
-def in_volume(points: np.ndarray, volume: SceneVolume | None) -> np.ndarray:
-    """Return points [N, 3] of the world in the physical coordinates of a volume, if there is one."""
-    if volume is None:
-        return points
-    grid = open_grid(volume.file)
-    middle = np.array(grid.origin) + 0.5 * np.array(grid.sides)
-    return np.asarray(points / grid.scale + middle)
+def write_vtp(path: str | Path, model: Surfels, space: Placement | None = None, told: Told = None) -> Path:
+    """Create or replace a .vtp file of `polydata_of` in one step, with what is told as arrays of its field.
 
-
-def write_vtp(path: str | Path, model: Surfels, volume: SceneVolume | None = None) -> Path:
-    """Create or replace a .vtp file of `polydata_of` in one step; ParaView opens it."""
+    ParaView opens it.
+    """
+    mesh = polydata_of(model, space)
+    for key, value in (told or {}).items():
+        mesh.field_data[key] = value if isinstance(value, list) else [value]
     with TemporaryDirectory() as folder:  # VTK writes to a path only
         file = Path(folder, "surfels.vtp")
-        polydata_of(model, volume).save(file)
+        mesh.save(file)
         return write_bytes(path, file.read_bytes())

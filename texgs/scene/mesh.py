@@ -13,10 +13,11 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.memory import require_memory
 from texgs.core.progress import progress
-from texgs.fields.ply_columns import colored, write_columns
+from texgs.fields.ply_columns import Told, colored, write_columns
 from texgs.raster import Render
 from texgs.raster.fusion import BLOCK, DepthView, Lattice
 from texgs.volume.isosurface import Mesh, isosurface
+from texgs.volume.placement import Placement
 
 TRUNCATION = 5.0  # voxels beside a surface that know their distance from it, as in 2DGS; at most BLOCK
 LEAST_VIEWS = 1  # more views than this must have seen a voxel
@@ -132,8 +133,14 @@ def with_triangles(mesh: Mesh, kept: np.ndarray) -> Mesh:
     return Mesh(mesh.vertices[used], triangles.reshape(-1, 3).astype(np.int32))
 
 
-def write_mesh(path: str | Path, mesh: Mesh) -> Path:
+def write_mesh(path: str | Path, mesh: Mesh, told: Told = None) -> Path:
     """Create or replace a binary PLY file in one step; a mesh without colours is grey."""
     colors = np.full_like(mesh.vertices, 200, dtype=np.uint8) if mesh.colors is None else mesh.colors
     columns = colored(torch.from_numpy(mesh.vertices), torch.from_numpy(colors))
-    return write_columns(path, columns, mesh.triangles)
+    return write_columns(path, columns, mesh.triangles, told)
+
+
+def placed(mesh: Mesh, space: Placement) -> Mesh:
+    """Return a mesh of the world in a space; its triangles are counter-clockwise there, too."""
+    triangles = mesh.triangles[:, ::-1] if space.is_mirrored else mesh.triangles
+    return Mesh(space.points(mesh.vertices).astype(np.float32), triangles, mesh.colors)

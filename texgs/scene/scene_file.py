@@ -21,6 +21,7 @@ from texgs.fields.part_edit import PartEdit, color
 from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment
 from texgs.scene.series_file import read_series
 from texgs.scene.twin import SceneVolume
+from texgs.volume.placement import Placement
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
@@ -29,7 +30,7 @@ VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
 OF_SCENE = ("light", "background", "cuts", "frame")
 MOST_LISTED = 5  # scene files of a folder, in an error
-KEYS = ("texgs-scene", *OF_SCENE, "models", "volume", "functions", "series", "time")
+KEYS = ("texgs-scene", *OF_SCENE, "models", "volume", "space", "functions", "series", "time")
 EDITS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDITS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
@@ -81,7 +82,8 @@ def _scene(values: Any, folder: Path) -> Scene:
     volume = volume_of(values["volume"], folder) if "volume" in values else None
     frame = table_of(Frame, values["frame"], "frame") if "frame" in values else None
     functions = functions_of(values.get("functions", {}), "functions")
-    scene = Scene(models, light, background, cuts, volume, frame, functions)
+    space = table_of(Placement, values["space"], "space") if "space" in values else None
+    scene = Scene(models, light, background, cuts, volume, frame, functions, space=space)
     if "series" not in values:
         return scene
     file = named_file("series", folder, values["series"], "a series")
@@ -110,6 +112,8 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
         look = asdict(scene.volume.appearance)
         tfs = plain_functions(scene.volume.tfs)
         values["volume"] = {"file": relative(scene.volume.file), **look, "tfs": tfs}
+    if scene.space is not None:
+        values["space"] = asdict(scene.space)
     if scene.series is not None:
         values |= {"series": relative(scene.series.file), "time": scene.time}
     if scene.functions:

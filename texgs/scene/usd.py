@@ -9,15 +9,23 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
+from texgs.fields.ply_columns import Told
 from texgs.fields.splats import REACH
 from texgs.raster.shading import DEGREES
 from texgs.scene.clouds import Cloud
+from texgs.volume.placement import Placement
 
+METRES = {"mm": 1e-3, "um": 1e-6, "micrometer": 1e-6, "nm": 1e-9, "nanometer": 1e-9, "angstrom": 1e-10}
 ATTRIBUTES = ("Position", "Orientation", "Scale", "Opacity", "SphericalHarmonics")  # in schemas of their own
 
 
-def write_usd(path: str | Path, clouds: Sequence[Cloud]) -> Path:
-    """Create or replace a .usda or .usdc file in one step.
+def write_usd(
+    path: str | Path,
+    clouds: Sequence[Cloud],
+    told: Told = None,
+    space: Placement | None = None,
+) -> Path:
+    """Create or replace a .usda or .usdc file in one step; clouds that are in a file's space name it.
 
     Below /Scene, with +y up and one metre for a world unit, each model is a prim with its name:
     `ParticleField` with the Gaussian surflet kernel, whose opacity is zero off the plane, or
@@ -28,15 +36,18 @@ def write_usd(path: str | Path, clouds: Sequence[Cloud]) -> Path:
         ArgumentError: if usd-core is missing or older, or the file cannot be written.
     """
     try:
-        from pxr import Gf, Usd, UsdGeom
+        from pxr import Gf, Usd, UsdGeom, Vt
         from pxr.UsdVol import ParticleField  # noqa: F401  absent before 26.03
     except ImportError as error:
         raise ArgumentError(
             f"{path}: expected usd-core 26.3 or newer, which is not installed; pip install '.[usd]'"
         ) from error
     stage = Usd.Stage.CreateInMemory()
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    is_z_up = space is not None and int(np.abs(space.turn[:, 1]).argmax()) == 2
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z if is_z_up else UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, METRES.get(space.unit, 1.0) if space else 1.0)
+    said = {key: Vt.DoubleArray(x) if isinstance(x, list) else x for key, x in (told or {}).items()}
+    stage.GetRootLayer().customLayerData = said
     root = UsdGeom.Xform.Define(stage, "/Scene").GetPrim()
     stage.SetDefaultPrim(root)
     Usd.ColorSpaceAPI.Apply(root).CreateColorSpaceNameAttr(Gf.ColorSpaceNames.SRGBRec709)

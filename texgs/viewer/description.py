@@ -93,6 +93,7 @@ def describe(
         "tfs": plain_functions(scene.volume.tfs) if scene.volume else {},
         "modes": [mode for mode in get_args(Mode) if MODES.get(mode, "") in ("", *kind.can)],
         "bounds": known,
+        "space": asdict(scene.space) | scene.space.drawn if scene.space else None,
         "fov_y": LENS.fov_y,
         "views": [{"name": "home", "target": target, "distance": distance, **HOME}],
     }

@@ -19,6 +19,7 @@ from texgs.volume.dicom_slice import TIMES, Slice, advised, said_in, slices_in
 from texgs.volume.grid import dims_of
 from texgs.volume.itk_image import sentence
 from texgs.volume.slabs import require_step
+from texgs.volume.space import LPS
 
 OF_SERIES = ["SeriesNumber", "SeriesDescription", "TemporalPositionIdentifier", "Modality"]
 UNEVEN = 0.05  # of the distance of slices: how much one may differ, as places are rounded in files
@@ -42,6 +43,8 @@ def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any
         "spacing": (*first.spacing, distance),
         "origin": first.place.tolist(),
         "directions": first.directions.tolist(),
+        "space": LPS,
+        "unit": "mm",
         "n_steps": n_steps,
         "note": "; ".join(filter(None, (note, first.note, without_padding(values, slices)))),
     }

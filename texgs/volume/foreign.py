@@ -21,17 +21,20 @@ from texgs.core.memory import free_memory
 from texgs.volume.extra_axis import extra_axis, one_volume
 from texgs.volume.grid import (
     AS_STORED,
+    AxisPermutation,
     Dims,
     Grid,
     Triple,
     byte_count,
     closest,
+    permuted_lattice,
     permuted_values,
     require_room,
 )
 from texgs.volume.headers import METAIMAGE, NRRD
 from texgs.volume.samples import StoredSamples, stored_samples, unpacked
 from texgs.volume.slabs import ArraySource, RawSource, Source, step_note
+from texgs.volume.space import LEFT_HANDED, RIGHT_HANDED, Space
 
 BY_VTK = (".vti", ".vtr", ".vts", ".pvti", ".pvtr", ".vtk", ".slc")
 DICOM = (".dcm", ".ima")  # suffixes of files; slices without are read in their folder
@@ -62,31 +65,40 @@ def open_foreign(
         with one_volume(path, extra) as header:
             reply, values = _ask(header, keys, is_header_only=stored is not None)
         nx, ny, nz = reply["dims"]
-        dims, axes = (nx, ny, nz), closest(np.array(reply["directions"]))
-        dx, dy, dz = spacing or (reply["spacing"][axis] for axis, _ in axes)
-        lengths = [(dims[axis] - 1) * step for (axis, _), step in zip(axes, (dx, dy, dz), strict=True)]
-        x, y, z = origin or (
-            place - (0.0 if sign > 0 else length)
-            for place, (_, sign), length in zip(reply["origin"], axes, lengths, strict=True)
-        )
+        dims, (axes, steps, first, space) = (nx, ny, nz), _lattice_of(reply, spacing, origin)
         if stored is not None:
             dtype = np.dtype(reply["dtype"]).newbyteorder(">" if stored.is_big_endian else "<")
             if (stored.encoding, axes, extra) == ("raw", AS_STORED, None):
-                return _raw(stored, dims, dtype, (dx, dy, dz), (x, y, z))
+                return _raw(stored, dims, dtype, steps, first, space)
             every = (nx, ny, nz * extra.size) if extra else dims
             is_raw = stored.encoding == "raw"
             values = _raw(stored, every, dtype).mapped() if is_raw else unpacked(stored, every, dtype)
             if extra is not None:
                 values = extra.picked(values, index)
                 reply["n_steps"] = extra.size if extra.key == "time" else 1
-        source = ArraySource(Grid(permuted_values(values, axes), (dx, dy, dz), (x, y, z)), path.name)
+        source = ArraySource(Grid(permuted_values(values, axes), steps, first, space=space), path.name)
         source.n_steps = reply.get("n_steps", 1)
         source.note = "; ".join(filter(None, (step_note(time, source.n_steps), reply.get("note"))))
         return source
 
 
-def _raw(stored: StoredSamples, dims: Dims, dtype: np.dtype, *lattice: Triple) -> RawSource:
-    """Return samples as a source that reads them on demand; spacing and origin follow."""
+def _lattice_of(
+    reply: dict[str, Any], spacing: Triple | None, origin: Triple | None
+) -> tuple[AxisPermutation, Triple, Triple, Space]:
+    """Return which stored axes are closest to those of space; spacing, origin and space along these."""
+    directions = np.array(reply["directions"])
+    space = Space.along(directions, reply.get("space", RIGHT_HANDED), reply.get("unit", ""))
+    mirror = (-1.0, 1.0, 1.0) if space.name == LEFT_HANDED else (1.0, 1.0, 1.0)  # the world is right-handed
+    axes = AS_STORED if reply.get("is_upright") else closest(directions * mirror)
+    steps = dict(enumerate(reply["spacing"]))
+    steps |= {axis: step for (axis, _), step in zip(axes, spacing or (), strict=False)}
+    stored = (steps[0], steps[1], steps[2])
+    _, along, first, turned = permuted_lattice(reply["dims"], stored, reply["origin"], space, axes)
+    return axes, along, origin or first, turned
+
+
+def _raw(stored: StoredSamples, dims: Dims, dtype: np.dtype, *lattice: Any) -> RawSource:
+    """Return samples as a source that reads them on demand; spacing, origin and space follow."""
     before = stored.offset if stored.offset >= 0 else stored.path.stat().st_size - byte_count(dims, dtype)
     return RawSource(stored.path, dims, dtype, before, *lattice)
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.memory import require_memory
+from texgs.volume.space import UNTOLD, Space, Triple
 
-Triple = tuple[float, float, float]
 Dims = tuple[int, int, int]
 ONES, ZEROS = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 
@@ -36,8 +36,9 @@ class Grid:
 
     values: np.ndarray  # [Z, Y, X], real numbers, every axis at least 2; x is the fastest axis, as in VTK
     spacing: Triple = ONES  # x, y, z; physical units, above 0
-    origin: Triple = ZEROS  # centre of the first sample, x, y, z; physical units
+    origin: Triple = ZEROS  # centre of the first sample in the file's space; physical units
     others: tuple[np.ndarray, ...] = ()  # samples of further channels, of the same shape and type
+    space: Space = UNTOLD
 
     def __post_init__(self) -> None:
         check_lattice(dims_of(self.values.shape), self.values.dtype, self.spacing, self.origin)
@@ -135,13 +136,19 @@ def permuted_values(values: np.ndarray, axes: AxisPermutation) -> np.ndarray:
 
 
 def permuted_lattice(
-    dims: Dims, spacing: Triple, origin: Triple, axes: AxisPermutation
-) -> tuple[Dims, Triple, Triple]:
-    """Return dims, spacing and origin after a rotation around the point (0, 0, 0) of physical space."""
-    lattice = []
-    for axis, sign in axes:
-        last = origin[axis] + (dims[axis] - 1) * spacing[axis]
-        # A flipped axis runs from the last sample to the first, and coordinates change sign.
-        lattice.append((dims[axis], spacing[axis], origin[axis] if sign > 0 else 0.0 - last))
-    (nx, dx, x), (ny, dy, y), (nz, dz, z) = lattice
-    return (nx, ny, nz), (dx, dy, dz), (x, y, z)
+    dims: Dims, spacing: Triple, origin: Triple, space: Space, axes: AxisPermutation
+) -> tuple[Dims, Triple, Triple, Space]:
+    """Return dims, spacing, origin and space of a lattice with other axes; no sample moves in its space."""
+    # A flipped axis begins at its last sample.
+    ends = [(size - 1) * step for size, step in zip(dims, spacing, strict=True)]
+    flipped = [axis for axis, sign in axes if sign < 0]
+    lengths = tuple(ends[axis] if axis in flipped else 0.0 for axis in range(3))
+    rows = np.array([sign * np.array(space.axes[axis]) + 0.0 for axis, sign in axes])
+    (i, _), (j, _), (k, _) = axes
+    turned = Space.along(rows, space.name, space.unit)
+    return (
+        (dims[i], dims[j], dims[k]),
+        (spacing[i], spacing[j], spacing[k]),
+        space.place(origin, lengths),
+        turned,
+    )

@@ -1,12 +1,17 @@
 """Text headers of NRRD and MetaImage files: their fields, and the file with the samples."""
 
+import re
+from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 
 from texgs.core.errors import ArgumentError
 from texgs.core.names import named_file
+from texgs.volume.space import Triple
 
 NRRD, METAIMAGE = (".nrrd", ".nhdr"), (".mhd", ".mha")  # suffixes
+UPRIGHT = "uprightspacing"  # a pair of ours: +y is up, whatever the directions are
+UNIT = re.compile(r'"([^"]*)"')
 ANALYZE = (".hdr", ".img")  # of ANALYZE and NIfTI in two files, each of which may be given for both
 LONGEST_HEADER = 1 << 20  # bytes; a foreign file may hold no line break for gigabytes
 
@@ -23,8 +28,9 @@ def read_fields(path: Path) -> tuple[dict[str, str], int]:
         name, separator, value = line.decode("utf-8", "surrogateescape").partition(":" if is_nrrd else "=")
         if is_nrrd and not line.strip():  # ends a header that samples follow
             break
-        if separator and not value.startswith("="):  # NRRD's own pairs of key and value are for others
-            fields[name.replace(" ", "").strip().lower()] = value.strip()
+        if separator:  # NRRD's pairs of key and value, :=, keep a sign: they are no fields of its own
+            sign = "=" if value.startswith("=") else ""
+            fields[name.replace(" ", "").strip().lower() + sign] = value.removeprefix(sign).strip()
         if "elementdatafile" in fields:  # the last one
             break
     if head.tell() == LONGEST_HEADER:
@@ -32,6 +38,18 @@ def read_fields(path: Path) -> tuple[dict[str, str], int]:
     if not is_nrrd and "elementdatafile" not in fields:
         raise ArgumentError("expected a MetaImage file, found no ElementDataFile in its header")
     return fields, head.tell()
+
+
+def unit_in(fields: Mapping[str, str]) -> str:
+    """Return the unit of an NRRD's space; empty where it tells none, or several."""
+    units = set(UNIT.findall(fields.get("spaceunits", "")))
+    return units.pop() if len(units) == 1 else ""
+
+
+def spacing_in(fields: Mapping[str, str]) -> Triple | None:
+    """Return the spacing of a volume that is prepared, with axes of its file; None of others."""
+    said = fields.get(f"{UPRIGHT}=", "").split()
+    return (float(said[0]), float(said[1]), float(said[2])) if said else None
 
 
 def samples_of(header: Path) -> Path | None:

@@ -1,6 +1,7 @@
 """Images that SimpleITK reads, as lattice and samples."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,15 @@ import SimpleITK as sitk
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Dims, byte_count, check_lattice, require_room
-from texgs.volume.headers import NRRD, read_fields
+from texgs.volume.headers import NRRD, read_fields, spacing_in, unit_in
+from texgs.volume.space import LEFT_HANDED, LPS, RAS, RIGHT_HANDED, letters
 
-# ITK's space runs to the left and the back, that of these NRRD files to the right and the front.
-TO_RIGHT_FRONT = (-1.0, -1.0, 1.0)
+# Names of spaces in NRRD files; places in those that run to the front are told as RAS, from ITK's LPS.
 NRRD_SPACES = {
-    "right-anterior-superior": TO_RIGHT_FRONT,
-    "ras": TO_RIGHT_FRONT,
-    "left-anterior-superior": TO_RIGHT_FRONT,
-    "las": TO_RIGHT_FRONT,
-    "3d-left-handed": (-1.0, 1.0, 1.0),
+    **dict.fromkeys((RAS, "ras", "left-anterior-superior", "las"), RAS),
+    **dict.fromkeys((LPS, "lps"), LPS),
+    "scanner-xyz": "scanner-xyz",
+    "3d-left-handed": LEFT_HANDED,
 }
 GIPL_HEADER = 256  # bytes before the samples
 SOURCE_LINE = re.compile(r"^.*?(?:sitk::ERROR|ITK ERROR|itk::ERROR): (?:\w+\(0x[0-9a-f]+\): )?", re.DOTALL)
@@ -36,14 +36,19 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
         if suffix == ".gipl":
             require_bytes(path, GIPL_HEADER + byte_count(dims, dtype))
         fields = read_fields(path)[0] if suffix in NRRD else {}
-        signs = np.array(NRRD_SPACES.get(fields.get("space", "").lower(), (1.0, 1.0, 1.0)))
+        space, unit = _space_of(suffix, fields)
+        signs = np.array((-1.0, -1.0, 1.0) if space == RAS else (1.0, 1.0, 1.0))
         lattice: dict[str, Any] = {
             "dims": dims,
             "dtype": dtype.name,
             "spacing": reader.GetSpacing(),
             "origin": (np.array(reader.GetOrigin()) * signs + 0.0).tolist(),
             "directions": (np.reshape(reader.GetDirection(), (3, 3)).T * signs).tolist(),
+            "space": space,
+            "unit": unit,
         }
+        if upright := spacing_in(fields):
+            lattice |= {"spacing": upright, "is_upright": True}
         if {"axismins", "axismaxs"} <= fields.keys() and "spacedirections" not in fields:
             lattice["origin"] = np.nan_to_num(np.array(fields["axismins"].split(), float)).tolist()
             if "spacings" not in fields:
@@ -54,6 +59,14 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
         return lattice, sitk.GetArrayFromImage(reader.Execute())
     except RuntimeError as error:
         raise ArgumentError(sentence(error)) from error
+
+
+def _space_of(suffix: str, fields: Mapping[str, str]) -> tuple[str, str]:
+    """Return name and unit of a file's space: what NRRD says, else those of ITK."""
+    if suffix not in NRRD:
+        return LPS, "mm"
+    name = NRRD_SPACES.get(fields.get("space", "").lower(), RIGHT_HANDED)
+    return name, unit_in(fields) or ("mm" if letters(name) else "")
 
 
 def require_bytes(path: Path, expected: int) -> None:

@@ -17,9 +17,10 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
-from texgs.volume.axes import Axis, axes_of, lattice, picked, upright
+from texgs.volume.axes import METRES, Axis, axes_of, lattice, picked, upright
 from texgs.volume.grid import Triple, require_room
 from texgs.volume.slabs import SLAB_BYTES, Source
+from texgs.volume.space import Space
 
 if TYPE_CHECKING:
     import xarray
@@ -77,6 +78,7 @@ class LayerSource(Source):
         is_masked = is_float == [False, True] or self._valid != EVERYTHING
         dtype = np.dtype(np.float32) if is_masked else self._samples.dtype
         super().__init__(Path(name).name, (x.size, y.size, z.size), dtype, spacing, origin)
+        self.space = Space(unit=x.unit if x.unit in METRES and not remark else "")
         self.take(axes, self._index)
         self.note = "; ".join(filter(None, (note, self.note, guess, remark)))
         plane, chunk = x.size * y.size * self.dtype.itemsize, chunks[self._z] if chunks else 1

@@ -19,6 +19,7 @@ from texgs.volume.grid import (
     require_room,
 )
 from texgs.volume.slabs import ArraySource, RawSource, Source
+from texgs.volume.space import Space
 
 MAPS = (".mrc", ".map", ".ccp4", ".rec")  # suffixes
 VERSIONS = (20140, 20141)  # of MRC, in which bytes have a sign
@@ -51,11 +52,11 @@ def open_mrc(path: Path, spacing: Triple | None, origin: Triple | None) -> Sourc
         else:
             values = RawSource(path, dims, dtype, offset).mapped()
         axes, steps, first, note = lattice_of(header)
-        lattice = (spacing or steps, origin or first)
+        lattice, space = (spacing or steps, origin or first), Space(unit="angstrom")
         if axes == AS_STORED and isinstance(values, np.memmap):
-            source: Source = RawSource(path, dims, dtype, offset, *lattice)
+            source: Source = RawSource(path, dims, dtype, offset, *lattice, space)
         else:
-            source = ArraySource(Grid(permuted_values(values, axes), *lattice), path.name)
+            source = ArraySource(Grid(permuted_values(values, axes), *lattice, space=space), path.name)
         source.note = "" if spacing else note
         return source
 

@@ -1,6 +1,7 @@
 """The canonical file of a prepared volume: an NRRD with raw samples, mapped into memory."""
 
 import re
+from math import hypot
 from pathlib import Path
 from typing import BinaryIO
 
@@ -9,8 +10,9 @@ import numpy as np
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
 from texgs.volume.grid import Dims, Grid, Triple, byte_count
-from texgs.volume.headers import read_fields
+from texgs.volume.headers import UPRIGHT, read_fields, spacing_in, unit_in
 from texgs.volume.slabs import RawSource
+from texgs.volume.space import UNTOLD, Space
 
 ALIGNMENT = 64  # bytes; where the samples of a canonical file start: cache lines, and any vector type
 WORDS = {"int8": "signed char", "uint8": "uchar", "int16": "short", "uint16": "ushort", "float32": "float"}
@@ -25,7 +27,8 @@ def open_grid(path: str | Path) -> Grid:
         raise ArgumentError(f"{path}: no such file; {MAKES}")
     with located(path):
         first, *others = open_prepared(path)
-    return Grid(first.mapped(), first.spacing, first.origin, tuple(other.mapped() for other in others))
+    values = [each.mapped() for each in (first, *others)]
+    return Grid(values[0], first.spacing, first.origin, tuple(values[1:]), first.space)
 
 
 def open_prepared(path: Path) -> list[RawSource]:
@@ -37,10 +40,12 @@ def open_prepared(path: Path) -> list[RawSource]:
             raise ArgumentError(f"expected a prepared volume with raw encoding, got {encoding}; {MAKES}")
         nx, ny, nz, *n = map(int, fields["sizes"].split())
         directions = fields["spacedirections"].removesuffix("none")
-        dx, _, _, _, dy, _, _, _, dz = map(float, NUMBER.findall(directions))
+        vectors = np.reshape(np.array(NUMBER.findall(directions), float), (3, 3))
+        dx, dy, dz = spacing_in(fields) or map(hypot, *vectors.T.tolist())
+        space = Space.along(vectors, fields["space"], unit_in(fields))
         x, y, z = map(float, NUMBER.findall(fields["spaceorigin"]))
         stored = np.dtype({word: name for name, word in WORDS.items()}[fields["type"]]).newbyteorder("<")
-        lattice, size = ((dx, dy, dz), (x, y, z)), byte_count((nx, ny, nz), stored)
+        lattice, size = ((dx, dy, dz), (x, y, z), space), byte_count((nx, ny, nz), stored)
         (count,) = n or [1]
         if count < 1:
             raise ArgumentError(f"expected at least one channel, got {count}; {MAKES}")
@@ -51,31 +56,41 @@ def open_prepared(path: Path) -> list[RawSource]:
 
 
 def write_header(
-    file: BinaryIO, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple, channels: int = 1
+    file: BinaryIO,
+    dims: Dims,
+    dtype: np.dtype,
+    spacing: Triple,
+    origin: Triple,
+    space: Space = UNTOLD,
+    channels: int = 1,
 ) -> int:
     """Write the header of a canonical file, and return its length, a multiple of `ALIGNMENT` bytes.
 
     Raw samples follow, little endian, of one of the types in `WORDS`; of one channel after the other.
     """
-    dx, dy, dz = spacing
-    directions = " ".join(_vector(step) for step in ((dx, 0, 0), (0, dy, 0), (0, 0, dz)))
+    vectors = (np.array(space.axes) * np.array(spacing)[:, None]).tolist()
+    directions = " ".join(map(_vector, vectors))
+    # Lengths of vectors of any direction may differ from the spacing in the last bit.
+    pair = [f"{UPRIGHT}:={' '.join(repr(float(step)) for step in spacing)}"]
+    units = ["space units:" + 3 * f' "{space.unit}"'] if space.unit else []
     size, none, kind = (f" {channels}", " none", " list") if channels > 1 else ("", "", "")
     lines = [
         "NRRD0004",
         f"type: {WORDS[dtype.name]}",
         f"dimension: {4 if channels > 1 else 3}",
-        "space: 3D-right-handed",
+        f"space: {space.name}",
         f"sizes: {dims[0]} {dims[1]} {dims[2]}{size}",
         f"space directions: {directions}{none}",
+        *units,
         f"kinds: domain domain domain{kind}",
         "endian: little",
         "encoding: raw",
         f"space origin: {_vector(origin)}",
+        *(pair if space.axes != UNTOLD.axes else []),
     ]
-    text = "\n".join(lines) + "\n#"
+    text = ("\n".join(lines) + "\n#").encode()
     # The comment fills up; two line breaks end it and the header.
-    text += "-" * (-(len(text) + 2) % ALIGNMENT) + "\n\n"
-    return file.write(text.encode("ascii"))
+    return file.write(text + b"-" * (-(len(text) + 2) % ALIGNMENT) + b"\n\n")
 
 
 def _vector(numbers: Triple) -> str:

@@ -23,8 +23,9 @@ def require_itself(path: Path) -> bytes:
 
 def require_packing(path: Path, suffixes: Container[str]) -> None:
     """Require gzip where the suffix says so, and only there, of formats that have suffixes for both."""
-    is_packed, suffix = require_itself(path).startswith(GZIP), path.suffix.lower()
-    if suffix == ".gz" and not is_packed and Path(path.stem).suffix.lower() + suffix in suffixes:
+    start, suffix = require_itself(path), path.suffix.lower()
+    is_packed = start.startswith(GZIP)
+    if suffix == ".gz" and start and not is_packed and Path(path.stem).suffix.lower() + suffix in suffixes:
         raise ArgumentError(f"expected gzip, got another file; if it is whole, rename it to {path.stem}")
     if is_packed and suffix + ".gz" in suffixes:
         raise ArgumentError(f"expected a file that is not packed, got gzip; rename it to {path.name}.gz")

@@ -65,14 +65,16 @@ def prepare_channels(
     _check_keys(nan_value, reduce, method, up)
     source, tallies = _first_of(sources), [_Tally(each.name) for each in sources]
     bounds, axes = bounds_of(source.dims, crop), UPRIGHT[up]
-    dims, spacing, origin = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
+    dims, spacing, origin, space = permuted_lattice(
+        *_reduced_lattice(source, bounds, reduce), source.space, axes
+    )
     kept = "uint8" if source.dtype.kind == "b" else source.dtype.name
     dtype = np.dtype(kept if kept in WORDS else "float32")
     ((x0, x1), (y0, y1), (z0, z1)), size = bounds, prod(dims) * dtype.itemsize
 
     def write(file: BinaryIO) -> None:
         _require_disk(source.name, target, len(sources) * size)
-        offset = write_header(file, dims, dtype, spacing, origin, len(sources))
+        offset = write_header(file, dims, dtype, spacing, origin, space, len(sources))
         slabs = slab_bounds(source, z0, z1, multiple=reduce)
         steps = [(number, *slab) for number in range(len(sources)) for slab in slabs]
         for number, start, stop in steps if progress is None else progress(steps, len(steps)):
@@ -207,11 +209,9 @@ def _reduced_lattice(source: Source, bounds: Bounds, reduce: int) -> tuple[Dims,
             f"{nx} x {ny} x {nz}; crop or reduce less"
         )
     dx, dy, dz = source.spacing
-    x, y, z = (
-        start + (low + 0.5 * (reduce - 1)) * step
-        for start, (low, _), step in zip(source.origin, bounds, source.spacing, strict=True)
-    )
-    return (nx, ny, nz), (dx * reduce, dy * reduce, dz * reduce), (x, y, z)
+    skipped = [(low + 0.5 * (reduce - 1)) * s for (low, _), s in zip(bounds, source.spacing, strict=True)]
+    first = source.space.place(source.origin, skipped)
+    return (nx, ny, nz), (dx * reduce, dy * reduce, dz * reduce), first
 
 
 def block_means(values: np.ndarray, factor: int) -> np.ndarray:

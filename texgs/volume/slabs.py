@@ -9,6 +9,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Axis, Channel
 from texgs.volume.grid import ONES, ZEROS, Dims, Grid, Triple, byte_count, check_lattice
+from texgs.volume.space import UNTOLD, Space
 
 SLAB_BYTES = 1 << 23  # reads of this size run at the disk's speed, and memory stays small
 
@@ -20,6 +21,7 @@ class Source(ABC):
     n_steps = 1  # of time, one of which this is
     channels: Sequence[Channel] = ()  # of the file, one of which this is
     channel: Channel | None = None
+    space = UNTOLD
 
     def __init__(self, name: str, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> None:
         check_lattice(dims, dtype, spacing, origin)
@@ -45,7 +47,7 @@ class ArraySource(Source):
 
     def __init__(self, grid: Grid, name: str = "volume") -> None:
         super().__init__(name, grid.dims, grid.values.dtype, grid.spacing, grid.origin)
-        self._values = grid.values
+        self._values, self.space = grid.values, grid.space
 
     def slices(self, start: int, stop: int) -> np.ndarray:
         """Return samples [stop - start, Y, X]."""
@@ -67,8 +69,10 @@ class RawSource(Source):
         offset: int = 0,
         spacing: Triple = ONES,
         origin: Triple = ZEROS,
+        space: Space = UNTOLD,
     ) -> None:
         super().__init__(path.name, dims, stored, spacing, origin)
+        self.space = space
         self._path, self._stored, self._offset = path, stored, offset
         if not path.is_file():
             raise ArgumentError(f"no such file with samples: {path}")

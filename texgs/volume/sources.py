@@ -20,14 +20,14 @@ from texgs.volume.grid import (
     byte_count,
     check_lattice,
     dims_of,
-    require_room,
 )
 from texgs.volume.headers import METAIMAGE, NRRD
 from texgs.volume.mrc import MAPS, open_mrc
 from texgs.volume.netcdf import open_netcdf
+from texgs.volume.nifti import BY_NIBABEL, open_nifti
 from texgs.volume.ome_zarr import is_zarr, open_zarr
 from texgs.volume.pointers import require_itself, require_packing
-from texgs.volume.slabs import ArraySource, RawSource, Source, require_step, size_text, step_note
+from texgs.volume.slabs import ArraySource, RawSource, Source, size_text
 from texgs.volume.slice_names import tiffs_in
 from texgs.volume.text_columns import ColumnSource
 from texgs.volume.tiff import open_tiff
@@ -36,8 +36,6 @@ from texgs.volume.tiff import open_tiff
 COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
 DEFAULTS = {"endian": "little", "skip": 0, "time": 0}  # of keys, which every format may be given
 HDF5 = (".nc", ".nc4", ".h5", ".hdf5", ".hdf", ".nxs", ".ims")
-ORIENTED = ("sform_code", "qform_code", "goodRASFlag")  # of headers of NIfTI and MGH: 0 for none
-BY_NIBABEL = (".nii", ".nii.gz", ".hdr", ".img", ".mgh", ".mgz")
 IMARIS = (
     "Imaris pads arrays with zeros, and tells size and extent by text that is not read: dataset.volume.crop "
     "and spacing set them"
@@ -128,7 +126,7 @@ def tells_superior(path: Path) -> bool:
     """Return whether z points to the head by a volume's format: of NIfTI, and of a folder of DICOM."""
     opener, _ = _opener(path)
     is_dicom = opener is open_foreign and (path.is_dir() or _suffix(path) in DICOM)
-    return opener is _open_nifti or is_dicom
+    return opener is open_nifti or is_dicom
 
 
 def _opener(path: Path) -> tuple[Callable[..., Source] | None, tuple[str, ...]]:
@@ -204,49 +202,6 @@ def _open_npy(
     return ArraySource(Grid(values, *lattice), path.name)
 
 
-def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: int = 0) -> Source:
-    """Open an image of NIfTI, ANALYZE or MGH, its axes permuted and flipped to the closest R, A, S.
-
-    It is mapped if it is not compressed, and of several along a fourth axis one step is read. By nibabel: ITK
-    knows neither NIfTI-2 nor axes that are not at right angles.
-    """
-    import nibabel
-    from nibabel.imageglobals import LoggingOutputSuppressor
-
-    with reading_as("a NIfTI file"), LoggingOutputSuppressor():
-        image = nibabel.load(path)
-        if not isinstance(image, nibabel.AnalyzeImage | nibabel.MGHImage):  # the former has NIfTI below it
-            raise ArgumentError(f"expected a NIfTI image, got {type(image).__name__}")
-        stored = image.get_data_dtype()
-        if stored.fields:
-            raise ArgumentError(f"expected a scalar volume, got {len(stored.fields)} components per sample")
-        n_steps, *rest = image.shape[3:] or (1,)
-        require_step(time, n_steps)
-        shape = image.shape[:3] + tuple(size for size in rest if size != 1)
-        x, y, z = dims_of(shape)[::-1]
-        check_lattice((x, y, z), stored)
-        codes = [int(image.header[name]) for name in ORIENTED if name in image.header]
-        # Method 1 of the standard: nibabel would mirror x.
-        told = image.affine if any(codes) else np.diag([*image.header.get_zooms()[:3], 1.0])
-        turn = nibabel.io_orientation(told)
-        if np.isnan(turn).any():
-            raise ArgumentError("expected three independent axes, got a singular affine matrix")
-        proxy: Any = image.dataobj
-        is_scaled = (proxy.slope, proxy.inter) != (1, 0)
-        proxy = proxy[..., time, *[0] * len(rest)] if n_steps > 1 else proxy  # reads no other step
-        require_room((x, y, z), np.dtype(np.float32) if is_scaled else stored)
-        samples = np.asarray(proxy, np.float32) if is_scaled else np.asanyarray(proxy)
-        values = nibabel.apply_orientation(samples.reshape(shape, order="F"), turn)  # [X, Y, Z]
-        affine = told @ nibabel.orientations.inv_ornt_aff(turn, shape)
-    dx, dy, dz = (float(step) for step in nibabel.affines.voxel_sizes(affine))
-    first = (float(affine[0, 3]), float(affine[1, 3]), float(affine[2, 3]))
-    source = ArraySource(Grid(values.T, spacing or (dx, dy, dz), origin or first), path.name)
-    kind = "NIfTI" if isinstance(image, nibabel.Nifti1Pair) else "ANALYZE"
-    remark = "" if any(codes) else f"{kind} tells no orientation: axes are taken as stored"
-    source.n_steps, source.note = n_steps, "; ".join(filter(None, (step_note(time, n_steps), remark)))
-    return source
-
-
 def _open_imaris(path: Path, spacing: Triple | None, origin: Triple | None, **keys: Any) -> Source:
     """Open an array of Imaris as one of HDF5."""
     source = open_netcdf(path, spacing, origin, **keys)
@@ -259,7 +214,7 @@ OPENERS: dict[str, Callable[..., Source]] = {
     **dict.fromkeys((".raw", ".bin", ".dat"), _open_raw),
     **dict.fromkeys((".tif", ".tiff"), open_tiff),
     **dict.fromkeys((".npy", ".npz"), _open_npy),
-    **dict.fromkeys(BY_NIBABEL, _open_nifti),
+    **dict.fromkeys(BY_NIBABEL, open_nifti),
     **dict.fromkeys((*NRRD, *METAIMAGE, ".gipl"), open_foreign),  # by SimpleITK
     **dict.fromkeys((*MAPS, *(f"{suffix}.gz" for suffix in MAPS)), open_mrc),
     **dict.fromkeys(BY_VTK, open_foreign),

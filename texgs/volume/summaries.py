@@ -11,6 +11,7 @@ import numpy as np
 from texgs.core.io import read_json, write_json
 from texgs.volume.grid import Dims, Triple
 from texgs.volume.slabs import Source, slab_bounds
+from texgs.volume.space import UNTOLD, Space
 from texgs.volume.suggest import looks_like_labels
 
 Counted = dict[str, Any]  # minimum, maximum, histogram, and its scale: "linear" or "log"
@@ -36,6 +37,7 @@ class Summary:
     maximum: float
     histogram: tuple[int, ...]  # counts in 256 equal bins over [minimum, maximum]
     robust: Counted | None = None  # what functions are suggested from, where that is another histogram
+    space: Space = UNTOLD
 
     @property
     def voxels(self) -> int:
@@ -55,7 +57,9 @@ def summarize(source: Source, minimum: float, maximum: float, shared: Ends = (0.
     """Summarize a volume whose range is known, and that which neighbours share; reads it once or more."""
     whole = counted(source, minimum, maximum)
     lattice = (source.dims, source.dtype.name, source.spacing, source.origin)
-    return Summary(*lattice, minimum, maximum, whole["histogram"], robust_histogram(source, whole, shared))
+    return Summary(
+        *lattice, minimum, maximum, whole["histogram"], robust_histogram(source, whole, shared), source.space
+    )
 
 
 def robust_histogram(source: Source, whole: Counted, shared: Ends) -> Counted | None:

@@ -12,7 +12,7 @@ from texgs.core.io import reading_as
 from texgs.core.ply_file import is_ply, read_vertices
 from texgs.core.tensor_file import read_tensor_file, write_tensor_file
 from texgs.fields.gaussians.model import Baked, Gaussians
-from texgs.fields.ply_columns import splat_columns, take_geometry, take_harmonics, write_columns
+from texgs.fields.ply_columns import Told, splat_columns, take_geometry, take_harmonics, write_columns
 
 FORMAT = "texgs-gaussians"
 VERSION = 1
@@ -55,7 +55,7 @@ def _require_finite_float32(model: Gaussians) -> None:
     check.finite(**model.parameters)
 
 
-def write_ply(path: str | Path, model: Gaussians) -> Path:
+def write_ply(path: str | Path, model: Gaussians, told: Told = None) -> Path:
     """Create or replace a binary PLY file in one step, 248 bytes for each Gaussian.
 
     It holds means, normals of zero, harmonics of degree 3 (those that the model has not are zero), and
@@ -65,7 +65,7 @@ def write_ply(path: str | Path, model: Gaussians) -> Path:
     with located(path):
         check.finite(**p)
     sh = pad(p["sh"], (0, 0, 0, HARMONICS - p["sh"].shape[1]))
-    return write_columns(path, splat_columns(p, torch.zeros_like(p["means"]), sh))
+    return write_columns(path, splat_columns(p, torch.zeros_like(p["means"]), sh), told=told)
 
 
 def read_ply(path: str | Path) -> Gaussians:

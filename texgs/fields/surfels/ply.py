@@ -17,6 +17,7 @@ from texgs.core.memory import require_memory
 from texgs.core.ply_file import read_vertices
 from texgs.core.tensor_file import load_torch
 from texgs.fields.ply_columns import (
+    Told,
     numbered,
     splat_columns,
     take,
@@ -44,7 +45,7 @@ RELEASE = {  # our name of a factor by the release's, in the order of its files
 BESIDE = "the release writes it beside the surfels"
 
 
-def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
+def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs", told: Told = None) -> Path:
     """Create or replace a binary PLY file in one step.
 
     All flavours hold means, unit normals that light sees (2DGS leaves them at zero), opacities, scales and
@@ -67,7 +68,7 @@ def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
     with located(path):
         check.finite(**parameters)
         columns = _columns(Surfels(parameters, model.shading), flavour)
-    return write_columns(path, columns)
+    return write_columns(path, columns, told=told)
 
 
 def read_ply(path: str | Path) -> Surfels:

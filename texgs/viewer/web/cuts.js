@@ -3,6 +3,7 @@
 import { angles, direction, dot } from "./camera.js";
 import { capital, element, slider, tick } from "./inputs.js";
 import { PlaneHandles } from "./handles.js";
+import { placeOf } from "./space.js";
 
 const MOST = 6; // planes, as the server has it
 const SIDES = ["low", "high"].flatMap((side) => [0, 1, 2].map((axis) => ({ side, axis })));
@@ -162,8 +163,9 @@ export class Cuts {
     const azimuth = angle("Azimuth", "azimuth", 180), polar = angle("Polar", "polar", 90);
     const button = (text, what, onclick) =>
       element("button", { type: "button", onclick, "aria-label": `${what} ${name}` }, text);
-    const box = element("fieldset", { className: "part" }, element("legend", {}, on.row), position.row, azimuth.row,
-      polar.row, ...["x", "y", "z"].map((axis, i) => button(axis, `Snap to ${axis}:`,
+    const { space } = this.#page.state.scene, place = element("div", { className: "place" });
+    const box = element("fieldset", { className: "part" }, element("legend", {}, on.row), position.row, place,
+      azimuth.row, polar.row, ...["x", "y", "z"].map((axis, i) => button(axis, `Snap to ${axis}:`,
         () => this.tilt(index, snapped(plane().normal, i)))),
       button("Flip", "Flip", () => {
         const { normal, offset } = plane();
@@ -179,6 +181,7 @@ export class Cuts {
       box.classList.toggle("hidden-part", !isOn);
       on.show(isOn);
       position.show(offset);
+      place.textContent = space ? placeOf(space, normal, this.middle(plane())) : "";
       azimuth.show(Number(angled.azimuth.toFixed(1)));
       polar.show(Number(angled.polar.toFixed(1)));
     });

@@ -14,7 +14,8 @@ export class Gizmo {
   constructor(page) {
     this.#page = page;
     this.#root = addShape(document.getElementById("marks"), "g", { class: "gizmo" });
-    this.#ends = Object.entries(AXES).map(([name, angles]) => this.#make(name, direction(...angles)));
+    const ends = page.state.scene.space?.ends ?? [..."xyz"].map((letter) => [letter, ""]);
+    this.#ends = Object.entries(AXES).map(([name, angles]) => this.#make(name, direction(...angles), ends));
   }
 
   /** Draw the axes as the camera sees them, the farthest end first. */
@@ -31,13 +32,14 @@ export class Gizmo {
     }
   }
 
-  #make(name, axis) {
-    const [sign, letter] = name, color = COLORS[letter];
+  /** @param {string[][]} ends - letters ahead and behind along x, y and z: of the patient, or of the file */
+  #make(name, axis, ends) {
+    const [sign, letter] = name, color = COLORS[letter], words = ends["xyz".indexOf(letter)][sign === "+" ? 0 : 1];
     const group = addShape(this.#root, "g", { class: sign === "+" ? "ahead" : "behind", stroke: color, fill: color });
     const line = addShape(group, "line"), end = addShape(group, "g", { class: "end" });
-    addShape(end, "title").textContent = `From ${name}`;
-    addShape(end, "circle", { r: RADIUS[sign] });
-    if (sign === "+") addShape(end, "text", { y: 4 }).textContent = letter;
+    addShape(end, "title").textContent = words && words !== letter ? `From ${words} (${name})` : `From ${name}`;
+    addShape(end, "circle", { r: RADIUS[words ? "+" : "−"] });
+    if (words) addShape(end, "text", { y: 4 }).textContent = words;
     end.addEventListener("click", () => this.#page.goTo(name));
     return { axis, group, line, end };
   }

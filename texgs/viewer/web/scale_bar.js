@@ -14,16 +14,17 @@ export class ScaleBar {
     [this.#line, this.#words] = ["path", "text"].map((tag) => addShape(root, tag));
   }
 
-  /** Draw it for the camera: in the units of the spacing of the scene's volume, or else in those of the world. */
+  /** Draw it for the camera: in the unit of the scene's volume, where it is known, or else in those of the world. */
   draw() {
     const { camera, canvas: { clientWidth, clientHeight }, state } = this.#page, { scale } = state.scene.bounds;
+    const unit = state.scene.space?.unit || "volume units";
     const pixels = camera.project(camera.target, clientWidth, clientHeight).scale * (scale ?? 1); // of a unit
     const length = round(LONGEST / pixels), right = clientWidth - MARGIN, left = right - length * pixels;
     const y = clientHeight - MARGIN;
     this.#line.setAttribute("d", path([[left, y - TICK], [left, y], [right, y], [right, y - TICK]]));
     this.#words.setAttribute("x", right);
     this.#words.setAttribute("y", y - TICK - 3);
-    this.#words.textContent = `${Number(length.toPrecision(1))} ${scale ? "volume" : "world"} units`;
+    this.#words.textContent = `${Number(length.toPrecision(1))} ${scale ? unit : "world units"}`;
   }
 }
 

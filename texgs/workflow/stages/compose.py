@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,13 +45,17 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.scene.scene_file import write_scene
     from texgs.volume.framing import frame_of
     from texgs.volume.nrrd_file import open_grid
+    from texgs.volume.placement import Placement
 
     models = {
         name.removeprefix(MODEL): SceneModel(path) for name, path in inputs.items() if name.startswith(MODEL)
     }
     volume = volume_of(settings, inputs["volume"]) if "volume" in inputs else None
-    framing = [tf for name, tf in volume.tfs.items() if name in settings.framing] if volume else []
-    scene = Scene(models, volume=volume, frame=frame_of(open_grid(volume.file), framing) if volume else None)
+    scene = Scene(models, volume=volume)
+    if volume is not None:
+        framing = [tf for name, tf in volume.tfs.items() if name in settings.framing]
+        grid = open_grid(volume.file)
+        scene = replace(scene, frame=frame_of(grid, framing), space=Placement.of(grid))
     write_scene(output / SCENE, scene)
     composition = scene.open(torch_device(settings.fit.device))
     camera = orbit(AZIMUTH, POLAR, *scene.framed(composition).lens(settings.fov_y).square(settings.image))
