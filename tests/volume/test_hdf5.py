@@ -228,11 +228,13 @@ def test_a_virtual_array_needs_all_of_its_parts(tmp_path):
     np.testing.assert_array_equal(whole(path), values)
     write(tmp_path / "part1.h5", other=VALUES[:4])
     with pytest.raises(
-        ArgumentError, match=r"/entry/data: expected data in its part part1\.h5, found none; is it whole"
+        ArgumentError, match=r"/entry/data: expected its part data of part1\.h5, which is not there"
     ):
         open_source(path)
     (tmp_path / "part1.h5").unlink()
-    with pytest.raises(ArgumentError, match=r"/entry/data: expected its part part1\.h5, which is not there"):
+    with pytest.raises(
+        ArgumentError, match=r"/entry/data: expected its part data of part1\.h5, which is not there"
+    ):
         open_source(path)
 
 
@@ -262,7 +264,7 @@ def test_chunks_that_were_never_written_are_told(tmp_path):
         array = file.create_dataset("v", VALUES.shape, "u2", chunks=(1, 12, 13), fillvalue=5)
         array[:4] = VALUES[:4]
     source = open_source(tmp_path / "v.h5")
-    assert source.note == "7 of 11 chunks were never written and count as 5"
+    assert source.note == "7 of 11 chunks are not there and count as 5"
     np.testing.assert_array_equal(source.slices(3, 5), [VALUES[3], np.full((12, 13), 5)])
 
 

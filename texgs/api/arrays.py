@@ -10,7 +10,7 @@ from texgs.api.display import as_python
 from texgs.core.errors import ArgumentError, located
 from texgs.core.names import check_count
 from texgs.volume.grid import ONES, ZEROS, Grid, Triple
-from texgs.volume.layers import LayerSource
+from texgs.volume.layers import labelled
 from texgs.volume.slabs import ArraySource, Source
 from texgs.volume.space import UNTOLD, Space
 
@@ -110,4 +110,4 @@ def of_data_array(array: Any, spacing: Triple | None, origin: Triple | None) -> 
             "other, as by .isel(time=0)"
         )
     with located("DataArray"):
-        return LayerSource("DataArray", array, (spacing, origin), chunks=array.encoding.get("chunksizes"))
+        return labelled("DataArray", array, (spacing, origin))

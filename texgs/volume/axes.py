@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,12 @@ METRES |= {f"{prefix[:1]}m": 10.0**n for prefix, n in POWERS.items() if prefix !
 METRES |= dict.fromkeys(("um", "µm", "μm", "micron", "microns"), 1e-6) | {"angstrom": 1e-10}
 # What CF and cf_xarray call axes, and the letters that they have here.
 LETTERS = {"X": "x", "longitude": "x", "Y": "y", "latitude": "y", "Z": "z", "vertical": "z", "T": "t"}
+# Attributes of CF: what stands for missing samples; how packed ones are scaled; which are valid; and others.
+CODES, PACKED = ("_FillValue", "missing_value"), {"scale_factor", "add_offset"}
+NUMBERS = (*CODES, *PACKED, "valid_min", "valid_max", "valid_range")
+UNSIGNED = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
+CF = (*NUMBERS, UNSIGNED, "axis", "standard_name", "long_name", "units", "positive")
+CF += ("cartesian_axis", "grads_dim", "_CoordinateAxisType")  # of others, known to cf_xarray
 PRESSURES = ("Pa", "hPa", "kPa", "mbar", "millibar", "dbar", "decibar", "bar")
 
 
@@ -64,25 +70,35 @@ def nameless(shape: Sequence[int]) -> list[str]:
     return [*("" if is_volume else known.get(len(shape), ""))] or [f"?{k}" for k in range(len(shape))]
 
 
-def axes_of(field: xarray.DataArray) -> list[Axis]:
-    """Return the axes of an array with labels, in the order they are stored.
+def axes_of(names: Sequence[Any], shape: Sequence[int], places: Mapping[Any, Any]) -> list[Axis]:
+    """Return the axes of an array with labels, as it is stored; `places` are coordinates [n] of some of them.
 
-    Attributes tell which of them run along x, y, z and time, as CF has them: `axis`, `standard_name`, `units`
-    of degrees and `positive`; else names do, such as lon or depth. cf_xarray knows both.
+    Attributes of these tell which axes run along x, y, z and time, as CF has them: `axis`, `standard_name`,
+    `units` of degrees and `positive`; else names do, such as lon or depth. cf_xarray knows both.
     """
     import cf_xarray
     import xarray
 
-    known = dict.fromkeys(field.dims, "")
+    known = dict.fromkeys(names, "")
     for criterion, pattern in cf_xarray.criteria.regex.items():
         if letter := LETTERS.get(criterion):
             known |= {name: letter for name in known if pattern.fullmatch(str(name).lower())}
-    labels = xarray.Dataset(coords=field.coords).cf  # an accessor keeps what it is of, and so its file open
-    for criterion, names in {**labels.axes, **labels.coordinates}.items():
+    sizes = dict(zip(names, shape, strict=True))
+    own = {name: places[name] for name, n in sizes.items() if getattr(places.get(name), "shape", ()) == (n,)}
+    coords = {name: (name, np.asarray(each[:]), attributes_of(each)) for name, each in own.items()}
+    labels = xarray.Dataset(coords=coords)
+    for criterion, named in {**labels.cf.axes, **labels.cf.coordinates}.items():
         if letter := LETTERS.get(criterion):
-            known |= {name: letter for name in names if name in known}
-    places = {name: field.coords[name] for name in known if name in field.coords}
-    return [along(str(name), field.sizes[name], places.get(name), known[name]) for name in known]
+            known |= dict.fromkeys(named, letter)
+    return [along(str(name), n, labels.coords.get(name), known[name]) for name, n in sizes.items()]
+
+
+def attributes_of(array: Any) -> dict[str, Any]:
+    """Return the attributes of CF that an array of h5py, Zarr or xarray has, with bytes as text."""
+    said = {key: np.ravel(array.attrs[key]) for key in CF if key in array.attrs}
+    is_text = {key for key, values in said.items() if values.dtype.kind in "SUO" and values.size == 1}
+    words = {key: said[key][0] for key in is_text}
+    return said | {k: v.decode(errors="replace") if isinstance(v, bytes) else v for k, v in words.items()}
 
 
 def along(name: str, size: int, places: xarray.DataArray | None = None, letter: str = "") -> Axis:

@@ -1,4 +1,4 @@
-"""Arrays with labels as sources: decoded as CF says, by xarray, and read in layers of whole chunks.
+"""Arrays with axes as sources: decoded as CF says, by xarray, and read in layers of whole chunks.
 
 Files are opened by the libraries of their formats: xarray's own engines give up on a group of HDF5 with a
 link to nowhere or a type that NetCDF lacks, and on one of Zarr in which a single array has no labels.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from functools import cache
+from math import ceil, prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,18 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
-from texgs.volume.axes import METRES, Axis, axes_of, lattice, picked, upright
+from texgs.volume.axes import (
+    CODES,
+    METRES,
+    NUMBERS,
+    PACKED,
+    UNSIGNED,
+    Axis,
+    axes_of,
+    lattice,
+    picked,
+    upright,
+)
 from texgs.volume.grid import Triple, require_room
 from texgs.volume.slabs import SLAB_BYTES, Source
 from texgs.volume.space import Space
@@ -28,11 +39,6 @@ if TYPE_CHECKING:
 SHARE = 4  # one layer takes this part of the free memory at most
 LISTED = 8  # arrays in a message
 EVERYTHING = (-np.inf, np.inf)
-# Attributes of CF: what stands for missing samples; how packed ones are scaled; which are valid; and others.
-CODES, PACKED = ("_FillValue", "missing_value"), {"scale_factor", "add_offset"}
-NUMBERS = (*CODES, *PACKED, "valid_min", "valid_max", "valid_range")
-UNSIGNED = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
-CF = (*NUMBERS, UNSIGNED, "axis", "standard_name", "long_name", "units", "positive")
 
 
 class LayerSource(Source):
@@ -44,11 +50,12 @@ class LayerSource(Source):
 
     Args:
         name: of the file, for messages.
-        field: as it is stored, read where it is indexed; attributes of CF say how to decode it.
+        array: what is read where it is indexed, with a shape and a type.
+        axes: of the array.
+        attributes: those of CF, which say how samples are decoded.
         given: spacing and origin that replace those of the axes.
         channel: label or number of one of several.
         time: step of several.
-        axes: where they are not those of the labels.
         chunks: samples along each axis that are stored in one piece.
         note: for the user.
     """
@@ -56,16 +63,17 @@ class LayerSource(Source):
     def __init__(
         self,
         name: str | Path,
-        field: xarray.DataArray,
+        array: Any,
+        axes: Sequence[Axis],
+        attributes: Mapping[str, Any],
         given: tuple[Triple | None, Triple | None],
         channel: str | None = None,
         time: int | None = None,
         *,
-        axes: Sequence[Axis] | None = None,
         chunks: Sequence[int] | None = None,
         note: str = "",
     ) -> None:
-        self._name, axes = name, axes or axes_of(field)
+        self._name, self._array = name, array
         self._index = picked(axes, channel, time)
         space = [k for k, index in enumerate(self._index) if isinstance(index, slice)]
         self._turn, guess = upright([axes[k] for k in space])
@@ -73,10 +81,8 @@ class LayerSource(Source):
         self._z = space[self._turn[0]]
         self._signs = [-1 if axis.step < 0 else 1 for axis in (z, y, x)]
         spacing, origin, remark = lattice((x, y, z), *given)
-        self._samples, self._valid = decoded(field)
-        is_float = [each.dtype.kind == "f" for each in (field, self._samples)]
-        is_masked = is_float == [False, True] or self._valid != EVERYTHING
-        dtype = np.dtype(np.float32) if is_masked else self._samples.dtype
+        self._coding = coding_of(attributes, array.dtype)
+        dtype = decoded(np.empty(0, array.dtype), self._coding).dtype
         super().__init__(Path(name).name, (x.size, y.size, z.size), dtype, spacing, origin)
         self.space = Space(unit=x.unit if x.unit in METRES and not remark else "")
         self.take(axes, self._index)
@@ -96,10 +102,7 @@ class LayerSource(Source):
             self._part(first, max(low, first), min(high, first + self._depth))[::sign] for first in firsts
         ]
         values = np.concatenate(parts)[:, :: signs[0], :: signs[1]]
-        if self._valid != EVERYTHING:
-            values = np.where((values < self._valid[0]) | (values > self._valid[1]), np.nan, values)
-        with np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
-            return values.astype(self.dtype, copy=False)
+        return values.astype(self.dtype, copy=False)
 
     def _part(self, first: int, low: int, high: int) -> np.ndarray:
         """Return slices low to high - 1, as they are stored, of the layer that begins with `first`."""
@@ -108,7 +111,8 @@ class LayerSource(Source):
             index = list(self._index)
             index[self._z] = slice(first, min(first + self._depth, self.dims[2]))
             with reading_as("an array that is whole", where=f"{self._name}: "):
-                self._layer = self._samples[tuple(index)].values.transpose(self._turn)
+                samples = np.asarray(self._array[tuple(index)]).transpose(self._turn)
+                self._layer = decoded(samples, self._coding)
             self._first = first
         return self._layer[low - first : high - first]
 
@@ -134,61 +138,61 @@ def one_of(arrays: Mapping[str, Any], variable: str | None) -> str:
     )
 
 
-def lazy(array: Any, names: Sequence[str], places: Mapping[str, Any]) -> xarray.DataArray:
-    """Return an array of h5py or Zarr with labels, whose samples are read when it is indexed.
+def labelled(
+    name: str | Path, field: xarray.DataArray, given: tuple[Triple | None, Triple | None], **keys: Any
+) -> LayerSource:
+    """Return an array of xarray, whose labels say where its axes run; keys are those of `LayerSource`."""
+    axes = axes_of(field.dims, field.shape, field.coords)
+    chunks = field.encoding.get("chunksizes")
+    return LayerSource(name, field.variable, axes, field.attrs, given, chunks=chunks, **keys)
 
-    `places` are arrays with the coordinates [n] of some of its axes.
+
+def gaps_in(array: Any, pieces: Sequence[int], n_written: int, fill: Any) -> str:
+    """Say how many pieces of an array were never written or are lost, if any, and what stands for them."""
+    count = prod(ceil(n / size) for n, size in zip(array.shape, pieces, strict=True))
+    missing = count - n_written
+    return f"{missing} of {count} chunks are not there and count as {fill}" if missing else ""
+
+
+def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> dict[str, Any]:
+    """Return what attributes of CF say of samples of a type, as numbers [n]; they may be written as text.
+
+    Codes are as samples have them, which may have fewer digits.
+    """
+    said: dict[str, Any] = {}
+    for key in (each for each in NUMBERS if np.size(attributes.get(each, ())) > 0):
+        values = np.ravel(attributes[key])
+        try:
+            values = values if values.dtype.kind in "iuf" else values.astype(np.float64)
+        except ValueError:
+            raise ArgumentError(
+                f"{key}: expected a number, got {attributes[key]}; correct the file"
+            ) from None
+        with np.errstate(over="ignore"):
+            said[key] = values.astype(dtype) if key in CODES and dtype.kind == "f" else values
+    if str(attributes.get(UNSIGNED, "")).lower() == "true" and dtype.kind == "i":
+        said[UNSIGNED] = "true"
+    return said
+
+
+def decoded(values: np.ndarray, said: Mapping[str, Any]) -> np.ndarray:
+    """Return samples as `coding_of` says they are: packed ones are scaled, NaN stands for those that miss.
+
+    Integers become float32 where any of this is said.
     """
     import xarray
 
-    coords = {name: (name, each[:], attributes_of(each)) for name, each in places.items()}
-    samples = xarray.core.indexing.LazilyIndexedArray(_backend()(array))
-    return xarray.DataArray(samples, coords, names, attrs=attributes_of(array))
-
-
-@cache
-def _backend() -> type:
-    """Return the class of arrays in files that xarray indexes; made late, as xarray takes half a second."""
-    from xarray.backends import BackendArray
-    from xarray.core.indexing import IndexingSupport, explicit_indexing_adapter
-
-    class StoredArray(BackendArray):
-        def __init__(self, array: Any) -> None:
-            self.array, self.shape, self.dtype = array, array.shape, array.dtype
-
-        def __getitem__(self, key: Any) -> Any:
-            read = self.array.__getitem__
-            return explicit_indexing_adapter(key, self.shape, IndexingSupport.BASIC, read)
-
-    return StoredArray
-
-
-def attributes_of(array: Any) -> dict[str, Any]:
-    """Return the attributes of CF that an array of h5py or Zarr has, with bytes as text."""
-    said = {key: np.ravel(array.attrs[key]) for key in CF if key in array.attrs}
-    is_text = {key for key, values in said.items() if values.dtype.kind in "SUO" and values.size == 1}
-    words = {key: said[key][0] for key in is_text}
-    return said | {k: v.decode(errors="replace") if isinstance(v, bytes) else v for k, v in words.items()}
-
-
-def decoded(field: xarray.DataArray) -> tuple[xarray.Variable, tuple[float, float]]:
-    """Return samples, still to be read, as attributes of CF say they are, and the range that is valid.
-
-    Packed ones are scaled; NaN stands for each code of missing ones. Numbers may be written as text.
-    """
-    import xarray
-
-    said = {key: numbers(key, field) for key in NUMBERS if np.size(field.attrs.get(key, ())) > 0}
-    coding: dict[str, Any] = {key: said[key] for key in CODES if key in said}
+    coding = {key: said[key] for key in (*CODES, UNSIGNED) if key in said}
     coding |= {key: float(said[key][0]) for key in PACKED if key in said}
-    if str(field.attrs.get(UNSIGNED, "")).lower() == "true" and field.dtype.kind == "i":
-        coding[UNSIGNED] = "true"
-    samples = field.variable.copy(deep=False)
-    samples.attrs = coding
-    with warnings.catch_warnings():
+    stored = xarray.Variable([*map(str, range(values.ndim))], values, coding)
+    with warnings.catch_warnings(), np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
         warnings.simplefilter("ignore", xarray.SerializationWarning)  # of several codes
-        samples = xarray.decode_cf(xarray.Dataset({"field": samples}), decode_times=False)["field"].variable
-    return samples, valid_range(said)
+        samples = xarray.conventions.decode_cf_variable("field", stored, decode_times=False).values
+        low, high = valid_range(said)
+        if (low, high) != EVERYTHING:
+            samples = np.where((samples < low) | (samples > high), np.nan, samples)
+        is_new = samples.dtype.kind == "f" != values.dtype.kind
+        return samples.astype(np.float32) if is_new else samples
 
 
 def valid_range(said: Mapping[str, np.ndarray]) -> tuple[float, float]:
@@ -200,14 +204,3 @@ def valid_range(said: Mapping[str, np.ndarray]) -> tuple[float, float]:
     scale, offset = said.get("scale_factor", [1.0])[0], said.get("add_offset", [0.0])[0]
     first, last = sorted((float((low - 0.5) * scale + offset), float((high + 0.5) * scale + offset)))
     return first, last
-
-
-def numbers(key: str, field: xarray.DataArray) -> np.ndarray:
-    """Return the numbers [n] of an attribute; codes as samples have them, which may have fewer digits."""
-    values = np.ravel(field.attrs[key])
-    try:
-        values = values if values.dtype.kind in "iuf" else values.astype(np.float64)
-    except ValueError:
-        raise ArgumentError(f"{key}: expected a number, got {field.attrs[key]}; correct the file") from None
-    with np.errstate(over="ignore"):
-        return values.astype(field.dtype) if key in CODES and field.dtype.kind == "f" else values

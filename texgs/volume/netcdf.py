@@ -1,9 +1,8 @@
 """HDF5 and NetCDF-4, by h5py, and classic NetCDF, by xarray: VTK fills up what is cut off with zeros."""
 
 import posixpath
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from importlib import import_module
-from math import ceil, prod
 from pathlib import Path
 from typing import Any
 
@@ -11,17 +10,16 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
-from texgs.volume.axes import nameless
+from texgs.volume.axes import Axis, attributes_of, axes_of, nameless
 from texgs.volume.grid import Triple
-from texgs.volume.layers import LayerSource, lazy, one_of
+from texgs.volume.layers import LayerSource, gaps_in, labelled, one_of
 
 CLASSIC = (b"CDF\x01", b"CDF\x02")  # the latter with offsets of 64 bits
 NO_COORDINATES = b"This is a netCDF dimension but not a netCDF variable"  # begins the NAME of such a scale
-# NetCDF's values of samples that were never written, where a file names none; bytes have none.
-NEVER_WRITTEN: dict[str, float] = {
-    **{"i2": -32767, "u2": 2**16 - 1, "i4": 1 - 2**31, "u4": 2**32 - 1, "i8": 2 - 2**63, "u8": 2**64 - 2},
-    **{"f4": 9.969209968386869e36, "f8": 9.969209968386869e36},
-}
+# What names the samples of NetCDF that were never written, where a file does not; bytes have none.
+INTEGERS = {"i2": -32767, "u2": 2**16 - 1, "i4": 1 - 2**31, "u4": 2**32 - 1, "i8": 2 - 2**63, "u8": 2**64 - 2}
+CODES = INTEGERS | dict.fromkeys(("f4", "f8"), 9.969209968386869e36)
+NEVER_WRITTEN: dict[str, dict[str, Any]] = {dtype: {"_FillValue": code} for dtype, code in CODES.items()}
 
 
 def open_netcdf(
@@ -37,28 +35,21 @@ def open_netcdf(
             "expected NetCDF-4 or classic NetCDF, got another one; convert it: nccopy -k nc4 OLD.nc NEW.nc"
         )
     with reading_as("an HDF5 or NetCDF file"):
-        opener = _classic if start in CLASSIC else _hdf5
-        field, more = opener(path, variable)
-        return LayerSource(path, field, (spacing, origin), **more, **keys)
+        return (_classic if start in CLASSIC else _hdf5)(path, variable, (spacing, origin), **keys)
 
 
-def _classic(path: Path, variable: str | None) -> tuple[Any, dict[str, Any]]:
-    """Return a variable of classic NetCDF, and nothing more about it."""
+def _classic(path: Path, variable: str | None, given: Any, **keys: Any) -> LayerSource:
+    """Open a variable of classic NetCDF."""
     import xarray
 
     file = xarray.open_dataset(path, engine="scipy", decode_cf=False, cache=False)
     field = file[one_of({str(name): file[name] for name in file.variables}, variable)]
-    return field.assign_attrs(never_written(field) | field.attrs), {}
+    code = NEVER_WRITTEN.get(field.dtype.str[1:], {})
+    return labelled(path, field.assign_attrs(code | field.attrs), given, **keys)
 
 
-def never_written(array: Any) -> dict[str, Any]:
-    """Return the attribute that names the value of samples of NetCDF that were never written."""
-    code = NEVER_WRITTEN.get(np.dtype(array.dtype).str[1:])
-    return {} if code is None else {"_FillValue": code}
-
-
-def _hdf5(path: Path, variable: str | None) -> tuple[Any, dict[str, Any]]:
-    """Return an array of HDF5, with what `LayerSource` needs to know about it."""
+def _hdf5(path: Path, variable: str | None, given: Any, **keys: Any) -> LayerSource:
+    """Open an array of HDF5."""
     import h5py
 
     with suppress(ImportError):
@@ -78,46 +69,47 @@ def _hdf5(path: Path, variable: str | None) -> tuple[Any, dict[str, Any]]:
         arrays[asked] = file[asked]
     array = arrays[one_of(arrays, variable)]
     require_filters(array)
-    require_sources(array)
-    field = lazy(array, *labels_of(array))
+    if array.is_virtual:
+        require_sources(array)
+    chunks, attributes, gaps = array.chunks, attributes_of(array), ""
     if "_NCProperties" in file.attrs:
-        field = field.assign_attrs(never_written(field) | field.attrs)
-    notes = [gaps_in(array), *(f"{name} {what}" for name, what in broken.items())]
-    return field, {"chunks": array.chunks, "note": "; ".join(filter(None, notes))}
+        attributes = NEVER_WRITTEN.get(array.dtype.str[1:], {}) | attributes
+    if chunks and not array.is_virtual:
+        gaps = gaps_in(array, chunks, array.id.get_num_chunks(), array.fillvalue)
+    note = "; ".join(filter(None, (gaps, *(f"{name} {what}" for name, what in broken.items()))))
+    return LayerSource(path, array, labels_of(array), attributes, given, chunks=chunks, note=note, **keys)
 
 
-def labels_of(array: Any) -> tuple[list[str], dict[str, Any]]:
-    """Return the names of the axes of an array, and the scales of dimensions that hold their coordinates."""
+def labels_of(array: Any) -> list[Axis]:
+    """Return the axes of an array by their labels, and by the scales of dimensions with coordinates."""
     scales = [axis[0] if len(axis) else None for axis in array.dims]
     labels = [axis.label or f"?{k}" for k, axis in enumerate(array.dims)]
     pairs = zip(scales, labels, strict=True)
     names = [label if scale is None else posixpath.basename(scale.name) for scale, label in pairs]
     if len({*names}) < len(names) or all(name.startswith("?") for name in names):
-        return nameless(array.shape), {}
-    rows = zip(names, scales, array.shape, strict=True)
-    return names, {name: x for name, x, n in rows if x is not None and x.shape == (n,) and _is_array(x)}
+        return axes_of(nameless(array.shape), array.shape, {})
+    places = {name: scale for name, scale in zip(names, scales, strict=True) if _is_array(scale)}
+    return axes_of(names, array.shape, places)
 
 
 def arrays_in(file: Any) -> tuple[dict[str, Any], dict[str, str]]:
     """Return arrays by their paths, also those behind links; and what is missing, by the paths of links."""
     import h5py
 
-    items: dict[str, Any] = {}
     links: dict[str, Any] = {}
-    file.visititems(lambda name, item: items.update({name: item}))
+    names: dict[Any, str] = {}  # of each item, once
+    broken: dict[str, str] = {}
+    file.visititems(lambda name, item: names.update({item: name}))
     file.visititems_links(lambda name, link: links.update({name: link}))
-    broken, own = {}, [*items.values()]
     for name, link in links.items():
-        if isinstance(link, h5py.HardLink):
-            continue
         item = file.get(name)
         if item is None:
             broken[name] = f"links to {getattr(link, 'filename', link.path)}, which is not there"
-        elif item not in own:
-            items[name] = item
+        elif item not in names:
+            names[item] = name
             if isinstance(item, h5py.Group):
-                item.visititems(lambda below, each, name=name: items.update({f"{name}/{below}": each}))
-    return {name: item for name, item in items.items() if _is_array(item)}, broken
+                item.visititems(lambda below, each, name=name: names.update({each: f"{name}/{below}"}))
+    return {name: item for item, name in names.items() if _is_array(item)}, broken
 
 
 def require_filters(array: Any) -> None:
@@ -135,31 +127,19 @@ def require_sources(array: Any) -> None:
     """Require the arrays that a virtual one is made of: HDF5 gives its fill value for what is not there."""
     import h5py
 
-    if not array.is_virtual:
-        return
-    folder = Path(array.file.filename).parent
-    for name, part in {(source.file_name, source.dset_name) for source in array.virtual_sources()}:
-        file = array.file.filename if name == "." else name
-        if "%" in file:  # a pattern, of which HDF5 takes all that there are
+    own = Path(array.file.filename)
+    for name, part in {(each.file_name, each.dset_name) for each in array.virtual_sources()}:
+        places = [own] if name == "." else [own.parent / name, Path(name)]
+        if "%" in name:  # a pattern, of which HDF5 takes all that there are
             continue
-        places = [place for place in (folder / file, Path(file)) if place.is_file()]
-        if not places:
-            raise ArgumentError(f"{array.name}: expected its part {name}, which is not there; put it there")
-        with h5py.File(places[0], "r") as source:
+        place = next(filter(Path.is_file, places), None)
+        with h5py.File(place, "r") if place else nullcontext({}) as source:
             if part not in source:
                 raise ArgumentError(
-                    f"{array.name}: expected {part} in its part {name}, found none; is it whole?"
+                    f"{array.name}: expected its part {part} of {name}, which is not there; put it there"
                 )
-            require_sources(source[part])
-
-
-def gaps_in(array: Any) -> str:
-    """Say how many chunks of an array were never written, if any."""
-    if array.is_virtual or not array.chunks:
-        return ""
-    count = prod(ceil(n / size) for n, size in zip(array.shape, array.chunks, strict=True))
-    missing = count - array.id.get_num_chunks()
-    return f"{missing} of {count} chunks were never written and count as {array.fillvalue}" if missing else ""
+            if source[part].is_virtual:
+                require_sources(source[part])
 
 
 def _is_array(item: Any) -> bool:

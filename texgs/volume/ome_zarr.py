@@ -18,9 +18,9 @@ import numpy as np
 from texgs.core.io import reading_as
 from texgs.core.memory import room_for_volume
 from texgs.core.names import is_number
-from texgs.volume.axes import Axis, Channel, nameless
+from texgs.volume.axes import Axis, Channel, attributes_of, axes_of, nameless
 from texgs.volume.grid import Triple
-from texgs.volume.layers import LayerSource, lazy, one_of
+from texgs.volume.layers import LayerSource, gaps_in, one_of
 
 METADATA = ("zarr.json", ".zgroup", ".zarray")  # files of a node: of format 3, and of format 2
 SHORT: dict[Any, str] = {"time": "t", "channel": "c"}  # names of axes, by types of OME-Zarr
@@ -53,34 +53,19 @@ def open_zarr(
         if name in images:
             name, note = _fitting(list(images[name]), nodes)
         known = {level: axes for levels in images.values() for level, axes in levels.items()}
-        array, axes = nodes[name], known.get(name)
-        names, places = ([axis.name for axis in axes], {}) if axes else _labels(name, nodes)
-        field = lazy(array, names, places).assign_attrs(_fill_value(array))
-        note = "; ".join(filter(None, (note, _gaps_in(array))))
-        return LayerSource(path, field, (spacing, origin), axes=axes, chunks=array.chunks, note=note, **keys)
-
-
-def _fill_value(array: Any) -> dict[str, Any]:
-    """Return the attribute that names missing samples where xarray has written it in other ways than CF."""
-    code = array.attrs.get("_FillValue")
-    if isinstance(code, str):  # a number, packed, in format 3
-        return {"_FillValue": np.frombuffer(b64decode(code), "<f8")}
-    is_of_xarray = array.metadata.zarr_format == 2 and "_ARRAY_DIMENSIONS" in array.attrs
-    return (
-        {}
-        if code is not None or not is_of_xarray or array.fill_value is None
-        else {"_FillValue": array.fill_value}
-    )
-
-
-def _gaps_in(array: Any) -> str:
-    """Say how many chunks of an array are not there, if any."""
-    missing = array.nchunks - array.nchunks_initialized
-    return (
-        f"{missing} of {array.nchunks} chunks are not there and count as {array.fill_value}"
-        if missing
-        else ""
-    )
+        array = nodes[name]
+        axes, attributes = known.get(name) or _labels(name, nodes), attributes_of(array)
+        # The code of missing samples as xarray writes it: in format 2 by other means, in format 3 packed.
+        is_of_xarray = array.metadata.zarr_format == 2 and "_ARRAY_DIMENSIONS" in array.attrs
+        if is_of_xarray and array.fill_value is not None:
+            attributes = {"_FillValue": array.fill_value, **attributes}
+        if isinstance(code := attributes.get("_FillValue"), str):
+            attributes["_FillValue"] = np.frombuffer(b64decode(code), "<f8")
+        pieces = array.shards or array.chunks
+        n_written = array.nchunks_initialized * prod(array.chunks) // prod(pieces)
+        gaps = gaps_in(array, pieces, n_written, array.fill_value)
+        note, chunks = "; ".join(filter(None, (note, gaps))), array.chunks
+        return LayerSource(path, array, axes, attributes, (spacing, origin), chunks=chunks, note=note, **keys)
 
 
 def _root(path: Path) -> Any:
@@ -148,12 +133,11 @@ def _fitting(levels: list[str], nodes: Mapping[str, Any]) -> tuple[str, str]:
     return name, "" if name == levels[0] else f"{note}; dataset.volume.variable={levels[0]} takes the finest"
 
 
-def _labels(name: str, nodes: Mapping[str, Any]) -> tuple[list[str], dict[str, Any]]:
-    """Return the names of the axes of an array that is no level, and the coordinates that are beside it."""
+def _labels(name: str, nodes: Mapping[str, Any]) -> list[Axis]:
+    """Return the axes of an array that is no level, by their names and the coordinates that are beside it."""
     array, folder = nodes[name], posixpath.dirname(name)
     names = getattr(array.metadata, "dimension_names", None) or array.attrs.get("_ARRAY_DIMENSIONS")
     if not names or None in names:
-        return nameless(array.shape), {}
-    beside = {each: nodes.get(posixpath.join(folder, each)) for each in names}
-    sizes = dict(zip(names, array.shape, strict=True))
-    return list(names), {k: x for k, x in beside.items() if getattr(x, "shape", ()) == (sizes[k],)}
+        return axes_of(nameless(array.shape), array.shape, {})
+    places = {each: nodes.get(posixpath.join(folder, each)) for each in names}
+    return axes_of(names, array.shape, places)
