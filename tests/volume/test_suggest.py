@@ -9,7 +9,6 @@ from texgs.volume.axes import Channel
 from texgs.volume.grid import Grid
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
-from texgs.volume.suggest import suggest
 from texgs.volume.suggest import suggested as of_summary
 from texgs.volume.transfer import check_disjoint
 
@@ -25,6 +24,11 @@ CT = normal((-1000, 20, 500_000), (40, 60, 200_000), (1200, 150, 50_000)).clip(-
 AIR = normal((0, 5, 500_000), (100, 10, 100_000))
 
 
+def suggest(counts, low, high, count=None, channel=None):
+    """Functions for a histogram alone."""
+    return of_summary({"histogram": counts, "minimum": low, "maximum": high}, count, channel)
+
+
 def suggested(values, count=None):
     """Functions for the histogram of values, with what holds for every suggestion, and the range."""
     low, high = float(np.min(values)), float(np.max(values))
@@ -35,7 +39,9 @@ def suggested(values, count=None):
 def check(basic, low, high):
     check_disjoint(basic)
     assert list(basic) == [f"TF{i + 1:02d}" for i in range(len(basic))]
-    assert all(low <= tf.support[0] < tf.support[1] <= high for tf in basic.values())
+    slack = 1e-5 * (high - low)  # numbers are short
+    ends = [(tf.support[0] + slack, tf.support[1] - slack) for tf in basic.values()]
+    assert all(low <= first < last <= high for first, last in ends)
     supports = [tf.support for tf in basic.values()]
     assert supports == sorted(supports)
     peaks = [max(alpha for _, alpha in tf.opacity) for tf in basic.values()]

@@ -25,7 +25,7 @@ METRES |= dict.fromkeys(("um", "µm", "μm", "micron", "microns"), 1e-6) | {"ang
 # What CF and cf_xarray call axes, and the letters that they have here.
 LETTERS = {"X": "x", "longitude": "x", "Y": "y", "latitude": "y", "Z": "z", "vertical": "z", "T": "t"}
 # Attributes of CF: what stands for missing samples; how packed ones are scaled; which are valid; and others.
-CODES, PACKED = ("_FillValue", "missing_value"), {"scale_factor", "add_offset"}
+CODES, PACKED = ("_FillValue", "missing_value"), {"scale_factor": 1.0, "add_offset": 0.0}
 NUMBERS = (*CODES, *PACKED, "valid_min", "valid_max", "valid_range")
 UNSIGNED = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
 CF = (*NUMBERS, UNSIGNED, "axis", "standard_name", "long_name", "units", "positive")

@@ -82,7 +82,7 @@ class LayerSource(Source):
         self._signs = [-1 if axis.step < 0 else 1 for axis in (z, y, x)]
         spacing, origin, remark = lattice((x, y, z), *given)
         self._coding = coding_of(attributes, array.dtype)
-        dtype = decoded(np.empty(0, array.dtype), self._coding).dtype
+        dtype = decoded(np.empty(0, array.dtype), *self._coding).dtype
         super().__init__(Path(name).name, (x.size, y.size, z.size), dtype, spacing, origin)
         self.space = Space(unit=x.unit if x.unit in METRES and not remark else "")
         self.take(axes, self._index)
@@ -112,7 +112,7 @@ class LayerSource(Source):
             index[self._z] = slice(first, min(first + self._depth, self.dims[2]))
             with reading_as("an array that is whole", where=f"{self._name}: "):
                 samples = np.asarray(self._array[tuple(index)]).transpose(self._turn)
-                self._layer = decoded(samples, self._coding)
+                self._layer = decoded(samples, *self._coding)
             self._first = first
         return self._layer[low - first : high - first]
 
@@ -154,12 +154,13 @@ def gaps_in(array: Any, pieces: Sequence[int], n_written: int, fill: Any) -> str
     return f"{missing} of {count} chunks are not there and count as {fill}" if missing else ""
 
 
-def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> dict[str, Any]:
-    """Return what attributes of CF say of samples of a type, as numbers [n]; they may be written as text.
+def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> tuple[dict[str, Any], tuple[float, float]]:
+    """Return how samples of a type are coded, by attributes of CF, and the range of those that are valid.
 
-    Codes are as samples have them, which may have fewer digits.
+    Numbers may be written as text. Codes are as samples have them, which may have fewer digits. The range is
+    that after decoding; one of whole numbers is of packed samples.
     """
-    said: dict[str, Any] = {}
+    said: dict[str, np.ndarray] = {}
     for key in (each for each in NUMBERS if np.size(attributes.get(each, ())) > 0):
         values = np.ravel(attributes[key])
         try:
@@ -170,37 +171,30 @@ def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> dict[str, Any]:
             ) from None
         with np.errstate(over="ignore"):
             said[key] = values.astype(dtype) if key in CODES and dtype.kind == "f" else values
+    coding: dict[str, Any] = {key: said[key] for key in CODES if key in said}
+    coding |= {key: float(said[key][0]) for key in PACKED if key in said}
     if str(attributes.get(UNSIGNED, "")).lower() == "true" and dtype.kind == "i":
-        said[UNSIGNED] = "true"
-    return said
+        coding[UNSIGNED] = "true"
+    low, high = said.get("valid_range", EVERYTHING)
+    low, high = said.get("valid_min", [low])[0], said.get("valid_max", [high])[0]
+    if coding.keys() & PACKED and any(np.asarray(end).dtype.kind in "iu" for end in (low, high)):
+        scale, offset = (coding.get(key, default) for key, default in PACKED.items())
+        low, high = sorted(((low - 0.5) * scale + offset, (high + 0.5) * scale + offset))
+    return coding, (float(low), float(high))
 
 
-def decoded(values: np.ndarray, said: Mapping[str, Any]) -> np.ndarray:
+def decoded(values: np.ndarray, coding: Mapping[str, Any], valid: tuple[float, float]) -> np.ndarray:
     """Return samples as `coding_of` says they are: packed ones are scaled, NaN stands for those that miss.
 
     Integers become float32 where any of this is said.
     """
     import xarray
 
-    coding = {key: said[key] for key in (*CODES, UNSIGNED) if key in said}
-    coding |= {key: float(said[key][0]) for key in PACKED if key in said}
     stored = xarray.Variable([*map(str, range(values.ndim))], values, coding)
     with warnings.catch_warnings(), np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
         warnings.simplefilter("ignore", xarray.SerializationWarning)  # of several codes
         samples = xarray.conventions.decode_cf_variable("field", stored, decode_times=False).values
-        low, high = valid_range(said)
-        if (low, high) != EVERYTHING:
-            samples = np.where((samples < low) | (samples > high), np.nan, samples)
+        if valid != EVERYTHING:
+            samples = np.where((samples < valid[0]) | (samples > valid[1]), np.nan, samples)
         is_new = samples.dtype.kind == "f" != values.dtype.kind
         return samples.astype(np.float32) if is_new else samples
-
-
-def valid_range(said: Mapping[str, np.ndarray]) -> tuple[float, float]:
-    """Return the least and the largest valid sample, after decoding; whole numbers are of packed samples."""
-    low, high = said.get("valid_range", EVERYTHING)
-    low, high = said.get("valid_min", [low])[0], said.get("valid_max", [high])[0]
-    if not said.keys() & PACKED or np.asarray(high).dtype.kind == "f":
-        return float(low), float(high)
-    scale, offset = said.get("scale_factor", [1.0])[0], said.get("add_offset", [0.0])[0]
-    first, last = sorted((float((low - 0.5) * scale + offset), float((high + 0.5) * scale + offset)))
-    return first, last

@@ -52,12 +52,11 @@ def _axis(text: str, values: Sequence[int]) -> Axis:
 
 def _require_even(files: dict[int, Path]) -> None:
     """Require that the numbers of slices, each with a file, have no gap."""
-    numbers = sorted(files)
-    step = min(after - before for before, after in pairwise(numbers))
-    for before, after in pairwise(numbers):
+    pairs = list(pairwise(sorted(files)))
+    step = min(after - before for before, after in pairs)
+    for before, after in pairs:
         if after - before != step:
             raise ArgumentError(
                 f"{files[before].name} and {files[after].name}: expected numbers {step} apart, as of other "
-                f"slices, got {after - before}: some are missing; add them, or rename the files if these are "
-                "all"
+                f"slices, got {after - before}; add those that are missing, or rename the files"
             )

@@ -6,7 +6,7 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Channel
@@ -40,21 +40,6 @@ BELOW = 0.1  # of the foreground's voxels, that makes values below the backgroun
 def suggested(
     known: Mapping[str, Any], count: int | None = None, channel: Channel | None = None
 ) -> dict[str, TransferFunction]:
-    """Propose functions with short numbers from the robust histogram of a `Summary`, see `suggest`."""
-    known = known.get("robust") or known
-    low, high, scale = known["minimum"], known["maximum"], known.get("scale", "linear")
-    basic = suggest(known["histogram"], low, high, count, channel, scale)
-    return {name: tf.rounded(low, high) for name, tf in basic.items()}
-
-
-def suggest(
-    histogram: ArrayLike,
-    minimum: float,
-    maximum: float,
-    count: int | None = None,
-    channel: Channel | None = None,
-    scale: str = "linear",
-) -> dict[str, TransferFunction]:
     """Propose basic transfer functions with disjoint supports: TF01, TF02, ... in ascending order of value.
 
     The background, the most frequent value and what is around it, is left out. What remains is cut at the
@@ -62,18 +47,19 @@ def suggest(
     falls, at thresholds of least variance (Otsu 1979) on the log histogram. Where values are in at most 32
     of the bins, apart, they are taken for labels, the lowest for background. Higher values are more opaque.
 
-    The histogram counts voxels in equal bins over [minimum, maximum], or over the logarithms of these where
-    its scale is "log"; two of them are not 0. There are
-    `count` functions, fewer where there are fewer values; by default what shows, at most 5. Of a channel with
-    a window it is one by default, see `windowed`.
+    It is the histogram of a `Summary`, the robust one if there is, with two bins that are not empty. There
+    are `count` functions, fewer where there are fewer values; by default what shows, at most 5. Of a channel
+    with a window it is one by default, see `windowed`. Their numbers are short.
     """
     if count is not None and (not isinstance(count, Integral) or count < 1):
         raise ArgumentError(f"count: expected a whole number from 1 on, got {count!r}")
-    if count is None and channel and (shown := windowed(channel, minimum, maximum)):
-        return {"TF01": shown}
-    to, back = (np.log, np.exp) if scale == "log" else (float, float)
-    minimum, maximum = float(to(minimum)), float(to(maximum))
-    counts = np.asarray(histogram, dtype=np.float64)
+    known = known.get("robust") or known
+    low, high = known["minimum"], known["maximum"]
+    if count is None and channel and (shown := windowed(channel, low, high)):
+        return {"TF01": shown.rounded(low, high)}
+    to, back = (np.log, np.exp) if known.get("scale") == "log" else (float, float)
+    minimum, maximum = float(to(low)), float(to(high))
+    counts = np.asarray(known["histogram"], dtype=np.float64)
     values = minimum + (np.arange(len(counts)) + 0.5) * (maximum - minimum) / len(counts)
     present = counts > 0
     if looks_like_labels(counts, maximum - minimum):
@@ -84,10 +70,11 @@ def suggest(
         classes = _materials(counts, count)
     edges = np.concatenate([[minimum], (values[1:] + values[:-1]) / 2, [maximum]])
     opacities = np.geomspace(0.08, 0.6, len(classes)) if len(classes) > 1 else [ALONE]
-    return {
-        f"TF{i + 1:02d}": _trapezoid(edges[start], edges[stop], opacities[i], i, (minimum, maximum), back)
+    basic = [
+        _trapezoid(edges[start], edges[stop], opacities[i], i, (minimum, maximum), back).rounded(low, high)
         for i, (start, stop) in enumerate(classes)
-    }
+    ]
+    return {f"TF{i:02d}": tf for i, tf in enumerate(basic, start=1)}
 
 
 def windowed(channel: Channel, low: float, high: float) -> TransferFunction | None:

@@ -28,19 +28,18 @@ class PageSource(Source):
     """Slices that are pages of TIFF files, decoded when they are asked for.
 
     `pages` are the file of every z slice and where its header begins there, 0 for that of the first page;
-    `shape` is Y and X of each, `lattice` spacing and origin.
+    `kind` is Y and X of each and the type of samples, `lattice` spacing and origin.
     """
 
     def __init__(
         self,
         path: Path,
         pages: Sequence[tuple[Path, int]],
-        shape: tuple[int, int],
-        dtype: np.dtype,
+        kind: tuple[tuple[int, int], np.dtype],
         lattice: tuple[Triple, Triple],
     ) -> None:
-        super().__init__(path.name, (shape[1], shape[0], len(pages)), dtype, *lattice)
-        self._pages, self._shape = pages, shape
+        self._pages, (self._shape, dtype) = pages, kind
+        super().__init__(path.name, (*self._shape[::-1], len(pages)), dtype, *lattice)
 
     def slices(self, start: int, stop: int) -> np.ndarray:
         """Return samples [stop - start, Y, X]; row 0 of a page is y = 0."""
@@ -96,19 +95,19 @@ def open_tiff(
         if is_slices and len(tiff.pages) != 1:
             raise ArgumentError(f"expected one page per file, got {len(tiff.pages)} in {files[0].name}")
         one, note = chosen(images, image, None if path.is_dir() else tiff)
-        shape, dtype = _page_type(one.keyframe)
+        kind = _kind(one.keyframe)
         told, labels = told_of(one, tiff, images)
         axes, remark = axes_of(one, labels)
         if is_slices:
             axes, files = arranged(files)
-        index = picked([*axes, Axis("Y", shape[0]), Axis("X", shape[1])], channel, time)
+        index = picked([*axes, *map(Axis, "YX", kind[0])], channel, time)
         sizes = [axis.size for axis in axes]
         numbers = np.arange(prod(sizes)).reshape(sizes)[tuple(index[:-2])]  # of the planes of z slices
         lattice = (spacing or told or ONES, origin or ZEROS)
         if is_slices:
-            source: Source = PageSource(path, [(files[k], 0) for k in numbers], shape, dtype, lattice)
+            source: Source = PageSource(path, [(files[k], 0) for k in numbers], kind, lattice)
         else:
-            source = _of_planes(path, one, numbers, (prod(sizes), *shape), lattice)
+            source = _of_planes(path, one, numbers, (prod(sizes), *kind[0]), lattice)
     source.take(axes, index)
     source.note = "; ".join(filter(None, (note, remark, source.note, "" if spacing or told else NO_SPACING)))
     return source
@@ -132,12 +131,12 @@ def _of_planes(
         pages = pages[part]
     require_pages(image, pages)
     if is_page_each and all(page.offset for page in pages):
-        return PageSource(path, [(file_of(page), page.offset) for page in pages], whole[1:], dtype, lattice)
+        return PageSource(path, [(file_of(page), page.offset) for page in pages], (whole[1:], dtype), lattice)
     require_room(whole[::-1], dtype)
     return ArraySource(Grid(image.asarray(out="memmap").reshape(whole)[part], *lattice), path.name)
 
 
-def _page_type(page: Any) -> tuple[tuple[int, int], np.dtype]:
+def _kind(page: Any) -> tuple[tuple[int, int], np.dtype]:
     """Return the shape (Y, X) and sample type of a page that can be read."""
     if page.samplesperpixel != 1:
         raise ArgumentError(f"expected a scalar volume, got {page.samplesperpixel} components per sample")
@@ -154,16 +153,17 @@ def _page_type(page: Any) -> tuple[tuple[int, int], np.dtype]:
 def complaints_raised() -> Iterator[None]:
     """Raise what tifffile only logs: lost pages, for one. Other warnings are about metadata, and dropped."""
     records: list[logging.LogRecord] = []
-    collector = logging.Handler(logging.WARNING)
-    collector.emit = records.append  # type: ignore[assignment,method-assign]
     logger = logging.getLogger("tifffile")
-    propagates, logger.propagate = logger.propagate, False
-    logger.addHandler(collector)
+
+    def collect(record: logging.LogRecord) -> bool:
+        records.append(record)
+        return False  # nobody else hears of it
+
+    logger.addFilter(collect)
     try:
         yield
     finally:
-        logger.propagate = propagates
-        logger.removeHandler(collector)
+        logger.removeFilter(collect)
     for record in records:
         said = record.getMessage()
         if record.levelno >= logging.ERROR or any(word in said for word in LOST):

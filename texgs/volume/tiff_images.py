@@ -53,15 +53,14 @@ def chosen(images: Sequence[Any], wanted: str | None, tiff: Any) -> tuple[Any, s
     That is the only volume, or the only one with pages in an open file, which may be None.
     """
     volumes = {str(k): image for k, image in enumerate(images) if is_volume(image)} or {"0": images[0]}
-    names = [image.name for image in volumes.values()]
-    named = {image.name: image for image in volumes.values() if names.count(image.name) == 1 and image.name}
-    if found := (volumes | named).get(str(wanted)):
-        return found, ""
-    here = {k: each for k, each in volumes.items() if any(page and page.parent is tiff for page in each)}
-    for known, why in ((volumes, "the only volume"), (here, "the only one with pages in this file")):
-        if wanted is None and len(known) == 1:
-            number, image = next(iter(known.items()))
-            return image, f"image {number} of {len(images)}, {why}" if len(images) > 1 else ""
+    fits, why = [k for k, image in volumes.items() if str(wanted) in (k, image.name)], ""
+    if wanted is None and len(volumes) == 1:
+        fits, why = [*volumes], "the only volume"
+    elif wanted is None:
+        fits = [k for k, image in volumes.items() if any(page and page.parent is tiff for page in image)]
+        why = "the only one with pages in this file"
+    if len(fits) == 1:
+        return volumes[fits[0]], f"image {fits[0]} of {len(images)}, {why}" if why and len(images) > 1 else ""
     sizes = (f"{image.name} {' x '.join(map(str, image.shape[::-1]))}".strip() for image in volumes.values())
     listed = ", ".join(map("{} ({})".format, volumes, sizes))
     raise ArgumentError(f"dataset.volume.image: expected one of {listed}, got {wanted or 'none'}")
@@ -90,27 +89,26 @@ def axes_of(image: Any, labels: Sequence[str]) -> tuple[list[Axis], str]:
 
 def told_of(image: Any, tiff: Any, images: Sequence[Any]) -> tuple[Triple | None, list[str]]:
     """Return the spacing x, y, z, in the unit of x, as OME or ImageJ tells, and OME's labels of channels."""
-    if tiff.is_ome:
-        root = ElementTree.fromstring(tiff.ome_metadata)
-        if (other := root.find("{*}BinaryOnly")) is not None:
-            raise ArgumentError(
-                f"expected a whole OME-TIFF, got a part of {other.get('MetadataFile')}; open that one, or "
-                "make one file of all, by bfconvert of Bio-Formats, say"
-            )
-        known = root.findall("{*}Image")
-        alike = [each for each in known if each.get("Name") == image.name]
-        if len(alike) == 1 or len(known) == len(images):
-            described = alike[0] if len(alike) == 1 else known[list(images).index(image)]
-            pixels = described.findall("{*}Pixels")[0]
-            labels = [each.get("Name", "") for each in pixels.findall("{*}Channel")]
-            return _of_ome(pixels.attrib), labels
+    if not tiff.is_ome:
+        depth = (tiff.imagej_metadata or {}).get("spacing")
+        tags = [image.keyframe.tags.get(name) for name in ("XResolution", "YResolution")]
+        if not depth or not all(tag and tag.value[0] for tag in tags):
+            return None, []
+        dx, dy = (tag.value[1] / tag.value[0] for tag in tags)  # pixels in a unit
+        return (dx, dy, abs(float(depth))), []  # below 0 for slices from the top down, by ImageJ
+    root = ElementTree.fromstring(tiff.ome_metadata)
+    if (other := root.find("{*}BinaryOnly")) is not None:
+        raise ArgumentError(
+            f"expected a whole OME-TIFF, got a part of {other.get('MetadataFile')}; open that one, or make "
+            "one file of all, by bfconvert of Bio-Formats, say"
+        )
+    known = root.findall("{*}Image")
+    alike = [each for each in known if each.get("Name") == image.name]
+    fits = [known[list(images).index(image)]] if len(known) == len(images) else alike
+    if len(fits) != 1:
         return None, []
-    depth = (tiff.imagej_metadata or {}).get("spacing")
-    tags = [image.keyframe.tags.get(name) for name in ("XResolution", "YResolution")]
-    if not depth or not all(tag and tag.value[0] for tag in tags):
-        return None, []
-    dx, dy = (tag.value[1] / tag.value[0] for tag in tags)  # pixels in a unit
-    return (dx, dy, abs(float(depth))), []  # below 0 for slices from the top down, by ImageJ
+    pixels = fits[0].findall("{*}Pixels")[0]
+    return _of_ome(pixels.attrib), [each.get("Name", "") for each in pixels.findall("{*}Channel")]
 
 
 def _of_ome(pixels: Mapping[str, str]) -> Triple | None:
