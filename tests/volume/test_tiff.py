@@ -247,9 +247,7 @@ def test_pages_whose_samples_were_never_written_are_refused(tmp_path, tag):
     with tifffile.TiffFile(tmp_path / "v.tif", mode="r+") as file:
         entry = file.pages[4].aspage().tags[tag]
         entry.overwrite((entry.value[0], 0))
-    with pytest.raises(
-        ArgumentError, match=r"v.tif: expected a whole page, got one with samples that were never"
-    ):
+    with pytest.raises(ArgumentError, match=r"v.tif: expected a whole page, got samples that were never"):
         whole(tmp_path / "v.tif")
 
 

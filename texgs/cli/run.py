@@ -71,21 +71,18 @@ def snakemake(words: Sequence[str]) -> bool:
         theirs.ArgumentParser.error = Parser.error
         sys.argv[:1] = ["snakemake"]  # what these parsers are of
         given, unknown = get_argument_parser().parse_known_intermixed_args(list(words))
+        require_pairs([word for word in words if word in (*given.targets, *unknown)])
+        require_free([word for word in words if word not in (*given.targets, *(given.config or ()))])
+        require_targets(given.targets)
+        chosen = [word for word in given.targets if WORD.fullmatch(word)]
+        rest = [word for word in words if word not in chosen]
+        sys.argv = ["snakemake", *rest]  # the Snakefile looks there
+        if not unknown and {*(given.profile or ())} == {profile := os.environ.get("SNAKEMAKE_PROFILE")}:
+            theirs.ArgumentParser.error = partialmethod(Parser.error, where=f"SNAKEMAKE_PROFILE={profile}: ")
+        end = [*rest, "--"].index("--")
+        parser, options = parse_args([*defaults(given), *rest[:end], *profile_of(given), *rest[end:]])
     except RuntimeError as error:  # it looks for its own configuration in the user's home
         raise ArgumentError(f"HOME: snakemake needs a home folder ({error}); set HOME to one") from error
-    except (CliException, WorkflowError) as error:
-        raise ArgumentError(f"{str(error).rstrip('. ')}; see snakemake --help") from error
-    require_pairs([word for word in words if word in (*given.targets, *unknown)])
-    require_free([word for word in words if word not in (*given.targets, *(given.config or ()))])
-    require_targets(given.targets)
-    chosen = [word for word in given.targets if WORD.fullmatch(word)]
-    rest = [word for word in words if word not in chosen]
-    sys.argv = ["snakemake", *rest]  # the Snakefile looks there
-    told = [*defaults(given), *located(rest)]
-    if not unknown and {*(given.profile or ())} == {profile := os.environ.get("SNAKEMAKE_PROFILE")}:
-        theirs.ArgumentParser.error = partialmethod(Parser.error, where=f"SNAKEMAKE_PROFILE={profile}: ")
-    try:
-        parser, options = parse_args(told)
     except (CliException, WorkflowError) as error:
         raise ArgumentError(f"{str(error).rstrip('. ')}; see snakemake --help") from error
     options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
@@ -175,34 +172,29 @@ def require_free(words: Sequence[str]) -> None:
 
 
 def defaults(given: argparse.Namespace) -> list[str]:
-    """Return options that hold where the user says nothing else: Snakefile of texgs, local profile.
+    """Return options that hold where the user says nothing else, such as the Snakefile of texgs.
 
     A dry run counts jobs by their rules; `--quiet host` lists each.
     """
-    from texgs.config.project import PROFILES, SNAKEFILE
+    from texgs.config.project import SNAKEFILE
 
-    options = ["--quiet", "host", "reason", "rules"] if given.dryrun and given.quiet is None else []
-    options += ["--snakefile", str(SNAKEFILE)]
-    if given.profile is None and given.workflow_profile is None:
-        options += ["--workflow-profile", str(PROFILES / "local")]
-    return options
+    quiet = ["--quiet", "host", "reason", "rules"] if given.dryrun and given.quiet is None else []
+    return [*quiet, "--snakefile", str(SNAKEFILE)]
 
 
-def located(words: Sequence[str]) -> list[str]:
-    """Return the words, with the path of a profile of texgs where only its name is given."""
+def profile_of(given: argparse.Namespace) -> list[str]:
+    """Return the option for a profile of texgs: the local one, or that of which only the name is given."""
     from texgs.config.project import PROFILES
 
-    profile, located = "--workflow-profile", list[str]()
-    for word in words:
-        located += word.split("=", 1) if word.startswith(f"{profile}=") else [word]
-    for index, (option, name) in enumerate(pairwise(located), start=1):
-        if option != profile or name == "none" or Path(name).exists():
-            continue
-        if not (PROFILES / name).is_dir():
-            known = ", ".join(sorted(each.name for each in PROFILES.iterdir()))
-            raise ArgumentError(f"{profile}: expected {known} or a folder, got {name}")
-        located[index] = str(PROFILES / name)
-    return located
+    option, name = "--workflow-profile", given.workflow_profile
+    if name is None:
+        return [] if given.profile else [option, str(PROFILES / "local")]
+    if name == "none" or Path(name).exists():
+        return []
+    if not (PROFILES / name).is_dir():
+        known = ", ".join(sorted(each.name for each in PROFILES.iterdir()))
+        raise ArgumentError(f"{option}: expected {known} or a folder, got {name}")
+    return [option, str(PROFILES / name)]
 
 
 def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
@@ -231,9 +223,6 @@ def tell_last_words(logs: Iterable[Path]) -> None:
 
 def last_line(log: Path) -> str:
     """Return the last line with text of a log; empty where there is none, or the job was interrupted."""
-    try:
-        lines = log.read_text(encoding="utf-8", errors="replace").split("\n")
-    except OSError:
-        return ""
-    line = next((line for line in reversed(lines) if line.strip()), "")
+    text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
+    line = text.rstrip().rpartition("\n")[2]
     return "" if INTERRUPTED in line else line

@@ -60,7 +60,7 @@ class Axis:
         """Return time, channel or space, by the name, or a unit such as "days since 2000-01-01"."""
         if self.letter == "t" or self.name.lower() in ("t", "time") or " since " in self.unit:
             return "time"
-        return "channel" if self.name.lower() in ("c", "channel") else "space"
+        return "channel" if self.name.lower() in ("c", "ch", "channel") else "space"
 
 
 def nameless(shape: Sequence[int]) -> list[str]:
@@ -134,7 +134,7 @@ def upright(axes: Sequence[Axis]) -> tuple[list[int], str]:
     return [0, 1, 2], f"axes {names} are taken for z, y, x, as they are stored" if is_guess else ""
 
 
-def picked(axes: Sequence[Axis], channel: str | None, time: int | None) -> list[int | slice]:
+def picked(axes: Sequence[Axis], channel: str | None = None, time: int | None = None) -> list[int | slice]:
     """Return one index for each axis that is none of space or of size 1, all of the three others."""
     said = {kind: str(value) for kind, value in (("time", time), ("channel", channel)) if value is not None}
     is_space = [axis.kind == "space" and axis.size > 1 for axis in axes]
@@ -171,16 +171,13 @@ def lattice(
     units = [axis.unit for axis in axes]
     is_length = all(unit in METRES for unit in units)
     if len({*units} - {""}) > 1 and not is_length:
-        remark = (
-            f"units along x, y, z are {', '.join(x or 'none' for x in units)}, so that samples are 1 apart"
-        )
-        return spacing or ONES, origin or ZEROS, "" if spacing else remark
+        names = ", ".join(unit or "none" for unit in units)
+        remark = "" if spacing else f"units along x, y, z are {names}, so that samples are 1 apart"
+        return spacing or ONES, origin or ZEROS, remark
     if spacing is None and (uneven := [axis.name for axis in axes if not axis.is_even]):
         raise ArgumentError(f"expected even distances along {', '.join(uneven)}; resample, or set spacing")
     factors = [METRES[unit] / METRES[units[0]] if is_length else 1.0 for unit in units]
-    dx, dy, dz = (abs(axis.step) * factor for axis, factor in zip(axes, factors, strict=True))
-    x, y, z = (
-        min(axis.start, axis.start + (axis.size - 1) * axis.step) * factor
-        for axis, factor in zip(axes, factors, strict=True)
-    )
+    pairs = list(zip(axes, factors, strict=True))
+    dx, dy, dz = (abs(axis.step) * factor for axis, factor in pairs)
+    x, y, z = (min(axis.start, axis.start + (axis.size - 1) * axis.step) * factor for axis, factor in pairs)
     return spacing or (dx, dy, dz), origin or (x, y, z), ""

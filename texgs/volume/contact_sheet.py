@@ -15,7 +15,9 @@ MILLISECONDS = 80  # of a picture of an animation
 
 def write_contact_sheet(path: str | Path, pictures: Sequence[Image.Image]) -> Path:
     """Write a PNG with rows of pictures of any mode and size, in reading order, over white."""
-    shown = [_thumbnail(_over_white(picture)) for picture in pictures]
+    shown = [_over_white(picture) for picture in pictures]
+    for picture in shown:
+        picture.thumbnail((THUMBNAIL, THUMBNAIL), Image.Resampling.LANCZOS, reducing_gap=None)
     width, height = max(picture.width for picture in shown), max(picture.height for picture in shown)
     columns = min(COLUMNS, len(shown))
     across, down = width + GUTTER, height + GUTTER  # from one picture to the next
@@ -39,12 +41,3 @@ def _over_white(picture: Image.Image) -> Image.Image:
     """Return a picture over white."""
     layer = picture.convert("RGBA")
     return Image.alpha_composite(Image.new("RGBA", layer.size, "white"), layer).convert("RGB")
-
-
-def _thumbnail(picture: Image.Image) -> Image.Image:
-    """Return a picture reduced to the size of a thumbnail, or as it is where it is smaller."""
-    if max(picture.size) <= THUMBNAIL:
-        return picture
-    scale = THUMBNAIL / max(picture.size)
-    width, height = (max(1, round(scale * side)) for side in picture.size)
-    return picture.resize((width, height), Image.Resampling.LANCZOS)

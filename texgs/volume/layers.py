@@ -54,10 +54,9 @@ class LayerSource(Source):
         axes: of the array.
         attributes: those of CF, which say how samples are decoded.
         given: spacing and origin that replace those of the axes.
-        channel: label or number of one of several.
-        time: step of several.
         chunks: samples along each axis that are stored in one piece.
         note: for the user.
+        keys: channel and time, see `picked`.
     """
 
     def __init__(
@@ -67,14 +66,12 @@ class LayerSource(Source):
         axes: Sequence[Axis],
         attributes: Mapping[str, Any],
         given: tuple[Triple | None, Triple | None],
-        channel: str | None = None,
-        time: int | None = None,
-        *,
         chunks: Sequence[int] | None = None,
         note: str = "",
+        **keys: Any,
     ) -> None:
         self._name, self._array = name, array
-        self._index = picked(axes, channel, time)
+        self._index = picked(axes, **keys)
         space = [k for k, index in enumerate(self._index) if isinstance(index, slice)]
         self._turn, guess = upright([axes[k] for k in space])
         z, y, x = (axes[space[k]] for k in self._turn)
@@ -122,12 +119,10 @@ def one_of(arrays: Mapping[str, Any], variable: str | None) -> str:
 
     `arrays` have a shape and a type each. Fields may have axes of time and channels besides three.
     """
-    is_field = {
-        k: v.dtype.kind in "biuf" and 3 <= sum(n > 1 for n in v.shape) <= 5 for k, v in arrays.items()
-    }
-    fields = sorted(name for name in arrays if is_field[name])
+    kinds = {name: (array.dtype.kind, sum(n > 1 for n in array.shape)) for name, array in arrays.items()}
+    fields = sorted(name for name, (kind, n_axes) in kinds.items() if kind in "biuf" and 3 <= n_axes <= 5)
     name = fields[0] if len(fields) == 1 and not variable else (variable or "").strip("/")
-    if is_field.get(name):
+    if name in fields:
         return name
     got, more = variable or "none", f" and {len(fields) - LISTED} more" if len(fields) > LISTED else ""
     if name in arrays:
@@ -166,9 +161,7 @@ def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> tuple[dict[str,
         try:
             values = values if values.dtype.kind in "iuf" else values.astype(np.float64)
         except ValueError:
-            raise ArgumentError(
-                f"{key}: expected a number, got {attributes[key]}; correct the file"
-            ) from None
+            raise ArgumentError(f"{key}: expected a number, got {values[0]}; correct the file") from None
         with np.errstate(over="ignore"):
             said[key] = values.astype(dtype) if key in CODES and dtype.kind == "f" else values
     coding: dict[str, Any] = {key: said[key] for key in CODES if key in said}

@@ -48,7 +48,9 @@ def open_zarr(
         images = {name: levels for name in nodes if (levels := _levels(name, nodes))}
         arrays = {name: node for name, node in nodes.items() if isinstance(node, zarr.Array)}
         arrays |= {name: nodes[next(iter(levels))] for name, levels in images.items()}
-        outer = {each: node for each, node in arrays.items() if images.keys().isdisjoint(_above(each))}
+        groups = {posixpath.normpath(name) for name in images}  # "." at the root, as of their parents
+        is_inner = {k: not groups.isdisjoint(map(str, PurePosixPath(k).parents)) for k in arrays}
+        outer = {k: node for k, node in arrays.items() if not is_inner[k]}
         name = one_of(arrays if variable else outer, variable)
         if name in images:
             name, note = _fitting(list(images[name]), nodes)
@@ -81,11 +83,6 @@ def _root(path: Path) -> Any:
     return zarr.open(ZipStore(path, mode="r"), mode="r", path=folder)
 
 
-def _above(name: str) -> list[str]:
-    """Return the paths of the groups that a node is in."""
-    return ["/".join(each.parts) for each in PurePosixPath(name).parents]
-
-
 def _levels(name: str, nodes: Mapping[str, Any]) -> dict[str, list[Axis]]:
     """Return the paths of the levels of an image with their axes, the finest first; none for other nodes."""
     said = nodes[name].attrs.get("ome", nodes[name].attrs)  # of 0.5, of 0.4
@@ -94,9 +91,8 @@ def _levels(name: str, nodes: Mapping[str, Any]) -> dict[str, list[Axis]]:
     image, levels = said["multiscales"][0], {}
     channels = tuple(map(_channel, said.get("omero", {}).get("channels", ())))
     # Versions before 0.4 only name their axes, or not even that, and have no transformations.
-    axes: list[Any] = [
-        {"name": each} if isinstance(each, str) else each for each in image.get("axes", "tczyx")
-    ]
+    said_axes: Any = image.get("axes", "tczyx")
+    axes = [{"name": each} if isinstance(each, str) else each for each in said_axes]
     names = [SHORT.get(axis.get("type"), axis["name"]) for axis in axes]
     units = [axis.get("unit", "") for axis in axes]
     for level in image["datasets"]:
@@ -107,10 +103,8 @@ def _levels(name: str, nodes: Mapping[str, Any]) -> dict[str, list[Axis]]:
             steps, starts = steps * scale, starts * scale + shift
         path = posixpath.normpath(posixpath.join(name, level["path"]))
         lines = zip(names, nodes[path].shape, units, starts.tolist(), steps.tolist(), strict=True)
-        levels[path] = [
-            Axis(*line, channels=channels if line[1] == len(channels) else (), letter=line[0])
-            for line in lines
-        ]
+        own = {len(channels): channels}  # of the axis that has so many
+        levels[path] = [Axis(*line, channels=own.get(line[1], ()), letter=line[0]) for line in lines]
     return levels
 
 

@@ -10,8 +10,6 @@ from texgs.core.errors import ArgumentError
 from texgs.core.names import SLICES, natural_order
 from texgs.volume.axes import Axis, Channel
 
-WORDS = {"ch": "channel"}  # before numbers, besides the names of axes
-
 
 def tiffs_in(folder: Path) -> list[Path]:
     """Return the TIFF files of a folder in natural order: slice9 comes before slice10."""
@@ -47,7 +45,7 @@ def arranged(files: Sequence[Path]) -> tuple[list[Axis], list[Path]]:
 def _axis(text: str, values: Sequence[int]) -> Axis:
     """Return the axis that a number counts, by the word before it."""
     word = re.split(r"[\W\d_]", text.lower())[-1]
-    return Axis(WORDS.get(word, word), len(values), channels=tuple(Channel(str(value)) for value in values))
+    return Axis(word, len(values), channels=tuple(Channel(str(value)) for value in values))
 
 
 def _require_even(files: dict[int, Path]) -> None:

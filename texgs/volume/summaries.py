@@ -75,8 +75,7 @@ def robust_histogram(source: Source, whole: Counted, shared: Ends) -> Counted | 
         inner = _counted_within(source, *fences)
         inside = sum(inner["histogram"])
         if prod(source.dims) - inside <= max(FEW, RARE * (inside - max(inner["histogram"]))):
-            found = inner
-    low, high = found["minimum"], found["maximum"]
+            found, low, high = inner, inner["minimum"], inner["maximum"]
     first, second = np.flatnonzero(found["histogram"])[:2]
     if low < AIR[0] and second - first > GAP * BINS:
         rest = _counted_within(source, np.nextafter(low, high), high)
@@ -99,12 +98,9 @@ def _counted_within(source: Source, low: float, high: float) -> Counted:
 
 def counted(source: Source, minimum: float, maximum: float, scale: str = "linear") -> Counted:
     """Count samples in equal bins over a range, or over its logarithms ("log"); reads the volume once."""
-    counts = np.zeros(BINS, dtype=np.int64)
-    for slab in slabs(source):
-        if scale == "log":
-            counts += histogram(np.log(slab[slab > 0], dtype=np.float64), np.log(minimum), np.log(maximum))
-        else:
-            counts += histogram(slab, minimum, maximum)
+    to = np.log if scale == "log" else np.asarray
+    with np.errstate(divide="ignore", invalid="ignore"):  # of outliers that have no logarithm
+        counts = np.sum([histogram(to(slab), to(minimum), to(maximum)) for slab in slabs(source)], axis=0)
     return {"minimum": minimum, "maximum": maximum, "histogram": tuple(counts.tolist()), "scale": scale}
 
 

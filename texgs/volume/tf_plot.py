@@ -77,10 +77,9 @@ def _fill(
         _draw(opacity, name, tf)
     lows, highs = zip(edges[[0, -1]], *(tf.support for tf in basic.values()), strict=True)
     low, high = min(lows), max(highs)
-    margin = 0.02 * (high - low)  # so that nothing lies on the frame
-    opacity.set(xlim=(low - margin, high + margin), xlabel="value", title=words(title))
-    if summary.get("scale") == "log":
-        opacity.set(xscale="log", xlim=(low, high))
+    scale = summary.get("scale", "linear")
+    margin = 0.02 * (high - low) if scale == "linear" else 0.0  # so that nothing lies on the frame
+    opacity.set(xscale=scale, xlim=(low - margin, high + margin), xlabel="value", title=words(title))
     opacity.set(ylim=(0, 1.12), yticks=np.linspace(0, 1, 6), ylabel="opacity")
 
 

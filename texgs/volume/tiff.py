@@ -62,24 +62,17 @@ class PageSource(Source):
                 f"got {list(values.shape)} of {values.dtype}"
             )
         if 0 in (*page.dataoffsets, *page.databytecounts):
-            raise ArgumentError(
-                f"{file}: expected a whole page, got one with samples that were never written"
-            )
+            raise ArgumentError(f"{file}: expected a whole page, got samples that were never written")
         return values
 
 
 def open_tiff(
-    path: Path,
-    spacing: Triple | None,
-    origin: Triple | None,
-    image: str | None = None,
-    channel: str | None = None,
-    time: int | None = None,
+    path: Path, spacing: Triple | None, origin: Triple | None, image: str | None = None, **keys: Any
 ) -> Source:
     """Open an image of a TIFF file with a page per z slice, or a folder of single TIFFs.
 
     Of a folder only the first file is opened now, unless it is one OME-TIFF. Spacing is what ImageJ or OME
-    has written, else 1.
+    has written, else 1; further keys are those of `picked`.
     """
     import tifffile
 
@@ -100,7 +93,7 @@ def open_tiff(
         axes, remark = axes_of(one, labels)
         if is_slices:
             axes, files = arranged(files)
-        index = picked([*axes, *map(Axis, "YX", kind[0])], channel, time)
+        index = picked([*axes, *map(Axis, "YX", kind[0])], **keys)
         sizes = [axis.size for axis in axes]
         numbers = np.arange(prod(sizes)).reshape(sizes)[tuple(index[:-2])]  # of the planes of z slices
         lattice = (spacing or told or ONES, origin or ZEROS)

@@ -125,6 +125,7 @@ def require_pages(image: Any, pages: Sequence[Any]) -> None:
     if lost := sum(page is None for page in pages):
         folder = file_of(image.keyframe).parent
         names = dict.fromkeys(re.findall(r'FileName="([^"]+)"', image.parent.ome_metadata or ""))
-        absent = [name for name in names if not (folder / name).exists()]
-        files = f"{', '.join(absent[:3])} of the same OME-TIFF" if absent else "the file with all of them"
-        raise ArgumentError(f"{lost} of {len(pages)} slices are missing; put {files} beside this file")
+        absent = ", ".join([name for name in names if not (folder / name).exists()][:3]) or "the files"
+        raise ArgumentError(
+            f"{lost} of {len(pages)} slices are missing; put {absent} of the same OME-TIFF beside this file"
+        )
