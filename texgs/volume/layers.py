@@ -1,4 +1,4 @@
-"""Arrays with axes as sources: decoded as CF says, by xarray, and read in layers of whole chunks.
+"""Arrays with axes as sources, read in layers of whole chunks and decoded as CF says.
 
 Files are opened by the libraries of their formats: xarray's own engines give up on a group of HDF5 with a
 link to nowhere or a type that NetCDF lacks, and on one of Zarr in which a single array has no labels.
@@ -6,7 +6,6 @@ link to nowhere or a type that NetCDF lacks, and on one of Zarr in which a singl
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from math import ceil, prod
 from pathlib import Path
@@ -17,18 +16,8 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
-from texgs.volume.axes import (
-    CODES,
-    METRES,
-    NUMBERS,
-    PACKED,
-    UNSIGNED,
-    Axis,
-    axes_of,
-    lattice,
-    picked,
-    upright,
-)
+from texgs.volume.axes import METRES, Axis, axes_of, lattice, picked, upright
+from texgs.volume.coding import coding_of, decoded
 from texgs.volume.grid import Triple, require_room
 from texgs.volume.slabs import SLAB_BYTES, Source
 from texgs.volume.space import Space
@@ -38,7 +27,6 @@ if TYPE_CHECKING:
 
 SHARE = 4  # one layer takes this part of the free memory at most
 LISTED = 8  # arrays in a message
-EVERYTHING = (-np.inf, np.inf)
 
 
 class LayerSource(Source):
@@ -88,30 +76,27 @@ class LayerSource(Source):
         most = max(1, free_memory() // (SHARE * plane))
         self._depth = min(chunk * max(1, SLAB_BYTES // (chunk * plane)), most)  # slices in a layer
         require_room((x.size, y.size, self._depth), self.dtype)
-        self._first, self._layer = -1, np.empty(0)  # index of its first slice, and the layer in memory
+        self._first, self._kept = -1, np.empty(0)  # index of its first slice, and the layer in memory
 
     def slices(self, start: int, stop: int) -> np.ndarray:
         """Return samples [stop - start, Y, X], NaN where they are missing."""
         (sign, *signs), size = self._signs, self.dims[2]
         low, high = (start, stop) if sign > 0 else (size - stop, size - start)  # as stored
         firsts = range(low - low % self._depth, high, self._depth)[::sign]
-        parts = [
-            self._part(first, max(low, first), min(high, first + self._depth))[::sign] for first in firsts
-        ]
+        parts = [self._layer(first)[max(low - first, 0) : high - first][::sign] for first in firsts]
         values = np.concatenate(parts)[:, :: signs[0], :: signs[1]]
         return values.astype(self.dtype, copy=False)
 
-    def _part(self, first: int, low: int, high: int) -> np.ndarray:
-        """Return slices low to high - 1, as they are stored, of the layer that begins with `first`."""
+    def _layer(self, first: int) -> np.ndarray:
+        """Return the layer that begins with a slice, as it is stored."""
         if self._first != first:
-            self._first, self._layer = -1, np.empty(0)  # gives its memory back before the next one is read
+            self._first, self._kept = -1, np.empty(0)  # gives its memory back before the next one is read
             index = list(self._index)
             index[self._z] = slice(first, min(first + self._depth, self.dims[2]))
             with reading_as("an array that is whole", where=f"{self._name}: "):
                 samples = np.asarray(self._array[tuple(index)]).transpose(self._turn)
-                self._layer = decoded(samples, *self._coding)
-            self._first = first
-        return self._layer[low - first : high - first]
+                self._first, self._kept = first, decoded(samples, *self._coding)
+        return self._kept
 
 
 def one_of(arrays: Mapping[str, Any], variable: str | None) -> str:
@@ -147,47 +132,3 @@ def gaps_in(array: Any, pieces: Sequence[int], n_written: int, fill: Any) -> str
     count = prod(ceil(n / size) for n, size in zip(array.shape, pieces, strict=True))
     missing = count - n_written
     return f"{missing} of {count} chunks are not there and count as {fill}" if missing else ""
-
-
-def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> tuple[dict[str, Any], tuple[float, float]]:
-    """Return how samples of a type are coded, by attributes of CF, and the range of those that are valid.
-
-    Numbers may be written as text. Codes are as samples have them, which may have fewer digits. The range is
-    that after decoding; one of whole numbers is of packed samples.
-    """
-    said: dict[str, np.ndarray] = {}
-    for key in (each for each in NUMBERS if np.size(attributes.get(each, ())) > 0):
-        values = np.ravel(attributes[key])
-        try:
-            values = values if values.dtype.kind in "iuf" else values.astype(np.float64)
-        except ValueError:
-            raise ArgumentError(f"{key}: expected a number, got {values[0]}; correct the file") from None
-        with np.errstate(over="ignore"):
-            said[key] = values.astype(dtype) if key in CODES and dtype.kind == "f" else values
-    coding: dict[str, Any] = {key: said[key] for key in CODES if key in said}
-    coding |= {key: float(said[key][0]) for key in PACKED if key in said}
-    if str(attributes.get(UNSIGNED, "")).lower() == "true" and dtype.kind == "i":
-        coding[UNSIGNED] = "true"
-    low, high = said.get("valid_range", EVERYTHING)
-    low, high = said.get("valid_min", [low])[0], said.get("valid_max", [high])[0]
-    if coding.keys() & PACKED and any(np.asarray(end).dtype.kind in "iu" for end in (low, high)):
-        scale, offset = (coding.get(key, default) for key, default in PACKED.items())
-        low, high = sorted(((low - 0.5) * scale + offset, (high + 0.5) * scale + offset))
-    return coding, (float(low), float(high))
-
-
-def decoded(values: np.ndarray, coding: Mapping[str, Any], valid: tuple[float, float]) -> np.ndarray:
-    """Return samples as `coding_of` says they are: packed ones are scaled, NaN stands for those that miss.
-
-    Integers become float32 where any of this is said.
-    """
-    import xarray
-
-    stored = xarray.Variable([*map(str, range(values.ndim))], values, coding)
-    with warnings.catch_warnings(), np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
-        warnings.simplefilter("ignore", xarray.SerializationWarning)  # of several codes
-        samples = xarray.conventions.decode_cf_variable("field", stored, decode_times=False).values
-        if valid != EVERYTHING:
-            samples = np.where((samples < valid[0]) | (samples > valid[1]), np.nan, samples)
-        is_new = samples.dtype.kind == "f" != values.dtype.kind
-        return samples.astype(np.float32) if is_new else samples
