@@ -85,12 +85,10 @@ def labels_of(array: Any) -> list[Axis]:
     """Return the axes of an array by their labels, and by the scales of dimensions with coordinates."""
     scales = [axis[0] if len(axis) else None for axis in array.dims]
     labels = [axis.label or f"?{k}" for k, axis in enumerate(array.dims)]
-    pairs = zip(scales, labels, strict=True)
-    names = [label if scale is None else posixpath.basename(scale.name) for scale, label in pairs]
+    names = [posixpath.basename(x.name) if x else label for x, label in zip(scales, labels, strict=True)]
     if len({*names}) < len(names) or all(name.startswith("?") for name in names):
         return axes_of(nameless(array.shape), array.shape, {})
-    places = {name: scale for name, scale in zip(names, scales, strict=True) if _is_array(scale)}
-    return axes_of(names, array.shape, places)
+    return axes_of(names, array.shape, {k: x for k, x in zip(names, scales, strict=True) if _is_array(x)})
 
 
 def arrays_in(file: Any) -> tuple[dict[str, Any], dict[str, str]]:

@@ -53,14 +53,15 @@ def chosen(images: Sequence[Any], wanted: str | None, tiff: Any) -> tuple[Any, s
     That is the only volume, or the only one with pages in an open file, which may be None.
     """
     volumes = {str(k): image for k, image in enumerate(images) if is_volume(image)} or {"0": images[0]}
-    fits, why = [k for k, image in volumes.items() if str(wanted) in (k, image.name)], ""
-    if wanted is None and len(volumes) == 1:
-        fits, why = [*volumes], "the only volume"
-    elif wanted is None:
+    fits, why = [*volumes], "the only volume"
+    if wanted is not None:
+        fits = [k for k, image in volumes.items() if str(wanted) in (k, image.name)]
+    elif len(volumes) > 1:
         fits = [k for k, image in volumes.items() if any(page and page.parent is tiff for page in image)]
         why = "the only one with pages in this file"
     if len(fits) == 1:
-        return volumes[fits[0]], f"image {fits[0]} of {len(images)}, {why}" if why and len(images) > 1 else ""
+        is_told = wanted is None and len(images) > 1
+        return volumes[fits[0]], f"image {fits[0]} of {len(images)}, {why}" if is_told else ""
     sizes = (f"{image.name} {' x '.join(map(str, image.shape[::-1]))}".strip() for image in volumes.values())
     listed = ", ".join(map("{} ({})".format, volumes, sizes))
     raise ArgumentError(f"dataset.volume.image: expected one of {listed}, got {wanted or 'none'}")
