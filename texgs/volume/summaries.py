@@ -100,7 +100,8 @@ def counted(source: Source, minimum: float, maximum: float, scale: str = "linear
     """Count samples in equal bins over a range, or over its logarithms ("log"); reads the volume once."""
     to = np.log if scale == "log" else np.asarray
     with np.errstate(divide="ignore", invalid="ignore"):  # of outliers that have no logarithm
-        counts = np.sum([histogram(to(slab), to(minimum), to(maximum)) for slab in slabs(source)], axis=0)
+        ends = float(to(minimum)), float(to(maximum))
+        counts = np.sum([histogram(to(slab), *ends) for slab in slabs(source)], axis=0)
     return {"minimum": minimum, "maximum": maximum, "histogram": tuple(counts.tolist()), "scale": scale}
 
 
