@@ -343,3 +343,15 @@ def test_the_fill_value_of_xarray_in_format_2_is_missing(tmp_path):
     array.attrs["_ARRAY_DIMENSIONS"] = ["z", "y", "x"]
     expected = np.where(values == 7, np.nan, values)
     np.testing.assert_array_equal(open_source(tmp_path / "v.zarr").slices(0, 4), expected)
+
+
+@pytest.mark.parametrize("shards", [None, (4, 6, 8)])
+def test_chunks_that_are_missing_are_told_and_ends_of_shards_are_none(tmp_path, shards):
+    sizes = {"shape": (11, 12, 13), "chunks": (2, 6, 4), "shards": shards}
+    array = zarr.create_array(tmp_path / "v.zarr", dtype="u2", **sizes)
+    array[:] = np.arange(1, 11 * 12 * 13 + 1).reshape(11, 12, 13)
+    assert open_source(tmp_path / "v.zarr").note == ""
+    min(path for path in (tmp_path / "v.zarr").rglob("*") if path.name == "0" and path.is_file()).unlink()
+    total = 3 * 2 * 2 if shards else 6 * 2 * 4
+    told = f"1 of {total} chunks are not there and count as 0"
+    assert open_source(tmp_path / "v.zarr").note == told
