@@ -358,3 +358,10 @@ def test_scales_may_be_text_and_a_valid_range_of_whole_numbers_is_of_packed_samp
         file["v"].attrs["scale_factor"] = "half"
     with pytest.raises(ArgumentError, match="scale_factor: expected a number, got half; correct the file"):
         open_source(path)
+
+
+def test_one_end_of_a_valid_range_of_whole_numbers_is_of_packed_samples(tmp_path):
+    path = write(tmp_path / "v.h5", v=VALUES.astype("i2"))
+    with h5py.File(path, "a") as file:
+        file["v"].attrs.update({"scale_factor": -0.5, "add_offset": 10.0, "valid_min": np.int16(40)})
+    np.testing.assert_allclose(whole(path), np.where(VALUES >= 40, 10 - 0.5 * VALUES, np.nan))
