@@ -25,7 +25,7 @@ EXPECTED = {
     "02-h5-vds": (
         1,
         1,
-        {"expected its part part1.h5, which is not": 1, "7 of 12 chunks were never written": 1},
+        {"expected its part data of part1.h5, which is not": 1, "7 of 12 chunks are not there": 1},
     ),
     "03-h5-links": (4, 0, {"entry/data links to gone.h5, which is not there": 1, "choose one of": 4}),
     "04-mrc-map": (8, 2, {"READ: Volume zyx: 12 x 14 x 16": 1, "tells no spacing": 1, "got complex64": 1}),
