@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -98,7 +99,7 @@ def _counted_within(source: Source, low: float, high: float) -> Counted:
 
 def counted(source: Source, minimum: float, maximum: float, scale: str = "linear") -> Counted:
     """Count samples in equal bins over a range, or over its logarithms ("log"); reads the volume once."""
-    to = np.log if scale == "log" else np.asarray
+    to = partial(np.log, dtype=np.float64) if scale == "log" else np.asarray
     with np.errstate(divide="ignore", invalid="ignore"):  # of outliers that have no logarithm
         ends = float(to(minimum)), float(to(maximum))
         counts = np.sum([histogram(to(slab), *ends) for slab in slabs(source)], axis=0)
