@@ -15,7 +15,7 @@ import SimpleITK as sitk
 from texgs.core.errors import ArgumentError
 from texgs.volume.dicom_phases import ALL, FileSeries, phases_of
 from texgs.volume.dicom_samples import samples_of, without_padding
-from texgs.volume.dicom_slice import TIMES, Slice, advised, said_in, slices_in
+from texgs.volume.dicom_slice import CONVERT, TIMES, Slice, said_in, slices_in
 from texgs.volume.grid import dims_of
 from texgs.volume.itk_image import sentence
 from texgs.volume.slabs import require_step
@@ -32,7 +32,8 @@ def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any
     """Read lattice and samples [Z, Y, X], rescaled by slope and intercept, of a step of a series."""
     sitk.ProcessObject.GlobalWarningDisplayOff()
     try:
-        slices, distance, n_steps, note = step_at(path, series, time)
+        slices, n_steps, note = step_at(path, series, time)
+        distance = slice_distance(slices)
         values = samples_of(slices)
     except RuntimeError as error:
         raise ArgumentError(sentence(error)) from error
@@ -51,33 +52,16 @@ def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any
     return lattice, values
 
 
-def step_at(path: Path, series: str | None, time: int) -> tuple[list[Slice], float, int, str]:
-    """Return the slices of a step, their distance, how many steps there are, and what to say of them."""
-    every, note = series_in(path) if path.is_dir() else [of_frames(path)], ""
+def step_at(path: Path, series: str | None, time: int) -> tuple[list[Slice], int, str]:
+    """Return the slices of a step, how many steps there are, and what to say of them."""
+    every = series_in(path) if path.is_dir() else [FileSeries([str(path)])]
     if series == ALL and len(every) > 1:
         phases, note = phases_of(every)
         require_step(time, len(phases))
-        slices, n_steps = slices_of(phases[time]), len(phases)
-    else:
-        slices = slices_of(chosen(every, series))
-        with advised(slices[0].frame is not None):
-            steps = steps_of(slices)
-        require_step(time, len(steps))
-        slices, n_steps = steps[time], len(steps)
-    with advised(slices[0].frame is not None):
-        return slices, slice_distance(slices), n_steps, note
-
-
-def of_frames(path: Path) -> FileSeries:
-    """Return a file of many frames as a series."""
-    if is_foreign(path):
-        raise ArgumentError("expected a file of DICOM, got another")
-    if len(slices_in(path)) < 2:
-        folder = path.absolute().parent
-        raise ArgumentError(
-            f"expected a file of many frames, got one slice of a series; open its folder, {folder}"
-        )
-    return FileSeries("", "", "", "", [str(path)], ())
+        return slices_of(phases[time]), len(phases), note
+    steps = steps_of(slices_of(chosen(every, series)))
+    require_step(time, len(steps))
+    return steps[time], len(steps), ""
 
 
 def series_in(folder: Path) -> list[FileSeries]:
@@ -88,17 +72,14 @@ def series_in(folder: Path) -> list[FileSeries]:
         header = pydicom.dcmread(files[0], stop_before_pixels=True, force=True, specific_tags=OF_SERIES)
         first = said_in([header])
         number, description, position, kind = (str(first.get(each, "")) for each in OF_SERIES)
-        every.append(
-            FileSeries(
-                number, description or kind, position, uid, files, lattice_of(Path(files[0]), len(files))
-            )
-        )
+        lattice = lattice_of(Path(files[0]), len(files))
+        every.append(FileSeries(files, uid, number, description or kind, position, lattice))
     names = {Path(file).name for each in every for file in each.files}
     unlisted = [path for path in sorted(folder.iterdir()) if path.name not in names]
-    if foreign := next((path.name for path in unlisted if is_foreign(path)), None):
-        raise ArgumentError(f"{foreign}: expected a file of DICOM, got another; correct it, or take it away")
-    if damaged := next((path.name for path in unlisted if is_slice(path)), None):
-        raise ArgumentError(f"{damaged}: cut off or damaged; put the whole slice there, or take it away")
+    if damaged := next(filter(is_damaged, unlisted), None):
+        raise ArgumentError(
+            f"{damaged.name}: cut off, damaged or no file of DICOM; put it there again, or take it away"
+        )
     if not every:
         below = ", ".join([path.name for path in unlisted if path.is_dir()][:3])
         advice = f"; open the folder with the slices, in {below}" if below else ""
@@ -136,20 +117,13 @@ def slices_of(series: FileSeries) -> list[Slice]:
     return sorted(slices, key=lambda each: each.height)
 
 
-def is_slice(path: Path) -> bool:
-    """Return whether a file is one of DICOM with samples; GDCM lists none that is damaged."""
-    if not path.is_file():
+def is_damaged(path: Path) -> bool:
+    """Return whether a file that GDCM does not list should be a slice; hidden ones of macOS do not count."""
+    if path.name.startswith(".") or not path.is_file():
         return False
     with path.open("rb") as file:
-        return file.read(132)[128:] == MAGIC and PIXELS in file.read()
-
-
-def is_foreign(path: Path) -> bool:
-    """Return whether a file is none of DICOM, but has its ending; hidden ones of macOS do not count."""
-    if path.suffix.lower() != ".dcm" or path.name.startswith(".") or not path.is_file():
-        return False
-    with path.open("rb") as file:
-        return file.read(132)[128:] != MAGIC
+        is_dicom = file.read(132)[128:] == MAGIC
+        return PIXELS in file.read() if is_dicom else path.suffix.lower() == ".dcm"
 
 
 def steps_of(slices: list[Slice]) -> list[list[Slice]]:
@@ -176,18 +150,14 @@ def steps_of(slices: list[Slice]) -> list[list[Slice]]:
 
 def time_tag(places: list[list[Slice]]) -> tuple[int, str]:
     """Return index and name of the tag that tells all slices at one place apart."""
-    lacking = ""
     for index, name in enumerate(TIMES):
         values = [[each.times[index] for each in place] for place in places]
         if all("" not in some and len({*map(float, some)}) == len(some) for some in values):
             return index, name
-        without = [each.name for place in places for each in place if not each.times[index]]
-        if 0 < len(without) < sum(map(len, places)):
-            lacking += f"; {without[0]} has no {name}"
     first, second = next(place for place in places if len(place) > 1)[:2]
     raise ArgumentError(
         f"{first.name} and {second.name}: expected slices at different places, got two at one, and "
-        f"no {' or '.join(TIMES)} that tells such slices apart{lacking}"
+        f"no {' or '.join(TIMES)} in all that tells such slices apart; {CONVERT}"
     )
 
 
@@ -195,7 +165,7 @@ def slice_distance(slices: list[Slice]) -> float:
     """Return the distance from slice to slice, in mm, of a series in the order of its places."""
     first = slices[0]
     if len(slices) < 2:
-        raise ArgumentError("expected at least 2 slices, got 1")
+        raise ArgumentError("expected at least 2 slices, got 1; open the folder with all of the series")
     for each in slices:
         is_like = each.sizes == first.sizes and np.allclose(each.spacing, first.spacing)
         if not is_like or not np.allclose(each.directions, first.directions, atol=1e-3):
@@ -208,13 +178,10 @@ def slice_distance(slices: list[Slice]) -> float:
             )
     gaps = np.diff([each.height for each in slices])
     step = float(np.sort(gaps)[(len(gaps) - 1) // 2])
-    for before, after, gap in zip(slices, slices[1:], gaps, strict=False):
-        if abs(gap - step) > UNEVEN * step:
-            count = round(gap / step)
-            is_missing = count > 1 and abs(gap - count * step) <= UNEVEN * step
-            found = f"{count - 1} missing" if is_missing else "another"
-            raise ArgumentError(
-                f"{before.name} and {after.name}: expected slices {step:.6g} mm apart, got "
-                f"{gap:.6g} mm: {found}; complete the series, or resample it"
-            )
-    return float(slices[-1].height - first.height) / (len(slices) - 1)
+    worst = int(np.abs(gaps - step).argmax())
+    if abs(gaps[worst] - step) > UNEVEN * step:
+        raise ArgumentError(
+            f"{slices[worst].name} and {slices[worst + 1].name}: expected slices {step:.6g} mm apart, got "
+            f"{gaps[worst]:.6g} mm; complete the series, or {CONVERT}"
+        )
+    return float(slices[-1].height - first.height) / len(gaps)

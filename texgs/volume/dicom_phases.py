@@ -19,12 +19,12 @@ ORDERS = {
 class FileSeries(NamedTuple):
     """A series in a folder, as its first file tells."""
 
-    number: str
-    description: str
-    position: str  # in time
-    uid: str
     files: Sequence[str]
-    lattice: tuple[float, ...]  # number of slices, and all that the first says of it; empty: it has none
+    uid: str = ""
+    number: str = ""
+    description: str = ""
+    position: str = ""  # in time
+    lattice: tuple[float, ...] = ()  # number of slices, and all that the first says of it; empty: it has none
 
     def __str__(self) -> str:
         return f"{self.number} ({self.description}, {len(self.files)} files, UID {self.uid})"
