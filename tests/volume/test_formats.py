@@ -337,7 +337,7 @@ def test_other_types_are_refused(tmp_path):
         ("DATASET POLYDATA\nPOINTS 1 float\n0 0 0\n", r"expected image data .*, got PolyData"),
         (
             "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 3\nORIGIN 0 0 0\nSPACING 1 1 1\n",
-            "expected data of points or cells, found none",
+            "expected scalars of points or cells, got none",
         ),
     ],
 )

@@ -41,7 +41,7 @@ def test_points_come_before_cells(tmp_path):
     points = np.arange(14 * 13 * 12.0)
     image.point_data["p"] = points
     image.save(tmp_path / "v.vti")
-    note = "array p; dataset.volume.variable chooses another (density of cells)"
+    note = "array p; dataset.volume.variable chooses another (density)"
     assert open_source(tmp_path / "v.vti").note == note
     assert_holds(tmp_path / "v.vti", points.reshape(12, 13, 14))
     assert_holds(tmp_path / "v.vti", VALUES, variable="density")

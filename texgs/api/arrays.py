@@ -95,10 +95,12 @@ def of_image_data(image: Any) -> tuple[np.ndarray, Triple, Triple, Space]:
 
     from texgs.volume.vtk_image import field_of
 
-    values, steps, (x, y, z), directions, _ = field_of(wrap(image), None)
+    lattice, values = field_of(wrap(image))
+    directions = np.array(lattice["directions"])
     if np.linalg.det(directions) <= 0:
         raise ArgumentError("ImageData: expected axes that are not mirrored; write a .vti file and open that")
-    return values, steps, (x, y, z), Space.along(np.asarray(directions))
+    (dx, dy, dz), (x, y, z) = lattice["spacing"], lattice["origin"]
+    return values, (dx, dy, dz), (x, y, z), Space.along(directions)
 
 
 def of_data_array(array: Any, spacing: Triple | None, origin: Triple | None) -> Source:

@@ -16,13 +16,7 @@ from texgs.volume.slabs import require_step
 OF_SPACE = ("domain", "space")  # kinds of axes of NRRD
 SEQUENCE = ".seq.nrrd"  # of 3D Slicer, whose list is one of steps in time
 WORD = re.compile(r'\([^)]*\)|"[^"]*"|\S+')  # of a field of NRRD: a vector is one, and so is a text
-# Fields of NRRD with a word for each axis; of MetaImage with a number.
-PER_AXIS = (
-    *("sizes", "kinds", "spacedirections", "spacings", "thicknesses", "axismins", "axismaxs"),
-    *("centers", "centerings", "labels", "units"),
-)
-NUMBERS = ("dimsize", "elementspacing", "elementsize", "offset", "position", "origin", "centerofrotation")
-MATRICES = ("transformmatrix", "rotation", "orientation")
+TEXTS = ("type", "color")  # fields whose four words are not of four axes
 
 
 class ExtraAxis(NamedTuple):
@@ -87,18 +81,16 @@ def one_volume(path: Path, axis: ExtraAxis | None) -> Iterator[Path]:
 
 
 def bare(line: str, place: int, is_nrrd: bool) -> str:
-    """Return a line of a header without what it says of an axis."""
+    """Return a line of a header without what it says of an axis: one of four words, or of a matrix."""
     name, mark, value = line.partition(":" if is_nrrd else "=")
     key, words = name.replace(" ", "").strip().lower(), WORD.findall(value)
     if key == "datafile":
         return "#"
-    if key in ("dimension", "ndims"):
-        words = ["3"]
-    elif key == "elementnumberofchannels":
-        words = ["1"]
-    elif key in PER_AXIS if is_nrrd else key in NUMBERS and len(words) == 4:
+    if key in ("dimension", "ndims", "elementnumberofchannels"):
+        words = ["1" if key.startswith("element") else "3"]
+    elif len(words) == 4 and key not in TEXTS:
         del words[place]
-    elif key in MATRICES and len(words) == 16:
+    elif len(words) == 16:
         words = [word for k, word in enumerate(words) if k < 12 and k % 4 < 3]
     else:
         return line

@@ -9,12 +9,12 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.volume.grid import (
-    AS_STORED,
     ONES,
     AxisPermutation,
     Grid,
     Triple,
     check_lattice,
+    dims_of,
     permuted_values,
     require_room,
 )
@@ -33,30 +33,25 @@ def open_mrc(path: Path, spacing: Triple | None, origin: Triple | None) -> Sourc
     with reading_as("an MRC file"), warnings.catch_warnings(action="ignore"):
         with mrcfile.open(path, permissive=True, header_only=True) as file:
             header = file.header
-        dtype, offset = type_of(header), header.nbytes + int(header.nsymbt)
-        dims = (int(header.nx), int(header.ny), int(header.nz))
+        dims, dtype = (int(header.nx), int(header.ny), int(header.nz)), type_of(header)
         check_lattice(dims, dtype)
         if mrcfile.utils.spacegroup_is_volume_stack(header.ispg) and header.mz < header.nz:
-            raise ArgumentError(
-                f"expected one volume, got a stack of {header.nz // header.mz}; take it apart"
-            )
-        if path.suffix.lower() == ".gz":
+            count = header.nz // header.mz
+            raise ArgumentError(f"expected one volume, got a stack of {count}; take it apart")
+        is_packed = path.suffix.lower() == ".gz"
+        if is_packed:
             require_room(dims, dtype)
-            with mrcfile.open(path, permissive=True) as file:
-                values = file.data
-            if values is None:
-                raise ArgumentError(
-                    "the file is cut off or damaged: it has fewer samples than its header says"
-                )
-            values = values.view(dtype)
-        else:
-            values = RawSource(path, dims, dtype, offset).mapped()
+        with (mrcfile.open if is_packed else mrcfile.mmap)(path, permissive=True) as file:
+            values = file.data
+        if values is None:
+            raise ArgumentError("the file is cut off or damaged: it has fewer samples than its header says")
         axes, steps, first, note = lattice_of(header)
+        values = permuted_values(values.view(dtype).reshape(dims[::-1]), axes)
         lattice, space = (spacing or steps, origin or first), Space(unit="angstrom")
-        if axes == AS_STORED and isinstance(values, np.memmap):
-            source: Source = RawSource(path, dims, dtype, offset, *lattice, space)
+        if isinstance(values, np.memmap) and values.flags.c_contiguous:
+            source: Source = RawSource(path, dims_of(values.shape), dtype, values.offset, *lattice, space)
         else:
-            source = ArraySource(Grid(permuted_values(values, axes), *lattice, space=space), path.name)
+            source = ArraySource(Grid(values, *lattice, space=space), path.name)
         source.note = "" if spacing else note
         return source
 
@@ -88,7 +83,5 @@ def lattice_of(header: Any) -> tuple[AxisPermutation, Triple, Triple, str]:
     first = header.origin.item()
     if not any(first):
         first = (starts[x] * dx, starts[y] * dy, starts[z] * dz)
-    note = (
-        "" if is_told else "MRC tells no spacing, so that samples are 1 apart; dataset.volume.spacing sets it"
-    )
-    return ((x, 1), (y, 1), (z, 1)), (dx, dy, dz), first, note
+    note = "MRC tells no spacing, so that samples are 1 apart; dataset.volume.spacing sets it"
+    return ((x, 1), (y, 1), (z, 1)), (dx, dy, dz), first, "" if is_told else note
