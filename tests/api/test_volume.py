@@ -280,7 +280,7 @@ def test_image_data_that_are_a_part_of_others_keep_their_place():
     ("data", "keys", "message"),
     [
         (field(4, 4, 4), {"name": 3}, "name: expected words, got 3"),
-        (field(4, 4, 4), {"spacing": 2}, "spacing: expected three numbers x, y, z, got 2"),
+        (field(4, 4, 4), {"spacing": 2}, "spacing: expected 3 numbers, got 2"),
         (field(4, 4, 4), {"nan_value": "0"}, "nan_value: expected a finite float32, got 0"),
         ([[1, 2], [3]], {}, r"data: expected an array \[Z, Y, X\], got list"),
         (

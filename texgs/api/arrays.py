@@ -1,6 +1,6 @@
 """Sources from objects of other libraries, which are known by what they can: none of these is imported."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from operator import index
 from typing import Any
 
@@ -30,7 +30,7 @@ def source_of(
     Raises:
         ArgumentError, ShapeError: if there is no scalar field on a regular lattice.
     """
-    said = three("spacing", spacing), three("origin", origin)
+    said = several("spacing", spacing, 3), several("origin", origin, 3)
     if hasattr(data, "data_vars"):
         names = ", ".join(map(str, data.data_vars))
         raise ArgumentError(f"data: expected one array, got a Dataset of {names}; choose one by its name")
@@ -43,32 +43,20 @@ def source_of(
     return ArraySource(Grid(values, said[0] or steps, said[1] or first, space=space), name)
 
 
-def three(name: str, numbers: Sequence[float] | None) -> Triple | None:
-    """Return three numbers as floats; None where there are none."""
-    if numbers is None:
-        return None
+def several(name: str, numbers: Any, count: int, kind: Callable[[Any], float] = float) -> Any:
+    """Return a tuple of so many numbers, any or whole ones (by `index`); None where there are none."""
     try:
-        x, y, z = map(float, numbers)
+        return None if numbers is None else tuple(map(kind, np.reshape(numbers, count).tolist()))
     except (TypeError, ValueError):
-        raise ArgumentError(f"{name}: expected three numbers x, y, z, got {numbers!r:.100}") from None
-    return x, y, z
-
-
-def whole(name: str, numbers: Any, count: int) -> tuple[int, ...] | None:
-    """Return so many whole numbers; None where there are none."""
-    if numbers is None:
-        return None
-    try:
-        return tuple(map(index, np.reshape(numbers, count).tolist()))
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{name}: expected {count} whole numbers, got {numbers!r:.100}") from None
+        what = f"{count} {'whole ' if kind is index else ''}numbers"
+        raise ArgumentError(f"{name}: expected {what}, got {numbers!r:.100}") from None
 
 
 def keys_of_format(keys: Mapping[str, Any]) -> dict[str, Any]:
     """Return what only some formats take as these have it, with numbers of Python."""
     plain = {key: as_python(value) for key, value in keys.items()}
     if "dims" in plain:
-        plain["dims"] = whole("dims", plain["dims"], 3)
+        plain["dims"] = several("dims", plain["dims"], 3, index)
     if isinstance(plain.get("series"), int):
         plain["series"] = str(plain["series"])  # DICOM has text
     for key, least in (("column", 1), ("skip", 0), ("time", 0)):

@@ -8,13 +8,14 @@ from dataclasses import replace
 from filecmp import cmp
 from html import escape
 from inspect import signature
+from operator import index
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from texgs.api.arrays import keys_of_format, source_of, three, whole
+from texgs.api.arrays import keys_of_format, several, source_of
 from texgs.api.display import as_python, camera_of, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
 from texgs.config.project import check_name, name_of
@@ -92,7 +93,7 @@ class Volume:
         self._scratch = TemporaryDirectory(prefix="texgs-") if folder is None else None
         self.folder = Path(folder if folder is not None else self._scratch.name)  # type: ignore[union-attr]
         if isinstance(data, str | Path):
-            steps, first = three("spacing", spacing), three("origin", origin)
+            steps, first = several("spacing", spacing, 3), several("origin", origin, 3)
             source = open_source(data, spacing=steps, origin=first, **keys_of_format(keys))
         elif keys:
             hint = close(next(iter(keys)), signature(Volume).parameters)
@@ -102,7 +103,7 @@ class Volume:
         self._channel = source.channel
         if up is None:
             up = "+z" if isinstance(data, str | Path) and tells_superior(Path(data)) else "+y"
-        crop, nan_value = whole("crop", crop, 6), as_python(nan_value)
+        crop, nan_value = several("crop", crop, 6, index), as_python(nan_value)
         how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": nan_value}
         self.summary = self._prepared(source, how)
         if source.note:

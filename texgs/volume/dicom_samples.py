@@ -11,51 +11,29 @@ from pydicom.uid import MultiFrameGrayscaleWordSecondaryCaptureImageStorage as C
 
 from texgs.volume.dicom_slice import Slice
 from texgs.volume.grid import require_room
-from texgs.volume.itk_image import require_volume
 
 SCALE = ("RescaleSlope", "RescaleIntercept")
-INT16 = np.iinfo(np.int16)
 
 
 def samples_of(slices: Sequence[Slice]) -> np.ndarray:
     """Return samples [Z, Y, X] of slices, rescaled by slope and intercept."""
+    require_room((*slices[0].sizes, len(slices)), np.dtype(np.float32))
     if any(each.frame is not None for each in slices):
         return samples_of_frames(slices)
-    headers = [header(each.path) for each in slices]
-    pixel_ids = {each.GetPixelIDValue() for each in headers}
-    pixel_id = sitk.sitkFloat64 if len(pixel_ids) > 1 else pixel_ids.pop()
-    require_room(
-        *require_volume([*slices[0].sizes, len(slices)], pixel_id, headers[0].GetNumberOfComponents())
-    )
-    reader = sitk.ImageSeriesReader()
-    reader.SetFileNames([str(each.path) for each in slices])
-    reader.SetOutputPixelType(pixel_id)
-    return sitk.GetArrayFromImage(reader.Execute())
-
-
-def header(path: Path) -> sitk.ImageFileReader:
-    """Return a reader that has read a header."""
-    reader = sitk.ImageFileReader()
-    reader.SetFileName(str(path))
-    reader.ReadImageInformation()
-    return reader
+    return np.concatenate([sitk.GetArrayFromImage(sitk.ReadImage(each.path)) for each in slices])
 
 
 def samples_of_frames(slices: Sequence[Slice]) -> np.ndarray:
     """Return samples [Z, Y, X] of frames; whole numbers that fit into 16 bits stay such."""
-    columns, rows = slices[0].sizes
-    require_room((columns, rows, len(slices)), np.dtype(np.float32))
     stored = {path: stored_frames(path) for path in {each.path for each in slices}}
-    is_scaled = any(each.scale != (1, 0) for each in slices)
-    dtype = np.result_type(*stored.values())
-    values = np.empty((len(slices), rows, columns), np.float32 if is_scaled else dtype)
-    for plane, each in zip(values, slices, strict=True):
-        slope, intercept = each.scale
-        samples = stored[each.path][each.frame or 0]
-        plane[:] = samples * slope + intercept if is_scaled else samples
-    is_whole = dtype.kind in "iu" and all(float(x).is_integer() for each in slices for x in each.scale)
-    fits = INT16.min <= values.min() and values.max() <= INT16.max
-    return values.astype(np.int16) if is_scaled and is_whole and fits else values
+    planes = [stored[each.path][each.frame or 0] for each in slices]
+    scales = [each.scale for each in slices]
+    if {*scales} == {(1, 0)}:
+        return np.stack(planes)
+    values = np.stack([plane * a + b for plane, (a, b) in zip(planes, scales, strict=True)], dtype=np.float32)
+    with np.errstate(invalid="ignore"):
+        whole = values.astype(np.int16)
+    return whole if np.array_equal(whole, values) else values
 
 
 def stored_frames(path: Path) -> np.ndarray:

@@ -72,7 +72,8 @@ def one_volume(path: Path, axis: ExtraAxis | None) -> Iterator[Path]:
     if axis is None:
         yield path
         return
-    head = path.read_bytes()[: read_fields(path)[1]].decode("latin-1")
+    with path.open("rb") as file:
+        head = file.read(read_fields(path)[1]).decode("latin-1")
     with TemporaryDirectory() as folder:
         header = Path(folder) / path.name
         lines = [bare(line, axis.place, path.suffix.lower() in NRRD) for line in head.splitlines()]

@@ -74,8 +74,6 @@ class RawSource(Source):
         super().__init__(path.name, dims, stored, spacing, origin)
         self.space = space
         self._path, self._stored, self._offset = path, stored, offset
-        if not path.is_file():
-            raise ArgumentError(f"no such file with samples: {path}")
         size = path.stat().st_size
         if offset < 0 or size < offset + byte_count(dims, stored):
             expected = size_text(dims, stored, offset)
