@@ -390,7 +390,7 @@ def test_a_project_is_left_as_it_is(tmp_path, capsys):
 def test_a_folder_of_something_else_is_refused(tmp_path, capsys):
     (tmp_path / "thesis.tex").write_text("mine")
     assert main(["init", str(tmp_path)]) == 2
-    assert "got one with thesis.tex; choose another" in capsys.readouterr().err
+    assert "got thesis.tex; choose another" in capsys.readouterr().err
     assert main(["init", str(tmp_path / "thesis.tex")]) == 2
     assert "got a file" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]

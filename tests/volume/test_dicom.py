@@ -294,7 +294,7 @@ def test_an_order_that_is_not_told_is_refused(tmp_path, tags, message):
 def test_series_of_which_none_are_most_are_refused(tmp_path):
     write_series(tmp_path, sample_values()[:4], number=1)
     write_series(tmp_path, sample_values()[:5, :7], number=2, uid=generate_uid())
-    message = "expected the series of the steps on one lattice, more than on any other, got "
+    message = "expected series on one lattice, more than on any other, got "
     with pytest.raises(ArgumentError, match=message):
         open_source(tmp_path, series="all")
     for number, rows in ((3, 12), (4, 7)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import suppress
 from dataclasses import asdict, replace
 from math import prod
 from pathlib import Path
@@ -125,10 +126,8 @@ def array_of(volume: Volume) -> Source | None:
     if not holds_arrays(path):
         return None
     for channel in (volume.channel or "0", volume.channel):
-        try:
+        with suppress(TexgsError):  # it has no channels; what else is wrong with it is told when it is read
             return source(replace(volume, channel=channel), path)
-        except TexgsError:  # it has no channels; what else is wrong with it is told when it is read
-            pass
     return None
 
 
@@ -210,12 +209,10 @@ def run_init(arguments: argparse.Namespace) -> int:
     if is_there(folder / "conf" / "dataset"):
         print(f"{folder}: is a project already")
         return 0
-    if folder.exists() and not folder.is_dir():
-        raise ArgumentError(f"{folder}: expected a new or empty folder, got a file; choose another name")
-    if folder.is_dir() and (names := sorted(path.name for path in folder.iterdir())):
-        raise ArgumentError(
-            f"{folder}: expected a new or empty folder, got one with {', '.join(names[:3])}; choose another"
-        )
+    names = [path.name for path in folder.iterdir()] if folder.is_dir() else ["a file"]
+    if folder.exists() and names:
+        got = ", ".join(sorted(names)[:3])
+        raise ArgumentError(f"{folder}: expected a new or empty folder, got {got}; choose another name")
     for file in sorted(path for path in PROJECT.rglob("*") if path.is_file()):
         name = file.relative_to(PROJECT).as_posix().replace("gitignore", ".gitignore")
         write_bytes(folder / name, file.read_bytes())

@@ -45,8 +45,8 @@ def with_tfs(config: Config, channels: dict[str, Channel | None], arguments: arg
         basic = basic_tfs(dataset.name, known[""], channels[""], arguments.tf, arguments.count)
         listed = {key: BasicTF(**tf.to_dict()) for key, tf in basic.items()}
     dataset = replace(dataset, basic_tfs=listed)
-    ensure(STAGES["transfer"], replace(config, dataset=dataset))
     check_basic_tfs(dataset)
+    ensure(STAGES["transfer"], replace(config, dataset=dataset))
     return dataset
 
 
@@ -95,7 +95,6 @@ def basic_tfs(
 
     from texgs.volume.suggest import looks_like_labels, suggested
     from texgs.volume.tf_files import read_tf
-    from texgs.volume.transfer import check_disjoint
 
     low, high = summary["minimum"], summary["maximum"]
     if not files:
@@ -109,12 +108,11 @@ def basic_tfs(
             )
         return suggested(summary, count, channel)
     basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
-    check_disjoint(basic)
     for path, tf in zip(files, basic.values(), strict=True):
         first, last = tf.support
         if last <= 1 < high:
             raise ArgumentError(
-                f"{path}: expected values of the data, which go up to {high:g}, got a TF "
-                f"on [{first:g}, {last:g}]; rescale it to the data in ParaView first"
+                f"{path}: expected values of the data, which go up to {high:g}, got a TF on [{first:g}, "
+                f"{last:g}]; rescale it to the data in ParaView first"
             )
     return basic

@@ -138,12 +138,11 @@ def steps_of(slices: list[Slice]) -> list[list[Slice]]:
         return [slices]
     index, name = time_tag(places)
     first = places[0]
-    for place in places:
-        if len(place) != len(first):
-            raise ArgumentError(
-                f"expected a slice of each {name} at each place, got {len(first)} at "
-                f"{first[0].height:.6g} mm, {len(place)} at {place[0].height:.6g} mm; complete the series"
-            )
+    if odd := next((place for place in places if len(place) != len(first)), None):
+        raise ArgumentError(
+            f"expected a slice of each {name} at each place, got {len(first)} at {first[0].height:.6g} mm, "
+            f"{len(odd)} at {odd[0].height:.6g} mm; complete the series"
+        )
     in_order = [sorted(place, key=lambda each: float(each.times[index])) for place in places]
     return [list(step) for step in zip(*in_order, strict=True)]
 
@@ -169,7 +168,9 @@ def slice_distance(slices: list[Slice]) -> float:
     for each in slices:
         is_like = each.sizes == first.sizes and np.allclose(each.spacing, first.spacing)
         if not is_like or not np.allclose(each.directions, first.directions, atol=1e-3):
-            raise ArgumentError(f"{each.name}: expected size, spacing and orientation of {first.name}")
+            raise ArgumentError(
+                f"{each.name}: expected size, spacing and orientation of {first.name}; {CONVERT}"
+            )
         shift = np.abs(first.directions[:2] @ (each.place - first.place)).max()
         if shift > TILT * (each.height - first.height) + ROUNDING:
             raise ArgumentError(

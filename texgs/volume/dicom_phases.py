@@ -35,10 +35,8 @@ def phases_of(every: Sequence[FileSeries]) -> tuple[list[FileSeries], str]:
     ranked = Counter(each.lattice for each in every if each.lattice).most_common(2)
     (lattice, count), (_, next_count), *_ = [*ranked, ((), 0), ((), 0)]
     if count < 2 or count == next_count:
-        titles = "; ".join(map(str, every))
-        raise ArgumentError(
-            f"expected the series of the steps on one lattice, more than on any other, got {titles}"
-        )
+        got = "; ".join(map(str, every))
+        raise ArgumentError(f"expected series on one lattice, more than on any other, got {got}")
     phases, left = ([each for each in every if (each.lattice == lattice) is x] for x in (True, False))
     if part := next((each for each in left if each.lattice[1:] == lattice[1:]), None):
         raise ArgumentError(f"expected series as long as {phases[0]}, got {part}; complete them")

@@ -12,8 +12,6 @@ from pydicom.uid import MultiFrameGrayscaleWordSecondaryCaptureImageStorage as C
 from texgs.volume.dicom_slice import Slice
 from texgs.volume.grid import require_room
 
-SCALE = ("RescaleSlope", "RescaleIntercept")
-
 
 def samples_of(slices: Sequence[Slice]) -> np.ndarray:
     """Return samples [Z, Y, X] of slices, rescaled by slope and intercept."""
@@ -43,8 +41,7 @@ def stored_frames(path: Path) -> np.ndarray:
         return data.pixel_array.reshape(-1, data.Rows, data.Columns)
     # GDCM unpacks more than pydicom, but would rescale all frames as the first.
     bare = data.group_dataset(0x0028)
-    for name in SCALE:
-        bare.pop(name, None)
+    bare.RescaleSlope, bare.RescaleIntercept = 1, 0
     bare["PixelData"], bare.file_meta = data["PixelData"], data.file_meta
     bare.SOPInstanceUID, bare.SOPClassUID = data.SOPInstanceUID, CAPTURE
     with tempfile.TemporaryDirectory() as folder:
@@ -63,8 +60,7 @@ def without_padding(values: np.ndarray, slices: Sequence[Slice]) -> str:
     count = int(masks.sum())
     if count in (0, values.size):
         return ""
-    one = values[masks][0]
-    least = values.min(where=~masks, initial=values.max())
+    one, least = values[masks][0], values.min(where=~masks, initial=values.max())
     values[masks] = least
     share = f"{100 * count / values.size:.3g} %"
     return f"{share} of the samples are padding ({one:g}) and take the smallest other value, {least:g}"
