@@ -35,7 +35,12 @@ def source_of(
         names = ", ".join(map(str, data.data_vars))
         raise ArgumentError(f"data: expected one array, got a Dataset of {names}; choose one by its name")
     if hasattr(data, "dims") and hasattr(data, "coords"):
-        return of_data_array(data, *said)
+        if len(data.dims) != 3:
+            got = ", ".join(map(str, data.dims)) or "none"
+            advice = "select one of each other, as by .isel(time=0)"
+            raise ArgumentError(f"DataArray: expected three dimensions, got {got}; {advice}")
+        with located("DataArray"):
+            return labelled("DataArray", data, said)
     if hasattr(data, "GetFieldData"):  # of VTK
         values, steps, first, space = of_image_data(data)
     else:
@@ -72,9 +77,8 @@ def of_array(data: Any) -> np.ndarray:
     try:
         return np.asarray(data)
     except ValueError as error:
-        raise ArgumentError(
-            f"data: expected an array [Z, Y, X], got {type(data).__name__} ({error})"
-        ) from error
+        kind = type(data).__name__
+        raise ArgumentError(f"data: expected an array [Z, Y, X], got {kind} ({error})") from error
 
 
 def of_image_data(image: Any) -> tuple[np.ndarray, Triple, Triple, Space]:
@@ -89,15 +93,3 @@ def of_image_data(image: Any) -> tuple[np.ndarray, Triple, Triple, Space]:
         raise ArgumentError("ImageData: expected axes that are not mirrored; write a .vti file and open that")
     (dx, dy, dz), (x, y, z) = lattice["spacing"], lattice["origin"]
     return values, (dx, dy, dz), (x, y, z), Space.along(directions)
-
-
-def of_data_array(array: Any, spacing: Triple | None, origin: Triple | None) -> Source:
-    """Return xarray's data as a source, with what labels and attributes tell, as of those in files."""
-    names = [str(name) for name in array.dims]
-    if len(names) != 3:
-        raise ArgumentError(
-            f"DataArray: expected three dimensions, got {', '.join(names) or 'none'}; select one of each "
-            "other, as by .isel(time=0)"
-        )
-    with located("DataArray"):
-        return labelled("DataArray", array, (spacing, origin))

@@ -121,6 +121,6 @@ def first_message(window: Any) -> str:
     """
     output = window.GetOutput()  # bytes where a damaged file is quoted that is no text
     text = output.decode(errors="replace") if isinstance(output, bytes) else output
-    message = next((message for message in text.split("\n\n") if message.strip()), "").strip()
-    lines = [line for line in message.splitlines() if not re.match(r"(ERROR|(Generic )?Warning): In", line)]
-    return " ".join(lines).split("): ", 1)[-1].strip(" .!")
+    message = next(filter(str.strip, text.split("\n\n")), "")
+    bare = " ".join(re.sub(r"(?m)^(ERROR|(Generic )?Warning): In.*", "", message).split())
+    return bare.split("): ", 1)[-1].strip(" .!")
