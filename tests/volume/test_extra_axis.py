@@ -41,7 +41,8 @@ def test_one_of_the_axis_is_read_wherever_it_is(tmp_path, place, encoding, name)
 
 @pytest.mark.parametrize("kind", ["list", "vector", "RGB-color"])
 def test_channels_and_layers_have_to_be_chosen(tmp_path, kind):
-    write_nrrd(tmp_path / "v.seg.nrrd", 0, kind, "gzip")
+    words = {"content": "an image of four", "Segment0_Name": "of a left lung"}
+    write_nrrd(tmp_path / "v.seg.nrrd", 0, kind, "gzip", **words)
     with pytest.raises(
         ArgumentError, match=r"channel: expected one of 0 to 2, as there are 3 components .*none"
     ):

@@ -60,7 +60,7 @@ def test_a_map_without_a_cell_says_so(tmp_path):
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"mapc": 2}, r"rows and sections along x, y, z, got axes 2, 2, 3"),
+        ({"mapc": 2}, r"rows and sections along x, y, z, got axes \[2, 2, 3\]"),
         ({"cellb": (90, 90, 120)}, r"axes at right angles, got \[90.0, 90.0, 120.0\]; resample the map"),
         ({"ispg": 401, "nz": 10, "mz": 5}, "expected one volume, got a stack of 2; take it apart"),
         ({"mode": 4}, "expected integers, floats or bool, got complex64"),

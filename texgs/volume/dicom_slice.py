@@ -63,9 +63,9 @@ def slices_in(path: Path) -> list[Slice]:
     shared = data.get("SharedFunctionalGroupsSequence") or [()]
     said = said_in([*(data.get("DetectorInformationSequence") or [])[:1], data, *first_items(shared[0])])
     with located(path.name if count < 2 else f"{path.name}, a multi-frame file"):
-        frames = [said | said_in(first_items(group)) for group in groups]
-        if not groups:
-            frames = stacked(said, count) if count > 1 else [said]
+        frames = [said | said_in(first_items(group)) for group in groups] or [said]
+        if count > 1 and not groups:
+            frames = stacked(said, count)
         if len(frames) != count:
             raise ArgumentError(f"expected places of {count} frames, got {len(frames)}; {CONVERT}")
         if len(stacks := {str(each.get("StackID", "")) for each in frames}) > 1:
@@ -118,12 +118,10 @@ def slice_of(path: Path, said: dict[str, Any], frame: int | None) -> Slice:
     dy, dx = (float(number) for number in said.get(key, (1, 1)))
     sizes = (int(said["Columns"]), int(said["Rows"]))
     times = tuple(str(next((said[each] for each in words if each in said), "")) for words in TIMES.values())
-    slope, intercept = (
-        said.get("RescaleSlope", said.get("DoseGridScaling", 1)),
-        said.get("RescaleIntercept", 0),
-    )
+    slope = float(said.get("RescaleSlope", said.get("DoseGridScaling", 1)))
+    scale = (slope, float(said.get("RescaleIntercept", 0)))
     bits, is_signed = int(said.get("BitsStored", 16)), bool(said.get("PixelRepresentation"))
     codes = [int(said[each]) % 2**bits for each in PADDING if each in said]  # with a sign or without
     codes = [code - 2**bits * (is_signed and code >> bits - 1) for code in codes]
-    padding, scale = (min(codes), max(codes)) if codes else None, (float(slope), float(intercept))
+    padding = (min(codes), max(codes)) if codes else None
     return Slice(path, frame, sizes, (dx, dy), place, directions, times, scale, padding, note)

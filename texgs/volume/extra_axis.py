@@ -85,7 +85,7 @@ def bare(line: str, place: int, is_nrrd: bool) -> str:
     """Return a line of a header without what it says of an axis: one of four words, or of a matrix."""
     name, mark, value = line.partition(":" if is_nrrd else "=")
     key, words = name.replace(" ", "").strip().lower(), WORD.findall(value)
-    if key == "datafile":
+    if key == "datafile" or value.startswith("="):  # pairs of key and value are for others
         return "#"
     if key in ("dimension", "ndims", "elementnumberofchannels"):
         words = ["1" if key.startswith("element") else "3"]

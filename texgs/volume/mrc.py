@@ -70,8 +70,7 @@ def lattice_of(header: Any) -> tuple[AxisPermutation, Triple, Triple, str]:
     """Return where the axes x, y, z come from, spacing and origin along them, and what is to say of these."""
     stored = [int(header[name]) for name in ("mapc", "mapr", "maps")]
     if sorted(stored) != [1, 2, 3]:
-        got = ", ".join(map(str, stored))
-        raise ArgumentError(f"expected columns, rows and sections along x, y, z, got axes {got}")
+        raise ArgumentError(f"expected columns, rows and sections along x, y, z, got axes {stored}")
     x, y, z = (stored.index(axis) for axis in (1, 2, 3))
     angles = [float(each) for each in header.cellb.item()]
     if not all(abs(angle - 90) < 0.01 or angle == 0 for angle in angles):
