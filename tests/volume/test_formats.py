@@ -103,8 +103,7 @@ def test_a_file_that_is_cut_off_is_refused_where_itk_would_fill_it(tmp_path, nam
     whole = path.read_bytes()
     np.testing.assert_array_equal(open_source(path).slices(0, 11), sample_values("int16"))
     path.write_bytes(whole[:-1])
-    message = rf"cut off: expected .*{len(whole)} bytes, found {len(whole) - 1}"
-    with pytest.raises(ArgumentError, match=message):
+    with pytest.raises(ArgumentError, match="the file is cut off"):
         open_source(path).slices(0, 11)
 
 
