@@ -5,6 +5,7 @@ from pathlib import Path
 from zipfile import ZipFile, is_zipfile
 
 from texgs.core.errors import ArgumentError
+from texgs.core.io import reading_as
 
 LFS, GZIP, PAGES = b"version https://git-lfs", b"\x1f\x8b", (b"<!doctype html", b"<html")
 OF_ZARR = (".zarray", ".zgroup", ".zattrs", "zarr.json")  # names in a zip of Zarr
@@ -30,7 +31,7 @@ def require_packing(path: Path, suffixes: Container[str]) -> None:
     if is_packed and suffix + ".gz" in suffixes:
         raise ArgumentError(f"expected a file that is not packed, got gzip; rename it to {path.name}.gz")
     if suffix == ".zip" and is_zipfile(path):
-        with ZipFile(path) as archive:
+        with reading_as("a folder or zip of Zarr"), ZipFile(path) as archive:
             names = archive.namelist()
         if not any(name.endswith(OF_ZARR) for name in names):
             raise ArgumentError(f"expected a zip of Zarr, got one of {', '.join(names[:3])} ...; unpack it")
