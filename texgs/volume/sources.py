@@ -11,16 +11,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
 from texgs.volume.foreign import BY_VTK, DICOM, open_foreign
-from texgs.volume.grid import (
-    ONES,
-    ZEROS,
-    Dims,
-    Grid,
-    Triple,
-    byte_count,
-    check_lattice,
-    dims_of,
-)
+from texgs.volume.grid import ONES, ZEROS, Dims, Grid, Triple, byte_count, check_lattice, dims_of
 from texgs.volume.headers import METAIMAGE, NRRD
 from texgs.volume.mrc import MAPS, open_mrc
 from texgs.volume.netcdf import open_netcdf
@@ -35,7 +26,7 @@ from texgs.volume.tiff import open_tiff
 # Tried in this order where the size of a plain file does not fit the type given.
 COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
 DEFAULTS = {"endian": "little", "skip": 0, "time": 0}  # of keys, which every format may be given
-HDF5 = (".nc", ".nc4", ".h5", ".hdf5", ".hdf", ".nxs", ".ims")
+HDF5 = (".nc", ".nc4", ".h5", ".hdf5", ".hdf", ".nxs")
 IMARIS = (
     "Imaris pads arrays with zeros, and tells size and extent by text that is not read: dataset.volume.crop "
     "and spacing set them"
@@ -67,7 +58,7 @@ def open_source(
         path: file, or folder of slices.
         spacing: replaces the file's, x, y, z.
         origin: replaces the file's, x, y, z.
-        keys: what only some formats take, see `KEYS`: `dims`, samples along x, y, z; `dtype`, numpy's name of
+        keys: what only some formats take: `dims`, samples along x, y, z; `dtype`, numpy's name of
             the sample type, such as "uint16"; `endian`, "little" or "big"; `skip`, bytes before the first
             sample; `series`, number or UID of one of several; `variable`, the path of an array in the file;
             `image`, name or number, from 0, of one of several of TIFF; `channel`, its label or number, from
@@ -125,15 +116,14 @@ def holds_arrays(path: Path) -> bool:
 def tells_superior(path: Path) -> bool:
     """Return whether z points to the head by a volume's format: of NIfTI, and of a folder of DICOM."""
     opener, _ = _opener(path)
-    is_dicom = opener is open_foreign and (path.is_dir() or _suffix(path) in DICOM)
-    return opener is open_nifti or is_dicom
+    return opener is open_nifti or (opener is open_foreign and (path.is_dir() or _suffix(path) in DICOM))
 
 
 def _opener(path: Path) -> tuple[Callable[..., Source] | None, tuple[str, ...]]:
     """Return what opens a file or a folder, and the keys that it takes."""
     suffix = _suffix(path)
     if not path.is_dir():
-        return OPENERS.get(suffix), KEYS.get(suffix, ())
+        return OPENERS.get(suffix, (None, ()))
     if is_zarr(path) or suffix == ".zarr":
         return open_zarr, IN_FILES
     return (open_tiff, IN_PAGES) if tiffs_in(path) else (open_foreign, ("series", "time"))
@@ -209,29 +199,24 @@ def _open_imaris(path: Path, spacing: Triple | None, origin: Triple | None, **ke
     return source
 
 
-# Suffix: function of the path, of spacing and origin where they replace the file's, and of further keys.
-OPENERS: dict[str, Callable[..., Source]] = {
-    **dict.fromkeys((".raw", ".bin", ".dat"), _open_raw),
-    **dict.fromkeys((".tif", ".tiff"), open_tiff),
-    **dict.fromkeys((".npy", ".npz"), _open_npy),
-    **dict.fromkeys(BY_NIBABEL, open_nifti),
-    **dict.fromkeys((*NRRD, *METAIMAGE, ".gipl"), open_foreign),  # by SimpleITK
-    **dict.fromkeys((*MAPS, *(f"{suffix}.gz" for suffix in MAPS)), open_mrc),
-    **dict.fromkeys(BY_VTK, open_foreign),
-    **dict.fromkeys(DICOM, open_foreign),
-    **dict.fromkeys(HDF5, open_netcdf),
-    ".ims": _open_imaris,
-    **dict.fromkeys((".zip", ".ozx"), open_zarr),
-    **dict.fromkeys((".txt", ".txt.gz"), ColumnSource),
-}
-KEYS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys((".raw", ".bin", ".dat"), ("dims", "dtype", "endian", "skip")),
-    **dict.fromkeys((".tif", ".tiff"), IN_PAGES),
-    **dict.fromkeys((*HDF5, ".zip", ".ozx"), IN_FILES),
-    **dict.fromkeys((".txt", ".txt.gz"), ("dims", "column")),
-    **dict.fromkeys(BY_NIBABEL, ("time",)),
-    ".npz": ("variable",),
-    **dict.fromkeys(BY_VTK, ("variable",)),
-    **dict.fromkeys(DICOM, ("time",)),
-    **dict.fromkeys((*NRRD, *METAIMAGE), ("channel", "time")),
+# By suffix: function of the path, of spacing and origin where they replace the file's, and of these keys.
+OPENERS: dict[str, tuple[Callable[..., Source], tuple[str, ...]]] = {
+    suffix: (opener, keys)
+    for opener, keys, *suffixes in (
+        (_open_raw, ("dims", "dtype", "endian", "skip"), ".raw", ".bin", ".dat"),
+        (open_tiff, IN_PAGES, ".tif", ".tiff"),
+        (_open_npy, (), ".npy"),
+        (_open_npy, ("variable",), ".npz"),
+        (open_nifti, ("time",), *BY_NIBABEL),
+        (open_foreign, ("channel", "time"), *NRRD, *METAIMAGE),  # by SimpleITK
+        (open_foreign, (), ".gipl"),
+        (open_mrc, (), *MAPS, *(f"{suffix}.gz" for suffix in MAPS)),
+        (open_foreign, ("variable",), *BY_VTK),
+        (open_foreign, ("time",), *DICOM),
+        (open_netcdf, IN_FILES, *HDF5),
+        (_open_imaris, IN_FILES, ".ims"),
+        (open_zarr, IN_FILES, ".zip", ".ozx"),
+        (ColumnSource, ("dims", "column"), ".txt", ".txt.gz"),
+    )
+    for suffix in suffixes
 }
