@@ -102,7 +102,6 @@ def fit_now_into(
     from texgs.scene.twin import SceneVolume
     from texgs.volume.caster import Caster
     from texgs.volume.framing import frame_of
-    from texgs.volume.placement import Placement
     from texgs.volume.render import Appearance
 
     look, frame, models = Appearance(), frame_of(volume.grid, functions.values()), {}
@@ -114,8 +113,7 @@ def fit_now_into(
     for name, tf in functions.items():
         *_, model = fit_now(caster, look, tf, frame.lens(width=size, height=size), name, seed)
         models[name] = SceneModel(write_model(files[name], model))
-    space = Placement.of(volume.grid)
-    return write_scene(folder / SCENE, Models(models, volume=made_of, frame=frame, space=space))
+    return write_scene(folder / SCENE, Models(models, volume=made_of, frame=frame, space=volume.grid.world))
 
 
 def compose_in(

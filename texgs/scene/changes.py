@@ -23,11 +23,12 @@ from texgs.scene.scene import Scene
 from texgs.scene.scene_file import SEGMENT_KEYS, cuts_of, known, plain_cuts
 from texgs.scene.session import SCENE_KEYS, Session
 from texgs.volume.nrrd_file import open_grid
+from texgs.volume.space import Space
 
 NUMBERED = re.compile(r"cut\.([1-9])=")
-PLANE = "AXIS,POSITION with x, -x, y, -y, z or -z, or NX,NY,NZ,OFFSET"
+PLANE = "AXIS,POSITION with x, -x, y, -y, z or -z, or NX,NY,NZ,OFFSET, in world units"
 TOWARDS = "RASLPIXYZ"  # axes of the space of a volume's file
-BOX = "X0,Y0,Z0,X1,Y1,Z1"
+BOX = "X0,Y0,Z0,X1,Y1,Z1, in world units"
 LOOKS = ("style", "picture", "instruction")  # what people look for here, too
 VOXELS = "v"  # behind a position along an axis that counts samples, the first of which is 0
 
@@ -82,14 +83,10 @@ def _require_through(session: Session, cuts: Cuts) -> None:
         composed = session.composition
         low, high = span_of(models_of(composed), scene.framed(composed), plane.normal)
         if plane.offset < low or (plane.offset > high and plane in cuts.planes):
-            normal, space, in_file = ",".join(f"{each + 0.0:.3g}" for each in plane.normal), scene.space, ""
-            if space is not None:
-                first = float(space.turn @ plane.normal @ space.points(np.zeros(3)))
-                ends = (f"{first + space.scale * end:.4g}" for end in (low, high))
-                in_file = f" ({' to '.join(ends)} {space.unit} in the file)".replace("  ", " ")
+            normal = ",".join(f"{each + 0.0:.3g}" for each in plane.normal)
             raise ArgumentError(
-                f"expected a cut through the models, which lie from {low:.3g} to {high:.3g}{in_file} along "
-                f"{normal}, got {plane.offset:.3g}; samples are counted as in 64v"
+                f"expected a cut through the models, which lie from {low:.3g} to {high:.3g} along {normal}, "
+                f"got {plane.offset:.3g}; samples are counted as in 64v"
             )
 
 
@@ -162,41 +159,39 @@ def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:
 def _plane(scene: Scene, text: str) -> Plane:
     """Return the plane at a position of an axis, which takes away what is beyond; or of normal and offset."""
     words = text.split(",")
-    axis = words[0].lstrip("+-")
-    if len(words) == 2 and len(axis) == 1 and axis in AXES:
-        sign, number = -1.0 if words[0].startswith("-") else 1.0, AXES.index(axis)
-        return Plane(along(number, sign), sign * _places(scene, [words[1]], [number], PLANE)[0])
-    if len(words) == 2 and len(axis) == 1 and axis in TOWARDS:
-        return _in_space(scene, axis, -1.0 if words[0].startswith("-") else 1.0, words[1])
-    numbers = _places(scene, words, [None] * 4, PLANE)
-    return Plane(numbers[:3], numbers[3])
+    letter, sign = words[0].lstrip("+-"), -1.0 if words[0].startswith("-") else 1.0
+    if len(words) != 2 or letter not in [*AXES, *TOWARDS]:
+        numbers = _places(scene, words, [None] * 4, PLANE)
+        return Plane(numbers[:3], numbers[3])
+    if letter in TOWARDS and not words[1].endswith(VOXELS):
+        return _in_space(scene, letter, sign, words[1])
+    normal = along(AXES.index(letter)) if letter in AXES else _towards(scene, letter)[1]
+    axis = int(np.abs(normal).argmax())  # that runs there most nearly
+    (place,) = _places(scene, words[1:], [axis], PLANE)
+    return Plane(along(axis, sign if normal[axis] > 0 else -sign), sign * place)
 
 
 def _in_space(scene: Scene, letter: str, sign: float, text: str) -> Plane:
-    """Return the plane at a place of the file's space, or at a sample, both counted towards a letter."""
+    """Return the plane at a place of the file's space, counted towards a letter."""
+    space, normal = _towards(scene, letter)
+    form = f"{letter},POSITION in {space.unit or 'units of the file'}"
+    (place,) = _places(scene, [text.removesuffix(space.unit)], [None], form)
+    middle = float(space.turn @ normal @ space.points(np.zeros(3)))
+    return Plane((sign * normal).tolist(), sign * (place - middle) / space.scale)
+
+
+def _towards(scene: Scene, letter: str) -> tuple[Space, np.ndarray]:
+    """Return the space of the volume's file, and the unit vector [3] of the world towards its letter."""
     space = scene.space
-    towards = None if space is None else space.axis(letter)
+    towards = space and space.axis(letter)
     if space is None or towards is None:
-        known = "a scene with the space of its volume's file" if space is None else f"an axis of {space.name}"
+        known = f"an axis of {space.name}" if space else "a scene with the space of its volume's file"
         raise ArgumentError(f"expected {known}, got {letter}; x, y and z are those of the world")
-    normal = space.turn.T @ towards
-    if text.endswith(VOXELS):  # of the axis that runs there most nearly
-        own = int(np.abs(towards).argmax())
-        axis, way = space.nearest[own]
-        (place,) = _places(scene, [text], [axis], PLANE)
-        return Plane(along(axis, sign * way * towards[own]), sign * place)
-    try:
-        place = float(text.removesuffix(space.unit)) - float(towards @ space.points(np.zeros(3)))
-    except ValueError:
-        unit = space.unit or "units of the file"
-        raise ArgumentError(
-            f"expected {letter},POSITION in {unit} or samples as in 64v, got {text}"
-        ) from None
-    return Plane((sign * normal).tolist(), sign * place / space.scale)
+    return space, space.turn.T @ towards
 
 
 def _places(scene: Scene, words: Sequence[str], axes: Sequence[int | None], form: str) -> list[float]:
-    """Return numbers in world units; those along an axis may count samples of the volume."""
+    """Return numbers; those along an axis may count samples of the volume, and are world units then."""
     places = []
     for word, axis in zip(words, axes, strict=False):
         counts = axis is not None and word.endswith(VOXELS)
@@ -206,9 +201,7 @@ def _places(scene: Scene, words: Sequence[str], axes: Sequence[int | None], form
             break
         places.append(_of_sample(scene, axis, number) if counts and axis is not None else number)
     if len(words) != len(axes) or len(places) != len(axes) or not all(map(is_number, places)):
-        raise ArgumentError(
-            f"expected {form}, in world units or along an axis as in 64v, got {','.join(words)}"
-        )
+        raise ArgumentError(f"expected {form} or along an axis as in 64v, got {','.join(words)}")
     return places
 
 

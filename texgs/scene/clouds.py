@@ -24,7 +24,7 @@ from texgs.fields.surfels.texels import untextured
 from texgs.raster.reference.shading import harmonics
 from texgs.scene.scene import Scene
 from texgs.volume.cameras import icosphere_of
-from texgs.volume.placement import Placement
+from texgs.volume.space import Space
 
 THIN = 1e-6  # standard deviation of a surfel along its normal, world units
 DIRECTIONS = 92  # from which the light on a surfel is looked at
@@ -61,7 +61,7 @@ def clouds_of(scene: Scene) -> list[Cloud]:
     return visible
 
 
-def placed(cloud: Cloud, space: Placement) -> Cloud:
+def placed(cloud: Cloud, space: Space) -> Cloud:
     """Return a cloud of the world in a space, whose axes have to be at right angles.
 
     Gaussians look the same from behind, so that a mirror of one is a turn of it.

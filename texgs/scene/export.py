@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import cast
 
+import numpy as np
 import torch
 
 from texgs.core.camera import Camera
@@ -36,7 +37,7 @@ from texgs.scene.scene import Scene
 from texgs.scene.spz import write_spz
 from texgs.scene.usd import write_usd
 from texgs.volume.cameras import icosphere_of
-from texgs.volume.placement import Placement
+from texgs.volume.space import Space
 
 OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
 OF_CLOUDS = ("usd", "gltf", "spz")  # of scenes, with their light
@@ -61,7 +62,7 @@ class Export:
     drop_unseen: bool = False  # compact: no texture for surfels that no view sees
     device: torch.device | str = "cpu"
     space: str | None = None  # file, that of the scene's volume, or world; default: see `IN_FILE`
-    known: Placement | None = None  # that of the scene's volume
+    known: Space | None = None  # that of the scene's volume
 
     def __post_init__(self) -> None:
         if self.space not in (None, "file", "world"):
@@ -76,7 +77,7 @@ class Export:
         return [camera.to(self.device) for camera in placed]
 
     @property
-    def target(self) -> Placement | None:
+    def target(self) -> Space | None:
         """The space that places are moved to; None for the world."""
         if self.space == "file" and self.known is None:
             raise ArgumentError(
@@ -89,7 +90,16 @@ class Export:
     @property
     def told(self) -> Told:
         """What the file says of the space that the scene knows."""
-        return None if self.known is None else self.known.told(self.target is not None)
+        if self.known is None:
+            return None
+        matrix = np.array(self.known.matrix, float).ravel().tolist()
+        places = "space" if self.target else "world"
+        return {
+            "space": self.known.name,
+            "unit": self.known.unit,
+            "world_to_space": matrix,
+            "places": places,
+        }
 
 
 def require_export(field: Kind, kind: str) -> None:
@@ -194,7 +204,7 @@ def write_points(
     path: str | Path,
     model: Surfels,
     least_opacity: float = 0.5,
-    space: Placement | None = None,
+    space: Space | None = None,
     told: Told = None,
 ) -> Path:
     """Create or replace a PLY point cloud in one step: means, and colours without light as 8-bit numbers.

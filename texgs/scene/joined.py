@@ -21,7 +21,7 @@ from texgs.fields.surfels.composition import Part, by_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import mean_texels
 from texgs.raster.shading import Y00
-from texgs.volume.placement import Placement
+from texgs.volume.space import Space
 
 if TYPE_CHECKING:
     import pyvista
@@ -60,7 +60,7 @@ def _surfels(part: Part, edits: Sequence[PartEdit], has_normals: bool) -> dict[s
     return {name: x[opacities > 0] for name, x in surfels.items()}
 
 
-def polydata_of(model: Surfels, space: Placement | None = None) -> pyvista.PolyData:
+def polydata_of(model: Surfels, space: Space | None = None) -> pyvista.PolyData:
     """Return surfels, see `joined`, as hexagons of 1.5 standard deviations.
 
     They lie in a file's space, or in the world where there is none. Cells have `rgba`
@@ -91,7 +91,7 @@ def polydata_of(model: Surfels, space: Placement | None = None) -> pyvista.PolyD
     return mesh
 
 
-def write_vtp(path: str | Path, model: Surfels, space: Placement | None = None, told: Told = None) -> Path:
+def write_vtp(path: str | Path, model: Surfels, space: Space | None = None, told: Told = None) -> Path:
     """Create or replace a .vtp file of `polydata_of` in one step, with what is told as arrays of its field.
 
     ParaView opens it.

@@ -17,7 +17,7 @@ from texgs.fields.ply_columns import Told, colored, write_columns
 from texgs.raster import Render
 from texgs.raster.fusion import BLOCK, DepthView, Lattice
 from texgs.volume.isosurface import Mesh, isosurface
-from texgs.volume.placement import Placement
+from texgs.volume.space import Space
 
 TRUNCATION = 5.0  # voxels beside a surface that know their distance from it, as in 2DGS; at most BLOCK
 LEAST_VIEWS = 1  # more views than this must have seen a voxel
@@ -140,7 +140,7 @@ def write_mesh(path: str | Path, mesh: Mesh, told: Told = None) -> Path:
     return write_columns(path, columns, mesh.triangles, told)
 
 
-def placed(mesh: Mesh, space: Placement) -> Mesh:
+def placed(mesh: Mesh, space: Space) -> Mesh:
     """Return a mesh of the world in a space; its triangles are counter-clockwise there, too."""
     triangles = mesh.triangles[:, ::-1] if space.is_mirrored else mesh.triangles
     return Mesh(space.points(mesh.vertices).astype(np.float32), triangles, mesh.colors)

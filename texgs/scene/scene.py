@@ -25,7 +25,7 @@ from texgs.scene.bounds import bounds_of, models_of
 from texgs.scene.segment_file import read_segment
 from texgs.scene.series_file import Series
 from texgs.scene.twin import SceneVolume
-from texgs.volume.placement import Placement
+from texgs.volume.space import Space
 from texgs.volume.transfer import TransferFunction
 
 WHITE = (1.0, 1.0, 1.0)
@@ -109,7 +109,7 @@ class Scene:
     functions: Mapping[str, TransferFunction] = field(default_factory=dict)  # that the mode volume shows
     series: Series | None = None  # in time, of which the scene shows a step
     time: int | None = None  # number of this step
-    space: Placement | None = None  # of the file of its volume, where that is known
+    space: Space | None = None  # of the file of its volume, where that is known
 
     def __post_init__(self) -> None:
         if not self.models:

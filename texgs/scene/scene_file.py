@@ -21,8 +21,8 @@ from texgs.fields.part_edit import PartEdit, color
 from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment
 from texgs.scene.series_file import read_series
 from texgs.scene.twin import SceneVolume
-from texgs.volume.placement import Placement
 from texgs.volume.render import Appearance
+from texgs.volume.space import Space
 from texgs.volume.transfer import TransferFunction
 
 T = TypeVar("T")
@@ -82,7 +82,7 @@ def _scene(values: Any, folder: Path) -> Scene:
     volume = volume_of(values["volume"], folder) if "volume" in values else None
     frame = table_of(Frame, values["frame"], "frame") if "frame" in values else None
     functions = functions_of(values.get("functions", {}), "functions")
-    space = table_of(Placement, values["space"], "space") if "space" in values else None
+    space = table_of(Space, values["space"], "space") if "space" in values else None
     scene = Scene(models, light, background, cuts, volume, frame, functions, space=space)
     if "series" not in values:
         return scene

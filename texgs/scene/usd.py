@@ -13,7 +13,7 @@ from texgs.fields.ply_columns import Told
 from texgs.fields.splats import REACH
 from texgs.raster.shading import DEGREES
 from texgs.scene.clouds import Cloud
-from texgs.volume.placement import Placement
+from texgs.volume.space import Space
 
 METRES = {"mm": 1e-3, "um": 1e-6, "micrometer": 1e-6, "nm": 1e-9, "nanometer": 1e-9, "angstrom": 1e-10}
 ATTRIBUTES = ("Position", "Orientation", "Scale", "Opacity", "SphericalHarmonics")  # in schemas of their own
@@ -23,7 +23,7 @@ def write_usd(
     path: str | Path,
     clouds: Sequence[Cloud],
     told: Told = None,
-    space: Placement | None = None,
+    space: Space | None = None,
 ) -> Path:
     """Create or replace a .usda or .usdc file in one step; clouds that are in a file's space name it.
 

@@ -17,7 +17,9 @@ from texgs.scene.bounds import STRAYS, models_of, span_of
 from texgs.scene.frame import Mode
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import plain_functions
+from texgs.volume.grid import closest
 from texgs.volume.nrrd_file import open_grid
+from texgs.volume.space import LETTERS, Space
 
 LENS = Lens()
 HOME = {"azimuth": 30.0, "polar": 20.0}  # degrees, as `texgs render` has them
@@ -93,10 +95,19 @@ def describe(
         "tfs": plain_functions(scene.volume.tfs) if scene.volume else {},
         "modes": [mode for mode in get_args(Mode) if MODES.get(mode, "") in ("", *kind.can)],
         "bounds": known,
-        "space": asdict(scene.space) | scene.space.drawn if scene.space else None,
+        "space": drawn(scene.space) if scene.space else None,
         "fov_y": LENS.fov_y,
         "views": [{"name": "home", "target": target, "distance": distance, **HOME}],
     }
+
+
+def drawn(space: Space) -> dict[str, Any]:
+    """Return a space with what axes are drawn by: names of its own, and at both ends of the world's."""
+    ahead, behind = LETTERS.get(space.name, ("xyz", ["", "", ""]))
+    ends = [["", ""]] * 3
+    for front, back, (axis, sign) in zip(ahead, behind, closest(space.turn.T), strict=True):
+        ends[axis] = [front, back][::sign]
+    return asdict(space) | {"axes": ahead, "ends": ends, "scale": space.scale}
 
 
 def describe_model(

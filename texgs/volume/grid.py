@@ -66,6 +66,13 @@ class Grid:
         return 1.0 / max(self.sides)
 
     @property
+    def world(self) -> Space:
+        """The file's space, and the way there from the world."""
+        middle = self.space.place(self.origin, [0.5 * side for side in self.sides])
+        rows = np.column_stack([self.space.axes.T / self.scale, middle]).tolist()
+        return replace(self.space, matrix=[*rows, [0.0, 0.0, 0.0, 1.0]])
+
+    @property
     def aabb(self) -> tuple[Triple, Triple]:
         """Lowest and highest corner (x, y, z) in world units; the box is centred at the origin."""
         x, y, z = (0.5 * self.scale * side for side in self.sides)
@@ -143,7 +150,7 @@ def permuted_lattice(
     ends = [(size - 1) * step for size, step in zip(dims, spacing, strict=True)]
     flipped = [axis for axis, sign in axes if sign < 0]
     lengths = tuple(ends[axis] if axis in flipped else 0.0 for axis in range(3))
-    rows = np.array([sign * np.array(space.axes[axis]) + 0.0 for axis, sign in axes])
+    rows = np.array([sign * space.axes[axis] + 0.0 for axis, sign in axes])
     (i, _), (j, _), (k, _) = axes
     turned = Space.along(rows, space.name, space.unit)
     return (

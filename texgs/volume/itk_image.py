@@ -11,7 +11,7 @@ import SimpleITK as sitk
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Dims, byte_count, check_lattice, require_room
 from texgs.volume.headers import NRRD, read_fields, spacing_in, unit_in
-from texgs.volume.space import LEFT_HANDED, LPS, RAS, RIGHT_HANDED, letters
+from texgs.volume.space import LEFT_HANDED, LETTERS, LPS, RAS, RIGHT_HANDED
 
 # Names of spaces in NRRD files; places in those that run to the front are told as RAS, from ITK's LPS.
 NRRD_SPACES = {
@@ -66,7 +66,7 @@ def _space_of(suffix: str, fields: Mapping[str, str]) -> tuple[str, str]:
     if suffix not in NRRD:
         return LPS, "mm"
     name = NRRD_SPACES.get(fields.get("space", "").lower(), RIGHT_HANDED)
-    return name, unit_in(fields) or ("mm" if letters(name) else "")
+    return name, unit_in(fields) or ("mm" if name in LETTERS else "")
 
 
 def require_bytes(path: Path, expected: int) -> None:

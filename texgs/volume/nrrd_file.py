@@ -68,7 +68,7 @@ def write_header(
 
     Raw samples follow, little endian, of one of the types in `WORDS`; of one channel after the other.
     """
-    vectors = (np.array(space.axes) * np.array(spacing)[:, None]).tolist()
+    vectors = (space.axes * np.array(spacing)[:, None]).tolist()
     directions = " ".join(map(_vector, vectors))
     # Lengths of vectors of any direction may differ from the spacing in the last bit.
     pair = [f"{UPRIGHT}:={' '.join(repr(float(step)) for step in spacing)}"]
@@ -86,7 +86,7 @@ def write_header(
         "endian: little",
         "encoding: raw",
         f"space origin: {_vector(origin)}",
-        *(pair if space.axes != UNTOLD.axes else []),
+        *(pair if space.matrix != UNTOLD.matrix else []),
     ]
     text = ("\n".join(lines) + "\n#").encode()
     # The comment fills up; two line breaks end it and the header.

@@ -45,7 +45,6 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.scene.scene_file import write_scene
     from texgs.volume.framing import frame_of
     from texgs.volume.nrrd_file import open_grid
-    from texgs.volume.placement import Placement
 
     models = {
         name.removeprefix(MODEL): SceneModel(path) for name, path in inputs.items() if name.startswith(MODEL)
@@ -55,7 +54,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     if volume is not None:
         framing = [tf for name, tf in volume.tfs.items() if name in settings.framing]
         grid = open_grid(volume.file)
-        scene = replace(scene, frame=frame_of(grid, framing), space=Placement.of(grid))
+        scene = replace(scene, frame=frame_of(grid, framing), space=grid.world)
     write_scene(output / SCENE, scene)
     composition = scene.open(torch_device(settings.fit.device))
     camera = orbit(AZIMUTH, POLAR, *scene.framed(composition).lens(settings.fov_y).square(settings.image))
