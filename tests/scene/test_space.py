@@ -27,9 +27,9 @@ from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.session import Session
 from texgs.viewer.description import describe, drawn
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.space import Space
 from texgs.volume.prepare import prepare
 from texgs.volume.sources import open_source
+from texgs.volume.space import Space
 
 RADIUS = 0.1  # of a sphere around the blob, world units
 COARSE = ("--kind", "mesh", "--views", "42", "--size", "160", "--voxel", "0.012")

@@ -14,7 +14,7 @@ from texgs.core.names import EXPORTS, SCENES
 from texgs.viewer import PAGE_VOLUME
 
 if TYPE_CHECKING:
-    from texgs.scene.scene import Scene, SceneModel
+    from texgs.scene.scene import Scene
 
 ENDINGS = list(dict.fromkeys(ending for endings in EXPORTS.values() for ending in endings))
 SPACES = ("file", "world")
@@ -66,7 +66,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
-    from texgs.fields.files import open_field
     from texgs.scene.export import OF_CLOUDS, Export, export_model, export_scene, remarks, require_other
     from texgs.scene.scene_file import only_scene, read_scene
 
@@ -76,32 +75,21 @@ def run(arguments: argparse.Namespace) -> int:
     require_taken(arguments, kind)
     require_own_place(arguments.to, "--to")
     scene = read_scene(arguments.source) if arguments.source.suffix in SCENES else None
+    shown = as_scene(arguments, scene)
     if kind == "html":
-        print(of_page(arguments, scene))
+        print(of_page(arguments, shown))
         return 0
-    export = Export(kind, **{name: getattr(arguments, name) for name in OPTIONS})
-    export = replace(export, known=scene.space if scene else None)
-    if kind in OF_CLOUDS:
-        shown = as_scene(arguments, scene)
+    options = {name: getattr(arguments, name) for name in OPTIONS}
+    export = Export(kind, known=shown.space, **options)
+    if kind in OF_CLOUDS or (scene is not None and arguments.model is None):
         print(export_scene(arguments.to, shown, export))
-        print("; ".join([BAKED, *remarks(shown, export)]), file=sys.stderr)
-        return 0
-    if scene is not None and arguments.model is None:
-        print(export_scene(arguments.to, scene, export))
-        for note in remarks(scene, export):
+        for note in [BAKED] * (kind in OF_CLOUDS) + remarks(shown, export):
             print(f"{arguments.to}: {note}", file=sys.stderr)
         return 0
-    require_other(arguments.to, scene or as_scene(arguments, None))
-    field = open_field(arguments.source) if scene is None else chosen(scene, arguments.model).open()[0]
-    print(export_model(arguments.to, field, export))
+    require_other(arguments.to, scene or shown)
+    (entry,) = shown.models.values()
+    print(export_model(arguments.to, entry.open()[0], export))
     return 0
-
-
-def chosen(scene: Scene, name: str) -> SceneModel:
-    """Return the model of a scene that has a name."""
-    if name not in scene.models:
-        raise ArgumentError(f"--model: expected one of {', '.join(scene.models)}, got {name}")
-    return scene.models[name]
 
 
 def kind_of(arguments: argparse.Namespace) -> str:
@@ -149,10 +137,12 @@ def as_scene(arguments: argparse.Namespace, scene: Scene | None) -> Scene:
         return Scene({arguments.source.stem: SceneModel(arguments.source)})
     if arguments.model is None:
         return scene
-    return replace(scene, models={arguments.model: chosen(scene, arguments.model)})
+    if arguments.model not in scene.models:
+        raise ArgumentError(f"--model: expected one of {', '.join(scene.models)}, got {arguments.model}")
+    return replace(scene, models={arguments.model: scene.models[arguments.model]})
 
 
-def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
+def of_page(arguments: argparse.Namespace, scene: Scene) -> Path:
     """Export a scene, one model of it or a model file as a web page."""
     from texgs.fields import files
     from texgs.report.check import checked
@@ -160,7 +150,6 @@ def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
     from texgs.viewer.page_volume import page_volume
     from texgs.viewer.standalone import write_page
 
-    scene = as_scene(arguments, scene)
     for entry in scene.models.values():
         require_export(files.kind_of(entry.file), "html")
     volume = None

@@ -94,12 +94,7 @@ class Export:
             return None
         matrix = np.array(self.known.matrix, float).ravel().tolist()
         places = "space" if self.target else "world"
-        return {
-            "space": self.known.name,
-            "unit": self.known.unit,
-            "world_to_space": matrix,
-            "places": places,
-        }
+        return {"space": self.known.name, "unit": self.known.unit, "world_to_space": matrix, "places": places}
 
 
 def require_export(field: Kind, kind: str) -> None:
@@ -146,9 +141,9 @@ def export_scene(path: Path, scene: Scene, export: Export) -> Path:
     space, told = export.target, export.told
     if export.kind in OF_CLOUDS:
         clouds = [cloud if space is None else placed_cloud(cloud, space) for cloud in clouds_of(scene)]
-        if export.kind == "usd":
-            return write_usd(path, clouds, told, space)
-        return write_spz(path, clouds) if export.kind == "spz" else write_gltf(path, clouds, told)
+        if export.kind == "spz":
+            return write_spz(path, clouds)
+        return (write_usd if export.kind == "usd" else write_gltf)(path, clouds, told)
     composed, edits = scene.open(export.device), scene.edits
     if export.kind == "mesh":
         look: Look = "unshaded" if "unlit" in field.can else "shaded"

@@ -13,18 +13,12 @@ from texgs.fields.ply_columns import Told
 from texgs.fields.splats import REACH
 from texgs.raster.shading import DEGREES
 from texgs.scene.clouds import Cloud
-from texgs.volume.space import Space
 
 METRES = {"mm": 1e-3, "um": 1e-6, "micrometer": 1e-6, "nm": 1e-9, "nanometer": 1e-9, "angstrom": 1e-10}
 ATTRIBUTES = ("Position", "Orientation", "Scale", "Opacity", "SphericalHarmonics")  # in schemas of their own
 
 
-def write_usd(
-    path: str | Path,
-    clouds: Sequence[Cloud],
-    told: Told = None,
-    space: Space | None = None,
-) -> Path:
+def write_usd(path: str | Path, clouds: Sequence[Cloud], told: Told = None) -> Path:
     """Create or replace a .usda or .usdc file in one step; clouds that are in a file's space name it.
 
     Below /Scene, with +y up and one metre for a world unit, each model is a prim with its name:
@@ -43,9 +37,9 @@ def write_usd(
             f"{path}: expected usd-core 26.3 or newer, which is not installed; pip install '.[usd]'"
         ) from error
     stage = Usd.Stage.CreateInMemory()
-    is_z_up = space is not None and int(np.abs(space.turn[:, 1]).argmax()) == 2
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z if is_z_up else UsdGeom.Tokens.y)
-    UsdGeom.SetStageMetersPerUnit(stage, METRES.get(space.unit, 1.0) if space else 1.0)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    unit = told["unit"] if told and told["places"] == "space" else ""
+    UsdGeom.SetStageMetersPerUnit(stage, METRES.get(str(unit), 1.0))
     said = {key: Vt.DoubleArray(x) if isinstance(x, list) else x for key, x in (told or {}).items()}
     stage.GetRootLayer().customLayerData = said
     root = UsdGeom.Xform.Define(stage, "/Scene").GetPrim()
