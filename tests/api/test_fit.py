@@ -19,7 +19,6 @@ from texgs.metrics.quality import compare
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.origins import Origins
 from texgs.volume.cameras import spiral
-from texgs.volume.placement import Placement
 from texgs.workflow.result import claim, publish
 
 TFS = {
@@ -241,6 +240,6 @@ def test_a_scene_of_a_turned_volume_knows_where_its_file_lies(tmp_path, monkeypa
     tf = texgs.TransferFunction([[0.2, 0.0], [0.3, 0.8], [1.0, 0.8]], [[0.3, 0.2, 0.4, 0.9]])
     overrides = () if recipe == "now" else SMALL
     made = texgs.fit(volume, {"a": tf}, recipe, size=64, folder=tmp_path, overrides=overrides)
-    assert made.session.scene.space.matrix == Placement.of(volume.grid).matrix
+    assert made.session.scene.space.matrix == volume.grid.world.matrix
     places = made.to_pyvista().points
     assert np.abs(np.median(places, axis=0) - [7 + 8, 8 + 6 * 2, 9 + 7 * 3]).max() < 2.5

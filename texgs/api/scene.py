@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -150,7 +149,7 @@ class Scene(Editing):
             ArgumentError: if the ending is unknown or another kind's, an option is, or the scene cannot be
                 written so.
         """
-        from texgs.scene.export import OF_MODELS, Export, export_scene, remarks, taken
+        from texgs.scene.export import OF_MODELS, Export, export_scene, taken
         from texgs.viewer.page_volume import page_volume
         from texgs.viewer.standalone import write_page
 
@@ -170,10 +169,7 @@ class Scene(Editing):
             volume = None if size is None else page_volume(scene, size)
             write_page(path, scene, path.stem, volume=volume, **options)
             return path
-        export = Export(chosen, **options)
-        for remark in remarks(scene, export):
-            warnings.warn(f"{path}: {remark}", stacklevel=2)
-        return export_scene(path, scene, export)
+        return export_scene(path, scene, Export(chosen, **options))
 
     # ---- Notebooks ------------------------------------------------------------
 

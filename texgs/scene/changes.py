@@ -7,6 +7,7 @@ space of the volume's file cut=S,-12mm and cut=-S,64v.
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -191,22 +192,23 @@ def _towards(scene: Scene, letter: str) -> tuple[Space, np.ndarray]:
 
 
 def _places(scene: Scene, words: Sequence[str], axes: Sequence[int | None], form: str) -> list[float]:
-    """Return numbers; those along an axis may count samples of the volume, and are world units then."""
-    places = []
-    for word, axis in zip(words, axes, strict=False):
-        counts = axis is not None and word.endswith(VOXELS)
-        try:
-            number = float(word.removesuffix(VOXELS) if counts else word)
-        except ValueError:
-            break
-        places.append(_of_sample(scene, axis, number) if counts and axis is not None else number)
-    if len(words) != len(axes) or len(places) != len(axes) or not all(map(is_number, places)):
+    """Return numbers, one for each axis or None, see `_place`."""
+    try:
+        places = [_place(scene, *each) for each in zip(words, axes, strict=True)]
+    except ArgumentError:  # of samples
+        raise
+    except ValueError:
+        places = [inf]
+    if not all(map(is_number, places)):
         raise ArgumentError(f"expected {form} or along an axis as in 64v, got {','.join(words)}")
     return places
 
 
-def _of_sample(scene: Scene, axis: int, number: float) -> float:
-    """Return the place of a sample along an axis, world units."""
+def _place(scene: Scene, word: str, axis: int | None) -> float:
+    """Return a number; along an axis it may count samples of the volume, and is in world units then."""
+    if axis is None or not word.endswith(VOXELS):
+        return float(word)
+    number = float(word.removesuffix(VOXELS))
     if scene.volume is None:
         raise ArgumentError("expected world units, got samples: this scene names no volume")
     grid = open_grid(scene.volume.file)

@@ -174,50 +174,35 @@ def _write(path: Path, export: Export, model: Surfels) -> Path:
     if export.kind == "compact":
         cameras = export.cameras(bounds_of([model])) if export.drop_unseen else []
         return write_compact(path, model, seen_surfels(model, cameras) if cameras else None)
+    if export.kind not in ("vtp", "points"):
+        return write_surfels(path, model, export.kind, export.told)
+    plain = joined([Part(model)], [PartEdit()]) if model.stage != "surfels" else model
     if export.kind == "vtp":
-        plain = joined([Part(model)], [PartEdit()]) if model.stage != "surfels" else model
         return write_vtp(path, plain, export.target, export.told)
-    if export.kind == "points":
-        return write_points(path, model, export.opacity, export.target, export.told)
-    return write_surfels(path, model, export.kind, export.told)
+    return _write_points(path, plain, export)
 
 
 def _write_fused(
     path: Path, export: Export, cameras: Sequence[Camera], render: Callable[..., Render], depth: str
 ) -> Path:
     """Write the mesh of what `render` shows, with the depth of that name."""
-    black = torch.zeros(3, device=export.device)
-
-    def shown(camera: Camera) -> Render:
-        return render(camera, background=black, outputs=(depth,))
-
+    shown = partial(render, background=torch.zeros(3, device=export.device), outputs=(depth,))
     mesh, space = fuse(shown, cameras, export.voxel), export.target
     return write_mesh(path, mesh if space is None else placed(mesh, space), export.told)
 
 
-def write_points(
-    path: str | Path,
-    model: Surfels,
-    least_opacity: float = 0.5,
-    space: Space | None = None,
-    told: Told = None,
-) -> Path:
-    """Create or replace a PLY point cloud in one step: means, and colours without light as 8-bit numbers.
-
-    Surfels need an opacity to become a point. Before shading, colours are those of the constant harmonic.
-    """
-    if model.stage != "surfels":
-        model = joined([Part(model)], [PartEdit()])
+def _write_points(path: Path, model: Surfels, export: Export) -> Path:
+    """Write a PLY point cloud: means of opaque surfels, and the colours of their constant harmonic, uint8."""
     means, _, _, opacities = geometry(model.parameters)
-    opaque = opacities >= least_opacity
+    opaque = opacities >= export.opacity
     if not bool(opaque.any()):
         most = float(opacities.max()) if len(opacities) else 0.0
         raise ArgumentError(
-            f"{path}: expected surfels with an opacity of {least_opacity:g} at least, got {most:.3g} "
+            f"{path}: expected surfels with an opacity of {export.opacity:g} at least, got {most:.3g} "
             "at most; lower the limit"
         )
     color = (0.5 + Y00 * model.parameters["sh"][:, 0])[opaque]
-    places = means[opaque]
+    places, space = means[opaque], export.target
     if space is not None:
         places = torch.from_numpy(space.points(places.cpu().numpy()))
-    return write_columns(path, colored(places, color.clamp(0, 1).mul(255).round()), told=told)
+    return write_columns(path, colored(places, color.clamp(0, 1).mul(255).round()), told=export.told)

@@ -15,7 +15,7 @@ from texgs.fields.surfels.composition import Composition
 from texgs.raster.shading import MATERIAL
 from texgs.scene.bounds import STRAYS, models_of, span_of
 from texgs.scene.frame import Mode
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene
 from texgs.scene.scene_file import plain_functions
 from texgs.volume.grid import closest
 from texgs.volume.nrrd_file import open_grid
@@ -79,7 +79,9 @@ def describe(
     ):
         # Only what has a palette has a texture, which can get a new look.
         can = [*keys, "look"] if is_textured else [key for key in keys if key != "palette"]
-        models.append(describe_model(model, entry, kind.name, palette, [*can, *segments]))
+        own = [{"name": key, "edit": asdict(segment.edit)} for key, segment in entry.segments.items()]
+        said = {"name": model, "kind": kind.name, "edit": asdict(entry.edit), "fitted_palette": list(palette)}
+        models.append({**said, "can": [*can, *segments], "segments": own})
     known = known or bounds(scene, composed)
     light, target = scene.light, known["center"]
     distance = Frame(target, known["radius"]).lens(LENS.fov_y).radius
@@ -108,21 +110,6 @@ def drawn(space: Space) -> dict[str, Any]:
     for front, back, (axis, sign) in zip(ahead, behind, closest(space.turn.T), strict=True):
         ends[axis] = [front, back][::sign]
     return asdict(space) | {"axes": ahead, "ends": ends, "scale": space.scale}
-
-
-def describe_model(
-    name: str, entry: SceneModel, kind: str, palette: tuple[float, ...], can: list[str]
-) -> dict[str, Any]:
-    """Return a model and its segments."""
-    segments = [{"name": key, "edit": asdict(segment.edit)} for key, segment in entry.segments.items()]
-    return {
-        "name": name,
-        "kind": kind,
-        "edit": asdict(entry.edit),
-        "fitted_palette": list(palette),
-        "can": can,
-        "segments": segments,
-    }
 
 
 def have_palette(composed: Composed) -> list[bool]:

@@ -43,25 +43,17 @@ LONGEST_LINE = 1 << 20  # bytes of what the process says before the samples
 COMPLAINT = re.compile(r"error|fail|cannot|corrupt|unexpected", re.IGNORECASE)
 
 
-def open_foreign(
-    path: Path,
-    spacing: Triple | None,
-    origin: Triple | None,
-    series: str | None = None,
-    time: int = 0,
-    variable: str | None = None,
-    channel: str | None = None,
-) -> Source:
+def open_foreign(path: Path, spacing: Triple | None, origin: Triple | None, **keys: Any) -> Source:
     """Open image data with its axes along the closest ones of space, so that nothing is mirrored.
 
     Samples that are stored as in memory are read on demand, all others as a whole. Spacing and origin replace
     those of the file; `series` is the number or UID of one of several in a folder of DICOM slices, `time` the
     step of one that has several volumes, and `variable` the name of a point array of VTK's image data.
     """
-    suffix, keys = path.suffix.lower(), {"series": series, "time": time, "variable": variable}
+    suffix, time = path.suffix.lower(), keys.get("time", 0)
     with reading_as(_kind(path)):
         stored = stored_samples(path) if suffix in (*NRRD, *METAIMAGE) else None
-        extra, index = extra_axis(path, time, channel) if stored is not None else (None, 0)
+        extra, index = extra_axis(path, time, keys.get("channel")) if stored is not None else (None, 0)
         with one_volume(path, extra) as header:
             reply, values = _ask(header, keys, is_header_only=stored is not None)
         nx, ny, nz = reply["dims"]
@@ -86,10 +78,10 @@ def _lattice_of(
     reply: dict[str, Any], spacing: Triple | None, origin: Triple | None
 ) -> tuple[AxisPermutation, Triple, Triple, Space]:
     """Return which stored axes are closest to those of space; spacing, origin and space along these."""
-    directions = np.array(reply["directions"])
-    space = Space.along(directions, reply.get("space", RIGHT_HANDED), reply.get("unit", ""))
-    mirror = (-1.0, 1.0, 1.0) if space.name == LEFT_HANDED else (1.0, 1.0, 1.0)  # the world is right-handed
+    directions, name = np.array(reply["directions"]), reply.get("space", RIGHT_HANDED)
+    mirror = (-1.0, 1.0, 1.0) if name == LEFT_HANDED else (1.0, 1.0, 1.0)  # the world is right-handed
     axes = AS_STORED if reply.get("is_upright") else closest(directions * mirror)
+    space = Space.along(directions, name, reply.get("unit", ""))
     steps = dict(enumerate(reply["spacing"]))
     steps |= {axis: step for (axis, _), step in zip(axes, spacing or (), strict=False)}
     stored = (steps[0], steps[1], steps[2])
@@ -183,12 +175,12 @@ def image_of(
     if path.suffix.lower() in BY_VTK:
         from texgs.volume.vtk_image import read_vtk
 
-        return read_vtk(path, keys["variable"])
+        return read_vtk(path, keys.get("variable"))
     from texgs.volume.dicom import read_dicom
     from texgs.volume.itk_image import read_itk
 
     if path.is_dir() or path.suffix.lower() in DICOM:
-        return read_dicom(path, keys["series"], keys["time"])
+        return read_dicom(path, keys.get("series"), keys.get("time", 0))
     return read_itk(path, is_header_only)
 
 

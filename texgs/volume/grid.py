@@ -1,7 +1,6 @@
 """A scalar field on a regular lattice: where it lies in the world, and its turns by right angles."""
 
 from dataclasses import dataclass, replace
-from itertools import permutations
 from math import isfinite, prod
 
 import numpy as np
@@ -124,16 +123,15 @@ def closest(directions: np.ndarray) -> AxisPermutation:
     Raises:
         ArgumentError: if two axes run along one line, or all three in a plane.
     """
+    from scipy.optimize import linear_sum_assignment
+
     if not np.isfinite(directions).all():
         return AS_STORED
     if abs(np.linalg.det(directions)) < 1e-3:
         raise ArgumentError(f"expected three independent axes, got a singular matrix: {directions.tolist()}")
-    x, y, z = max(
-        permutations(range(3)),
-        key=lambda axes: sum(abs(directions[axis, along]) for along, axis in enumerate(axes)),
-    )
-    signs = [1 if directions[axis, along] >= 0 else -1 for along, axis in enumerate((x, y, z))]
-    return (x, signs[0]), (y, signs[1]), (z, signs[2])
+    axes = linear_sum_assignment(np.abs(directions.T), maximize=True)[1].tolist()
+    x, y, z = ((axis, 1 if directions[axis, along] >= 0 else -1) for along, axis in enumerate(axes))
+    return x, y, z
 
 
 def permuted_values(values: np.ndarray, axes: AxisPermutation) -> np.ndarray:
@@ -147,15 +145,8 @@ def permuted_lattice(
 ) -> tuple[Dims, Triple, Triple, Space]:
     """Return dims, spacing, origin and space of a lattice with other axes; no sample moves in its space."""
     # A flipped axis begins at its last sample.
-    ends = [(size - 1) * step for size, step in zip(dims, spacing, strict=True)]
-    flipped = [axis for axis, sign in axes if sign < 0]
-    lengths = tuple(ends[axis] if axis in flipped else 0.0 for axis in range(3))
+    lengths = [(dims[axis] - 1) * spacing[axis] if (axis, -1) in axes else 0.0 for axis in range(3)]
     rows = np.array([sign * space.axes[axis] + 0.0 for axis, sign in axes])
     (i, _), (j, _), (k, _) = axes
-    turned = Space.along(rows, space.name, space.unit)
-    return (
-        (dims[i], dims[j], dims[k]),
-        (spacing[i], spacing[j], spacing[k]),
-        space.place(origin, lengths),
-        turned,
-    )
+    first, turned = space.place(origin, lengths), Space.along(rows, space.name, space.unit)
+    return (dims[i], dims[j], dims[k]), (spacing[i], spacing[j], spacing[k]), first, turned

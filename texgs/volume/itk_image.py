@@ -1,7 +1,6 @@
 """Images that SimpleITK reads, as lattice and samples."""
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,9 +33,11 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
         suffix, sizes = path.suffix.lower(), list(reader.GetSize())
         dims, dtype = require_volume(sizes, reader.GetPixelIDValue(), reader.GetNumberOfComponents())
         if suffix == ".gipl":
-            require_bytes(path, GIPL_HEADER + byte_count(dims, dtype))
+            expected, size = GIPL_HEADER + byte_count(dims, dtype), path.stat().st_size
+            if size < expected:  # ITK fills what is missing with what is in memory
+                raise ArgumentError(f"the file is cut off: expected {expected} bytes, found {size}")
         fields = read_fields(path)[0] if suffix in NRRD else {}
-        space, unit = _space_of(suffix, fields)
+        space = NRRD_SPACES.get(fields.get("space", "").lower(), RIGHT_HANDED) if fields else LPS
         signs = np.array((-1.0, -1.0, 1.0) if space == RAS else (1.0, 1.0, 1.0))
         lattice: dict[str, Any] = {
             "dims": dims,
@@ -45,7 +46,7 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
             "origin": (np.array(reader.GetOrigin()) * signs + 0.0).tolist(),
             "directions": (np.reshape(reader.GetDirection(), (3, 3)).T * signs).tolist(),
             "space": space,
-            "unit": unit,
+            "unit": unit_in(fields) or ("mm" if space in LETTERS else ""),
         }
         if upright := spacing_in(fields):
             lattice |= {"spacing": upright, "is_upright": True}
@@ -59,21 +60,6 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
         return lattice, sitk.GetArrayFromImage(reader.Execute())
     except RuntimeError as error:
         raise ArgumentError(sentence(error)) from error
-
-
-def _space_of(suffix: str, fields: Mapping[str, str]) -> tuple[str, str]:
-    """Return name and unit of a file's space: what NRRD says, else those of ITK."""
-    if suffix not in NRRD:
-        return LPS, "mm"
-    name = NRRD_SPACES.get(fields.get("space", "").lower(), RIGHT_HANDED)
-    return name, unit_in(fields) or ("mm" if name in LETTERS else "")
-
-
-def require_bytes(path: Path, expected: int) -> None:
-    """Require a file of at least so many bytes: ITK fills what is missing with what is in memory."""
-    size = path.stat().st_size
-    if size < expected:
-        raise ArgumentError(f"the file is cut off: expected {expected} bytes, found {size}")
 
 
 def require_volume(

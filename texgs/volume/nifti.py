@@ -19,8 +19,7 @@ UNITS = {"meter": "m", "micron": "um"}  # mm where a file tells none
 def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: int = 0) -> Source:
     """Open an image of NIfTI, ANALYZE or MGH, its axes permuted and flipped to the closest R, A, S.
 
-    It is mapped if it is not compressed, and of several along a fourth axis one step is read. By nibabel: ITK
-    knows neither NIfTI-2 nor axes that are not at right angles.
+    It is mapped if it is not compressed, and of several along a fourth axis one step is read.
     """
     import nibabel
     from nibabel.imageglobals import LoggingOutputSuppressor

@@ -56,13 +56,7 @@ def open_prepared(path: Path) -> list[RawSource]:
 
 
 def write_header(
-    file: BinaryIO,
-    dims: Dims,
-    dtype: np.dtype,
-    spacing: Triple,
-    origin: Triple,
-    space: Space = UNTOLD,
-    channels: int = 1,
+    file: BinaryIO, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple, space: Space, channels: int
 ) -> int:
     """Write the header of a canonical file, and return its length, a multiple of `ALIGNMENT` bytes.
 

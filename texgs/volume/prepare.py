@@ -15,6 +15,7 @@ from texgs.core.names import check_count, is_number
 from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
 from texgs.volume.nrrd_file import WORDS, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
+from texgs.volume.space import Space
 from texgs.volume.summaries import Summary, summarize
 
 Bounds = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
@@ -65,9 +66,7 @@ def prepare_channels(
     _check_keys(nan_value, reduce, method, up)
     source, tallies = _first_of(sources), [_Tally(each.name) for each in sources]
     bounds, axes = bounds_of(source.dims, crop), UPRIGHT[up]
-    dims, spacing, origin, space = permuted_lattice(
-        *_reduced_lattice(source, bounds, reduce), source.space, axes
-    )
+    dims, spacing, origin, space = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
     kept = "uint8" if source.dtype.kind == "b" else source.dtype.name
     dtype = np.dtype(kept if kept in WORDS else "float32")
     ((x0, x1), (y0, y1), (z0, z1)), size = bounds, prod(dims) * dtype.itemsize
@@ -133,21 +132,15 @@ class _Tally:
     def finite(self, slab: np.ndarray, start: tuple[int, int, int], nan_value: float | None) -> np.ndarray:
         """Return the slab with NaN and infinity replaced; count them where no value was chosen."""
         bad = ~np.isfinite(slab) if slab.dtype.kind == "f" else np.zeros(0, bool)
-        if not bad.any():
-            self.see(slab)
-            return slab
-        if nan_value is None:
+        if bad.any() and nan_value is None:
             self.n_bad += int(bad.sum())
             place = np.unravel_index(bad.argmax(), bad.shape)
             self.first = self.first or tuple(int(p) + s for p, s in zip(place[::-1], start, strict=True))
-        slab = np.where(bad, np.float32(nan_value or 0.0), slab)
-        self.see(slab)
-        return slab
-
-    def see(self, slab: np.ndarray) -> None:
-        """Note whether samples differ, as they are in the source."""
+        if bad.any():
+            slab = np.where(bad, np.float32(nan_value or 0.0), slab)
         self.sample = slab.flat[0] if self.sample is None else self.sample
         self.varies = self.varies or bool((slab != self.sample).any())
+        return slab
 
     def extend(self, block: np.ndarray) -> np.ndarray:
         """Widen the range by a block, and return it."""
@@ -200,8 +193,8 @@ def _check_keys(nan_value: float | None, reduce: int, method: str, up: str) -> N
         raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up}")
 
 
-def _reduced_lattice(source: Source, bounds: Bounds, reduce: int) -> tuple[Dims, Triple, Triple]:
-    """Return dims, spacing and origin after crop and reduction."""
+def _reduced_lattice(source: Source, bounds: Bounds, reduce: int) -> tuple[Dims, Triple, Triple, Space]:
+    """Return dims, spacing, origin and space after crop and reduction."""
     nx, ny, nz = (-(-(high - low) // reduce) for low, high in bounds)
     if min(nx, ny, nz) < 2:
         raise ArgumentError(
@@ -211,7 +204,7 @@ def _reduced_lattice(source: Source, bounds: Bounds, reduce: int) -> tuple[Dims,
     dx, dy, dz = source.spacing
     skipped = [(low + 0.5 * (reduce - 1)) * s for (low, _), s in zip(bounds, source.spacing, strict=True)]
     first = source.space.place(source.origin, skipped)
-    return (nx, ny, nz), (dx * reduce, dy * reduce, dz * reduce), first
+    return (nx, ny, nz), (dx * reduce, dy * reduce, dz * reduce), first, source.space
 
 
 def block_means(values: np.ndarray, factor: int) -> np.ndarray:
@@ -226,11 +219,8 @@ def block_means(values: np.ndarray, factor: int) -> np.ndarray:
 
 def block_middles(values: np.ndarray, factor: int) -> np.ndarray:
     """Return the sample in the middle of every block (the later of two); for labels, which have no mean."""
-    middles = []
-    for size in values.shape:
-        starts = np.arange(0, size, factor)
-        middles.append(starts + np.minimum(factor, size - starts) // 2)
-    return values[np.ix_(*middles)]
+    starts = [(np.arange(0, size, factor), size) for size in values.shape]
+    return values[np.ix_(*(first + np.minimum(factor, size - first) // 2 for first, size in starts))]
 
 
 REDUCERS = {"mean": block_means, "sample": block_middles}

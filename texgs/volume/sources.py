@@ -76,17 +76,13 @@ def open_source(
         with located(path):
             _try_to_read(path)
             return _open(path, spacing, origin, said)
-    except FileNotFoundError as error:
-        path = Path(error.filename or path)
-        if path.is_symlink():
-            target = path.readlink()
-            raise ArgumentError(
-                f"{path}: a link to {target}, which is not there; get it, as by git annex get"
-            ) from error
-        raise ArgumentError(f"{path}: no such file or folder; looked for {path.absolute()}") from error
     except OSError as error:
-        path = Path(error.filename or path)
-        raise ArgumentError(f"{path}: cannot be read ({error.strerror or error})") from error
+        path, why = Path(error.filename or path), f"cannot be read ({error.strerror or error})"
+        if isinstance(error, FileNotFoundError):
+            why = f"no such file or folder; looked for {path.absolute()}"
+            if path.is_symlink():
+                why = f"a link to {path.readlink()}, which is not there; get it, as by git annex get"
+        raise ArgumentError(f"{path}: {why}") from error
 
 
 def _try_to_read(path: Path) -> None:
