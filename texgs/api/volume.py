@@ -13,8 +13,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from texgs.api.arrays import keys_of_format, several, source_of
 from texgs.api.display import as_python, camera_of, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
@@ -183,7 +181,7 @@ class Volume:
         image = pyvista.ImageData(
             dimensions=self.grid.dims, spacing=self.grid.spacing, origin=self.grid.origin
         )
-        image.direction_matrix = np.array(self.grid.space.axes).T
+        image.direction_matrix = self.grid.space.axes.T
         image.point_data[self.name] = self.grid.values.reshape(-1)
         return image
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from texgs.scene.scene import Scene
 
 ENDINGS = list(dict.fromkeys(ending for endings in EXPORTS.values() for ending in endings))
-SPACES = ("file", "world")
 DEFAULTS = {ending: next(kind for kind in EXPORTS if ending in EXPORTS[kind]) for ending in ENDINGS}
 BAKED = "Surfels have one colour each, the mean of their texture, with the light of the scene as harmonics"
 OPTIONS = ("opacity", "voxel", "views", "size", "drop_unseen", "space", "device")  # that `Export` has, too
@@ -60,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     words = "coordinates: those of the volume's file, such as a patient's mm (default of points, mesh, vtp "
     words += "and gltf), or of the world, in which the volume is centred and its longest side is 1"
-    parser.add_argument("--space", choices=SPACES, help=words)
+    parser.add_argument("--space", choices=("file", "world"), help=words)
     add_device(parser)
 
 

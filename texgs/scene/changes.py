@@ -72,7 +72,8 @@ def _apply(session: Session, word: str) -> None:
         models = ", ".join(session.scene.models)
         raise ArgumentError(f"expected a model of the scene ({models}), got {part}")
     else:
-        _change_scene(session, name, text)
+        known({name: text}, ("light", "background", "cut", "time"), "the scene")
+        session.set_of_scene(name, _plain(text) if text else SCENE_KEYS[name])
 
 
 def _require_through(session: Session, cuts: Cuts) -> None:
@@ -106,13 +107,6 @@ def _change_part(session: Session, part: str, key: str, text: str) -> None:
         session.set(part, key, _plain(text))
     else:
         session.reset(part, key)
-
-
-def _change_scene(session: Session, key: str, text: str) -> None:
-    """Change the light, the background or the step; an empty text takes it back."""
-    known({key: text}, ("light", "background", "cut", "time"), "the scene")
-    value = _plain(text) if text else SCENE_KEYS[key]
-    session.set_of_scene(key, value)
 
 
 def _file(text: str) -> Path:

@@ -73,11 +73,10 @@ def describe(
     kind = kind_of(next(iter(scene.models.values())).file)
     segments = ["segments"] if "segments" in kind.can else []
     keys = [each.name for each in fields(PartEdit) if NEEDS.get(each.name, "relight") in kind.can]
-    models = []
-    for (model, entry), palette, is_textured in zip(
-        scene.models.items(), composed.palettes, have_palette(composed), strict=True
-    ):
+    models, parts = [], composed.parts if isinstance(composed, Composition) else [None] * len(scene.models)
+    for (model, entry), palette, part in zip(scene.models.items(), composed.palettes, parts, strict=True):
         # Only what has a palette has a texture, which can get a new look.
+        is_textured = part is not None and part.palette is not None
         can = [*keys, "look"] if is_textured else [key for key in keys if key != "palette"]
         own = [{"name": key, "edit": asdict(segment.edit)} for key, segment in entry.segments.items()]
         said = {"name": model, "kind": kind.name, "edit": asdict(entry.edit), "fitted_palette": list(palette)}
@@ -110,10 +109,3 @@ def drawn(space: Space) -> dict[str, Any]:
     for front, back, (axis, sign) in zip(ahead, behind, closest(space.turn.T), strict=True):
         ends[axis] = [front, back][::sign]
     return asdict(space) | {"axes": ahead, "ends": ends, "scale": space.scale}
-
-
-def have_palette(composed: Composed) -> list[bool]:
-    """Return of each model whether its palette can be replaced: surfels without texture have none."""
-    if isinstance(composed, Composition):
-        return [part.palette is not None for part in composed.parts]
-    return [False] * len(composed.palettes)

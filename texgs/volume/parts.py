@@ -23,21 +23,16 @@ def parts_of(path: Path) -> list[Path]:
     with suppress(TexgsError), reading_as("a volume"):
         names: Iterable[Path | str] = filter(None, [samples_of(path)])
         if suffix in (".tif", ".tiff"):
-            names = _of_ome_tiff(path)
+            import tifffile
+
+            with tifffile.TiffFile(path) as tiff:
+                names = OME_FILE.findall(tiff.ome_metadata or "")
         elif suffix in (".pvti", ".pvtr"):
             names = [name.decode() for name in PIECE.findall(path.read_bytes())]
         elif suffix in (".nc", ".nc4", ".h5", ".hdf5", ".hdf", ".nxs"):
             names = _of_hdf5(path)
         files = {(path.parent / name).resolve() for name in names}
     return sorted(file for file in files - {path.resolve()} if file.is_file())
-
-
-def _of_ome_tiff(path: Path) -> Iterable[str]:
-    """Return the names of the files that an OME-TIFF is in."""
-    import tifffile
-
-    with tifffile.TiffFile(path) as tiff:
-        return OME_FILE.findall(tiff.ome_metadata or "")
 
 
 def _of_hdf5(path: Path) -> Iterable[str]:

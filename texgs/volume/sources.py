@@ -36,11 +36,7 @@ IN_PAGES = ("image", "channel", "time")  # keys of an image of TIFF
 
 
 def open_source(
-    path: str | Path,
-    *,
-    spacing: Triple | None = None,
-    origin: Triple | None = None,
-    **keys: Any,
+    path: str | Path, *, spacing: Triple | None = None, origin: Triple | None = None, **keys: Any
 ) -> Source:
     """Open a volume without reading its samples where the format allows that.
 
@@ -195,24 +191,21 @@ def _open_imaris(path: Path, spacing: Triple | None, origin: Triple | None, **ke
     return source
 
 
-# By suffix: function of the path, of spacing and origin where they replace the file's, and of these keys.
-OPENERS: dict[str, tuple[Callable[..., Source], tuple[str, ...]]] = {
-    suffix: (opener, keys)
-    for opener, keys, *suffixes in (
-        (_open_raw, ("dims", "dtype", "endian", "skip"), ".raw", ".bin", ".dat"),
-        (open_tiff, IN_PAGES, ".tif", ".tiff"),
-        (_open_npy, (), ".npy"),
-        (_open_npy, ("variable",), ".npz"),
-        (open_nifti, ("time",), *BY_NIBABEL),
-        (open_foreign, ("channel", "time"), *NRRD, *METAIMAGE),  # by SimpleITK
-        (open_foreign, (), ".gipl"),
-        (open_mrc, (), *MAPS, *(f"{suffix}.gz" for suffix in MAPS)),
-        (open_foreign, ("variable",), *BY_VTK),
-        (open_foreign, ("time",), *DICOM),
-        (open_netcdf, IN_FILES, *HDF5),
-        (_open_imaris, IN_FILES, ".ims"),
-        (open_zarr, IN_FILES, ".zip", ".ozx"),
-        (ColumnSource, ("dims", "column"), ".txt", ".txt.gz"),
-    )
-    for suffix in suffixes
-}
+# Function of the path, of spacing and origin where they replace the file's, and of these keys; suffixes.
+FORMATS: tuple[tuple[Callable[..., Source], tuple[str, ...], tuple[str, ...]], ...] = (
+    (_open_raw, ("dims", "dtype", "endian", "skip"), (".raw", ".bin", ".dat")),
+    (open_tiff, IN_PAGES, (".tif", ".tiff")),
+    (_open_npy, (), (".npy",)),
+    (_open_npy, ("variable",), (".npz",)),
+    (open_nifti, ("time",), BY_NIBABEL),
+    (open_foreign, ("channel", "time"), (*NRRD, *METAIMAGE)),  # by SimpleITK
+    (open_foreign, (), (".gipl",)),
+    (open_mrc, (), (*MAPS, *(f"{suffix}.gz" for suffix in MAPS))),
+    (open_foreign, ("variable",), BY_VTK),
+    (open_foreign, ("time",), DICOM),
+    (open_netcdf, IN_FILES, HDF5),
+    (_open_imaris, IN_FILES, (".ims",)),
+    (open_zarr, IN_FILES, (".zip", ".ozx")),
+    (ColumnSource, ("dims", "column"), (".txt", ".txt.gz")),
+)
+OPENERS = {suffix: (opener, keys) for opener, keys, suffixes in FORMATS for suffix in suffixes}
