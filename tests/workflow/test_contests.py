@@ -17,7 +17,9 @@ def contest_file(folder, name):
     """Write the file that a data set names, and return it with the samples [Z, Y, X] to expect."""
     if name == "mantle":
         fields = {"temperature": FIELD + 9, "temperature anomaly": FIELD, "vx": FIELD - 9}
-        return write_netcdf(folder / "spherical001.nc", fields), FIELD
+        return write_netcdf(folder / "spherical001.nc", fields), FIELD[
+            ::-1
+        ]  # z runs south
     return write_lines(folder / "multifield.0099.txt.gz", LINES), TABLE[:, 1].reshape(4, 5, 6)
 
 
@@ -45,9 +47,9 @@ def test_another_step_or_quantity_is_chosen_by_keys_and_a_plain_file_is_still_re
     contest_file(tmp_path, "mantle")
     volume = tmp_path / "results" / "mantle" / "volume" / "volume.nrrd"
     assert main(["volume", *keys("mantle", tmp_path), "dataset.volume.variable=vx"]) == 0
-    np.testing.assert_array_equal(open_grid(volume).values, FIELD - 9)
+    np.testing.assert_array_equal(open_grid(volume).values, FIELD[::-1] - 9)
     FIELD.tofile(tmp_path / "mantle.raw")
-    plain = ["file=mantle.raw", "variable=null", "dims=[6,5,4]", "dtype=float32"]
+    plain = ["file=mantle.raw", "variable=null", "dims=[6,5,4]", "dtype=float32", "up=+y"]
     assert main(["volume", *keys("mantle", tmp_path), *(f"dataset.volume.{key}" for key in plain)]) == 0
     np.testing.assert_array_equal(open_grid(volume).values, FIELD)
 

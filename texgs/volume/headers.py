@@ -1,13 +1,18 @@
 """Text headers of NRRD and MetaImage files: their fields, and the file with the samples."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from texgs.core.errors import ArgumentError
 from texgs.core.names import named_file
-from texgs.volume.space import Triple
+
+if TYPE_CHECKING:
+    from texgs.volume.space import Triple
 
 NRRD, METAIMAGE = (".nrrd", ".nhdr"), (".mhd", ".mha")  # suffixes
 UPRIGHT = "uprightspacing"  # a pair of ours: +y is up, whatever the directions are
