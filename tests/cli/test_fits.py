@@ -16,7 +16,6 @@ FITS = "fit.field: texgs {} fits {}, but fit={} has field {};"
 AMBIENT = "fit.first_material.ambient: expected a value between 0 and 1, as material_range=bounded has"
 ABLE = "fit.field: texgs {} expects a fit of {}, but fit={} has field {}; choose another fit"
 OTHER = FITS.format("gaussians", "gaussians", "quick", "surfels") + " run texgs texture"
-HULL = "fit.gaussians.seeds.kind: expected no voxels, which are for surfels alone; choose visible"
 DOUBLING = "fit.voxels.stages: expected sides that double from one to the next, got"
 
 
@@ -40,7 +39,6 @@ def empty(tmp_path, monkeypatch):
         ("palette fit=stylerf_quick device=cuda", CPU_ONLY.format("stylerf_quick", "palette")),
         ("surfels fit=paper fit.material_range=bounded", AMBIENT),
         ("surfels fit=quick fit.texture.texels=0", "fit.texture.texels: expected"),
-        ("gaussians fit=gaussians_quick fit.gaussians.seeds.kind=voxels", HULL),
         ("cuts fit=plenoxels", ABLE.format("cuts", "surfels", "plenoxels", "voxels")),
         ("page fit=stylerf", ABLE.format("page", "surfels", "stylerf", "palette")),
         ("steps fit=gaussians", ABLE.format("steps", "surfels", "gaussians", "gaussians")),

@@ -1,7 +1,6 @@
 import pytest
 import torch
 
-from texgs.core.errors import ArgumentError
 from texgs.fields.gaussians.model import Baked, Gaussians
 from texgs.fields.splats import screen_box
 from texgs.fitting import checkpoint
@@ -11,6 +10,7 @@ from texgs.fitting.loop import Fit
 from texgs.fitting.seeds import seed_gaussians
 from texgs.fitting.settings import CommonRates, Densify, Seeds
 from texgs.raster.shading import Y00
+from texgs.volume.generate import sphere
 from texgs.volume.view_set import ViewSet
 
 from .scenes import SIZE, assert_same, ball_images, is_finite, quality, run
@@ -85,5 +85,11 @@ def test_seeds_are_grey_from_everywhere_and_as_thick_as_wide(tmp_path):
     assert not parameters["sh_rest"].any()
     shown = 0.5 + Y00 * parameters["sh"]
     assert bool(((shown > -1e-6) & (shown < 1 + 1e-6)).all())
-    with pytest.raises(ArgumentError, match=r"seeds\.kind=voxels needs a volume"):
-        seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), Seeds(kind="voxels"), 3, 0)
+
+
+def test_in_a_volume_they_start_where_it_shows_something_as_many_as_are_kept(tmp_path):
+    volume, tf = sphere(16), {"name": "TF01", "opacity": [[0.5, 0.5], [1, 0.5]], "color": [[0, 1, 0.5, 0]]}
+    views = ViewSet(tmp_path, [], [], {"tf": tf})
+    p = seed_gaussians(ball_images(), views, Seeds(), 0, 0, volume, most=150)
+    assert len(p["means"]) == 150
+    assert float(p["means"].norm(dim=1).max()) < 0.5

@@ -14,6 +14,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT
 from texgs.fitting import now
+from texgs.fitting.ends import ends_of_rays, thickened
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.generate import sphere
@@ -65,7 +66,7 @@ def test_surfels_start_where_views_see_something_also_behind_other_layers(small,
     """Of a shell, as many start on its far side as that side adds to the picture."""
     shell = of_range(replace(LOW, opacity=((0.2, 0), (0.3, height), (0.4, 0))), grid)
     caster, camera = Caster(grid, LOOK), orbit(20, 10, *LENS)
-    points = now.ends_of_rays(caster, LOOK, shell, [camera.resized(32)] * 60, 0)
+    points = ends_of_rays(caster, LOOK, shell, [camera.resized(32)] * 60, 20_000, 0)
     assert len(points.places) > 1000
     depth = (points.places @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3])[:, 2]
     middle = torch.stack([torch.zeros(64, 64), torch.full((64, 64), LENS.radius)])
@@ -79,7 +80,7 @@ def test_surfels_start_where_views_see_something_also_behind_other_layers(small,
 @given(st.floats(0, 0.999), st.floats(0.1, 50))
 def test_thicker_matter_lets_a_power_of_the_light_through(alpha, factor):
     tf = TransferFunction(((0, alpha), (1, 0.5)), ((0, 1, 1, 1),))
-    assert 1 - now.thickened(tf, factor).opacity[0][1] == pytest.approx((1 - alpha) ** factor, abs=1e-12)
+    assert 1 - thickened(tf, factor).opacity[0][1] == pytest.approx((1 - alpha) ** factor, abs=1e-12)
 
 
 @pytest.mark.parametrize(("tf", "side", "others"), [(HIGH, 64, 28), (FAINT, 32, 14)])

@@ -7,14 +7,21 @@ from scipy.spatial.distance import cdist
 
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError
+from texgs.core.geometry import quats_to_matrices
+from texgs.core.lens import Lens
 from texgs.fitting.hull import hull_points, mean_colors
+from texgs.fitting.now import cast_views
 from texgs.fitting.seeds import box_of, read_points, seed_surfels, shrunk, surfels_at
 from texgs.fitting.settings import Seeds
+from texgs.volume.cameras import icosphere
+from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
 from texgs.volume.images import load
+from texgs.volume.render import Appearance
+from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet, read_views
 
-from .scenes import RADIUS, assert_same, ball_images, blank_images, cameras, images_of, is_finite
+from .scenes import HEADLIGHT, RADIUS, assert_same, ball_images, blank_images, cameras, images_of, is_finite
 
 BOX = (torch.full((3,), -0.55), torch.full((3,), 0.55))
 
@@ -241,21 +248,82 @@ def test_points_published_with_the_paper_are_near_what_its_views_show():
     assert (mean_colors(images, parameters["means"]) - colors).abs().mean() < 0.15
 
 
-def test_voxels_of_the_volume_that_views_show():
-    """A ball of the value 1 in a grid: what is seen of it is its surface."""
-    at = np.linspace(-0.5, 0.5, 48)
+def parts(size=96):
+    """A large ball, a thin rod and a speck apart from it as masks [Z, Y, X], and a function that shows them.
+
+    The rod is 2 samples thick, the speck 3.
+    """
+    at = np.linspace(-0.5, 0.5, size)
     z, y, x = np.meshgrid(at, at, at, indexing="ij")
-    inside = (x**2 + y**2 + z**2 < RADIUS**2).astype(np.float32)
+    masks = {
+        "ball": np.hypot(np.hypot(x, y), z + 0.15) < 0.25,
+        "rod": (np.hypot(y + 0.3, z) < 0.011) & (np.abs(x) < 0.45),
+        "speck": np.hypot(np.hypot(x - 0.3, y - 0.3), z - 0.3) < 0.016,
+    }
     tf = {"name": "TF01", "opacity": [[0.5, 0.0], [1.0, 1.0], [2.0, 1.0]], "color": [[0, 0.8, 0.4, 0.2]]}
-    options = {"kind": "voxels", "metadata": {"tf": tf}, "volume": Grid(inside), "count": 200}
+    return masks, tf
+
+
+def seen(grid, tf, cameras):
+    """Images of a volume."""
+    function = TransferFunction.from_dict({name: tf[name] for name in ("opacity", "color")})
+    return cast_views(Caster(grid, Appearance()), function, [(each, HEADLIGHT) for each in cameras], "views")
+
+
+def near(masks, places):
+    """How many of places [N, 3] are within three samples of each part."""
+    found = {}
+    for name, mask in masks.items():
+        own = np.argwhere(mask)[:, ::-1] / (mask.shape[0] - 1) - 0.5
+        found[name] = int((cdist(places, own).min(axis=1) < 3 / mask.shape[0]).sum())
+    return found
+
+
+def grid_of(*masks):
+    return Grid(np.any(masks, axis=0).astype(np.float32))
+
+
+def test_each_part_of_a_volume_has_its_share_of_seeds_however_thin_or_small():
+    """That is its share of what views show, here of each part alone."""
+    masks, tf = parts()
+    grid, around = grid_of(*masks.values()), icosphere(2, Lens(2.4, 30, 96, 96))
+    alone = {name: float(seen(grid_of(mask), tf, around).planes[:, 3].sum()) for name, mask in masks.items()}
+    images, count = seen(grid, tf, around), 4000
+    surfels, _ = seeds(images=images, metadata={"tf": tf}, volume=grid, count=count)
+    found = near(masks, surfels["means"])
+    assert sum(found.values()) > 0.99 * count, "nowhere else"
+    for name, shown in alone.items():
+        expected = count * shown / sum(alone.values())
+        assert found[name] == pytest.approx(expected, rel=0.1, abs=3 * expected**0.5), name
+    hull, _ = seeds(images=images, count=count, kind="visible")
+    assert near(masks, hull["means"])["rod"] < 0.1 * found["rod"], "what the hull is not enough for"
+
+
+def test_seeds_in_a_volume_lie_on_what_shows_and_face_out():
+    masks, tf = parts(48)
+    grid = grid_of(masks["ball"])
+    options = {"images": seen(grid, tf, cameras(12)), "metadata": {"tf": tf}, "volume": grid}
     surfels, colors = seeds(**options)
-    radius = surfels["means"].norm(dim=1)
-    assert len(colors) == 200
-    assert radius.max() < RADIUS * 1.35
-    assert float((radius > 0.6 * RADIUS).float().mean()) > 0.75
+    out = surfels["means"] - torch.tensor([0, 0, -0.15])
+    assert (out.norm(dim=1) - 0.25).abs().max() < 2 / 48
+    facing = (quats_to_matrices(surfels["quats"])[..., 2] * out).sum(dim=1) / out.norm(dim=1)
+    assert facing.median() > 0.95
+    torch.testing.assert_close(colors, torch.tensor([0.8, 0.4, 0.2]).expand(300, 3), atol=0.02, rtol=0)
 
 
-def test_voxels_need_a_volume_and_a_transfer_function():
+def test_there_are_as_many_in_a_volume_as_are_kept_and_fewer_are_told(capsys):
+    masks, tf = parts(48)
+    grid = grid_of(masks["ball"])
+    images = seen(grid, tf, cameras(12))
+    views = view_set(tf=tf)
+    surfels, _ = seed_surfels(images, views, Seeds(), 0, grid, 500)
+    assert len(surfels["means"]) == 500
+    assert "seeds" not in capsys.readouterr().err
+    surfels, _ = seed_surfels(images, views, Seeds(count=9000), 0, grid, 500)
+    assert f"views: found {len(surfels['means']):,} of 9,000 seeds, so that thin" in capsys.readouterr().err
+
+
+def test_seeds_in_a_volume_need_one_and_a_transfer_function():
     for options in ({"metadata": {"tf": {}}}, {"volume": Grid(np.zeros((2, 2, 2), np.float32))}):
-        with pytest.raises(ArgumentError, match=r"seeds\.kind=voxels needs a volume and views that name"):
-            seeds(kind="voxels", **options)
+        with pytest.raises(ArgumentError, match=r"seeds\.kind=volume needs a volume and views that name"):
+            seeds(kind="volume", **options)

@@ -1,6 +1,5 @@
 """A model of a transfer function in seconds: views cast in memory, surfels where rays end, two short fits."""
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -10,12 +9,13 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.geometry import facing, z_order_of
+from texgs.core.geometry import facing
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light, random_lights
 from texgs.core.progress import progress
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, in_full_light, raw_material
+from texgs.fitting.ends import FAINT, Points, ends_of_rays
 from texgs.fitting.loop import Fit
 from texgs.fitting.seeds import surfels_at
 from texgs.fitting.settings import Densify, Losses, Phase, Rates, TextureKeys
@@ -28,9 +28,7 @@ from texgs.volume.transfer import TransferFunction
 
 FREQUENCY = 4  # of the icosphere of cameras, of which it has 162
 SURFELS, OPACITY = 20_000, 0.05
-PIXELS = 4000  # of each view, of which surfels are drawn
-LEAST, DENSEST = 100, 1 - 1e-6  # points
-FAINT = 0.02  # alpha below which a pixel shows nothing to speak of
+LEAST = 100  # points
 HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of their own
 GLANCE = 3  # times smaller views, which say where rays end
 RATES = Rates(quats=0.016, scales=0.05, opacities=0.1)
@@ -51,14 +49,6 @@ class Effort(NamedTuple):
 OPAQUE = Effort(step=0.5, reduce=1, others=1, iterations=(600, 1350))
 TRANSLUCENT = Effort(step=1.0, reduce=2, others=2, iterations=(950, 1000))
 MEAN_ALPHA = 0.7  # of what is seen: with less it is translucent
-
-
-class Points(NamedTuple):
-    """Where rays end: places, normals and colours [N, 3]."""
-
-    places: Tensor
-    normals: Tensor
-    colors: Tensor
 
 
 def fit_now(
@@ -82,7 +72,7 @@ def fit_now(
         ArgumentError: if the function shows nothing.
     """
     glances = [smaller(camera, GLANCE) for camera in icosphere(FREQUENCY, lens)[::HEADLIGHTS]]
-    points = ends_of_rays(caster, look, tf, glances, seed)
+    points = ends_of_rays(caster, look, tf, glances, SURFELS, seed)
     if len(points.places) < LEAST:
         raise ArgumentError("function: expected to see enough of the volume, got little; raise its opacity")
     effort = TRANSLUCENT if mean_alpha(caster, tf, glances[::HEADLIGHTS]) < MEAN_ALPHA else OPAQUE
@@ -156,45 +146,6 @@ def mean_alpha(caster: Caster, tf: TransferFunction, cameras: list[Camera]) -> f
     alphas = [caster.cast(tf, camera, HEADLIGHT).rgba[..., 3] for camera in cameras]
     seen = torch.cat([alpha[alpha > FAINT] for alpha in alphas])
     return float(seen.mean())
-
-
-def ends_of_rays(
-    caster: Caster, look: Appearance, tf: TransferFunction, cameras: list[Camera], seed: int
-) -> Points:
-    """Return where rays of random pixels lose some part of their light, another one in each view.
-
-    So there are as many ends on a layer as it shows, also behind others. They are on the CPU.
-    """
-    unlit = caster.with_appearance(replace(look, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
-    generator = torch.Generator().manual_seed(seed)
-    count, parts = len(cameras), []
-    shares = (torch.randperm(count, generator=generator) + 0.5) / count  # spread evenly, in random order
-    for camera, left in zip(cameras, shares.tolist(), strict=True):
-        thick = thickened(tf, math.log(0.5) / math.log(left))  # half of its light is left where `left` was
-        parts.append(ends_of(unlit, thick, camera, generator))
-    points = Points(*map(torch.cat, zip(*parts, strict=True)))
-    chosen = torch.randperm(len(points.places), generator=generator)[:SURFELS]
-    ordered = chosen[z_order_of(points.places[chosen])]
-    return Points(*(x[ordered] for x in points))
-
-
-def thickened(tf: TransferFunction, factor: float) -> TransferFunction:
-    """Return a function of a factor's extinction."""
-    through = [(value, math.log1p(-min(alpha, DENSEST))) for value, alpha in tf.opacity]
-    return tf.with_points([(value, -math.expm1(factor * x)) for value, x in through], tf.color)
-
-
-def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: torch.Generator) -> Points:
-    """Return where rays of random pixels of one view lose half of their light, as far as they do."""
-    seen = caster.cast(tf, camera, HEADLIGHT, ("median", "normal"))
-    z, normals, rgba = seen.median.cpu(), seen.normal.cpu(), seen.rgba.cpu()  # type: ignore[union-attr]
-    rows, columns = (rgba[..., 3] > FAINT).nonzero(as_tuple=True)
-    some = torch.randperm(len(rows), generator=generator)[:PIXELS]
-    rows, columns = rows[some], columns[some]
-    ends = z[rows, columns] > 0
-    at = rows[ends], columns[ends]
-    rgba = rgba[at]
-    return Points(camera.unproject(z)[at], normals[at], (rgba[:, :3] / rgba[:, 3:]).clamp(0, 1))
 
 
 def surfels_on(points: Points, seed: int) -> dict[str, Tensor]:

@@ -1,5 +1,6 @@
-"""Where surfels start: at given points, where views show something, in their hull, or anywhere."""
+"""Where surfels start: at given points, where rays end, where views show something, or anywhere."""
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -9,18 +10,21 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d, normalize
 
 from texgs.core.errors import ArgumentError, located
+from texgs.core.geometry import facing
 from texgs.core.names import POINTS
 from texgs.core.ply_file import read_vertices
 from texgs.fields.ply_columns import take
 from texgs.fields.splats import split, zeroth
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
+from texgs.fitting.ends import Points, ends_of_rays
 from texgs.fitting.hull import Box, hull_points, mean_colors, random_points
 from texgs.fitting.loop import Fit
 from texgs.fitting.settings import Densify, Losses, Phase, Rates, Seeds
+from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
 from texgs.volume.images import Images, smaller
-from texgs.volume.isosurface import visible_voxels
+from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
 
@@ -28,6 +32,8 @@ MARGIN = 0.02  # of the box around the data, relative to its longest side
 HALF_SIZE = 1.1  # of the cube around the origin where nothing else is known, in halves of the longest side
 SIDE = 1.0  # the longest side of data where views do not say, world units
 GREY = 0.5  # the colour of random seeds
+USUAL = 10_000  # seeds, where nothing says how many
+GLANCE = 100  # pixels of the longer side of views whose rays find seeds in a volume, about
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
 SMALLEST = 1e-4  # scale, world units
 # A quick fit finds what is seen of more surfels than are kept.
@@ -42,67 +48,91 @@ PHASE = Phase(
 
 
 def seed_surfels(
-    images: Images, views: ViewSet, seeds: Seeds, seed: int, volume: Grid | None = None
+    images: Images,
+    views: ViewSet,
+    seeds: Seeds,
+    seed: int,
+    volume: Grid | None = None,
+    most: int | None = None,
 ) -> tuple[dict[str, Tensor], Tensor]:
     """Return raw `means`, `quats`, `scales` and `opacities` of the first surfels by name, and colours [N, 3].
 
-    "points" are all in the folder's points3d.ply; "hull", points that no view sees through; "visible", those
-    of them that a quick fit finds to be seen, as hidden ones never show and still count under the cap of
-    density control; "voxels", the same from the volume's samples that the views' transfer function shows;
-    "random", grey ones in the box; "auto", points if there are any, else visible. Opacity is that before the
-    quick fit. Of the half size see `box_of`.
+    "points" are all in the folder's points3d.ply; "volume", where rays of views through it end, with its
+    normals, see `ends_of_rays`: each part has its share, however thin or small; "hull", points that no view
+    sees through; "visible", those of them that a quick fit finds to be seen, as hidden ones never show and
+    still count under the cap of density control; "random", grey ones in the box; "auto", points if there are
+    any, else those of the volume if there is one, else visible. Opacity is that before the quick fit. Of the
+    half size see `box_of`. By default there are as many in a volume as density control keeps, `most`.
     """
-    kind, count, half_size = seeds.kind, seeds.count, seeds.half_size
+    kind, half_size = seeds.kind, seeds.half_size
     if not 0 < seeds.opacity < 1:
         raise ArgumentError(f"seeds.opacity: expected a value between 0 and 1, got {seeds.opacity}")
     given = views.folder / POINTS
     if kind == "auto":
-        kind = "points" if given.is_file() else "visible"
+        has_volume = volume is not None and "tf" in views.metadata
+        kind = "points" if given.is_file() else "volume" if has_volume else "visible"
+    count = seeds.count or (most if kind == "volume" else None) or USUAL
     generator = torch.Generator().manual_seed(seed)
     colors: Tensor | None = None
+    normals: Tensor | None = None
     if kind == "points":
         points, colors = read_points(given)
-    elif kind == "voxels":
-        points, colors = shown_voxels(volume, views, CANDIDATES * count, seed)
+    elif kind == "volume":
+        points, normals, colors = ends_in(volume, views, images, count, seed)
     elif kind == "random":
         points = random_points(box_of(views, half_size), count, generator)
         colors = torch.full_like(points, GREY)
     else:
         candidates = CANDIDATES * count if kind == "visible" else count
         points = hull_points(images, box_of(views, half_size), candidates, generator)
+    if kind != "points" and len(points) < count:
+        print(
+            f"{views.folder}: found {len(points):,} of {count:,} seeds, so that thin and small parts may be "
+            "missing; larger views have room for more",
+            file=sys.stderr,
+        )
     if colors is None:
         colors = mean_colors(images, points)
     surfels = surfels_at(points, seeds.opacity, generator)
-    if kind not in ("visible", "voxels"):
+    if normals is not None:
+        surfels["quats"] = facing(normals)
+    if kind != "visible":
         return surfels, colors
     return most_seen(surfels, colors, images, count, seed)
 
 
-def seed_gaussians(images: Images, views: ViewSet, seeds: Seeds, degree: int, seed: int) -> dict[str, Tensor]:
+def seed_gaussians(
+    images: Images,
+    views: ViewSet,
+    seeds: Seeds,
+    degree: int,
+    seed: int,
+    volume: Grid | None = None,
+    most: int | None = None,
+) -> dict[str, Tensor]:
     """Return raw parameters of the first Gaussians: as surfels start, as thick as they are wide.
 
     `sh` is apart from `sh_rest`, as they learn at different rates; all but the zeroth harmonic are zero.
-    Seeds "voxels" need a volume and are refused.
     """
-    surfels, colors = seed_surfels(images, views, seeds, seed)
+    surfels, colors = seed_surfels(images, views, seeds, seed, volume, most)
     thickness = surfels["scales"].amin(dim=1, keepdim=True)  # seeds of surfels are round, or nearly so
     zeros = torch.zeros(len(colors), (degree + 1) ** 2 - 1, 3)
     sh = torch.cat([zeroth(colors), zeros], dim=1)
     return {**surfels, "scales": torch.cat([surfels["scales"], thickness], dim=1), **split(sh)}
 
 
-def shown_voxels(volume: Grid | None, views: ViewSet, count: int, seed: int) -> tuple[Tensor, Tensor]:
-    """Return points and colours [N, 3] of a volume where the views' transfer function shows it."""
+def ends_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed: int) -> Points:
+    """Return where rays of all views, made small, end in what their transfer function shows of a volume."""
     if volume is None or "tf" not in views.metadata:
         raise ArgumentError(
-            f"{views.folder}: seeds.kind=voxels needs a volume and views that name their transfer function; "
+            f"{views.folder}: seeds.kind=volume needs a volume and views that name their transfer function; "
             "seeds.kind=visible needs neither"
         )
     named = views.metadata["tf"]
     points = {key: named[key] for key in named if key != "name"} if isinstance(named, Mapping) else named
-    tf = TransferFunction.from_dict(points)
-    points, colors = visible_voxels(volume, tf, count, seed)
-    return torch.from_numpy(points), torch.from_numpy(colors)
+    look = Appearance(opacity_unit=views.metadata.get("opacity_unit", Appearance.opacity_unit))
+    cameras = [smaller(camera, max(max(images.size) // GLANCE, 1)) for camera in images.cameras]
+    return ends_of_rays(Caster(volume, look), look, TransferFunction.from_dict(points), cameras, most, seed)
 
 
 def box_of(views: ViewSet, half_size: float | None) -> Box:

@@ -14,7 +14,8 @@ from texgs.core.lens import Lens
 from texgs.fields.surfels.model import TEXTURE, Surfels
 from texgs.fields.surfels.step_file import UNITS
 from texgs.fields.surfels.texels import untextured
-from texgs.fitting.now import HEADLIGHTS, Points, cast_views, ends_of_rays, lit_cameras, refined, surfels_on
+from texgs.fitting.ends import Points, ends_of_rays
+from texgs.fitting.now import HEADLIGHTS, SURFELS, cast_views, lit_cameras, refined, surfels_on
 from texgs.fitting.now import RATES as RATES_OF_SEEDS
 from texgs.fitting.seeds import shown
 from texgs.fitting.settings import Rates
@@ -89,7 +90,7 @@ class Follower:
         """Plant surfels without texels, and fit all to views of a volume."""
         images = cast_views(caster, self._tf, lit_cameras(lens, seed), f"{title}, views")
         glances = [smaller(camera, 2) for camera in images.cameras[::HEADLIGHTS]]
-        points = ends_of_rays(caster, self._look, self._tf, glances, seed)
+        points = ends_of_rays(caster, self._look, self._tf, glances, SURFELS, seed)
         weights = shown(Surfels(plain, self._shading).to(caster.device), images[::HEADLIGHTS]).cpu()
         model = Surfels(planted(plain, points, weights, seed), self._shading).to(caster.device)
         return refined(model, images, ROUNDS * len(images), RATES, seed, title)

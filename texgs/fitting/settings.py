@@ -76,7 +76,7 @@ class Phase:
     densify: Densify = key(Densify, "density control")
 
 
-SEEDS = ("auto", "points", "visible", "voxels", "hull", "random")
+SEEDS = ("auto", "points", "volume", "visible", "hull", "random")
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,17 @@ class Seeds:
     """Where surfels or Gaussians start."""
 
     kind: str = key(
-        "auto", "where seeds are; auto: points of the views if there are any, else visible", choices=SEEDS
+        "auto",
+        "where seeds are; auto: points of the views if there are any, else where rays end in the volume if "
+        "there is one, else visible",
+        choices=SEEDS,
     )
-    count: int = key(10000, "number of seeds; given points are taken as they are", least=1)
+    count: int | None = key(
+        None,
+        "number of seeds; default in a volume as many as density control keeps, else 10000; given points are "
+        "taken as they are",
+        least=1,
+    )
     opacity: float = key(0.1, "opacity of each seed", above=0, below=1)
     half_size: float | None = key(
         None,

@@ -1,8 +1,7 @@
-"""What a transfer function shows of a volume as geometry: a surface of triangles, and points."""
+"""What a transfer function shows of a volume as geometry: a surface of triangles."""
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from texgs.volume.transfer import TransferFunction
 
 BYTES = 8  # of memory for a sample: what is opaque, in single precision, and the mesh
 FAR_OUTSIDE = 1000.0  # times the largest value, around a volume: its surface ends at the outermost samples
-MOST = 64_000_000  # samples to look at for points: a larger volume is looked at with a stride
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,33 +82,3 @@ def opaque_ranges(tf: TransferFunction, opacity: float) -> list[tuple[float, flo
         if (before < opacity) != (after < opacity)
     ]
     return list(zip(crossed[::2], crossed[1::2], strict=True))
-
-
-def visible_voxels(grid: Grid, tf: TransferFunction, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Draw `count` samples, the more likely the more opaque, each moved at random within its cell.
-
-    Return points [N, 3] in world units, fewer if fewer samples are visible, and colours [N, 3]. One slice is
-    in memory at a time (weighted reservoir sampling: Efraimidis and Spirakis 2006).
-    """
-    random, grid = np.random.default_rng(seed), grid.channel(tf.channel)
-    stride = ceil((grid.values.size / MOST) ** (1 / 3)) if grid.values.size > MOST else 1
-    keys, places, colors = np.empty(0), np.empty((0, 3)), np.empty((0, 3))
-    for z in range(0, grid.values.shape[0], stride):
-        rgba = tf(np.asarray(grid.values[z, ::stride, ::stride]))
-        y, x = np.nonzero(rgba[..., 3] > 0)
-        if not len(x):
-            continue
-        shown = rgba[y, x]
-        own = np.log(random.random(len(x))) / shown[:, 3]  # the largest keys are the sample
-        keys = np.concatenate([keys, own])
-        places = np.concatenate([places, np.stack([x * stride, y * stride, np.full(len(x), z)], axis=1)])
-        colors = np.concatenate([colors, shown[:, :3]])
-        if len(keys) > count:
-            best = np.argpartition(keys, -count)[-count:]
-            keys, places, colors = keys[best], places[best], colors[best]
-    if not len(keys):
-        raise ArgumentError("volume: expected samples that the transfer function shows, found none")
-    moved = places + stride * (random.random(places.shape) - 0.5)
-    cell = grid.scale * np.array(grid.spacing)
-    points = np.array(grid.aabb[0]) + cell * np.clip(moved, 0, np.array(grid.dims) - 1)
-    return points.astype(np.float32), colors.astype(np.float32)

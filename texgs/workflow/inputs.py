@@ -66,6 +66,15 @@ def view_set(config: Config, tf: str | None = None) -> dict[str, Path]:
     return {"views": made("views", config, tf=tf) if given is None else given / "transforms_train.json"}
 
 
+def start_of_fit(config: Config) -> dict[str, Path]:
+    """Return what a fit starts from: the views, and the volume where seeds may come from it."""
+    fit = config.fit
+    keys = fit if fit_specs()[fit.field].settings is None else getattr(fit, fit.field)
+    seeds = getattr(keys, "seeds", None)
+    from_volume = seeds and seeds.kind in ("auto", "volume") and config.dataset.views_folder is None
+    return {**view_set(config), **(prepared_volume(config) if from_volume else {})}
+
+
 def model_of(stage: str) -> Callable[[Config], dict[str, Path]]:
     """Return the model that a stage of the fit writes, and the views, as a function."""
     return lambda config: {"model": made("phase", config, stage), **view_set(config)}

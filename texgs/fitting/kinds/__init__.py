@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import torch
 
     from texgs.fields.field import Field
+    from texgs.volume.grid import Grid
     from texgs.volume.images import Images
     from texgs.volume.view_set import ViewSet
 
@@ -37,6 +38,7 @@ class FitTask(Generic[Settings]):
     seed: int
     title: str  # of progress bars
     metadata: Mapping[str, str]  # of the field: where it is from
+    volume: Grid | None = None  # that the views show, where seeds may come from it
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,6 @@
 
 from dataclasses import asdict, dataclass
 
-from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.fields.kinds.gaussians import FIELD
 from texgs.fitting.kinds import FitSpec, FitTask, Fitted
@@ -35,13 +34,6 @@ class GaussianKeys:
             densify=self.densify,
         )
 
-    def check(self) -> None:
-        """Require a start that Gaussians can have."""
-        if self.seeds.kind == "voxels":
-            raise ArgumentError(
-                "fit.gaussians.seeds.kind: expected no voxels, which are for surfels alone; choose visible"
-            )
-
 
 def fit(task: FitTask[GaussianKeys]) -> Fitted:
     """Fit Gaussians to the views, from the last checkpoint if there is one."""
@@ -52,7 +44,8 @@ def fit(task: FitTask[GaussianKeys]) -> Fitted:
     from texgs.fitting.seeds import seed_gaussians
 
     keys = task.settings
-    start = seed_gaussians(task.images, task.views, keys.seeds, keys.sh_degree, task.seed)
+    most = keys.densify.cap
+    start = seed_gaussians(task.images, task.views, keys.seeds, keys.sh_degree, task.seed, task.volume, most)
     shading = Baked(keys.antialiased)
     on_device = {name: x.to(task.device) for name, x in start.items()}
     run = Fit(on_device, shading, task.images, keys.phase, task.seed)
@@ -67,5 +60,4 @@ FIT = FitSpec(
     phases=("gaussians",),
     settings=GaussianKeys,
     fit=fit,
-    check=GaussianKeys.check,
 )

@@ -13,7 +13,7 @@ from texgs.core.memory import MIB
 from texgs.fitting.kinds import FitSpec, FitTask, fit_specs
 from texgs.fitting.settings import Phase
 from texgs.report.results import FitResult
-from texgs.workflow.inputs import is_fit_of, view_set
+from texgs.workflow.inputs import is_fit_of, start_of_fit
 from texgs.workflow.stage import Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import OfTF, Recipe
 
@@ -42,13 +42,15 @@ class FitJob(FitTask[Recipe]):
         """Return the job with the views that it reads."""
         from texgs.core.check import torch_device
         from texgs.volume.images import load
+        from texgs.volume.nrrd_file import open_grid
         from texgs.volume.view_set import read_views
 
         fit, views = settings.fit, read_views(inputs["views"].parent)
         title = f"{settings.dataset}/{settings.tf}: {settings.stage}"
         metadata = {"dataset": settings.dataset, "tf": settings.tf}
         images = load(views.train, fit.reduce)
-        return cls(fit, views, images, output, torch_device(fit.device), fit.seed, title, metadata)
+        volume = open_grid(inputs["volume"]) if "volume" in inputs else None
+        return cls(fit, views, images, output, torch_device(fit.device), fit.seed, title, metadata, volume)
 
     def run(
         self, parameters: Mapping[str, Tensor], shading: ShadingModel, phase: Phase
@@ -120,7 +122,7 @@ class Settings(PhaseSettings):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write model.safetensors.
 
-    It reads `views`, the transforms_train.json.
+    It reads `views`, the transforms_train.json; where seeds come from it also `volume`, the volume.nrrd.
     """
     kind, job = fit_specs()[settings.stage], FitJob.of(settings, inputs, output)
     if kind.settings is None or kind.fit is None:
@@ -140,7 +142,7 @@ def stage_of(kind: FitSpec[Any]) -> Stage:
         order=80,
         help=kind.summary,
         rule=PHASE,
-        inputs=view_set,
+        inputs=start_of_fit,
         work=work,
         applies=is_fit_of(kind.name),
         fits=kind.module,

@@ -4,13 +4,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from texgs.fitting.settings import Phase, Seeds
-from texgs.workflow.inputs import is_changed, is_fit_of, prepared_volume, view_set
+from texgs.workflow.inputs import is_changed, is_fit_of, start_of_fit
 from texgs.workflow.stage import Config, Outcome, Stage, read
 from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
 from texgs.workflow.stages.settings import Recipe
 
 # Keys of a recipe that later stages read.
 LATER = ("normals", "materials", "first_material", "shading", "texture")
+
+
+def most_surfels(config: Config) -> int | None:
+    """Return how many surfels density control of the first phase with iterations adds to at most."""
+    fit = config.fit
+    return (fit.surfels if fit.surfels.iterations else fit.shading).densify.cap
 
 
 @dataclass(kw_only=True)
@@ -21,6 +27,7 @@ class SurfelsRecipe(Recipe):
     facing: bool = read("fit.facing")
     material_range: str = read("fit.material_range")
     seeds: Seeds = read("fit.seeds")
+    most: int | None = read(most_surfels)
     changed: bool = read(lambda config: is_changed(config.fit, LATER))
 
 
@@ -35,7 +42,7 @@ class Settings(PhaseSettings):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write model.safetensors; a recipe without iterations here only seeds.
 
-    It reads `views`, the transforms_train.json; for seeds in voxels also `volume`, the volume.nrrd.
+    It reads `views`, the transforms_train.json; where seeds come from it also `volume`, the volume.nrrd.
     """
     import torch
 
@@ -44,14 +51,12 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.fields.surfels.model_file import write_model
     from texgs.fields.surfels.shading import ShadingModel
     from texgs.fitting.seeds import seed_surfels
-    from texgs.volume.nrrd_file import open_grid
 
     fit, phase, job = settings.fit, settings.phase, FitJob.of(settings, inputs, output)
     rendered = job.views.metadata.get("shading") or {}
     local_viewer = bool(rendered.get("local_viewer", True))
     shading = ShadingModel(fit.low_pass, fit.material_range, local_viewer, fit.facing)  # type: ignore[arg-type]
-    volume = open_grid(inputs["volume"]) if "volume" in inputs else None
-    parameters, colors = seed_surfels(job.images, job.views, fit.seeds, fit.seed, volume)
+    parameters, colors = seed_surfels(job.images, job.views, fit.seeds, fit.seed, job.volume, fit.most)
     sh = zeroth(colors)
     if phase.iterations:
         sh = torch.cat([sh, torch.zeros(len(sh), (phase.sh_degree + 1) ** 2 - 1, 3)], dim=1)
@@ -62,18 +67,12 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return job.outcome(model, seconds, phase.iterations, losses, ("test",) if phase.iterations else ())
 
 
-def inputs(config: Config) -> dict[str, Path]:
-    """Return the views, and the volume where surfels start in its voxels."""
-    from_voxels = config.fit.seeds.kind == "voxels" and config.dataset.views_folder is None
-    return {**view_set(config), **(prepared_volume(config) if from_voxels else {})}
-
-
 STAGE = Stage(
     "surfels",
     order=50,
     help="seed surfels and fit them with spherical harmonics",
     rule=PHASE,
-    inputs=inputs,
+    inputs=start_of_fit,
     work=work,
     applies=is_fit_of("surfels"),
 )

@@ -1,0 +1,67 @@
+"""Where rays through a volume end: the places that its views show, as many on each as they show of it."""
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.geometry import z_order_of
+from texgs.core.light import HEADLIGHT
+from texgs.volume.caster import Caster
+from texgs.volume.render import Appearance
+from texgs.volume.transfer import TransferFunction
+
+PIXELS = 4000  # of each view, whose rays are followed
+FAINT = 0.02  # alpha below which a pixel shows nothing to speak of
+DENSEST = 1 - 1e-6  # opacity of a point
+
+
+class Points(NamedTuple):
+    """Where rays end: places, normals and colours [N, 3]."""
+
+    places: Tensor
+    normals: Tensor
+    colors: Tensor
+
+
+def ends_of_rays(
+    caster: Caster, look: Appearance, tf: TransferFunction, cameras: list[Camera], most: int, seed: int
+) -> Points:
+    """Return where rays of random pixels lose some part of their light, another one in each view.
+
+    So there are as many ends on a layer as it shows, also behind others. They are on the CPU, `most` of them
+    or fewer.
+    """
+    unlit = caster.with_appearance(replace(look, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
+    generator = torch.Generator().manual_seed(seed)
+    count, parts = len(cameras), []
+    shares = (torch.randperm(count, generator=generator) + 0.5) / count  # spread evenly, in random order
+    for camera, left in zip(cameras, shares.tolist(), strict=True):
+        thick = thickened(tf, math.log(0.5) / math.log(left))  # half of its light is left where `left` was
+        parts.append(ends_of(unlit, thick, camera, generator))
+    points = Points(*map(torch.cat, zip(*parts, strict=True)))
+    chosen = torch.randperm(len(points.places), generator=generator)[:most]
+    ordered = chosen[z_order_of(points.places[chosen])]
+    return Points(*(x[ordered] for x in points))
+
+
+def thickened(tf: TransferFunction, factor: float) -> TransferFunction:
+    """Return a function of a factor's extinction."""
+    through = [(value, math.log1p(-min(alpha, DENSEST))) for value, alpha in tf.opacity]
+    return tf.with_points([(value, -math.expm1(factor * x)) for value, x in through], tf.color)
+
+
+def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: torch.Generator) -> Points:
+    """Return where rays of random pixels of one view lose half of their light, as far as they do."""
+    seen = caster.cast(tf, camera, HEADLIGHT, ("median", "normal"))
+    z, normals, rgba = seen.median.cpu(), seen.normal.cpu(), seen.rgba.cpu()  # type: ignore[union-attr]
+    rows, columns = (rgba[..., 3] > FAINT).nonzero(as_tuple=True)
+    some = torch.randperm(len(rows), generator=generator)[:PIXELS]
+    rows, columns = rows[some], columns[some]
+    ends = z[rows, columns] > 0
+    at = rows[ends], columns[ends]
+    rgba = rgba[at]
+    return Points(camera.unproject(z)[at], normals[at], (rgba[:, :3] / rgba[:, 3:]).clamp(0, 1))
