@@ -83,6 +83,20 @@ def test_harmonics_first_as_in_the_paper(viewed):
     assert "sh" not in read_model(viewed / "shading" / "model.safetensors").parameters
 
 
+def test_parts_that_are_missing_are_told_once_after_the_last_phase(viewed, capsys):
+    few = ["fit.seeds.count=8", "fit.shading.iterations=5"]
+    assert main(["texture", *TINY, *few]) == 0
+    share = numbers(viewed / "texture")["shown"]
+    (told,) = [line for line in capsys.readouterr().err.splitlines() if "parts are missing" in line]
+    assert share < 0.9
+    assert told.startswith(
+        f"sphere/TF01: texture: the model shows {100 * share:.1f} % of what test views show"
+    )
+    assert main(["texture", *TINY]) == 0
+    assert numbers(viewed / "texture")["shown"] > 0.98
+    assert "parts are missing" not in capsys.readouterr().err
+
+
 def test_a_material_per_surfel_on_request(seeded):
     main(["shading", *TINY, "fit.materials=surfel", "fit.shading.losses.smoothness=0.01"])
     ambient = read_model(seeded / "shading" / "model.safetensors").parameters["ambient"]

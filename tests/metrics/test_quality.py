@@ -49,6 +49,7 @@ def test_a_model_is_almost_its_own_pictures(tmp_path):
     visible = fmean([float((view.load()[..., 3] > 2).float().mean()) for view in views])
     assert visible < 0.3
     assert mean(scores)["object_psnr"] == pytest.approx(mean(scores)["psnr"] + 10 * log10(visible), abs=0.3)
+    assert mean(scores)["shown"] > 0.999
     halved = evaluate(model, views, reduce=2)
     assert 15 < mean(halved)["psnr"] < 48
 

@@ -3,6 +3,7 @@
 import json
 from collections import Counter
 from dataclasses import replace
+from math import floor
 from pathlib import Path
 
 import av
@@ -76,7 +77,12 @@ def test_a_check_tells_what_its_views_have(scene, tmp_path):
     assert result.psnr["mean"] == pytest.approx(np.mean(psnr))
     assert result.psnr["worst"] == result.psnr["floor"] == min(psnr)
     assert result.object_psnr["worst"] == min(each["object_psnr"] for each in views)
-    assert f"At least {min(psnr) - 0.05:.1f} dB from direct volume rendering in 95 of 100" in result.sentence
+    assert result.shown["worst"] == min(each["shown"] for each in views)
+    at_least = {name: floor(10 * min(each[name] for each in views)) / 10 for name in ("object_psnr", "psnr")}
+    first, rest = result.sentence.split(" in 95 of 100 such views, ")
+    assert first == f"At least {at_least['object_psnr']:.1f} dB on the object from direct volume rendering"
+    there = floor(1000 * min(each["shown"] for each in views)) / 10
+    assert rest.startswith(f"of the whole picture {at_least['psnr']:.1f} dB, and {there:.1f} % of what it")
     assert (tmp_path / "worst.png").stat().st_size > 5000
 
 

@@ -60,6 +60,34 @@ def test_a_phase_is_not_changed_by_what_later_ones_read():
         assert {name for name in before if digest(name, *of_tf, change) != before[name]} == changed, change
 
 
+@pytest.mark.parametrize(
+    ("stage", "words", "reads"),
+    [
+        ("surfels", "fit=quick", True),
+        ("surfels", "fit=default fit.seeds.kind=volume", True),
+        ("surfels", "fit=quick fit.seeds.kind=visible", False),
+        ("surfels", "fit=paper", False),
+        ("surfels", "dataset=vortex fit=quick", False),
+        ("shading", "fit=quick", False),
+        ("gaussians", "fit=gaussians_quick", True),
+        ("gaussians", "fit=gaussians", False),
+        ("voxels", "fit=plenoxels_quick", False),
+    ],
+)
+def test_a_fit_reads_the_volume_where_seeds_may_come_from_it(tmp_path, stage, words, reads):
+    (tmp_path / "vortex" / "TF01").mkdir(parents=True)
+    (tmp_path / "vortex" / "TF01" / "transforms_train.json").write_text("{}")
+    config = compose(("dataset=engine", "tf=TF01", f"data_folder={tmp_path}", *words.split()))
+    assert ("volume" in STAGES[stage].inputs(config)) == reads
+
+
+def test_as_many_seeds_as_density_control_keeps_in_the_first_phase_with_iterations():
+    for words, most in ((("fit=quick",), 20000), (("fit=demo",), 12000), (("fit=paper",), None)):
+        assert (
+            STAGES["surfels"].settings(compose(("dataset=engine", "tf=TF01", *words)))["fit"]["most"] == most
+        )
+
+
 def test_settings_file_is_named_after_its_contents(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     config = compose(("dataset=turbulence", "tf=TF01"))

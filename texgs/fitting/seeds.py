@@ -33,7 +33,7 @@ HALF_SIZE = 1.1  # of the cube around the origin where nothing else is known, in
 SIDE = 1.0  # the longest side of data where views do not say, world units
 GREY = 0.5  # the colour of random seeds
 USUAL = 10_000  # seeds, where nothing says how many
-GLANCE = 100  # pixels of the longer side of views whose rays find seeds in a volume, about
+GLANCE = 64  # pixels of the longer side of views whose rays find seeds in a volume, about
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
 SMALLEST = 1e-4  # scale, world units
 # A quick fit finds what is seen of more surfels than are kept.

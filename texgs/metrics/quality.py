@@ -11,6 +11,7 @@ from torch import Tensor
 
 from texgs.core.progress import progress
 from texgs.fields.field import Field
+from texgs.metrics.shown import shown_share
 from texgs.raster import Render
 from texgs.raster.losses import ssim as structural_similarity
 from texgs.raster.reference.losses import similarities
@@ -36,13 +37,17 @@ def ssim(image: Tensor, target: Tensor) -> float:
 
 
 def compare(image: Render, target: Render) -> dict[str, float]:
-    """Return PSNR in dB and SSIM of two images: full frame, and on the object, where one shows something."""
+    """Return PSNR in dB and SSIM of two images: full frame, and on the object, where one shows something.
+
+    Of what the target shows, `shown` is the share that the image shows, see `shown_share`.
+    """
     shown = image.color.clamp(0, 1)
     scores = {"psnr": psnr(shown, target.color), "ssim": ssim(shown, target.color)}
     if bool((seen := object_of(image, target)).any()):
         scores["object_psnr"] = psnr(shown[seen], target.color[seen])
         scores["object_ssim"] = similarities(shown, target.color)[seen].mean().item()
-    return scores
+    share = shown_share(image.alpha, target.alpha)
+    return scores if share is None else {**scores, "shown": share}
 
 
 def object_of(image: Render, target: Render) -> Tensor:
@@ -56,9 +61,10 @@ def evaluate(
 ) -> dict[str, list[float]]:
     """Return PSNR in dB and SSIM of each view over white, full frame, against the exact image.
 
-    The images are reduced as in `images.load`. Views with alpha have the PSNR on the object, too.
+    The images are reduced as in `images.load`. Views with alpha have the PSNR on the object, too,
+    and the share `shown` of what they show, see `shown_share`.
     """
-    measured: dict[str, list[float]] = {"psnr": [], "ssim": [], "object_psnr": []}
+    measured: dict[str, list[float]] = {"psnr": [], "ssim": [], "object_psnr": [], "shown": []}
     device = model.device
     read = partial(over_white, reduce=reduce)
     for view, planes in progress(read_ahead(read, views), len(views), title=title, unit="view"):
@@ -70,6 +76,8 @@ def evaluate(
         seen = object_of(image, target)
         if bool(seen.any()) and bool((target.alpha < 1).any()):
             measured["object_psnr"].append(psnr(image.color[seen], target.color[seen]))
+            if (share := shown_share(image.alpha, target.alpha)) is not None:
+                measured["shown"].append(share)
     return measured
 
 

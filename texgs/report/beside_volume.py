@@ -45,11 +45,11 @@ def side_by_side(
 
 
 def in_words(scores: Mapping[str, float]) -> tuple[str, str]:
-    """Return the scores of `compare`: of the whole picture, and on the object, if there is one."""
-    whole = "PSNR {psnr:.2f} dB, SSIM {ssim:.4f}".format(**scores)
+    """Return the scores of `compare`: on the object, if there is one, and of the whole picture."""
+    whole = "whole picture: {psnr:.2f} dB, SSIM {ssim:.4f}".format(**scores)
     if "object_psnr" not in scores:
-        return whole, "no object in view"
-    return whole, "object: {object_psnr:.2f} dB, SSIM {object_ssim:.4f}".format(**scores)
+        return "no object in view", whole
+    return "PSNR on the object {object_psnr:.2f} dB, SSIM {object_ssim:.4f}".format(**scores), whole
 
 
 def changed(image: Render, fitted: Render) -> dict[str, float]:

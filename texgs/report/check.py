@@ -41,22 +41,24 @@ def check(
     The worst are drawn into a PNG beside it.
     """
     floor_of([BEST] * count)  # refuses too few before the work
-    drawn, psnr, on_object = list(shots(scene, lens, count, seed)), list[float](), list[float]()
+    drawn, psnr, on_object, share = list(shots(scene, lens, count, seed)), *(list[float]() for _ in range(3))
     for _, camera, changed in progress(drawn, title="check", unit="view"):
         scores = compare(*beside(composition, camera, changed, twin))
         psnr.append(scores["psnr"])
         on_object.append(scores.get("object_psnr", BEST))
+        share.append(scores.get("shown", 1.0))
     worst = sorted(range(count), key=psnr.__getitem__)[:WORST]
     shown = [pictures(*beside(composition, *drawn[index][1:], twin)) for index in worst]
     titles = [f"{drawn[index][0]}\n{psnr[index]:.1f} dB" for index in worst]
     write_grid(file.with_suffix(".png"), {name: [each[name] for each in shown] for name in shown[0]}, titles)
-    whole, part = (floor(10 * floor_of(values)) / 10 for values in (psnr, on_object))
+    part, whole, there = (floor(10 * floor_of(x)) / 10 for x in (on_object, psnr, [100 * x for x in share]))
     sentence = (
-        f"At least {whole:.1f} dB from direct volume rendering in 95 of 100 such views, on the object "
-        f"{part:.1f} dB (views from anywhere, lights and edits at random)."
+        f"At least {part:.1f} dB on the object from direct volume rendering in 95 of 100 such views, of the "
+        f"whole picture {whole:.1f} dB, and {there:.1f} % of what it shows is there (views from anywhere, "
+        "lights and edits at random)."
     )
     seen = count, seed, lens.width, lens.height
-    result = CheckResult(sentence, checksum_of(scene), *seen, told(psnr), told(on_object))
+    result = CheckResult(sentence, checksum_of(scene), *seen, told(psnr), told(on_object), told(share))
     write_json(file, asdict(result))
     return result
 

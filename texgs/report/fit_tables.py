@@ -11,6 +11,7 @@ from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table, columns
 
 Run = dict[str, Record[FitResult]]  # a fit by its phases
 ON_OBJECT = Column("PSNR on the object", 2)
+SHOWN = Column("share shown", 4)
 RELIT = Column("PSNR under unseen lights", 2, UNPUBLISHED)  # of the last phase
 VARIANTS = {  # by the sweep: the heading of its variants, and that of the paper's file
     "views": ("training views", "views"),
@@ -30,6 +31,7 @@ def phase_rows(records: Iterable[Record[Any]]) -> list[dict[str, Any]]:
         numbers = {
             "PSNR": result.psnr,
             ON_OBJECT.title: result.object_psnr,
+            SHOWN.title: result.shown,
             "SSIM": result.ssim,
             "minutes": result.fit_seconds / 60,
             "CPU GiB": record.facts["peak_memory_mib"] / 1024,
@@ -51,8 +53,12 @@ def fits(records: Iterable[Record[Any]]) -> Table:
     rows = sorted(phase_rows(records), key=lambda row: (row["rank"], row["TF"] or ""))
     labels = [Column(title) for title in (DATA, "TF", LABEL, "phase")]
     psnr, *others = columns("fitting").values()
-    caption = "Test views, on the object where view or model show something; minutes of the phase itself."
-    return Table(caption, [*labels, psnr, ON_OBJECT, RELIT, *others], rows)
+    caption = (
+        "Test views, on the object where view or model show something. The share shown is that of what views "
+        "show, by alpha, in pixels in which the model is half as opaque at least: with less than 0.98, parts "
+        "are missing. Minutes of the phase itself."
+    )
+    return Table(caption, [*labels, ON_OBJECT, psnr, SHOWN, RELIT, *others], rows)
 
 
 def runs_of(records: Iterable[Record[Any]]) -> list[Run]:

@@ -102,6 +102,7 @@ class FitResult(Result, section="fitting"):
     losses: list[float] = field(default_factory=list)  # that were looked at
     psnr: float | None = None  # of test views, dB
     object_psnr: float | None = None  # the same on the object
+    shown: float | None = None  # share of what they show that the field shows, see `shown_share`
     ssim: float | None = None
     train_psnr: float | None = None
     train_ssim: float | None = None
@@ -175,13 +176,14 @@ class Comparison:
     ssim: float | None = None
     object_psnr: float | None = None
     object_ssim: float | None = None
+    shown: float | None = None  # share of what the volume shows, see `shown_share`
 
 
 @dataclass(frozen=True)
 class CheckResult:
     """How close views from anywhere, with lights and edits at random, are to those of the volume."""
 
-    sentence: str  # what holds for further views; each of its two numbers by itself
+    sentence: str  # what holds for further views; each of its numbers by itself
     models: str  # their checksum
     views: int
     seed: int
@@ -189,6 +191,7 @@ class CheckResult:
     height: int
     psnr: dict[str, float]  # mean, percentile_5, worst and floor, dB
     object_psnr: dict[str, float]
+    shown: dict[str, float]  # the same of the share of what the volume shows
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,8 @@ export class Compare {
   tell(scores) {
     const closeness = (of) => `${scores[`${of}psnr`].toFixed(2)} dB, SSIM ${scores[`${of}ssim`].toFixed(4)}`;
     const rest = "object_psnr" in scores ? `on the object ${closeness("object_")}` : "no object in view";
-    get("scores").textContent = "psnr" in scores ? `PSNR of this view ${closeness("")}; ${rest}.` : "";
+    const whole = "psnr" in scores ? closeness("") : "";
+    get("scores").textContent = whole && `PSNR of this view ${rest}; of the whole picture ${whole}.`;
   }
 
   #move(part) {

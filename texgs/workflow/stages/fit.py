@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -85,16 +86,22 @@ class FitJob(FitTask[Recipe]):
         measured: Sequence[str] = ("test",),
         **more: Any,
     ) -> Outcome:
-        """Return the result, with the quality on views of some splits; the checkpoint goes."""
+        """Return the result, with the quality on views of some splits; the checkpoint goes.
+
+        After the last phase, when training views are measured too, parts that are missing are told on stderr.
+        """
         import torch
 
         from texgs.fitting import checkpoint
+        from texgs.metrics.shown import what_is_lost
         from texgs.volume.images import smaller
 
         camera = smaller(self.views.train[0].camera, self.settings.reduce)
         scores: dict[str, Any] = {}
         for split in measured:
             scores |= self.quality(field, split)
+        if "train" in measured and (lost := what_is_lost(scores.get("shown"))):
+            print(f"{self.title}: {lost}", file=sys.stderr)
         is_gpu = self.device.type == "cuda"
         memory = torch.cuda.max_memory_allocated(self.device) / MIB if is_gpu else None
         checkpoint.discard(self.output / checkpoint.FOLDER)
