@@ -83,6 +83,13 @@ def test_harmonics_first_as_in_the_paper(viewed):
     assert "sh" not in read_model(viewed / "shading" / "model.safetensors").parameters
 
 
+def test_there_are_as_many_seeds_as_the_first_phase_with_iterations_keeps(viewed):
+    few = ["fit=demo", "fit.shading.densify.cap=300", "fit.surfels.densify={cap: 350, stop: 0}"]
+    for iterations, expected in ((0, 300), (1, 350)):
+        assert main(["surfels", *SPHERE, *few, f"fit.surfels.iterations={iterations}"]) == 0
+        assert numbers(viewed / "surfels")["primitives"] == expected
+
+
 def test_parts_that_are_missing_are_told_once_after_the_last_phase(viewed, capsys):
     few = ["fit.seeds.count=8", "fit.shading.iterations=5"]
     assert main(["texture", *TINY, *few]) == 0

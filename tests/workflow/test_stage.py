@@ -81,13 +81,6 @@ def test_a_fit_reads_the_volume_where_seeds_may_come_from_it(tmp_path, stage, wo
     assert ("volume" in STAGES[stage].inputs(config)) == reads
 
 
-def test_as_many_seeds_as_density_control_keeps_in_the_first_phase_with_iterations():
-    for words, most in ((("fit=quick",), 20000), (("fit=demo",), 12000), (("fit=paper",), None)):
-        assert (
-            STAGES["surfels"].settings(compose(("dataset=engine", "tf=TF01", *words)))["fit"]["most"] == most
-        )
-
-
 def test_settings_file_is_named_after_its_contents(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     config = compose(("dataset=turbulence", "tf=TF01"))

@@ -85,12 +85,8 @@ def seed_surfels(
     else:
         candidates = CANDIDATES * count if kind == "visible" else count
         points = hull_points(images, box_of(views, half_size), candidates, generator)
-    if kind != "points" and len(points) < count:
-        print(
-            f"{views.folder}: found {len(points):,} of {count:,} seeds, so that thin and small parts may be "
-            "missing; larger views have room for more",
-            file=sys.stderr,
-        )
+    if kind != "points":
+        tell_fewer(views, len(points), count)
     if colors is None:
         colors = mean_colors(images, points)
     surfels = surfels_at(points, seeds.opacity, generator)
@@ -122,7 +118,7 @@ def seed_gaussians(
 
 
 def ends_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed: int) -> Points:
-    """Return where rays of all views, made small, end in what their transfer function shows of a volume."""
+    """Return where rays of all views, small ones if these do, end in what they show of a volume."""
     if volume is None or "tf" not in views.metadata:
         raise ArgumentError(
             f"{views.folder}: seeds.kind=volume needs a volume and views that name their transfer function; "
@@ -131,8 +127,20 @@ def ends_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed
     named = views.metadata["tf"]
     points = {key: named[key] for key in named if key != "name"} if isinstance(named, Mapping) else named
     look = Appearance(opacity_unit=views.metadata.get("opacity_unit", Appearance.opacity_unit))
-    cameras = [smaller(camera, max(max(images.size) // GLANCE, 1)) for camera in images.cameras]
-    return ends_of_rays(Caster(volume, look), look, TransferFunction.from_dict(points), cameras, most, seed)
+    caster, tf = Caster(volume, look), TransferFunction.from_dict(points)
+    for factor in (max(max(images.size) // GLANCE, 1), 1):
+        cameras = [smaller(camera, factor) for camera in images.cameras]
+        ends = ends_of_rays(caster, look, tf, cameras, most, seed)
+        if len(ends.places) == most:
+            break
+    return ends
+
+
+def tell_fewer(views: ViewSet, found: int, count: int) -> None:
+    """Say on stderr where there are fewer seeds than asked."""
+    if found < count:
+        what = "so that thin and small parts may be missing; larger views have room for more"
+        print(f"{views.folder}: found {found:,} of {count:,} seeds, {what}", file=sys.stderr)
 
 
 def box_of(views: ViewSet, half_size: float | None) -> Box:

@@ -7,15 +7,10 @@ LEAST = 0.98  # with less, a run says so
 
 
 def shown_share(alpha: Tensor, truth: Tensor) -> float | None:
-    """Return the share of a view's alpha [H, W] that is in pixels in which a model shows half of it at least.
+    """Return the share of a view's alpha [H, W] in pixels in which a model has half of it at least.
 
-    Faint noise has no weight to speak of. It is None where the view shows nothing. A plain sum of the smaller
-    alpha of both would count what is a little fainter everywhere as what parts that are missing are: it is
-    0.93 of a translucent fit in which nothing is missing.
-
-    Args:
-        alpha: of the model.
-        truth: alpha of the view.
+    None where the view shows nothing; faint noise has little weight. The sum of the smaller alpha of both
+    would count what is a little fainter everywhere as missing: 0.07 of a translucent fit that has all parts.
     """
     whole = float(truth.sum())
     return float(truth[alpha >= ENOUGH * truth].sum()) / whole if whole else None

@@ -5,18 +5,12 @@ from pathlib import Path
 
 from texgs.fitting.settings import Phase, Seeds
 from texgs.workflow.inputs import is_changed, is_fit_of, start_of_fit
-from texgs.workflow.stage import Config, Outcome, Stage, read
+from texgs.workflow.stage import Outcome, Stage, read
 from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
 from texgs.workflow.stages.settings import Recipe
 
 # Keys of a recipe that later stages read.
 LATER = ("normals", "materials", "first_material", "shading", "texture")
-
-
-def most_surfels(config: Config) -> int | None:
-    """Return how many surfels density control of the first phase with iterations adds to at most."""
-    fit = config.fit
-    return (fit.surfels if fit.surfels.iterations else fit.shading).densify.cap
 
 
 @dataclass(kw_only=True)
@@ -27,7 +21,7 @@ class SurfelsRecipe(Recipe):
     facing: bool = read("fit.facing")
     material_range: str = read("fit.material_range")
     seeds: Seeds = read("fit.seeds")
-    most: int | None = read(most_surfels)
+    cap: int | None = read("fit.shading.densify.cap")  # surfels that the next phase keeps
     changed: bool = read(lambda config: is_changed(config.fit, LATER))
 
 
@@ -56,7 +50,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     rendered = job.views.metadata.get("shading") or {}
     local_viewer = bool(rendered.get("local_viewer", True))
     shading = ShadingModel(fit.low_pass, fit.material_range, local_viewer, fit.facing)  # type: ignore[arg-type]
-    parameters, colors = seed_surfels(job.images, job.views, fit.seeds, fit.seed, job.volume, fit.most)
+    most = phase.densify.cap if phase.iterations else fit.cap
+    parameters, colors = seed_surfels(job.images, job.views, fit.seeds, fit.seed, job.volume, most)
     sh = zeroth(colors)
     if phase.iterations:
         sh = torch.cat([sh, torch.zeros(len(sh), (phase.sh_degree + 1) ** 2 - 1, 3)], dim=1)
