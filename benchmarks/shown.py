@@ -38,7 +38,7 @@ OPAQUE, CLEAR = 0.5, 0.25  # alpha
 SMALL = 5e-4  # of the pixels of an object: smaller pieces do not count
 NEIGHBOURS = np.ones((3, 3), int)
 PIECES = ("missing_pieces", "largest_piece_percent", "largest_piece_pixels")
-TOLD = ("primitives", "psnr", "object_psnr", "ssim", "shown", "fit_seconds")
+TOLD = ("primitives", "psnr", "object_psnr", "ssim", "shown")
 
 
 def main(output: str, size: str, *volumes: str) -> None:

@@ -55,8 +55,8 @@ def fits(records: Iterable[Record[Any]]) -> Table:
     psnr, *others = columns("fitting").values()
     caption = (
         "Test views, on the object where view or model show something. The share shown is that of what views "
-        "show, by alpha, in pixels in which the model is half as opaque at least: with less than 0.98, parts "
-        "are missing. Minutes of the phase itself."
+        "show, by alpha, where the model is half as opaque at least: below 0.995 parts are missing. "
+        "Minutes of the phase itself."
     )
     return Table(caption, [*labels, ON_OBJECT, psnr, SHOWN, RELIT, *others], rows)
 
