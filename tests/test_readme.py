@@ -53,6 +53,7 @@ INSTEAD = (
         "",
         "it needs such a series; test_series.py in tests/workflow runs these verbs",
     ),
+    (r"texgs export .*--kind points", "texgs {words} --opacity 0.05", "30 iterations leave surfels faint"),
     (r"texgs study", "texgs study --help", "it takes scenes of several methods"),
     (r"texgs view ", "texgs view --help", "it serves until it is interrupted"),
     (r"texgs votes", "texgs votes --help", "it takes votes of people"),

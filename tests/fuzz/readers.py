@@ -350,7 +350,6 @@ READERS: dict[str, Reader] = {
     "steps of.mha": Reader(partial(four_axes, "v.mha"), partial(read_volume, time=1)),
     **{f"cells.{kind}": Reader(partial(vtk_cells, f"v.{kind}"), read_volume) for kind in ("vtr", "vtk")},
     "pieces.pvti": Reader(pieces, read_volume),
-    "piece of pieces.vti": Reader(pieces, read_volume, "v_1.vti"),
     "plain.slc": Reader(partial(slc, 0), read_volume),
     "packed.slc": Reader(partial(slc, 1), read_volume),
     "netcdf": Reader(lambda folder: write_netcdf(folder / "v.nc", {"t": FIELD}), read_volume),

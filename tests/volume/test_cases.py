@@ -43,7 +43,11 @@ EXPECTED = {
     "22-dicom-compressed": (
         14,
         0,
-        {"so that ImagerPixelSpacing is taken": 1, "unpack it": 1, "open its folder": 1},
+        {
+            "so that ImagerPixelSpacing is taken": 1,
+            "unpack it": 1,
+            "open the folder with all of the series": 1,
+        },
     ),
     "23-dicom-enhanced": (1, 3, {"int16, -524 to 319": 2, "float32, -5 to 3.43": 1, "(0.5, 0.5, 1.5)": 4}),
     "30-tiff-folders": (2, 0, {"channel: expected one of 0 (0), 1 (1)": 3, "s000.tif and s000_mask.tif": 1}),

@@ -17,9 +17,7 @@ def contest_file(folder, name):
     """Write the file that a data set names, and return it with the samples [Z, Y, X] to expect."""
     if name == "mantle":
         fields = {"temperature": FIELD + 9, "temperature anomaly": FIELD, "vx": FIELD - 9}
-        return write_netcdf(folder / "spherical001.nc", fields), FIELD[
-            ::-1
-        ]  # z runs south
+        return write_netcdf(folder / "spherical001.nc", fields), FIELD[::-1]  # z runs south
     return write_lines(folder / "multifield.0099.txt.gz", LINES), TABLE[:, 1].reshape(4, 5, 6)
 
 

