@@ -28,8 +28,8 @@ from texgs.volume.space import Space
 
 NUMBERED = re.compile(r"cut\.([1-9])=")
 PLANE = (
-    "AXIS,POSITION with x, -x, y, -y, z or -z, R, A, S, L, P, I, X, Y or Z of its file, or NX,NY,NZ,OFFSET, in "
-    "world units"
+    "AXIS,POSITION with x, -x, y, -y, z or -z, R, A, S, L, P, I, X, Y or Z of its file, or NX,NY,NZ,OFFSET, "
+    "in world units"
 )
 TOWARDS = "RASLPIXYZ"  # axes of the space of a volume's file
 BOX = "X0,Y0,Z0,X1,Y1,Z1, in world units"
