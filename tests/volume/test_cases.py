@@ -64,6 +64,7 @@ def test_files_of_people(case, tmp_path):
     if case.startswith("05") and find_spec("imagecodecs"):
         pytest.skip("with imagecodecs, what is refused here is read")
     shutil.copytree(CASES / case, tmp_path / case)
+    (tmp_path / case).chmod(0o755)  # they may be read-only
     for helper in ("common.py", "dcm.py"):
         shutil.copy(CASES / helper, tmp_path)
     command = [sys.executable, "make.py"]
