@@ -1,6 +1,8 @@
 import pytest
 import torch
 
+from tests.devices import device  # noqa: F401, a fixture
+from tests.raster.requirements import require_same_bits
 from texgs.fields.optimizer import Optimizer, Rate
 
 
@@ -25,13 +27,14 @@ def descend(optimizer, steps):
         optimizer.step(step / 10)
 
 
-def oracle(steps, values):
-    """Parameters after steps of torch.optim.Adam as it comes."""
-    leaves = {name: values[name].clone().requires_grad_() for name in RATES}
-    adam = torch.optim.Adam([{"params": [x], "lr": 0.0} for x in leaves.values()], eps=1e-15)
+def oracle(steps, values, rates=RATES, betas=(0.9, 0.999)):
+    """Parameters after steps of torch.optim.AdamW as it comes, in float64: its decay is a share of the rate."""
+    leaves = {name: values[name].double().requires_grad_() for name in rates}
+    adam = torch.optim.AdamW([{"params": [x]} for x in leaves.values()], betas=betas, eps=1e-15)
     for step in steps:
         for group, (name, x) in zip(adam.param_groups, leaves.items(), strict=True):
-            group["lr"] = RATES[name].start * RATES[name].final ** (step / 10)
+            group["lr"] = rates[name].start * rates[name].final ** (step / 10)
+            group["weight_decay"] = rates[name].decay / group["lr"]
             x.grad = gradient(name, x.detach(), step)
         adam.step()
     return leaves
@@ -40,8 +43,69 @@ def oracle(steps, values):
 def assert_close(optimizer, expected, rows=slice(None)):
     for name, x in expected.items():
         rows_of = x.detach() if name == "ambient" else x.detach()[rows]
-        value = optimizer.parameters[name].detach()[: len(rows_of)]
-        torch.testing.assert_close(value, rows_of, rtol=1e-5, atol=1e-6)  # fused and plain round differently
+        value = optimizer.parameters[name].detach()[: len(rows_of)].double()
+        torch.testing.assert_close(value, rows_of, rtol=1e-5, atol=1e-6)
+
+
+DECAYING = {**RATES, "means": Rate(0.1, 0.5, decay=0.05), "ambient": Rate(0.3, 1.0, decay=1.0)}
+
+
+@pytest.mark.parametrize("rates", [RATES, DECAYING], ids=["plain", "decaying"])
+def test_it_is_adam_on_every_device(rates, device):  # noqa: F811
+    """Of more floats than threads work on in one piece, and rows that fill no vector."""
+    given = {name: x.to(device) for name, x in parameters(n=7001).items()}
+    optimizer = Optimizer(given, rates, betas=(0.8, 0.95))
+    descend(optimizer, range(6))
+    for name, x in oracle(range(6), parameters(n=7001), rates, (0.8, 0.95)).items():
+        value = optimizer.parameters[name].detach().double().cpu()
+        torch.testing.assert_close(value, x.detach(), rtol=1e-5, atol=2e-6)
+
+
+def test_more_parameters_than_one_launch_takes(device):  # noqa: F811
+    values = {str(i): torch.randn(i, generator=torch.Generator().manual_seed(i)) for i in range(40)}
+    rates = {name: Rate(0.01 * (1 + int(name)), 0.5) for name in values}
+    optimizer = Optimizer({name: x.to(device) for name, x in values.items()}, rates)
+    for name, x in optimizer.parameters.items():
+        x.grad = gradient(name, x.detach(), 0)
+    optimizer.step(0.0)
+    for name, x in oracle([0], values, rates).items():
+        torch.testing.assert_close(optimizer.parameters[name].detach().cpu().double(), x.detach())
+
+
+def test_any_number_of_threads_gives_the_same_bits():
+    def fitted():
+        optimizer = Optimizer(parameters(n=30_001), DECAYING)
+        descend(optimizer, range(2))
+        return optimizer.state()
+
+    require_same_bits(fitted)
+
+
+def test_a_decay_is_a_share_of_the_parameter_whatever_its_rate():
+    optimizer = Optimizer({"means": torch.full((3,), 2.0)}, {"means": Rate(0.0, 1.0, decay=0.25)})
+    for _ in range(2):
+        optimizer.parameters["means"].grad = torch.ones(3)
+        optimizer.step(0.0)
+    assert torch.equal(optimizer.parameters["means"].detach(), torch.full((3,), 2 * 0.75**2))
+
+
+def test_a_parameter_without_a_gradient_takes_no_step():
+    optimizer = Optimizer(parameters(), DECAYING)
+    optimizer.step(0.0)
+    optimizer.parameters["ambient"].grad = torch.ones(1)
+    optimizer.step(0.0)
+    assert torch.equal(optimizer.parameters["means"].detach(), parameters()["means"])
+    steps = {name: int(optimizer.state()[f"adam.{name}.step"]) for name in RATES}
+    assert steps == {"means": 0, "opacities": 0, "ambient": 1}
+
+
+def test_autograd_sees_that_parameters_change():
+    optimizer = Optimizer(parameters(), RATES)
+    value = optimizer.parameters["means"].square().sum()
+    optimizer.parameters["means"].grad = torch.ones(6, 3)
+    optimizer.step(0.0)
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        value.backward()
 
 
 def test_it_is_adam_with_a_rate_for_each_parameter():

@@ -4,9 +4,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch.testing import assert_close
 
+from tests.devices import device  # noqa: F401, a fixture
 from tests.fitting.scenes import cameras, images_of, random_surfels
+from tests.raster.requirements import with_threads
 from texgs.core.camera import orbit
-from texgs.fields.splats import screen_box
+from texgs.fields.splats import REACH, screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.volume.images import MARGIN, Box, content_box
@@ -45,6 +47,43 @@ def test_the_box_is_not_much_larger_than_what_is_drawn():
     camera = orbit(30, 20, 2, 50, 200, 200)
     drawn, box = box_of(Surfels(p).render(camera).alpha > 0), screen_box(p, ShadingModel().options, camera)
     assert max(abs(a - b) for a, b in zip(drawn, box, strict=True)) <= 10
+
+
+def bounds(p, camera):
+    """Least depth, left, right, top and bottom of spheres around all surfels, by plain torch."""
+    points = p["means"].double() @ camera.viewmat[:3, :3].T.double() + camera.viewmat[:3, 3].double()
+    reach = REACH * p["scales"].double().amax(dim=1).exp()
+    depths = points[:, 2] + torch.stack([-reach, reach])  # [2, N]
+    edges = []
+    for at in (points[:, 0], points[:, 1]):
+        edges += [float(((at - reach) / depths).min()), float(((at + reach) / depths).max())]
+    return float(depths.min()), *edges
+
+
+@pytest.mark.parametrize("count", [1, 15, 9001])
+@pytest.mark.parametrize("axes", [2, 3])
+def test_the_box_is_that_of_all_spheres(count, axes, device):  # noqa: F811
+    p = random_surfels(count, count, 0.3, 0.1)
+    p["scales"] = torch.cat([p["scales"], p["scales"][:, :1] + 0.3], dim=1)[:, :axes]
+    camera = orbit(30, 20, 4, 50, 300, 200)
+    _, left, right, top, bottom = bounds(p, camera)
+    (fx, _, cx), (_, fy, cy), _ = camera.K.tolist()
+    disc = REACH * (0.3 if axes == 3 else 1 / 2) ** 0.5
+    edges = (fx * left + cx - disc, fy * top + cy - disc, fx * right + cx + disc, fy * bottom + cy + disc)
+    options = ShadingModel(low_pass=2.0).options
+    box = with_threads(2, lambda: [screen_box({k: x.to(device) for k, x in p.items()}, options, camera)])[0]
+    for side, edge in zip(box, edges, strict=True):
+        assert abs(side - edge) <= 1.01
+    assert is_inside(Box(*map(round, edges)), box)
+
+
+@pytest.mark.parametrize("name", ["means", "scales"])
+@pytest.mark.parametrize("value", [torch.nan, torch.inf])
+def test_a_value_that_is_not_finite_needs_the_whole_image(name, value, device):  # noqa: F811
+    p = random_surfels(0, 40, 0.1, 0.1)
+    p[name][17, 1] = value
+    camera = cameras(1)[0]
+    assert screen_box(p, ShadingModel().options, camera) == Box(0, 0, camera.width, camera.height)
 
 
 @pytest.mark.parametrize("mean", [(0.0, 0.0, 1.0), (0.0, 0.0, torch.nan)])

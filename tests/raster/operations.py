@@ -84,6 +84,24 @@ def surfels(n, shared=(), light="headlight"):
     return given if LIGHTS[light] is None else given | {"light": LIGHTS[light]}
 
 
+RANGES = {"diffuse": (0.0, 1.0), "specular": (0.0, 5.0), "shininess": (1.0, 40.0)}
+
+
+def raw_surfels(n, shared=()):
+    """Return the same with raw numbers for a material, and colours of which light makes some too bright."""
+    generator = torch.Generator().manual_seed(n + 1)
+    given = surfels(n, shared, "directional")
+    given |= {name: torch.randn(len(given[name]), generator=generator) - 1 for name in RANGES}
+    return given | {"color": 1.6 * given["color"]}
+
+
+def raw_blinn_phong(**given):
+    """Return the definition's base, clamped, and gain of surfels whose material is raw."""
+    factors = {name: low + (high - low) * given[name].sigmoid() for name, (low, high) in RANGES.items()}
+    base, gain = shading_definition.blinn_phong(**{**given, **factors}, facing=True)
+    return base.clamp(0, 1), gain
+
+
 def harmonics(n, degree):
     """Return spherical harmonics of n surfels."""
     generator = torch.Generator().manual_seed(n + degree)
@@ -147,6 +165,12 @@ OPERATIONS = {
         for light in LIGHTS
         for facing in (False, True)
     },
+    "blinn_phong, raw": Operation(
+        *(partial(shading.blinn_phong, facing=True, ranges=RANGES, clamped=True), raw_blinn_phong),
+        *(raw_surfels, ("color", *MATERIAL, "means", "quats"), ("camera_position", "light")),
+        tuple((n, shared) for n in (1, 17, 3001) for shared in ((), ("shininess", "specular"), MATERIAL)),
+        *((12,), (5000, ("diffuse", "shininess")), (2e-6, 1e-5)),
+    ),
     "spherical_harmonics": Operation(
         *(shading.spherical_harmonics, shading_definition.spherical_harmonics, harmonics),
         *(("sh", "means"), ("camera_position",)),

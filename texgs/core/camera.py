@@ -71,13 +71,12 @@ class Camera:
 
     def to(self, device: torch.device | str) -> Self:
         """Return the same camera with its matrices on another device."""
-        return replace(self, viewmat=self.viewmat.to(device), K=self.K.to(device))
+        viewmat, K = self.viewmat.to(device), self.K.to(device)
+        return self if viewmat is self.viewmat and K is self.K else replace(self, viewmat=viewmat, K=K)
 
     def crop(self, left: int, top: int, right: int, bottom: int) -> Self:
         """Return the camera of the pixels left <= x < right, top <= y < bottom of this one's image."""
-        K = self.K.clone()
-        K[0, 2] -= left
-        K[1, 2] -= top
+        K = self.K - self.K.new_tensor([[0, 0, left], [0, 0, top], [0, 0, 0]])
         return replace(self, K=K, width=right - left, height=bottom - top)
 
     def resized(self, longer: int) -> Self:

@@ -1,30 +1,50 @@
 """Adam over named parameters whose rows come and go."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-MOMENTS = ("exp_avg", "exp_avg_sq")
+from texgs.core import check
+from texgs.raster import native
+
+EPSILON = 1e-15
+NativeLearned = native.struct("texgs_learned", "n n, p values gradient first second, f keep rate correction")
+native.declare("texgs_adam", "n", NativeLearned, "fff")
 
 
 @dataclass(frozen=True)
 class Rate:
-    """A learning rate that falls log-linearly over a phase."""
+    """A learning rate that falls log-linearly over a phase, and what draws a parameter to 0."""
 
     start: float
     final: float  # relative to the start
+    decay: float = 0.0  # share of the parameter that each step takes away, whatever its learning rate
 
     def at(self, progress: float) -> float:
         """Return the rate at progress 0 to 1."""
         return self.start * self.final**progress
 
 
-class Optimizer:
-    """Parameters by name, each with its own learning rate.
+@dataclass
+class Moments:
+    """Running means of a parameter's gradient and of its square, and the steps that they are of."""
 
-    Parameters become leaves that require a gradient; those without a rate are constant.
+    exp_avg: Tensor
+    exp_avg_sq: Tensor
+    steps: int = 0
+
+    def map(self, change: Callable[[Tensor], Tensor]) -> "Moments":
+        """Return changed ones of as many steps."""
+        return Moments(change(self.exp_avg), change(self.exp_avg_sq), self.steps)
+
+
+class Optimizer:
+    """Parameters by name, each with its own learning rate and decay.
+
+    Parameters become leaves that require a gradient; those without a rate are constant. Adam as Kingma and Ba
+    2015 have it, decay decoupled from it as by Loshchilov and Hutter 2019; one call of the library a step.
     """
 
     def __init__(
@@ -33,19 +53,38 @@ class Optimizer:
         rates: Mapping[str, Rate],
         betas: tuple[float, float] = (0.9, 0.999),
     ) -> None:
-        self._rates = dict(rates)
-        self.parameters = {
-            name: x.detach().clone().requires_grad_(name in rates) for name, x in parameters.items()
+        self._rates, self._betas = dict(rates), betas
+        for name in rates:
+            check.floating(name, parameters[name])
+        self.parameters = {name: _leaf(x, name in rates) for name, x in parameters.items()}
+        self._moments = {
+            name: Moments(torch.zeros_like(self.parameters[name]), torch.zeros_like(self.parameters[name]))
+            for name in rates
         }
-        groups = [{"params": [self.parameters[name]], "name": name, "lr": 0.0} for name in self._rates]
-        self._adam = torch.optim.Adam(groups, betas=betas, eps=1e-15, fused=True)
 
     def step(self, progress: float) -> None:
         """Take one step with the rates of now, and forget the gradients."""
-        for group in self._adam.param_groups:
-            group["lr"] = self._rates[group["name"]].at(progress)
-        self._adam.step()
-        self._adam.zero_grad(set_to_none=True)
+        beta1, beta2 = self._betas
+        learning = {
+            name: x.grad
+            for name in self._rates
+            if (x := self.parameters[name]).grad is not None and x.numel()
+        }
+        if not learning:
+            return
+        table = (NativeLearned * len(learning))()
+        for row, (name, gradient) in zip(table, learning.items(), strict=True):
+            x, rate, moments = self.parameters[name], self._rates[name], self._moments[name]
+            moments.steps += 1
+            row.n = x.numel()
+            row.values, row.gradient = x.data_ptr(), gradient.data_ptr()
+            row.first, row.second = moments.exp_avg.data_ptr(), moments.exp_avg_sq.data_ptr()
+            row.keep = 1 - rate.decay
+            row.rate = rate.at(progress) / (1 - beta1**moments.steps)
+            row.correction = (1 - beta2**moments.steps) ** -0.5
+            x.grad = None
+        native.call("texgs_adam", len(table), table, 1 - beta1, 1 - beta2, EPSILON, device=x.device)
+        torch.autograd.graph.increment_version([self.parameters[name] for name in learning])
 
     def edit_rows(self, n: int, keep: Tensor, added: Mapping[str, Tensor]) -> None:
         """Keep some [n] bool of the n rows and append others by name, whose moments start at zero.
@@ -66,35 +105,29 @@ class Optimizer:
         self._replace(name, values, torch.zeros_like)
 
     def _replace(self, name: str, values: Tensor, moment: Callable[[Tensor], Tensor]) -> None:
-        old = self.parameters[name]
-        leaf = self.parameters[name] = values.detach().clone().requires_grad_(old.requires_grad)
-        for group in self._adam.param_groups:
-            if group["name"] == name:
-                group["params"] = [leaf]
-                if state := self._adam.state.pop(old, {}):
-                    self._adam.state[leaf] = {
-                        key: moment(value) if key in MOMENTS else value for key, value in state.items()
-                    }
+        self.parameters[name] = _leaf(values, name in self._rates)
+        if name in self._rates:
+            self._moments[name] = self._moments[name].map(moment)
 
     def state(self) -> dict[str, Tensor]:
         """Return all parameters and moments, for a checkpoint."""
         state = {name: x.detach() for name, x in self.parameters.items()}
-        for group in self._adam.param_groups:
-            for key, value in self._adam.state.get(group["params"][0], {}).items():
-                state[f"adam.{group['name']}.{key}"] = value
+        for name, moments in self._moments.items():
+            values = {"exp_avg": moments.exp_avg, "exp_avg_sq": moments.exp_avg_sq}
+            values["step"] = torch.tensor(float(moments.steps))
+            state |= {f"adam.{name}.{key}": value for key, value in values.items()}
         return state
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
         """Go on from `state`, wherever it was kept."""
-        self._adam.state.clear()
         for name, old in self.parameters.items():
-            self._replace(name, state[name].to(old.device), torch.zeros_like)
-        for group in self._adam.param_groups:
-            leaf, prefix = group["params"][0], f"adam.{group['name']}."
-            moments = {
-                key.removeprefix(prefix): value.to(leaf.device, copy=True)
-                for key, value in state.items()
-                if key.startswith(prefix)
-            }
-            if moments:
-                self._adam.state[leaf] = moments
+            self.parameters[name] = _leaf(state[name].to(old.device), name in self._rates)
+        for name in self._rates:
+            x, prefix = self.parameters[name], f"adam.{name}."
+            means = (state[prefix + key].to(x.device, copy=True) for key in ("exp_avg", "exp_avg_sq"))
+            self._moments[name] = Moments(*means, int(state[prefix + "step"]))
+
+
+def _leaf(values: Tensor, learns: bool) -> Tensor:
+    """Return a dense copy of values that is a leaf of autograd."""
+    return values.detach().clone(memory_format=torch.contiguous_format).requires_grad_(learns)

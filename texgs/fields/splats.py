@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from math import ceil, floor, isfinite
+from math import ceil, floor
 from typing import Any, Protocol, Self
 
 import torch
@@ -11,12 +11,14 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Role
-from texgs.raster import Options, Render, Texture, rasterize
+from texgs.raster import Options, Render, Texture, native, rasterize
 from texgs.raster.shading import Y00
+from texgs.raster.types import are_gaussians
 from texgs.volume.images import Box, Images, Target
 
 GEOMETRY = ("means", "quats", "scales", "opacities")
 REACH = 3.34  # standard deviations at which opacity 1 has fallen to 1/255, below which nothing is drawn
+native.declare("texgs_screen_bounds", "n i ppp f p")
 
 
 class Shading(Protocol):
@@ -127,24 +129,17 @@ def screen_box(parameters: Mapping[str, Tensor], options: Options, camera: Camer
 
     It is the whole image where a sphere reaches behind the camera, or a value is not finite.
     """
-    whole = Box(0, 0, camera.width, camera.height)
-    means = parameters["means"]
+    means, scales = parameters["means"].contiguous(), parameters["scales"].contiguous()
     if not len(means):
         return Box(camera.width // 2, camera.height // 2, camera.width // 2, camera.height // 2)
-    viewmat = camera.viewmat.to(means.device)
-    x, y, z = (means @ viewmat[:3, :3].T + viewmat[:3, 3]).unbind(dim=1)
-    reach = REACH * parameters["scales"].amax(dim=1).exp()
-    near, far = z - reach, z + reach
-    bounds = [near.min()]
-    for at in (x, y):
-        low, high = at - reach, at + reach
-        bounds += [torch.minimum(low / near, low / far).min(), torch.maximum(high / near, high / far).max()]
-    nearest, left, right, top, bottom = torch.stack(bounds).tolist()
-    if not isfinite(sum((nearest, left, right, top, bottom))) or nearest <= 0:
-        return whole
-    (fx, cx), (fy, cy) = camera.K[0, ::2].tolist(), camera.K[1, 1:].tolist()
-    is_flat = parameters["scales"].shape[1] == 2
-    variance = 1 / max(options.low_pass, 1e-6) if is_flat else options.dilation
+    bounds, viewmat = means.new_empty(5), camera.viewmat.to(means.device).contiguous()
+    spheres = (*scales.shape, means, scales, viewmat)
+    native.call("texgs_screen_bounds", *spheres, REACH, bounds, device=means.device)
+    nearest, left, right, top, bottom = bounds.tolist()
+    if nearest <= 0:
+        return Box(0, 0, camera.width, camera.height)
+    (fx, _, cx), (_, fy, cy), _ = camera.K.tolist()
+    variance = options.dilation if are_gaussians(scales) else 1 / max(options.low_pass, 1e-6)
     disc = REACH * variance**0.5  # of the low-pass filter, pixels
     return Box(
         floor(fx * left + cx - disc),

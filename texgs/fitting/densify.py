@@ -34,8 +34,8 @@ class DensityControl:
 
     def observe(self, shift_gradient: Tensor, width: int, height: int) -> None:
         """Note the gradient [N, 2] of the loss for shifts in pixels."""
-        half = shift_gradient.new_tensor([0.5 * width, 0.5 * height])
-        norms = (shift_gradient * half).norm(dim=1)
+        across, down = shift_gradient.unbind(1)
+        norms = torch.hypot(0.5 * width * across, 0.5 * height * down)
         self.gradients += norms
         self.counts += norms > 0
 

@@ -34,6 +34,7 @@ class Fit(ResumableFit):
     ) -> None:
         super().__init__(phase.iterations)
         self.shading, self.images, self.phase, self.seed = shading, images, phase, seed
+        self.order: tuple[int, list[int]] = (-1, [])  # an epoch and its views
         size = extent(images.cameras, parameters["means"])
         self.optimizer = Optimizer(parameters, rates(parameters, phase.rates, size))
         means = self.parameters["means"]
@@ -58,16 +59,16 @@ class Fit(ResumableFit):
         p, phase = self.parameters, self.phase
         target = visible_part(self.images, self.view_of(self.iteration), p, self.shading.options)
         is_observed = self.iteration <= phase.densify.stop
-        shift = torch.zeros_like(p["means"][:, :2]).requires_grad_() if is_observed else None
+        shifts = p["means"].new_empty(len(p["means"]), 2) if is_observed else None
         visible = join(p, min(phase.sh_degree, self.iteration // phase.sh_every))
         loss = view_loss(
-            visible, self.shading, target, phase.losses, shift, self.iteration, phase.turns_normals
+            visible, self.shading, target, phase.losses, shifts, self.iteration, phase.turns_normals
         )
         loss.backward()
-        if shift is not None and shift.grad is not None:
-            self.control.observe(shift.grad, *self.images.size)
         self.optimizer.step(self.iteration / self.iterations)
-        self.control.step(self.iteration, self.optimizer, self.generator(2 * self.iteration + 1))
+        if shifts is not None:
+            self.control.observe(shifts, *self.images.size)
+            self.control.step(self.iteration, self.optimizer, self.generator(2 * self.iteration + 1))
         if not len(self.parameters["means"]):
             raise FitError(
                 f"iteration {self.iteration}: expected something that shows in the views, but all of it has "
@@ -85,8 +86,10 @@ class Fit(ResumableFit):
     def view_of(self, iteration: int) -> int:
         """Return the view of an iteration: every epoch has a new order, without memory of those before."""
         epoch, place = divmod(iteration - 1, len(self.images))
-        order = torch.randperm(len(self.images), generator=self.generator(2 * epoch))
-        return int(order[place])
+        if self.order[0] != epoch:
+            order = torch.randperm(len(self.images), generator=self.generator(2 * epoch))
+            self.order = epoch, order.tolist()
+        return self.order[1][place]
 
     def generator(self, stream: int) -> torch.Generator:
         """Return random numbers that depend on the seed and a number only: a resumed run draws the same."""

@@ -1,17 +1,16 @@
 """The loss of one view."""
 
 from collections.abc import Mapping
-from typing import Any, cast
+from functools import cache
+from typing import cast
 
 import torch
 from torch import Tensor
 
-from texgs.core.camera import Camera
-from texgs.fields.splats import Shading, Splats
+from texgs.fields.splats import GEOMETRY, Shading, Splats
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fitting.settings import Losses
-from texgs.raster import Render
-from texgs.raster.losses import bilateral_smoothness, l1_dssim, normal_consistency, ssim
+from texgs.raster.compared import Comparison, rendered_loss
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Target
 
@@ -23,13 +22,13 @@ def view_loss(
     shading: Shading,
     target: Target,
     weights: Losses,
-    shift: Tensor | None,
+    shift_gradient: Tensor | None,
     iteration: int,
     turns_normals: bool = True,
 ) -> Tensor:
     """Render a view and compare it: L1 + D-SSIM of colour and alpha, normals, smooth material.
 
-    `shift` [N, 2] are zeros that receive the screen-space gradient. Iterations count from 1, as losses may
+    `shift_gradient` [N, 2] receives the gradient of shifts on screen, in pixels. Iterations count from 1, as losses may
     start later. `turns_normals` says whether shading has gradients into the surfels' orientation and place.
     """
     camera = target.camera
@@ -40,39 +39,34 @@ def view_loss(
     maps = material_maps(parameters, shading) if weights.smoothness > 0 else None
     has_normals = weights.normal > 0 and iteration > weights.normal_from
     features = colors if maps is None else torch.cat([colors, maps], dim=1)
-    outputs = ("normal", "depth") if has_normals else ()
-    render = draw(parameters, features, shading, camera, shift=shift, outputs=outputs)
-    # Split as planes, as they lie in memory: the gradient of a slice would be a whole image of zeros.
-    channels = [3] if maps is None else [3, SMOOTHED]
-    color, *attributes = (x.permute(1, 2, 0) for x in render.color.permute(2, 0, 1).split(channels))
-    loss = l1_dssim(color, target.color, weights.dssim)
-    if weights.alpha > 0:
-        alphas = (render.alpha, target.alpha)
-        only_dssim = not weights.alpha_l1
-        apart = weights.dssim * (1 - ssim(*alphas)) if only_dssim else l1_dssim(*alphas, weights.dssim)
-        loss = loss + weights.alpha * apart
-    if has_normals:
-        drawn = cast(tuple[Tensor, Tensor, Tensor], (render.normal, render.depth, render.alpha))
-        loss = loss + weights.normal * normal_consistency(*drawn, camera.viewmat, camera.K)
-    if attributes:
-        smoothness = bilateral_smoothness(attributes[0], target.color, target.alpha)
-        loss = loss + weights.smoothness * SMOOTHED * smoothness
-    return target.share * loss
+    of_colors, of_alpha = target.share, target.share * weights.alpha
+    comparison = Comparison(
+        *(target.color, target.alpha),
+        l1=of_colors * (1 - weights.dssim),
+        dssim=of_colors * weights.dssim,
+        alpha_l1=of_alpha * (1 - weights.dssim) if weights.alpha_l1 else 0.0,
+        alpha_dssim=of_alpha * weights.dssim,
+        normal=target.share * weights.normal if has_normals else 0.0,
+        smoothness=target.share * weights.smoothness * SMOOTHED,
+    )
+    return rendered_loss(
+        *(tuple(parameters[name] for name in GEOMETRY), features),
+        *((camera.viewmat, camera.K, camera.width, camera.height), comparison),
+        background=background(features.shape[1], features.device),
+        shift_gradient=shift_gradient,
+        options=shading.options,
+    )
 
 
 def render_view(parameters: Mapping[str, Tensor], shading: Shading, target: Target) -> Tensor:
     """Render the colours [H, W, 3] of a view over white."""
-    colors = cast(Tensor, shading.colors(parameters, target.camera, target.light))
-    return draw(parameters, colors, shading, target.camera).color
+    return Splats(parameters, shading).render(target.camera, target.light).color
 
 
-def draw(
-    parameters: Mapping[str, Tensor], features: Tensor, shading: Shading, camera: Camera, **more: Any
-) -> Render:
-    """Render features [N, C] over white behind colours, and over 0 behind material."""
-    background = features.new_zeros(features.shape[1])
-    background[:3] = 1
-    return Splats(parameters, shading).rasterized(camera, features=features, background=background, **more)
+@cache
+def background(channels: int, device: torch.device) -> Tensor:
+    """Return white behind colours, and 0 behind material [channels]."""
+    return torch.tensor([1.0] * 3 + [0.0] * (channels - 3), device=device)
 
 
 def material_maps(parameters: Mapping[str, Tensor], shading: Shading) -> Tensor | None:

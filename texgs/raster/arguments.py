@@ -128,6 +128,7 @@ def view(
     texture: Texture | None,
     outputs: Collection[str],
     options: Options,
+    raw: bool = False,
 ) -> View:
     """Check the rest; `camera` is viewmat, K, background and depth range, `size` is (width, height)."""
     viewmat, K, background, depth_range = camera
@@ -160,7 +161,7 @@ def view(
     matrices = (viewmat.detach().contiguous(), K.detach().contiguous())
     layout = (None, None) if texture is None else (texture.sizes, texture.offsets)
     rest = (None if x is None else x.detach().contiguous() for x in (background, *layout, depth_range))
-    return View(*matrices, width, height, wanted, options, *rest)
+    return View(*matrices, width, height, wanted, options, *rest, raw=raw)
 
 
 def pinhole(viewmat: Tensor, K: Tensor) -> None:

@@ -1,7 +1,9 @@
 """The native rasterizer as a differentiable function of torch, and what one call of it works on."""
 
+from collections.abc import Iterable, Mapping
 from ctypes import byref
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import torch
@@ -13,7 +15,7 @@ from texgs.raster.types import DEFAULT_OPTIONS, Options, Statistics
 IMAGES = ("color", "alpha", "depth", "median", "normal", "distortion")
 Surfels = native.struct(
     "texgs_surfels",
-    "n n, i axes, p means quats scales opacities shift, i channels, "
+    "n n, i axes, p means quats scales opacities, i raw, p shift, i channels, "
     "p features base gain texels sizes offsets, n n_texels",
 )
 Camera = native.struct("texgs_camera", "p viewmat K, i width height, p depth_range")
@@ -68,25 +70,25 @@ class View:
     sizes: Tensor | None = None  # [N, 2] of the texture
     offsets: Tensor | None = None  # [N]
     depth_range: Tensor | None = None  # [2, H, W] camera z
+    raw: bool = False  # scales are natural logarithms and opacities logits, and so are their gradients
 
     def structures(self, surfels: SurfelTensors) -> tuple[native.Struct, ...]:
         """Return the surfels, camera and options as the library takes them."""
+        means, quats, scales, opacities, shift, *colors = surfels
+        geometry = (*scales.shape, means, quats, scales, opacities, self.raw, shift)
+        n_texels = 0 if surfels.texels is None else len(surfels.texels)
+        layout = (self.sizes, self.offsets, n_texels)
+        return (Surfels(*geometry, surfels.channels, *colors, *layout), *self._constants)
+
+    @cached_property
+    def _constants(self) -> tuple[native.Struct, ...]:
+        """The camera and options as the library takes them."""
         o = self.options
-        scene = Surfels(
-            n=len(surfels.means),
-            axes=surfels.scales.shape[1],
-            channels=surfels.channels,
-            sizes=self.sizes,
-            offsets=self.offsets,
-            n_texels=0 if surfels.texels is None else len(surfels.texels),
-            **surfels._asdict(),
-        )
         low_pass = min(o.low_pass, 1e30)  # infinite: no filter; the library multiplies it by 0 at the centre
         far = min(o.far, 1e30)  # infinite: far / (far - near) is 1
         filters = (low_pass, o.filter_sigma, o.dilation, o.antialiased)
         options = RenderOptions(self.background, *filters, o.alpha_min, o.transmittance_min, o.near, far)
-        camera = Camera(self.viewmat, self.K, self.width, self.height, self.depth_range)
-        return scene, camera, options
+        return Camera(self.viewmat, self.K, self.width, self.height, self.depth_range), options
 
 
 def bin_surfels(surfels: SurfelTensors, view: View, images: dict[str, Tensor]) -> native.Handle:
@@ -111,6 +113,33 @@ def contribute(
     return sums, weight_sum, weight_max, pixels
 
 
+def render(
+    surfels: SurfelTensors, view: View, more: Mapping[str, Tensor]
+) -> tuple[dict[str, Tensor], native.Handle]:
+    """Render the planar images that a view has, and `more` outputs; return the images, and what made them."""
+    means, size = surfels.means, (view.height, view.width)
+    images = {"color": means.new_empty(surfels.channels, *size), "alpha": means.new_empty(size)}
+    for name in view.outputs & {"depth", "median", "distortion"}:
+        images[name] = means.new_empty(size)
+    if "normal" in view.outputs:
+        images["normal"] = means.new_empty(3, *size)
+    return images, bin_surfels(surfels, view, {**images, **more})
+
+
+def differentiate(
+    frame: native.Handle,
+    surfels: SurfelTensors,
+    view: View,
+    images: Mapping[str, Tensor | None],
+    by_image: Mapping[str, Tensor | None],
+    into: Iterable[Tensor | None],
+) -> None:
+    """Write the gradients of surfel tensors, those that have memory `into`, from those of planar images."""
+    structures = (*view.structures(surfels), Image(**images), Image(**by_image), Gradients(*into))
+    with frame.lock:
+        native.call("texgs_backward", frame.pointer, *structures, device=surfels.means.device)
+
+
 class RasterizeFunction(torch.autograd.Function):
     """Surfel tensors to images; the images are planar, [C, H, W] and [H, W]."""
 
@@ -119,14 +148,8 @@ class RasterizeFunction(torch.autograd.Function):
         """Render; `extra` receives the statistics."""
         surfels = SurfelTensors(*tensors)
         means = surfels.means
-        size = (view.height, view.width)
-        images = {"color": means.new_empty(surfels.channels, *size), "alpha": means.new_empty(size)}
-        for name in view.outputs & {"depth", "median", "distortion"}:
-            images[name] = means.new_empty(size)
-        if "normal" in view.outputs:
-            images["normal"] = means.new_empty(3, *size)
         radii = {"radii": means.new_empty(len(means))} if "statistics" in view.outputs else {}
-        frame = bin_surfels(surfels, view, images | radii)
+        images, frame = render(surfels, view, radii)
         if radii:
             _, weight_sum, weight_max, pixels = contribute(frame, surfels, view, None)
             extra["statistics"] = Statistics(weight_sum, weight_max, pixels, radii["radii"])
@@ -145,7 +168,6 @@ class RasterizeFunction(torch.autograd.Function):
         surfels, images = SurfelTensors(*ctx.saved_tensors[:n]), ctx.saved_tensors[n : n + len(IMAGES)]
         dense = (None if grad is None else grad.contiguous() for grad in grads)
         results = native.gradients(surfels, ctx.needs_input_grad[2:])
-        structures = (*ctx.view.structures(surfels), Image(*images), Image(*dense), Gradients(*results))
-        with ctx.frame.lock:
-            native.call("texgs_backward", ctx.frame.pointer, *structures, device=surfels.means.device)
+        named, by_image = (dict(zip(IMAGES, some, strict=True)) for some in (images, dense))
+        differentiate(ctx.frame, surfels, ctx.view, named, by_image, results)
         return None, None, *results

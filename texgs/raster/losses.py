@@ -15,10 +15,10 @@ from texgs.raster.arguments import pinhole, require
 
 Loss = tuple[str, tuple[float, ...], list[bool]]  # function, size and weights, which inputs want a gradient
 native.declare("texgs_l1_dssim", "pp iii ff pp")
-native.declare("texgs_bilateral_smoothness", "ppp iii pp")
+native.declare("texgs_bilateral_smoothness", "ppp iii f pp")
 native.declare("texgs_depth_to_normal", "ppp ii p")
 native.declare("texgs_depth_to_normal_backward", "ppp ii pp")
-native.declare("texgs_normal_consistency", "ppppp ii ppp")
+native.declare("texgs_normal_consistency", "ppppp ii f ppp")
 
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:
@@ -97,7 +97,7 @@ def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Ten
     given = {"attribute": (attribute, _axes(attribute)), "guide": (guide, "H W 3"), "alpha": (alpha, "H W")}
     require(given, constant=("guide", "alpha"))
     constants = [planar(guide), alpha.contiguous()]
-    return fused_loss("texgs_bilateral_smoothness", [planar(attribute)], constants)
+    return fused_loss("texgs_bilateral_smoothness", [planar(attribute)], constants, 1.0)
 
 
 def depth_to_normal(depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
@@ -138,7 +138,7 @@ def normal_consistency(normal: Tensor, depth: Tensor, alpha: Tensor, viewmat: Te
     """
     _require(depth, viewmat, K, normal=(normal, "H W 3"), alpha=(alpha, "H W"))
     constants = [alpha.detach().contiguous(), viewmat.contiguous(), K.contiguous()]
-    return fused_loss("texgs_normal_consistency", [planar(normal), depth.contiguous()], constants)
+    return fused_loss("texgs_normal_consistency", [planar(normal), depth.contiguous()], constants, 1.0)
 
 
 def _require(depth: Tensor, viewmat: Tensor, K: Tensor, **others: tuple[Tensor, str]) -> None:

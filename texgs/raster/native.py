@@ -1,7 +1,7 @@
 """The native libraries: found, opened and described to ctypes; calls with errors turned into exceptions.
 
 `libtexgs` works on CPU tensors, `libtexgs_cuda` on CUDA tensors; both export the functions of `csrc/texgs.h`,
-`texgs_losses.h`, `texgs_grid.h` and `texgs_volume.h`, the first also those of `texgs_fusion.h` and
+`texgs_losses.h`, `texgs_fit.h`, `texgs_grid.h` and `texgs_volume.h`, the first also those of `texgs_fusion.h` and
 `texgs_neural.h`. They know raw pointers only, so that one build serves every version of torch and Python.
 A module declares the structures and functions that it calls.
 """
@@ -24,7 +24,7 @@ from texgs.core import memory
 from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError
 from texgs.core.native_sources import SUFFIX, built_from, library_sources
 
-ABI_VERSION = 6
+ABI_VERSION = 7
 FOLDER = Path(__file__).parent / "_native"
 CSRC = Path(__file__).parent / "csrc"
 INSTALL = "install texgs again (pip install .)"

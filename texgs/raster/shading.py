@@ -1,6 +1,6 @@
 """Colour of surfels: Blinn-Phong shading, and spherical harmonics that depend on the view."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import pi, sqrt
 from typing import Any
 
@@ -13,9 +13,12 @@ from texgs.raster.arguments import require
 
 MATERIAL = ("ambient", "diffuse", "specular", "shininess")
 Y00 = 0.5 / sqrt(pi)  # the constant harmonic
+Ranges = Mapping[str, tuple[float, float]]  # of factors, by the name in MATERIAL
+NO_RANGES: Ranges = {}
 DEGREES = {1: 0, 4: 1, 9: 2, 16: 3}  # of spherical harmonics, by number of coefficients
-native.declare("texgs_blinn_phong", "n ppppp i pppp i pp")
-native.declare("texgs_blinn_phong_backward", "n ppppp i pppp i pp ppppppp")
+Factors = native.struct("texgs_factors", "i shared raw, 4f low span")
+native.declare("texgs_blinn_phong", "n ppppp", Factors, "pppp ii pp")
+native.declare("texgs_blinn_phong_backward", "n ppppp", Factors, "pppp ii pp ppppppp")
 native.declare("texgs_spherical_harmonics", "n i ppp p")
 native.declare("texgs_spherical_harmonics_backward", "n i ppp pp pp")
 
@@ -32,6 +35,8 @@ def blinn_phong(
     light: Tensor | None = None,  # [3]
     *,
     facing: bool = False,
+    ranges: Ranges = NO_RANGES,
+    clamped: bool = False,
 ) -> tuple[Tensor, Tensor]:
     """Shade surfels: color * (ambient + diffuse |n.l|) + specular |n.h|^shininess.
 
@@ -58,6 +63,9 @@ def blinn_phong(
         camera_position: [3] world units.
         light: [3] direction to a light far away, of any length, or None for a light at the camera.
         facing: whether the light must be in front of the face that the camera sees.
+        ranges: lowest and highest factor of what is given as raw numbers, by the name of the argument: a
+            factor is low + (high - low) * sigmoid(number).
+        clamped: whether shaded colours are clamped to [0, 1], as renderers of volumes do.
 
     Returns:
         base [N, 3], the shaded colours, and gain [N], ambient + diffuse |n.l| or what `facing` makes of it.
@@ -71,19 +79,24 @@ def blinn_phong(
         if sizes[name] not in (sizes["N"], 1):
             raise ShapeError(f"{name}: expected [{sizes['N']}] or one for all [1], got [{sizes[name]}]")
     tensors = (x for x, _ in (*surfels.values(), *lights.values()))
-    return _BlinnPhong.apply(facing, *(None if x is None else x.contiguous() for x in tensors))
+    lengths = [sizes[name] for name in MATERIAL]
+    dense = (None if x is None else x.contiguous() for x in tensors)
+    return _BlinnPhong.apply(_factors(lengths, ranges), (facing, clamped), *dense)
 
 
 class _BlinnPhong(torch.autograd.Function):
-    """`facing`, then colour, material, means, quats, camera position, and the light or None."""
+    """How, then colour, material, means, quats, camera position, and the light or None."""
 
     @staticmethod
-    def forward(ctx: Any, facing: bool, *tensors: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(
+        ctx: Any, factors: native.Struct, sides: tuple[bool, bool], *tensors: Tensor
+    ) -> tuple[Tensor, Tensor]:
         color = tensors[0]
         base, gain = torch.empty_like(color), color.new_empty(len(color))
-        native.call("texgs_blinn_phong", *_arguments(tensors, facing), base, gain, device=color.device)
+        given = (len(color), *tensors[:5], factors, *tensors[5:], *sides)
+        native.call("texgs_blinn_phong", *given, base, gain, device=color.device)
         ctx.save_for_backward(*tensors)
-        ctx.facing = facing
+        ctx.factors, ctx.sides = factors, sides
         ctx.set_materialize_grads(False)
         return base, gain
 
@@ -93,16 +106,19 @@ class _BlinnPhong(torch.autograd.Function):
         tensors = ctx.saved_tensors
         grad_base = torch.zeros_like(tensors[0]) if grad_base is None else grad_base.contiguous()
         grad_gain = None if grad_gain is None else grad_gain.contiguous()
-        gradients = native.gradients(tensors, ctx.needs_input_grad[1:])
-        arguments = (*_arguments(tensors, ctx.facing), grad_base, grad_gain, *gradients[:7])
-        native.call("texgs_blinn_phong_backward", *arguments, device=grad_base.device)
-        return None, *gradients
+        gradients = native.gradients(tensors, ctx.needs_input_grad[2:])
+        given = (len(tensors[0]), *tensors[:5], ctx.factors, *tensors[5:], *ctx.sides)
+        results = (grad_base, grad_gain, *gradients[:7])
+        native.call("texgs_blinn_phong_backward", *given, *results, device=grad_base.device)
+        return None, None, *gradients
 
 
-def _arguments(tensors: Sequence[Tensor], facing: bool) -> tuple:
-    """Return the arguments of the library, with a bit for each factor of the material that is shared."""
-    shared = sum(len(x) == 1 and 1 << k for k, x in enumerate(tensors[1:5]))
-    return len(tensors[0]), *tensors[:5], shared, *tensors[5:], facing
+def _factors(lengths: Sequence[int], ranges: Ranges) -> native.Struct:
+    """Return how a material becomes factors: those that one number gives to all, and the ranges of some."""
+    shared = sum(1 << k for k, length in enumerate(lengths) if length == 1)
+    raw = sum(1 << k for k, name in enumerate(MATERIAL) if name in ranges)
+    limits = [ranges.get(name, (0.0, 1.0)) for name in MATERIAL]
+    return Factors(shared, raw, tuple(low for low, _ in limits), tuple(high - low for low, high in limits))
 
 
 def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:

@@ -90,7 +90,7 @@ class Images:
             box = self.boxes[index].union(around).within(*self.size)
             planes = planes[:, box.top : box.bottom, box.left : box.right]
             camera, share = camera.crop(*box), planes[0].numel() / self.planes[0, 0].numel()
-        planes = planes.to(device).float().div_(255)
+        planes = planes.to(device) / 255
         color = planes[:3].permute(1, 2, 0)
         return Target(color, planes[3], camera.to(device), self.lights[index], share)
 

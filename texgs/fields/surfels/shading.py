@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import torch
 from torch import Tensor
@@ -38,22 +38,30 @@ class ShadingModel:
         if "ambient" not in p:
             return spherical_harmonics(p["sh"], p["means"], camera.position)
         colors = p["colors"] + p["palette"] if "texels" in p else p["colors"]
-        base, gain = self.lit(colors, material(p, self.material).values(), p, camera, light)
-        base = base.clamp(0, 1)  # as renderers of volumes do
+        raw, ranges = (p[name] for name in MATERIAL), RANGES[self.material]
+        base, gain = self.lit(colors, raw, p, camera, light, ranges=ranges, clamped=True)
         return Texture(base, gain, p["texels"], p["sizes"], p["offsets"]) if "texels" in p else base
 
     def lit(
-        self, colors: Tensor, factors: Iterable[Tensor], p: Mapping[str, Tensor], camera: Camera, light: Light
+        self,
+        colors: Tensor,
+        factors: Iterable[Tensor],
+        p: Mapping[str, Tensor],
+        camera: Camera,
+        light: Light,
+        **more: Any,
     ) -> tuple[Tensor, Tensor]:
         """Return base [N, 3] and gain [N] of surfels with parameters `p`; factors are those of `material`.
 
         A viewer who is not local is far behind the camera. Normals of their own come before those of surfels.
+        `more` is as in `blinn_phong`.
         """
         viewer = camera.position if self.local_viewer else -FAR * camera.viewmat[2, :3]
         toward = None if light.kind == "headlight" else light.direction(camera).to(camera.viewmat)
         a, d, s, b = factors
         turns = p.get("normals", p["quats"])
-        return blinn_phong(colors, a, d, s, b, p["means"], turns, viewer, toward, facing=self.facing)
+        places = (p["means"], turns, viewer, toward)
+        return blinn_phong(colors, a, d, s, b, *places, facing=self.facing, **more)
 
 
 def seen_normals(parameters: Mapping[str, Tensor], camera: Camera) -> Tensor:

@@ -25,7 +25,7 @@
 extern "C" {
 #endif
 
-#define TEXGS_ABI_VERSION 6
+#define TEXGS_ABI_VERSION 7
 #ifndef TEXGS_SOURCES /* the build defines it, see texgs_sources() */
 #define TEXGS_SOURCES "unknown"
 #endif
@@ -49,6 +49,7 @@ typedef struct {
     const float* quats;     /* [N, 4] wxyz, any length but zero */
     const float* scales;    /* [N, axes] standard deviations along the first axes, world units */
     const float* opacities; /* [N] in [0, 1] */
+    int32_t raw;            /* not 0: `scales` are natural logarithms and `opacities` logits, and so their gradients */
     const float* shift;     /* [N, 2] pixels added to the projection, or NULL */
     int32_t channels;       /* C of the colour, 1 to TEXGS_MAX_CHANNELS */
     const float* features;  /* [N, C], or [N, C - 3] beside a texture, NULL where that leaves none */

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What losses.cpp hands to the kernels of an instruction set, and the table of those kernels.
+// What losses.cpp and fit.cpp hand to the kernels of an instruction set, and the table of those kernels.
 #pragma once
 #include <cstdint>
 
+#include "../texgs_fit.h"
 #include "../texgs_losses.h"
 
 namespace texgs {
@@ -45,9 +46,9 @@ struct SmoothnessJob {
 
 struct BlinnPhongJob {
     const float *color, *ambient, *diffuse, *specular, *shininess;
-    int shared;  // TEXGS_SHARED_...
+    texgs_factors factors;
     const float *means, *quats, *camera_position, *light;
-    bool facing;
+    bool facing, clamped;
     float *shaded, *gain;
     const float *grad_shaded, *grad_gain;
     float *grad_color, *grad_ambient, *grad_diffuse, *grad_specular, *grad_shininess, *grad_means, *grad_quats;
@@ -65,6 +66,20 @@ struct HarmonicsJob {
     float *grad_sh, *grad_means;
 };
 
+struct AdamJob {
+    float take1, take2, epsilon;
+};
+
+struct SpheresJob {
+    int axes;
+    const float *means, *scales, *viewmat;
+    float reach;
+};
+// See texgs_screen_bounds().
+struct ScreenBounds {
+    float nearest, left, right, top, bottom;
+};
+
 struct LossKernels {
     SsimSums (*ssim)(const SsimJob&, const LossTile&);
     void (*depth_to_normal)(const NormalJob&, int y0, int y1);
@@ -75,7 +90,10 @@ struct LossKernels {
     MaterialSums (*blinn_phong_backward)(const BlinnPhongJob&, int64_t begin, int64_t end);
     void (*harmonics)(const HarmonicsJob&, int64_t begin, int64_t end);
     void (*harmonics_backward)(const HarmonicsJob&, int64_t begin, int64_t end);
+    void (*adam)(const AdamJob&, const texgs_learned&, int64_t begin, int64_t end);
+    ScreenBounds (*screen_bounds)(const SpheresJob&, int64_t begin, int64_t end);
 };
+const LossKernels& loss_kernels();  // of the active instruction set
 
 // One table per instruction set, each in loss_table.cpp.
 namespace portable {
@@ -99,6 +117,8 @@ void blinn_phong_range(const BlinnPhongJob&, int64_t begin, int64_t end);
 MaterialSums blinn_phong_backward_range(const BlinnPhongJob&, int64_t begin, int64_t end);
 void harmonics_range(const HarmonicsJob&, int64_t begin, int64_t end);
 void harmonics_backward_range(const HarmonicsJob&, int64_t begin, int64_t end);
+void adam_range(const AdamJob&, const texgs_learned&, int64_t begin, int64_t end);
+ScreenBounds screen_bounds_range(const SpheresJob&, int64_t begin, int64_t end);
 }  // namespace TEXGS_ISA
 #endif
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The loss and shading kernels of one instruction set.
+// The loss, shading and fit kernels of one instruction set.
 #include "loss_kernels.h"
 
 namespace texgs::TEXGS_ISA {
@@ -14,6 +14,8 @@ const LossKernels kLossKernels = {
     blinn_phong_backward_range,
     harmonics_range,
     harmonics_backward_range,
+    adam_range,
+    screen_bounds_range,
 };
 
 }  // namespace texgs::TEXGS_ISA

@@ -10,10 +10,6 @@
 #include "parallel.h"
 
 namespace texgs {
-namespace {
-
-constexpr int64_t kSurfelRange = 1024;
-constexpr int kRowRange = 32;
 
 const LossKernels& loss_kernels() {
 #if defined(__x86_64__) || defined(_M_X64)
@@ -22,6 +18,11 @@ const LossKernels& loss_kernels() {
 #endif
     return portable::kLossKernels;
 }
+
+namespace {
+
+constexpr int64_t kSurfelRange = 1024;
+constexpr int kRowRange = 32;
 
 // Planes of equal tiles, widths a multiple of 16 but for the last in a row.
 std::vector<LossTile> cut_tiles(int planes, int height, int width) {
@@ -114,64 +115,65 @@ int32_t texgs_depth_to_normal_backward(const float* depth, const float* viewmat,
 }
 
 int32_t texgs_normal_consistency(const float* normal, const float* depth, const float* alpha, const float* viewmat,
-                                 const float* K, int32_t height, int32_t width, float* value, float* grad_normal,
-                                 float* grad_depth, void*) {
+                                 const float* K, int32_t height, int32_t width, float weight, float* value,
+                                 float* grad_normal, float* grad_depth, void*) {
     return guarded([&] {
         check_image(1, height, width);
         const LossKernels& kernels = loss_kernels();
         const double n = static_cast<double>(height) * width;
         NormalJob job{};
         job.depth = depth, job.viewmat = viewmat, job.K = K, job.height = height, job.width = width;
-        job.normal = normal, job.alpha = alpha, job.scale = static_cast<float>(1.0 / n);
+        job.normal = normal, job.alpha = alpha, job.scale = static_cast<float>(weight / n);
         job.out_normal = grad_normal, job.out_depth = grad_depth;
         const double agreement = total(collect_ranges<double>(
             height, kRowRange, [&](int begin, int end) { return kernels.normal_consistency(job, begin, end); }));
-        *value = static_cast<float>(1.0 - agreement / n);
+        *value = static_cast<float>(weight * (1.0 - agreement / n));
     });
 }
 
 int32_t texgs_bilateral_smoothness(const float* attribute, const float* guide, const float* alpha, int32_t channels,
-                                   int32_t height, int32_t width, float* value, float* gradient, void*) {
+                                   int32_t height, int32_t width, float weight, float* value, float* gradient, void*) {
     return guarded([&] {
         check_image(channels, height, width);
         const LossKernels& kernels = loss_kernels();
         const double n = kSobelSum * static_cast<double>(channels) * height * width;
-        const SmoothnessJob job{attribute, guide, alpha, channels, height, width, static_cast<float>(1.0 / n),
+        const SmoothnessJob job{attribute, guide, alpha, channels, height, width, static_cast<float>(weight / n),
                                 gradient};
         const std::vector<LossTile> tiles = cut_tiles(1, height, width);
         const double sum =
             total(collect<double>(tiles.size(), [&](int64_t i) { return kernels.smoothness(job, tiles[i]); }));
-        *value = static_cast<float>(sum / n);
+        *value = static_cast<float>(weight * sum / n);
     });
 }
 
 int32_t texgs_blinn_phong(int64_t n, const float* color, const float* ambient, const float* diffuse,
-                          const float* specular, const float* shininess, int32_t shared, const float* means,
-                          const float* quats, const float* camera_position, const float* light, int32_t facing,
-                          float* shaded, float* gain, void*) {
+                          const float* specular, const float* shininess, const texgs_factors* factors,
+                          const float* means, const float* quats, const float* camera_position, const float* light,
+                          int32_t facing, int32_t clamped, float* shaded, float* gain, void*) {
     return guarded([&] {
         const LossKernels& kernels = loss_kernels();
         BlinnPhongJob job{};
         job.color = color, job.ambient = ambient, job.diffuse = diffuse, job.specular = specular;
-        job.shininess = shininess, job.shared = shared, job.means = means, job.quats = quats;
-        job.camera_position = camera_position, job.light = light, job.facing = facing != 0;
+        job.shininess = shininess, job.factors = *factors, job.means = means, job.quats = quats;
+        job.camera_position = camera_position, job.light = light, job.facing = facing != 0, job.clamped = clamped != 0;
         job.shaded = shaded, job.gain = gain;
         parallel_for(n, kSurfelRange, [&](int64_t begin, int64_t end, int) { kernels.blinn_phong(job, begin, end); });
     });
 }
 
 int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* ambient, const float* diffuse,
-                                   const float* specular, const float* shininess, int32_t shared, const float* means,
-                                   const float* quats, const float* camera_position, const float* light, int32_t facing,
-                                   const float* grad_shaded, const float* grad_gain, float* grad_color,
-                                   float* grad_ambient, float* grad_diffuse, float* grad_specular,
-                                   float* grad_shininess, float* grad_means, float* grad_quats, void*) {
+                                   const float* specular, const float* shininess, const texgs_factors* factors,
+                                   const float* means, const float* quats, const float* camera_position,
+                                   const float* light, int32_t facing, int32_t clamped, const float* grad_shaded,
+                                   const float* grad_gain, float* grad_color, float* grad_ambient, float* grad_diffuse,
+                                   float* grad_specular, float* grad_shininess, float* grad_means, float* grad_quats,
+                                   void*) {
     return guarded([&] {
         const LossKernels& kernels = loss_kernels();
-        const BlinnPhongJob job{color,         ambient,        diffuse,         specular,   shininess,    shared,
-                                means,         quats,          camera_position, light,      facing != 0,  nullptr,
-                                nullptr,       grad_shaded,    grad_gain,       grad_color, grad_ambient, grad_diffuse,
-                                grad_specular, grad_shininess, grad_means,      grad_quats};
+        const BlinnPhongJob job{color,        ambient,       diffuse,         specular,   shininess,   *factors,
+                                means,        quats,         camera_position, light,      facing != 0, clamped != 0,
+                                nullptr,      nullptr,       grad_shaded,     grad_gain,  grad_color,  grad_ambient,
+                                grad_diffuse, grad_specular, grad_shininess,  grad_means, grad_quats};
         double material[4] = {0.0, 0.0, 0.0, 0.0};
         for (const MaterialSums& sums : collect_ranges<MaterialSums>(n, kSurfelRange, [&](int64_t begin, int64_t end) {
                  return kernels.blinn_phong_backward(job, begin, end);
@@ -179,7 +181,7 @@ int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* a
             for (int k = 0; k < 4; ++k) material[k] += sums.v[k];
         float* const out[4] = {grad_ambient, grad_diffuse, grad_specular, grad_shininess};
         for (int k = 0; k < 4; ++k)
-            if (out[k] && (shared >> k & 1)) *out[k] = static_cast<float>(material[k]);
+            if (out[k] && (factors->shared >> k & 1)) *out[k] = static_cast<float>(material[k]);
     });
 }
 

@@ -27,6 +27,7 @@ P load_primitives(const texgs_surfels& s, int64_t first, int64_t n) {
     for (int k = 0; k < 4; ++k) p.quat[k] = load_strided(quat + k, 4, n);
     for (int k = 0; k < P::kScales; ++k) p.scale[k] = load_strided(scale + k, P::kScales, n);
     p.opacity = load_strided(s.opacities + first, 1, n);
+    if (s.raw) activate(p);
     return p;
 }
 

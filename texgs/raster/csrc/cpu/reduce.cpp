@@ -75,7 +75,9 @@ void reduce(const Raster& r, int64_t begin, int64_t end) {
             if (r.with_normal) m.normal = {s[normal], s[normal + 1], s[normal + 2]};
         }
         const auto q = project(view, primitive, r.camera, r.options);
-        store_gradients(r.out, first, n, drawn(r, first, n), project_backward(view, primitive, q, m, r.options));
+        auto gradient = project_backward(view, primitive, q, m, r.options);
+        if (r.surfels.raw) activate_backward(primitive, gradient);
+        store_gradients(r.out, first, n, drawn(r, first, n), gradient);
     }
 }
 

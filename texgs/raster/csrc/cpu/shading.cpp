@@ -6,6 +6,7 @@
 #include "interleaved.h"
 #include "loss_kernels.h"
 
+#include "../factors.h"
 #include "../maths.h"
 
 namespace texgs::TEXGS_ISA {
@@ -26,15 +27,32 @@ struct Lit {
     vf lobe;                     // |n_h|^shininess
 };
 
-TEXGS_INLINE vf parameter(const float* p, bool shared, int64_t i, int n) {
-    return shared ? vf(*p) : load_part(p + i, n);
-}
+// The factors of all surfels: those that are shared are computed once.
+class Factors {
+public:
+    explicit Factors(const BlinnPhongJob& job)
+        : form_(job.factors), numbers_{job.ambient, job.diffuse, job.specular, job.shininess} {
+        for (int k = 0; k < 4; ++k)
+            if (form_.shared >> k & 1) shared_[k] = factor(form_, k, vf(*numbers_[k]));
+    }
+    Material operator()(int64_t i, int n) const { return {at(0, i, n), at(1, i, n), at(2, i, n), at(3, i, n)}; }
 
-Material load_material(const BlinnPhongJob& job, int64_t i, int n) {
-    return {parameter(job.ambient, job.shared & TEXGS_SHARED_AMBIENT, i, n),
-            parameter(job.diffuse, job.shared & TEXGS_SHARED_DIFFUSE, i, n),
-            parameter(job.specular, job.shared & TEXGS_SHARED_SPECULAR, i, n),
-            parameter(job.shininess, job.shared & TEXGS_SHARED_SHININESS, i, n)};
+private:
+    vf at(int k, int64_t i, int n) const {
+        return form_.shared >> k & 1 ? shared_[k] : factor(form_, k, load_part(numbers_[k] + i, n));
+    }
+
+    const texgs_factors& form_;
+    const float* const numbers_[4];
+    vf shared_[4];
+};
+
+// Of a colour that is clamped to 0 and 1, in which NaN stays; and of its gradient, which passes within.
+TEXGS_INLINE vf clamped(vf a) { return select(a <= a, min(max(a, 0.0f), 1.0f), a); }
+TEXGS_INLINE vf clamped_backward(vf a, vf gradient) { return zero_unless((a >= vf(0.0f)) & (a <= vf(1.0f)), gradient); }
+TEXGS_INLINE Vec3<vf> shade(const Material& m, const Lit& s, vf gain, Vec3<vf> color) {
+    const vf highlight = m.specular * s.lobe;
+    return {fma(gain, color.x, highlight), fma(gain, color.y, highlight), fma(gain, color.z, highlight)};
 }
 
 TEXGS_INLINE Vec3<vf> load_vectors(const float* p, int64_t i, int n) {
@@ -112,15 +130,15 @@ void direction_gradients(const BlinnPhongJob& job, const Lit& s, vf by_n_l, vf b
 }  // namespace
 
 void blinn_phong_range(const BlinnPhongJob& job, int64_t begin, int64_t end) {
+    const Factors factors(job);
     for (int64_t i = begin; i < end; i += kLanes) {
         const int n = static_cast<int>(end - i < kLanes ? end - i : kLanes);
-        const Material m = load_material(job, i, n);
+        const Material m = factors(i, n);
         const Lit s = light_surfels(job, m, i, n);
-        const vf gain = fma(m.diffuse, abs(s.n_l), m.ambient), highlight = m.specular * s.lobe;
-        const Vec3<vf> color = load_vectors(job.color, i, n);
-        store_vectors(job.shaded,
-                      {fma(gain, color.x, highlight), fma(gain, color.y, highlight), fma(gain, color.z, highlight)}, i,
-                      n);
+        const vf gain = fma(m.diffuse, abs(s.n_l), m.ambient);
+        Vec3<vf> seen = shade(m, s, gain, load_vectors(job.color, i, n));
+        if (job.clamped) seen = {clamped(seen.x), clamped(seen.y), clamped(seen.z)};
+        store_vectors(job.shaded, seen, i, n);
         if (job.gain) store_part(job.gain + i, gain, n);
     }
 }
@@ -128,13 +146,17 @@ void blinn_phong_range(const BlinnPhongJob& job, int64_t begin, int64_t end) {
 MaterialSums blinn_phong_backward_range(const BlinnPhongJob& job, int64_t begin, int64_t end) {
     float* const out[4] = {job.grad_ambient, job.grad_diffuse, job.grad_specular, job.grad_shininess};
     vf total[4] = {0.0f, 0.0f, 0.0f, 0.0f};
+    const Factors factors(job);
     for (int64_t i = begin; i < end; i += kLanes) {
         const int n = static_cast<int>(end - i < kLanes ? end - i : kLanes);
         const vm present = to_float(iota()) < vf(static_cast<float>(n));
-        const Material m = load_material(job, i, n);
+        const Material m = factors(i, n);
         const Lit s = light_surfels(job, m, i, n);
         const vf gain = fma(m.diffuse, abs(s.n_l), m.ambient);
-        const Vec3<vf> color = load_vectors(job.color, i, n), g = load_vectors(job.grad_shaded, i, n);
+        const Vec3<vf> color = load_vectors(job.color, i, n), seen = shade(m, s, gain, color);
+        Vec3<vf> g = load_vectors(job.grad_shaded, i, n);
+        if (job.clamped)
+            g = {clamped_backward(seen.x, g.x), clamped_backward(seen.y, g.y), clamped_backward(seen.z, g.z)};
         if (job.grad_color) store_vectors(job.grad_color, gain * g, i, n);
 
         const vf by_gain = job.grad_gain ? dot(color, g) + load_part(job.grad_gain + i, n) : dot(color, g);
@@ -142,12 +164,14 @@ MaterialSums blinn_phong_backward_range(const BlinnPhongJob& job, int64_t begin,
         const vf cosine = max(abs(s.n_h), kSmallest), by_lobe = by_highlight * m.specular * s.lobe;
         const vf by_material[4] = {by_gain, by_gain * abs(s.n_l), by_highlight * s.lobe,
                                    by_lobe * vf(kLn2) * log2(cosine)};
+        const vf material[4] = {m.ambient, m.diffuse, m.specular, m.shininess};
         for (int k = 0; k < 4; ++k) {
             if (!out[k]) continue;
-            if (job.shared >> k & 1)
-                total[k] += zero_unless(present, by_material[k]);
+            const vf by_number = by_material[k] * factor_slope(job.factors, k, material[k]);
+            if (job.factors.shared >> k & 1)
+                total[k] += zero_unless(present, by_number);
             else
-                store_part(out[k] + i, by_material[k], n);
+                store_part(out[k] + i, by_number, n);
         }
         direction_gradients(job, s, by_gain * m.diffuse * sign(s.n_l), by_lobe * m.shininess / cosine * sign(s.n_h), i,
                             n);

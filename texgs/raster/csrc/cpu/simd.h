@@ -114,6 +114,9 @@ TEXGS_INLINE vf exp2(vf x) {
 }
 TEXGS_INLINE vf exp2_or_nan(vf x) { return select(x <= x, exp2(x), x); }
 
+TEXGS_INLINE vf exp(vf x) { return exp2_or_nan(min(vf(127.0f), vf(1.44269504f) * x)); }  // at most 2^127
+TEXGS_INLINE vf sigmoid(vf x) { return vf(1.0f) / (vf(1.0f) + exp(-x)); }
+
 // log2(x) for normal x > 0, absolute error below 4e-7.
 TEXGS_INLINE vf log2(vf x) {
     vf e = exponent(x), m = mantissa(x);

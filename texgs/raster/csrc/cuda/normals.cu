@@ -147,14 +147,14 @@ int32_t texgs_depth_to_normal_backward(const float* depth, const float* viewmat,
 }
 
 int32_t texgs_normal_consistency(const float* normal, const float* depth, const float* alpha, const float* viewmat,
-                                 const float* K, int32_t height, int32_t width, float* value, float* grad_normal,
-                                 float* grad_depth, void* on) {
+                                 const float* K, int32_t height, int32_t width, float weight, float* value,
+                                 float* grad_normal, float* grad_depth, void* on) {
     return with_workspace(viewmat, on, [&](Workspace& workspace, cudaStream_t stream) {
         check_image(1, height, width);
         const int64_t n = int64_t(height) * width, blocks = blocks_for(n, kBlock);
         double* sums = workspace.sums.ensure<double>(blocks);
-        const Consistency c{normal, alpha, static_cast<float>(-1.0 / n), sums, grad_normal, grad_depth};
+        const Consistency c{normal, alpha, static_cast<float>(-weight / double(n)), sums, grad_normal, grad_depth};
         launch(consistency_kernel, blocks, kBlock, stream, Map{depth, viewmat, K, height, width}, c);
-        finish_sum(sums, blocks, 1, 1.0, -1.0 / n, value, stream);
+        finish_sum(sums, blocks, 1, weight, -weight / double(n), value, stream);
     });
 }

@@ -14,6 +14,7 @@ __device__ P load_primitive(const texgs_surfels& s, int64_t i) {
     for (int k = 0; k < 4; ++k) p.quat[k] = s.quats[4 * i + k];
     for (int k = 0; k < P::kScales; ++k) p.scale[k] = s.scales[P::kScales * i + k];
     p.opacity = s.opacities[i];
+    if (s.raw) activate(p);
     return p;
 }
 

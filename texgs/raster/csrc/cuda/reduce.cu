@@ -63,6 +63,7 @@ __global__ __launch_bounds__(kBlock) void gradients_kernel(const Raster r) {
         }
         const auto q = project(view, primitive, r.camera, r.options);
         gradient = project_backward(view, primitive, q, m, r.options);
+        if (r.surfels.raw) activate_backward(primitive, gradient);
     }
     store_geometry(r.out, i, gradient);
 }

@@ -3,6 +3,7 @@
 //     gain = ambient + diffuse |n.l|,  shaded = gain * color + specular |n.h|^shininess.
 // With `facing` only ambient light is left where the light is behind the face that the camera sees. Elsewhere nothing
 // changes: v, l and so h are on one side of the surfel, and for n on that side |n.l| = n.l and |n.h| = n.h.
+#include "../factors.h"
 #include "../texgs_losses.h"
 #include "maths.cuh"
 #include "workspace.cuh"
@@ -16,9 +17,9 @@ constexpr float kSmallest = 1e-30f;  // a cosine or length below is 0
 struct Job {
     int64_t n;
     const float *color, *ambient, *diffuse, *specular, *shininess;
-    int shared;
+    texgs_factors factors;
     const float *means, *quats, *camera_position, *light;
-    bool facing;
+    bool facing, clamped;
 };
 struct Gradients {
     const float *shaded, *gain;
@@ -30,10 +31,13 @@ struct Material {
     float ambient, diffuse, specular, shininess;
 
     __device__ Material(const Job& job, int64_t i)
-        : ambient(job.ambient[job.shared & TEXGS_SHARED_AMBIENT ? 0 : i]),
-          diffuse(job.diffuse[job.shared & TEXGS_SHARED_DIFFUSE ? 0 : i]),
-          specular(job.specular[job.shared & TEXGS_SHARED_SPECULAR ? 0 : i]),
-          shininess(job.shininess[job.shared & TEXGS_SHARED_SHININESS ? 0 : i]) {}
+        : ambient(at(job, 0, job.ambient, i)),
+          diffuse(at(job, 1, job.diffuse, i)),
+          specular(at(job, 2, job.specular, i)),
+          shininess(at(job, 3, job.shininess, i)) {}
+    __device__ static float at(const Job& job, int k, const float* numbers, int64_t i) {
+        return factor(job.factors, k, numbers[job.factors.shared >> k & 1 ? 0 : i]);
+    }
 };
 
 __device__ inline Vec3<float> load(const float* p, int64_t i) { return {p[3 * i], p[3 * i + 1], p[3 * i + 2]}; }
@@ -78,14 +82,24 @@ struct Lit {
     }
 };
 
+// A colour that is clamped to 0 and 1, in which NaN stays; and its gradient, which passes within.
+__device__ inline float clamped(float a) { return a <= a ? clamp(a, 0.0f, 1.0f) : a; }
+__device__ inline float clamped_backward(float a, float gradient) { return a >= 0.0f && a <= 1.0f ? gradient : 0.0f; }
+
+__device__ inline Vec3<float> shade(const Material& m, const Lit& s, float gain, Vec3<float> color) {
+    const float highlight = m.specular * s.lobe;
+    return {fma(gain, color.x, highlight), fma(gain, color.y, highlight), fma(gain, color.z, highlight)};
+}
+
 __global__ __launch_bounds__(kBlock) void shade_kernel(const Job job, float* shaded, float* gains) {
     const int64_t i = int64_t(blockIdx.x) * kBlock + threadIdx.x;
     if (i >= job.n) return;
     const Material m(job, i);
     const Lit s(job, m, i);
-    const float gain = fma(m.diffuse, abs(s.n_l), m.ambient), highlight = m.specular * s.lobe;
-    const Vec3<float> color = load(job.color, i);
-    store(shaded, i, {fma(gain, color.x, highlight), fma(gain, color.y, highlight), fma(gain, color.z, highlight)});
+    const float gain = fma(m.diffuse, abs(s.n_l), m.ambient);
+    Vec3<float> seen = shade(m, s, gain, load(job.color, i));
+    if (job.clamped) seen = {clamped(seen.x), clamped(seen.y), clamped(seen.z)};
+    store(shaded, i, seen);
     if (gains) gains[i] = gain;
 }
 
@@ -116,12 +130,17 @@ __device__ ByMaterial shade_backward(const Job& job, const Gradients& out, int64
     const Material m(job, i);
     const Lit s(job, m, i);
     const float gain = fma(m.diffuse, abs(s.n_l), m.ambient);
-    const Vec3<float> color = load(job.color, i), g = load(out.shaded, i);
+    const Vec3<float> color = load(job.color, i), seen = shade(m, s, gain, color);
+    Vec3<float> g = load(out.shaded, i);
+    if (job.clamped) g = {clamped_backward(seen.x, g.x), clamped_backward(seen.y, g.y), clamped_backward(seen.z, g.z)};
     if (out.color) store(out.color, i, gain * g);
     const float by_gain = dot(color, g) + (out.gain ? out.gain[i] : 0.0f), by_highlight = g.x + g.y + g.z;
     const float cosine = fmaxf(abs(s.n_h), kSmallest), by_lobe = by_highlight * m.specular * s.lobe;
     store_directions(job, out, s, by_gain * m.diffuse * sign(s.n_l), by_lobe * m.shininess / cosine * sign(s.n_h), i);
-    return {{by_gain, by_gain * abs(s.n_l), by_highlight * s.lobe, by_lobe * kLn2 * log2f(cosine)}};
+    return {{by_gain * factor_slope(job.factors, 0, m.ambient),
+             by_gain * abs(s.n_l) * factor_slope(job.factors, 1, m.diffuse),
+             by_highlight * s.lobe * factor_slope(job.factors, 2, m.specular),
+             by_lobe * kLn2 * log2f(cosine) * factor_slope(job.factors, 3, m.shininess)}};
 }
 
 __global__ __launch_bounds__(kBlock) void shade_backward_kernel(const Job job, const Gradients out) {
@@ -131,7 +150,7 @@ __global__ __launch_bounds__(kBlock) void shade_backward_kernel(const Job job, c
 #pragma unroll
     for (int k = 0; k < 4; ++k) {
         if (!out.material[k]) continue;
-        if (job.shared >> k & 1) {
+        if (job.factors.shared >> k & 1) {
             const double sum = block_sum<kBlock>(by.v[k]);
             if (threadIdx.x == 0) out.sums[4 * int64_t(blockIdx.x) + k] = sum;
         } else if (i < job.n) {
@@ -147,25 +166,26 @@ using namespace texgs;
 using namespace texgs::cuda;
 
 int32_t texgs_blinn_phong(int64_t n, const float* color, const float* ambient, const float* diffuse,
-                          const float* specular, const float* shininess, int32_t shared, const float* means,
-                          const float* quats, const float* camera_position, const float* light, int32_t facing,
-                          float* shaded, float* gain, void* on) {
+                          const float* specular, const float* shininess, const texgs_factors* factors,
+                          const float* means, const float* quats, const float* camera_position, const float* light,
+                          int32_t facing, int32_t clamped, float* shaded, float* gain, void* on) {
     return on_device_of(camera_position, on, [&](cudaStream_t stream) {
-        const Job job{n,      color, ambient, diffuse,         specular, shininess,
-                      shared, means, quats,   camera_position, light,    facing != 0};
+        const Job job{n,     color, ambient,         diffuse, specular,    shininess,   *factors,
+                      means, quats, camera_position, light,   facing != 0, clamped != 0};
         launch(shade_kernel, blocks_for(n, kBlock), kBlock, stream, job, shaded, gain);
     });
 }
 
 int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* ambient, const float* diffuse,
-                                   const float* specular, const float* shininess, int32_t shared, const float* means,
-                                   const float* quats, const float* camera_position, const float* light, int32_t facing,
-                                   const float* grad_shaded, const float* grad_gain, float* grad_color,
-                                   float* grad_ambient, float* grad_diffuse, float* grad_specular,
-                                   float* grad_shininess, float* grad_means, float* grad_quats, void* on) {
+                                   const float* specular, const float* shininess, const texgs_factors* factors,
+                                   const float* means, const float* quats, const float* camera_position,
+                                   const float* light, int32_t facing, int32_t clamped, const float* grad_shaded,
+                                   const float* grad_gain, float* grad_color, float* grad_ambient, float* grad_diffuse,
+                                   float* grad_specular, float* grad_shininess, float* grad_means, float* grad_quats,
+                                   void* on) {
     return with_workspace(camera_position, on, [&](Workspace& workspace, cudaStream_t stream) {
-        const Job job{n,      color, ambient, diffuse,         specular, shininess,
-                      shared, means, quats,   camera_position, light,    facing != 0};
+        const Job job{n,     color, ambient,         diffuse, specular,    shininess,   *factors,
+                      means, quats, camera_position, light,   facing != 0, clamped != 0};
         const int64_t blocks = blocks_for(n, kBlock);
         Gradients out{grad_shaded,
                       grad_gain,
@@ -176,7 +196,7 @@ int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* a
                       workspace.sums.ensure<double>(4 * blocks)};
         launch(shade_backward_kernel, blocks, kBlock, stream, job, out);
         for (int k = 0; k < 4; ++k)
-            if (out.material[k] && (shared >> k & 1))
+            if (out.material[k] && (factors->shared >> k & 1))
                 finish_sum(out.sums + k, blocks, 4, 0.0, 1.0, out.material[k], stream);
     });
 }

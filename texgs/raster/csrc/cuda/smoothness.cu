@@ -98,14 +98,15 @@ using namespace texgs;
 using namespace texgs::cuda;
 
 int32_t texgs_bilateral_smoothness(const float* attribute, const float* guide, const float* alpha, int32_t channels,
-                                   int32_t height, int32_t width, float* value, float* gradient, void* on) {
+                                   int32_t height, int32_t width, float weight, float* value, float* gradient,
+                                   void* on) {
     return with_workspace(attribute, on, [&](Workspace& workspace, cudaStream_t stream) {
         check_image(channels, height, width);
         const double n = kSobelSum * static_cast<double>(channels) * height * width;
         const int64_t blocks = blocks_for(width, kWidth) * blocks_for(height, kHeight);
         double* sums = workspace.sums.ensure<double>(blocks);
         launch(smoothness_kernel, blocks, kBlock, stream,
-               Job{attribute, guide, alpha, channels, height, width, static_cast<float>(1.0 / n), sums, gradient});
-        finish_sum(sums, blocks, 1, 0.0, 1.0 / n, value, stream);
+               Job{attribute, guide, alpha, channels, height, width, static_cast<float>(weight / n), sums, gradient});
+        finish_sum(sums, blocks, 1, 0.0, weight / n, value, stream);
     });
 }

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a step of a fit needs besides rendering and losses: the step of Adam, and where on screen something can be. The
+ * conventions are those of texgs.h.
+ */
+#ifndef TEXGS_FIT_H
+#define TEXGS_FIT_H
+#include "texgs.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A parameter that learns. The structures themselves lie on the host. */
+typedef struct {
+    int64_t n; /* floats */
+    float* values;
+    const float* gradient;
+    float *first, *second; /* running means of the gradient and of its square */
+    float keep;            /* by which values are multiplied before the step: 1 - decay */
+    float rate;            /* learning rate / (1 - beta1^t), t the number of steps with this one */
+    float correction;      /* 1 / sqrt(1 - beta2^t) */
+} texgs_learned;
+
+/* A step of Adam with decoupled decay (Kingma and Ba 2015; Loshchilov and Hutter 2019), each parameter by itself:
+ * first += take1 (g - first), second += take2 (g^2 - second),
+ * value = keep value - rate first / (correction sqrt(second) + epsilon), with take = 1 - beta. */
+TEXGS_API int32_t texgs_adam(int64_t n_parameters, const texgs_learned*, float take1, float take2, float epsilon,
+                             void* stream);
+
+/* Where a camera sees spheres around means [n, 3], of `reach` exp(largest of scales [n, axes]): bounds [5] are the
+ * least camera z, and the least and largest x / z and y / z. The first is 0 or less, and the others void, where a
+ * sphere reaches behind the camera or a value is not finite. */
+TEXGS_API int32_t texgs_screen_bounds(int64_t n, int32_t axes, const float* means, const float* scales,
+                                      const float* viewmat, float reach, float* bounds, void* stream);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
