@@ -60,7 +60,7 @@ def bounds(p, camera):
     return float(depths.min()), *edges
 
 
-@pytest.mark.parametrize("count", [1, 15, 9001])
+@pytest.mark.parametrize("count", [4, 15, 9001])
 @pytest.mark.parametrize("axes", [2, 3])
 def test_the_box_is_that_of_all_spheres(count, axes, device):  # noqa: F811
     p = random_surfels(count, count, 0.3, 0.1)

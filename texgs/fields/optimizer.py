@@ -54,6 +54,8 @@ class Optimizer:
         betas: tuple[float, float] = (0.9, 0.999),
     ) -> None:
         self._rates, self._betas = dict(rates), betas
+        self._table = (NativeLearned * len(rates))()
+        self._rows = list(self._table)
         for name in rates:
             check.floating(name, parameters[name])
         self.parameters = {name: _leaf(x, name in rates) for name, x in parameters.items()}
@@ -72,8 +74,7 @@ class Optimizer:
         }
         if not learning:
             return
-        table = (NativeLearned * len(learning))()
-        for row, (name, gradient) in zip(table, learning.items(), strict=True):
+        for row, (name, gradient) in zip(self._rows, learning.items(), strict=False):
             x, rate, moments = self.parameters[name], self._rates[name], self._moments[name]
             moments.steps += 1
             row.n = x.numel()
@@ -83,7 +84,8 @@ class Optimizer:
             row.rate = rate.at(progress) / (1 - beta1**moments.steps)
             row.correction = (1 - beta2**moments.steps) ** -0.5
             x.grad = None
-        native.call("texgs_adam", len(table), table, 1 - beta1, 1 - beta2, EPSILON, device=x.device)
+        shares = (1 - beta1, 1 - beta2)
+        native.call("texgs_adam", len(learning), self._table, *shares, EPSILON, device=x.device)
         torch.autograd.graph.increment_version([self.parameters[name] for name in learning])
 
     def edit_rows(self, n: int, keep: Tensor, added: Mapping[str, Tensor]) -> None:

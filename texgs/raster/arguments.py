@@ -1,6 +1,7 @@
 """Checks of what the rasterizer is called with; what passes comes out dense."""
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import lru_cache
 from math import inf, isfinite
 from operator import index, mul
 
@@ -41,16 +42,38 @@ def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -
 
     `constant` names those for which there is no gradient, `cpu` says why other devices are refused.
     """
-    sizes: dict[str, int] = {}
     given = {name: tensor for name, (tensor, _) in tensors.items() if tensor is not None}
+    sizes = _sizes(tuple((tensors[name][1], getattr(x, "shape", None)) for name, x in given.items()))
+    if sizes is None or any(x.dtype != torch.float32 for x in given.values()):
+        sizes = _require_one_by_one(given, tensors)
+    if cpu or len({x.device for x in given.values()}) > 1:
+        for name, tensor in given.items():
+            if cpu and tensor.device.type != "cpu":
+                raise DeviceError(f"{name}: expected a tensor on cpu, got {tensor.device}; {cpu}")
+        check.same_device(**given)
+    check.constant(**{name: given.get(name) for name in constant})
+    return sizes
+
+
+@lru_cache(maxsize=64)  # training loops ask the same again and again
+def _sizes(shapes: tuple[tuple[str, tuple[int, ...] | None], ...]) -> dict[str, int] | None:
+    """Return the sizes of the axes of shapes, each with its axes; None where one does not fit."""
+    sizes: dict[str, int] = {}
+    for axes, shape in shapes:
+        found = None if shape is None else check.bind(shape, axes, tuple(sizes.items()))
+        if found is None:
+            return None
+        sizes |= found
+    return sizes
+
+
+def _require_one_by_one(given: Mapping[str, Tensor], tensors: Inputs) -> dict[str, int]:
+    """Return the sizes of axes, or say which tensor has another shape or dtype."""
+    sizes: dict[str, int] = {}
     for name, tensor in given.items():
         sizes |= check.shape(name, tensor, tensors[name][1], **sizes)
     for name, tensor in given.items():
         check.floating(name, tensor)
-        if cpu and tensor.device.type != "cpu":
-            raise DeviceError(f"{name}: expected a tensor on cpu, got {tensor.device}; {cpu}")
-    check.same_device(**given)
-    check.constant(**{name: given.get(name) for name in constant})
     return sizes
 
 
@@ -151,8 +174,9 @@ def view(
         raise ArgumentError(f"width, height: expected whole numbers, got {size[0]!r}, {size[1]!r}") from None
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise ArgumentError(f"width, height: expected 1 to {MAX_SIDE} pixels, got {width} x {height}")
-    ranges = {"depth_range": (depth_range, f"2 {height} {width}")}
-    require({"means": (surfels.means, "N 3"), **ranges}, constant=ranges)
+    if depth_range is not None:
+        ranges = {"depth_range": (depth_range, f"2 {height} {width}")}
+        require({"means": (surfels.means, "N 3"), **ranges}, constant=ranges)
     if options.check_finite:
         check.finite(**surfels._asdict(), **{name: x for name, (x, _) in constant.items()})
     planes = surfels.channels + 3 * len(wanted) + 2

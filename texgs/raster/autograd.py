@@ -1,6 +1,5 @@
 """The native rasterizer as a differentiable function of torch, and what one call of it works on."""
 
-from collections.abc import Iterable, Mapping
 from ctypes import byref
 from dataclasses import dataclass
 from functools import cached_property
@@ -72,6 +71,16 @@ class View:
     depth_range: Tensor | None = None  # [2, H, W] camera z
     raw: bool = False  # scales are natural logarithms and opacities logits, and so are their gradients
 
+    def images(self, surfels: SurfelTensors) -> dict[str, Tensor]:
+        """Return memory for the planar images of surfels that are wanted."""
+        means, size = surfels.means, (self.height, self.width)
+        images = {"color": means.new_empty(surfels.channels, *size), "alpha": means.new_empty(size)}
+        for name in self.outputs & {"depth", "median", "distortion"}:
+            images[name] = means.new_empty(size)
+        if "normal" in self.outputs:
+            images["normal"] = means.new_empty(3, *size)
+        return images
+
     def structures(self, surfels: SurfelTensors) -> tuple[native.Struct, ...]:
         """Return the surfels, camera and options as the library takes them."""
         means, quats, scales, opacities, shift, *colors = surfels
@@ -113,33 +122,6 @@ def contribute(
     return sums, weight_sum, weight_max, pixels
 
 
-def render(
-    surfels: SurfelTensors, view: View, more: Mapping[str, Tensor]
-) -> tuple[dict[str, Tensor], native.Handle]:
-    """Render the planar images that a view has, and `more` outputs; return the images, and what made them."""
-    means, size = surfels.means, (view.height, view.width)
-    images = {"color": means.new_empty(surfels.channels, *size), "alpha": means.new_empty(size)}
-    for name in view.outputs & {"depth", "median", "distortion"}:
-        images[name] = means.new_empty(size)
-    if "normal" in view.outputs:
-        images["normal"] = means.new_empty(3, *size)
-    return images, bin_surfels(surfels, view, {**images, **more})
-
-
-def differentiate(
-    frame: native.Handle,
-    surfels: SurfelTensors,
-    view: View,
-    images: Mapping[str, Tensor | None],
-    by_image: Mapping[str, Tensor | None],
-    into: Iterable[Tensor | None],
-) -> None:
-    """Write the gradients of surfel tensors, those that have memory `into`, from those of planar images."""
-    structures = (*view.structures(surfels), Image(**images), Image(**by_image), Gradients(*into))
-    with frame.lock:
-        native.call("texgs_backward", frame.pointer, *structures, device=surfels.means.device)
-
-
 class RasterizeFunction(torch.autograd.Function):
     """Surfel tensors to images; the images are planar, [C, H, W] and [H, W]."""
 
@@ -149,7 +131,8 @@ class RasterizeFunction(torch.autograd.Function):
         surfels = SurfelTensors(*tensors)
         means = surfels.means
         radii = {"radii": means.new_empty(len(means))} if "statistics" in view.outputs else {}
-        images, frame = render(surfels, view, radii)
+        images = view.images(surfels)
+        frame = bin_surfels(surfels, view, images | radii)
         if radii:
             _, weight_sum, weight_max, pixels = contribute(frame, surfels, view, None)
             extra["statistics"] = Statistics(weight_sum, weight_max, pixels, radii["radii"])
@@ -168,6 +151,7 @@ class RasterizeFunction(torch.autograd.Function):
         surfels, images = SurfelTensors(*ctx.saved_tensors[:n]), ctx.saved_tensors[n : n + len(IMAGES)]
         dense = (None if grad is None else grad.contiguous() for grad in grads)
         results = native.gradients(surfels, ctx.needs_input_grad[2:])
-        named, by_image = (dict(zip(IMAGES, some, strict=True)) for some in (images, dense))
-        differentiate(ctx.frame, surfels, ctx.view, named, by_image, results)
+        structures = (*ctx.view.structures(surfels), Image(*images), Image(*dense), Gradients(*results))
+        with ctx.frame.lock:
+            native.call("texgs_backward", ctx.frame.pointer, *structures, device=surfels.means.device)
         return None, None, *results

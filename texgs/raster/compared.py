@@ -6,12 +6,16 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from texgs.core import check
 from texgs.raster import arguments, native
-from texgs.raster.autograd import SurfelTensors, View, differentiate, render
-from texgs.raster.losses import planar
+from texgs.raster.autograd import SCENE, Gradients, Image, SurfelTensors, View
+from texgs.raster.losses import planar, scaled
 from texgs.raster.types import DEFAULT_OPTIONS, Options
 
-COLORS = 3  # channels that are colour; others are attributes
+NativeTarget = native.struct(
+    "texgs_target", "p color alpha, f l1 dssim alpha_l1 alpha_dssim normal smoothness"
+)
+native.declare("texgs_rendered_loss", *SCENE, Image, Image, NativeTarget, Gradients, "p")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,63 +61,36 @@ def rendered_loss(
     outputs = ("normal", "depth") if comparison.normal > 0 else ()
     constants = (*matrices, background, None)
     view = arguments.view(surfels, constants, (width, height), None, outputs, options, raw=True)
-    targets = {"color": (comparison.color, f"{height} {width} 3"), "alpha": (comparison.alpha, f"{height} {width}")}
-    arguments.require({"means": (surfels.means, "N 3"), **targets}, constant=targets)
+    sides = {"H": height, "W": width}
+    check.shape("color", comparison.color, "H W 3", **sides)
+    check.shape("alpha", comparison.alpha, "H W", **sides)
     wanted = [torch.is_grad_enabled() and x is not None and x.requires_grad for x in surfels]
     return _RenderedLoss.apply(view, comparison, shift_gradient, wanted, *surfels)
 
 
 class _RenderedLoss(torch.autograd.Function):
+    """The gradients of what is wanted are there before they are asked for; autograd hands them on, once."""
+
     @staticmethod
     def forward(
-        ctx: Any,
-        view: View,
-        comparison: Comparison,
-        shift_gradient: Tensor | None,
-        wanted: list[bool],
-        *tensors: Any,
+        ctx: Any, view: View, c: Comparison, shift_gradient: Tensor | None, wanted: list[bool], *tensors: Any
     ) -> Tensor:
         surfels = SurfelTensors(*tensors)
-        images, frame = render(surfels, view, {})
+        images = view.images(surfels)
         by_image = {name: torch.empty_like(image) for name, image in images.items()}
-        loss = _compare(comparison, view, images, by_image)
-        if any(wanted):
-            gradients = SurfelTensors(*native.gradients(surfels, wanted))
-            into = gradients._replace(shift=shift_gradient)
-            differentiate(frame, surfels, view, images, by_image, into)
-            ctx.gradients = gradients
-        return loss
+        if c.alpha_l1 == c.alpha_dssim == 0:
+            del by_image["alpha"]
+        weights = (c.l1, c.dssim, c.alpha_l1, c.alpha_dssim, c.normal, c.smoothness)
+        target = NativeTarget(planar(c.color), c.alpha.contiguous(), *weights)
+        ctx.gradients = SurfelTensors(*native.gradients(surfels, wanted))
+        into = Gradients(*ctx.gradients._replace(shift=shift_gradient)) if any(wanted) else None
+        values = surfels.means.new_zeros(4)
+        given = (*view.structures(surfels), Image(**images), Image(**by_image), target, into, values)
+        native.call("texgs_rendered_loss", *given, device=values.device)
+        return values.sum()
 
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
         gradients, ctx.gradients = ctx.gradients, None  # autograd may add to what it is handed
-        # A weight of 1 is common and scaling a pass; looking at it would make a GPU wait.
-        if upstream.device.type != "cpu" or upstream.item() != 1.0:
-            gradients = [g if g is None else g.mul_(upstream) for g in gradients]
-        return None, None, None, None, *gradients
-
-
-def _compare(
-    c: Comparison, view: View, images: dict[str, Tensor], by_image: dict[str, Tensor]
-) -> Tensor:
-    """Return the sum of losses, and write the gradients of images; those without one are left out."""
-    color, alpha = images["color"], images["alpha"]
-    target, target_alpha = planar(c.color), c.alpha.contiguous()
-    size, values = (view.height, view.width), color.new_zeros(4)
-    calls = [("texgs_l1_dssim", color, target, COLORS, *size, c.l1, c.dssim, values[0], by_image["color"])]
-    if c.alpha_l1 > 0 or c.alpha_dssim > 0:
-        weights = (c.alpha_l1, c.alpha_dssim)
-        calls.append(("texgs_l1_dssim", alpha, target_alpha, 1, *size, *weights, values[1], by_image["alpha"]))
-    else:
-        del by_image["alpha"]
-    if c.normal > 0:
-        drawn = (images["normal"], images["depth"], alpha, view.viewmat, view.K)
-        results = (values[2], by_image["normal"], by_image["depth"])
-        calls.append(("texgs_normal_consistency", *drawn, *size, c.normal, *results))
-    if attributes := len(color) - COLORS:
-        maps, results = color[COLORS:], (values[3], by_image["color"][COLORS:])
-        calls.append(("texgs_bilateral_smoothness", maps, target, target_alpha, attributes, *size, c.smoothness, *results))
-    for name, *given in calls:
-        native.call(name, *given, device=color.device)
-    return values.sum()
+        return None, None, None, None, *scaled(gradients, upstream)

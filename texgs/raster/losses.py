@@ -172,11 +172,16 @@ class _FusedLoss(torch.autograd.Function):
         # Autograd may accumulate into what it is handed: another pass through a retained graph computes anew.
         gradients = ctx.gradients or _evaluate(ctx.loss, ctx.saved_tensors)[1]
         ctx.gradients = None
-        # A weight of 1 is common and scaling a pass over the image; looking at it would make a GPU wait.
-        if upstream.device.type != "cpu" or upstream.item() != 1.0:
-            gradients = [g if g is None else g.mul_(upstream) for g in gradients]
         constants = len(ctx.needs_input_grad) - 1 - len(gradients)
-        return None, *gradients, *[None] * constants
+        return None, *scaled(gradients, upstream), *[None] * constants
+
+
+def scaled(gradients: Sequence[Tensor | None], upstream: Tensor) -> Sequence[Tensor | None]:
+    """Scale the gradients of a loss by its own []."""
+    # A weight of 1 is common and scaling a pass over the image; looking at it would make a GPU wait.
+    if upstream.device.type == "cpu" and upstream.item() == 1.0:
+        return gradients
+    return [g if g is None else g.mul_(upstream) for g in gradients]
 
 
 def _evaluate(loss: Loss, tensors: Sequence[Tensor]) -> tuple[Tensor, list[Tensor | None]]:

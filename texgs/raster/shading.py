@@ -1,6 +1,7 @@
 """Colour of surfels: Blinn-Phong shading, and spherical harmonics that depend on the view."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import lru_cache
 from math import pi, sqrt
 from typing import Any
 
@@ -79,9 +80,9 @@ def blinn_phong(
         if sizes[name] not in (sizes["N"], 1):
             raise ShapeError(f"{name}: expected [{sizes['N']}] or one for all [1], got [{sizes[name]}]")
     tensors = (x for x, _ in (*surfels.values(), *lights.values()))
-    lengths = [sizes[name] for name in MATERIAL]
+    shared = sum(1 << k for k, name in enumerate(MATERIAL) if sizes[name] == 1)
     dense = (None if x is None else x.contiguous() for x in tensors)
-    return _BlinnPhong.apply(_factors(lengths, ranges), (facing, clamped), *dense)
+    return _BlinnPhong.apply(_factors(shared, tuple(ranges.items())), (facing, clamped), *dense)
 
 
 class _BlinnPhong(torch.autograd.Function):
@@ -113,11 +114,11 @@ class _BlinnPhong(torch.autograd.Function):
         return None, None, *gradients
 
 
-def _factors(lengths: Sequence[int], ranges: Ranges) -> native.Struct:
-    """Return how a material becomes factors: those that one number gives to all, and the ranges of some."""
-    shared = sum(1 << k for k, length in enumerate(lengths) if length == 1)
-    raw = sum(1 << k for k, name in enumerate(MATERIAL) if name in ranges)
-    limits = [ranges.get(name, (0.0, 1.0)) for name in MATERIAL]
+@lru_cache(maxsize=64)
+def _factors(shared: int, ranges: tuple[tuple[str, tuple[float, float]], ...]) -> native.Struct:
+    """Return how a material becomes factors, some of them in ranges; bits of `shared` as in the library."""
+    limits = [dict(ranges).get(name, (0.0, 1.0)) for name in MATERIAL]
+    raw = sum(1 << k for k, name in enumerate(MATERIAL) if name in dict(ranges))
     return Factors(shared, raw, tuple(low for low, _ in limits), tuple(high - low for low, high in limits))
 
 

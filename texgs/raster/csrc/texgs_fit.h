@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a step of a fit needs besides rendering and losses: the step of Adam, and where on screen something can be. The
+ * A step of a fit: where on screen something can be, the loss of a view with its gradients, and the step of Adam. The
  * conventions are those of texgs.h.
  */
 #ifndef TEXGS_FIT_H
@@ -33,6 +33,24 @@ TEXGS_API int32_t texgs_adam(int64_t n_parameters, const texgs_learned*, float t
  * sphere reaches behind the camera or a value is not finite. */
 TEXGS_API int32_t texgs_screen_bounds(int64_t n, int32_t axes, const float* means, const float* scales,
                                       const float* viewmat, float reach, float* bounds, void* stream);
+
+enum { TEXGS_COLORS = 3 }; /* channels that are colour; those behind them are attributes */
+
+/* What a view should look like, and the weights of its losses. */
+typedef struct {
+    const float *color, *alpha; /* [3, H, W] and [H, W] */
+    float l1, dssim;            /* of colour, and of alpha: */
+    float alpha_l1, alpha_dssim;
+    float normal;     /* of normal consistency */
+    float smoothness; /* of bilateral smoothness of attributes */
+} texgs_target;
+
+/* Renders a view into `image` and writes the gradients of its losses into `grad`, which has the same memory, without
+ * that of losses that do not count: of alpha, and of normal and depth. Then the gradients `out` of surfels, if not
+ * NULL. values [4] are the losses times their weights, of colour, alpha, normals and attributes, where they count. */
+TEXGS_API int32_t texgs_rendered_loss(const texgs_surfels*, const texgs_camera*, const texgs_options*,
+                                      const texgs_image* image, const texgs_image* grad, const texgs_target*,
+                                      const texgs_gradients* out, float* values, void* stream);
 
 #ifdef __cplusplus
 }

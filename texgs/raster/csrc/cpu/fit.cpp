@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "../rendered_loss.h"
 #include "../status.h"
 #include "loss_kernels.h"
 #include "parallel.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The step of Adam, all parameters in one launch; and the part of the screen that spheres can cover.
-#include "../texgs_fit.h"
+#include "../rendered_loss.h"
 #include "maths.cuh"
 #include "workspace.cuh"
 
