@@ -8,6 +8,7 @@ from torch.testing import assert_close
 
 from tests.raster.requirements import refuses, require_same_bits
 from tests.raster.scenes import random_scene
+from texgs.core.camera import Camera
 from texgs.core.errors import ShapeError
 from texgs.raster import rasterize
 from texgs.raster.compared import Comparison, rendered_loss
@@ -22,7 +23,7 @@ def given(drawn=lambda scene: scene, channels=7, n=60, **size):
     generator = torch.Generator().manual_seed(4)
     scene = drawn(random_scene(2, n=n, **size))
     scene = replace(scene, features=torch.rand(n, channels, generator=generator), texture=None, shift=None)
-    scene = replace(scene, background=torch.rand(channels, generator=generator))
+    scene = replace(scene, background=torch.tensor([1.0] * 3 + [0.0] * (channels - 3)))
     planes = torch.rand(4, scene.height, scene.width, generator=generator)
     raw = {name: getattr(scene, name) for name in NAMES}
     raw |= {"scales": raw["scales"].log(), "opacities": raw["opacities"].clamp(1e-3, 1 - 1e-3).logit()}
@@ -30,12 +31,14 @@ def given(drawn=lambda scene: scene, channels=7, n=60, **size):
     return scene, raw, Comparison(planes[:3].permute(1, 2, 0), planes[3], **weights)
 
 
+def camera_of(scene):
+    return Camera(scene.viewmat, scene.K, scene.width, scene.height)
+
+
 def in_one_pass(scene, raw, comparison, shift_gradient=None):
     leaves = {name: x.clone().requires_grad_() for name, x in raw.items()}
     *geometry, features = leaves.values()
-    camera = (scene.viewmat, scene.K, scene.width, scene.height)
-    more = {"background": scene.background, "shift_gradient": shift_gradient}
-    loss = rendered_loss(tuple(geometry), features, camera, comparison, **more)
+    loss = rendered_loss(tuple(geometry), features, camera_of(scene), comparison, shift_gradient)
     (2 * loss).backward()
     return {"loss": loss.detach(), **{name: x.grad for name, x in leaves.items()}}
 
@@ -71,7 +74,7 @@ def test_loss_and_gradients_are_those_of_the_parts(channels, drawn, device):
 
 def test_what_counts_nothing_is_left_out():
     scene, raw, comparison = given(channels=3)
-    alone = replace(comparison, alpha_l1=0.0, alpha_dssim=0.0, normal=0.0)
+    alone = comparison._replace(alpha_l1=0.0, alpha_dssim=0.0, normal=0.0)
     assert_close(in_one_pass(scene, raw, alone)["loss"], by_parts(scene, raw, alone)[0]["loss"])
 
 
@@ -84,11 +87,10 @@ def test_without_gradients_the_value_is_the_same():
     loss = in_one_pass(scene, raw, comparison)["loss"]
     with torch.no_grad():
         *geometry, features = raw.values()
-        camera = (scene.viewmat, scene.K, scene.width, scene.height)
-        value = rendered_loss(tuple(geometry), features, camera, comparison, background=scene.background)
+        value = rendered_loss(tuple(geometry), features, camera_of(scene), comparison)
     assert torch.equal(value, loss)
 
 
 def test_a_target_of_another_size_is_refused():
     scene, raw, comparison = given()
-    refuses(ShapeError, "alpha", in_one_pass, scene, raw, replace(comparison, alpha=torch.zeros(2, 2)))
+    refuses(ShapeError, "alpha", in_one_pass, scene, raw, comparison._replace(alpha=torch.zeros(2, 2)))

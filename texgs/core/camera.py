@@ -77,7 +77,7 @@ class Camera:
     def crop(self, left: int, top: int, right: int, bottom: int) -> Self:
         """Return the camera of the pixels left <= x < right, top <= y < bottom of this one's image."""
         K = self.K - self.K.new_tensor([[0, 0, left], [0, 0, top], [0, 0, 0]])
-        return replace(self, K=K, width=right - left, height=bottom - top)
+        return type(self)(self.viewmat, K, right - left, bottom - top)
 
     def resized(self, longer: int) -> Self:
         """Return the camera of the same view at another resolution, the longer side having so many pixels."""

@@ -116,10 +116,10 @@ def split(sh: Tensor) -> dict[str, Tensor]:
 
 def join(parameters: Mapping[str, Tensor], degree: int | None = None) -> dict[str, Tensor]:
     """Return the parameters with one `sh` again, up to a degree."""
-    joined = {name: x for name, x in parameters.items() if name != "sh_rest"}
+    joined = dict(parameters)
     if "sh_rest" in parameters:
         count = parameters["sh_rest"].shape[1] if degree is None else (degree + 1) ** 2 - 1
-        joined["sh"] = torch.cat([parameters["sh"], parameters["sh_rest"][:, :count]], dim=1)
+        joined["sh"] = torch.cat([parameters["sh"], joined.pop("sh_rest")[:, :count]], dim=1)
     return joined
 
 

@@ -6,11 +6,13 @@ from torch import Tensor
 from texgs.core.geometry import quats_to_matrices
 from texgs.fields.optimizer import Optimizer
 from texgs.fitting.settings import Densify
+from texgs.raster import native
 from texgs.raster.shading import MATERIAL
 
 CHILDREN = 2  # of a split
 SHRINK = 1.6  # by which children are smaller
 RESET_OPACITY = 0.01
+native.declare("texgs_observe", "n p ff pp")
 
 
 def is_shared(name: str, values: Tensor) -> bool:
@@ -34,10 +36,8 @@ class DensityControl:
 
     def observe(self, shift_gradient: Tensor, width: int, height: int) -> None:
         """Note the gradient [N, 2] of the loss for shifts in pixels."""
-        across, down = shift_gradient.unbind(1)
-        norms = torch.hypot(0.5 * width * across, 0.5 * height * down)
-        self.gradients += norms
-        self.counts += norms > 0
+        given = (len(shift_gradient), shift_gradient, 0.5 * width, 0.5 * height)
+        native.call("texgs_observe", *given, self.gradients, self.counts, device=shift_gradient.device)
 
     def step(self, iteration: int, optimizer: Optimizer, generator: torch.Generator) -> None:
         """Densify, prune or reset opacities, as the schedule says for an iteration (counted from 1)."""

@@ -14,6 +14,7 @@ from texgs.fitting.checkpoint import ResumableFit
 from texgs.fitting.densify import DensityControl
 from texgs.fitting.losses import render_view, view_loss
 from texgs.fitting.settings import Phase, Rates
+from texgs.raster.arguments import pinhole
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 
@@ -35,6 +36,8 @@ class Fit(ResumableFit):
         super().__init__(phase.iterations)
         self.shading, self.images, self.phase, self.seed = shading, images, phase, seed
         self.order: tuple[int, list[int]] = (-1, [])  # an epoch and its views
+        for camera in images.cameras:
+            pinhole(camera.viewmat, camera.K)
         size = extent(images.cameras, parameters["means"])
         self.optimizer = Optimizer(parameters, rates(parameters, phase.rates, size))
         means = self.parameters["means"]

@@ -1,7 +1,6 @@
 """The loss of one view."""
 
 from collections.abc import Mapping
-from functools import cache
 from typing import cast
 
 import torch
@@ -28,8 +27,9 @@ def view_loss(
 ) -> Tensor:
     """Render a view and compare it: L1 + D-SSIM of colour and alpha, normals, smooth material.
 
-    `shift_gradient` [N, 2] receives the gradient of shifts on screen, in pixels. Iterations count from 1, as losses may
-    start later. `turns_normals` says whether shading has gradients into the surfels' orientation and place.
+    `shift_gradient` [N, 2] receives the gradient of shifts on screen, in pixels. Iterations count from 1, as
+    losses may start later. `turns_normals` says whether shading has gradients into the surfels' orientation
+    and place.
     """
     camera = target.camera
     fixed = {} if turns_normals else {name: parameters[name].detach() for name in ("means", "quats")}
@@ -51,22 +51,13 @@ def view_loss(
     )
     return rendered_loss(
         *(tuple(parameters[name] for name in GEOMETRY), features),
-        *((camera.viewmat, camera.K, camera.width, camera.height), comparison),
-        background=background(features.shape[1], features.device),
-        shift_gradient=shift_gradient,
-        options=shading.options,
+        *(camera, comparison, shift_gradient, shading.options),
     )
 
 
 def render_view(parameters: Mapping[str, Tensor], shading: Shading, target: Target) -> Tensor:
     """Render the colours [H, W, 3] of a view over white."""
     return Splats(parameters, shading).render(target.camera, target.light).color
-
-
-@cache
-def background(channels: int, device: torch.device) -> Tensor:
-    """Return white behind colours, and 0 behind material [channels]."""
-    return torch.tensor([1.0] * 3 + [0.0] * (channels - 3), device=device)
 
 
 def material_maps(parameters: Mapping[str, Tensor], shading: Shading) -> Tensor | None:

@@ -43,37 +43,37 @@ def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -
     `constant` names those for which there is no gradient, `cpu` says why other devices are refused.
     """
     given = {name: tensor for name, (tensor, _) in tensors.items() if tensor is not None}
-    sizes = _sizes(tuple((tensors[name][1], getattr(x, "shape", None)) for name, x in given.items()))
-    if sizes is None or any(x.dtype != torch.float32 for x in given.values()):
-        sizes = _require_one_by_one(given, tensors)
-    if cpu or len({x.device for x in given.values()}) > 1:
-        for name, tensor in given.items():
-            if cpu and tensor.device.type != "cpu":
-                raise DeviceError(f"{name}: expected a tensor on cpu, got {tensor.device}; {cpu}")
-        check.same_device(**given)
+    alike = {(x.dtype, x.device) if isinstance(x, Tensor) else None for x in given.values()}
+    shapes = tuple([(tensors[name][1], x.shape) for name, x in given.items()]) if None not in alike else ()
+    sizes = _sizes(shapes)
+    if sizes is None or len(alike) != 1 or cpu or next(iter(alike))[0] != torch.float32:
+        sizes = _require_one_by_one(given, tensors, cpu)
     check.constant(**{name: given.get(name) for name in constant})
     return sizes
 
 
-@lru_cache(maxsize=64)  # training loops ask the same again and again
-def _sizes(shapes: tuple[tuple[str, tuple[int, ...] | None], ...]) -> dict[str, int] | None:
+@lru_cache(maxsize=1024)  # training loops ask the same again and again
+def _sizes(shapes: tuple[tuple[str, tuple[int, ...]], ...]) -> dict[str, int] | None:
     """Return the sizes of the axes of shapes, each with its axes; None where one does not fit."""
     sizes: dict[str, int] = {}
     for axes, shape in shapes:
-        found = None if shape is None else check.bind(shape, axes, tuple(sizes.items()))
+        found = check.bind(shape, axes, tuple(sizes.items()))
         if found is None:
             return None
         sizes |= found
     return sizes
 
 
-def _require_one_by_one(given: Mapping[str, Tensor], tensors: Inputs) -> dict[str, int]:
-    """Return the sizes of axes, or say which tensor has another shape or dtype."""
+def _require_one_by_one(given: Mapping[str, Tensor], tensors: Inputs, cpu: str) -> dict[str, int]:
+    """Return the sizes of axes, or say which tensor is wrong, and how."""
     sizes: dict[str, int] = {}
     for name, tensor in given.items():
         sizes |= check.shape(name, tensor, tensors[name][1], **sizes)
     for name, tensor in given.items():
         check.floating(name, tensor)
+        if cpu and tensor.device.type != "cpu":
+            raise DeviceError(f"{name}: expected a tensor on cpu, got {tensor.device}; {cpu}")
+    check.same_device(**given)
     return sizes
 
 
@@ -151,7 +151,6 @@ def view(
     texture: Texture | None,
     outputs: Collection[str],
     options: Options,
-    raw: bool = False,
 ) -> View:
     """Check the rest; `camera` is viewmat, K, background and depth range, `size` is (width, height)."""
     viewmat, K, background, depth_range = camera
@@ -185,7 +184,7 @@ def view(
     matrices = (viewmat.detach().contiguous(), K.detach().contiguous())
     layout = (None, None) if texture is None else (texture.sizes, texture.offsets)
     rest = (None if x is None else x.detach().contiguous() for x in (background, *layout, depth_range))
-    return View(*matrices, width, height, wanted, options, *rest, raw=raw)
+    return View(*matrices, width, height, wanted, options, *rest)
 
 
 def pinhole(viewmat: Tensor, K: Tensor) -> None:

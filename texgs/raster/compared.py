@@ -1,12 +1,13 @@
 """The loss of a rendered view with all its gradients, in one pass: for loops with a step for each view."""
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
-from texgs.core import check
+from texgs.core.camera import Camera
 from texgs.raster import arguments, native
 from texgs.raster.autograd import SCENE, Gradients, Image, SurfelTensors, View
 from texgs.raster.losses import planar, scaled
@@ -18,11 +19,10 @@ NativeTarget = native.struct(
 native.declare("texgs_rendered_loss", *SCENE, Image, Image, NativeTarget, Gradients, "p")
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(NamedTuple):
     """What a view should look like, and how much each loss counts; see `texgs.raster.losses`."""
 
-    color: Tensor  # [H, W, 3]
+    color: Tensor  # [H, W, 3] over white
     alpha: Tensor  # [H, W]
     l1: float  # weight of mean |difference| of colour
     dssim: float  # weight of 1 - SSIM of colour
@@ -35,37 +35,42 @@ class Comparison:
 def rendered_loss(
     geometry: tuple[Tensor, Tensor, Tensor, Tensor],
     features: Tensor,  # [N, C]
-    camera: tuple[Tensor, Tensor, int, int],
+    camera: Camera,
     comparison: Comparison,
-    *,
-    background: Tensor,  # [C]
     shift_gradient: Tensor | None = None,  # [N, 2]
     options: Options = DEFAULT_OPTIONS,
 ) -> Tensor:
-    """Render surfels or 3D Gaussians and compare the view: the sum of weighted losses [].
+    """Render surfels or 3D Gaussians over white and compare the view: the sum of weighted losses [].
 
     The same as losses of what `rasterize` returns; but the gradients come with the value, so that autograd
     has one function to go back through, and that once.
 
     Args:
         geometry: means, quats, natural logarithms of scales, and logits of opacities; as models keep them.
-        features: [N, C] colours [N, 3], and attributes behind them.
-        camera: viewmat, K, width and height, as in `rasterize`.
+        features: [N, C] colours [N, 3], and attributes behind them, which are over 0.
+        camera: one that `texgs.raster.arguments.pinhole` accepts, which is not asked again.
         comparison: the target and weights.
-        background: [C].
-        shift_gradient: [N, 2] memory for the gradient of shifts on screen, in pixels.
+        shift_gradient: [N, 2] dense memory for the gradient of shifts on screen, in pixels.
         options: as in `rasterize`.
     """
-    *matrices, width, height = camera
     surfels = arguments.surfel_tensors(geometry, None, features, None)
-    outputs = ("normal", "depth") if comparison.normal > 0 else ()
-    constants = (*matrices, background, None)
-    view = arguments.view(surfels, constants, (width, height), None, outputs, options, raw=True)
-    sides = {"H": height, "W": width}
-    check.shape("color", comparison.color, "H W 3", **sides)
-    check.shape("alpha", comparison.alpha, "H W", **sides)
-    wanted = [torch.is_grad_enabled() and x is not None and x.requires_grad for x in surfels]
-    return _RenderedLoss.apply(view, comparison, shift_gradient, wanted, *surfels)
+    width, height, c = camera.width, camera.height, comparison
+    fixed = {"viewmat": (camera.viewmat, "4 4"), "K": (camera.K, "3 3")}
+    fixed |= {"color": (c.color, f"{height} {width} 3"), "alpha": (c.alpha, f"{height} {width}")}
+    arguments.require({"means": (surfels.means, "N 3"), **fixed}, constant=fixed)
+    outputs = frozenset(("normal", "depth") if c.normal > 0 else ())
+    matrices = (camera.viewmat.contiguous(), camera.K.contiguous())
+    behind = _background(surfels.channels, features.device)
+    view = View(*matrices, width, height, outputs, options, behind, raw=True)
+    tensors = (*surfels[: len(geometry)], surfels.features)
+    wanted = [torch.is_grad_enabled() and x.requires_grad for x in tensors]
+    return _RenderedLoss.apply(view, comparison, shift_gradient, wanted, *tensors)
+
+
+@cache
+def _background(channels: int, device: torch.device) -> Tensor:
+    """Return white behind colours, and 0 behind attributes [channels]."""
+    return torch.tensor([1.0] * 3 + [0.0] * (channels - 3), device=device)
 
 
 class _RenderedLoss(torch.autograd.Function):
@@ -73,17 +78,16 @@ class _RenderedLoss(torch.autograd.Function):
 
     @staticmethod
     def forward(
-        ctx: Any, view: View, c: Comparison, shift_gradient: Tensor | None, wanted: list[bool], *tensors: Any
+        ctx: Any, view: View, c: Comparison, shift: Tensor | None, wanted: list[bool], *tensors: Tensor
     ) -> Tensor:
-        surfels = SurfelTensors(*tensors)
+        surfels = _surfels(tensors)
         images = view.images(surfels)
         by_image = {name: torch.empty_like(image) for name, image in images.items()}
         if c.alpha_l1 == c.alpha_dssim == 0:
             del by_image["alpha"]
-        weights = (c.l1, c.dssim, c.alpha_l1, c.alpha_dssim, c.normal, c.smoothness)
-        target = NativeTarget(planar(c.color), c.alpha.contiguous(), *weights)
-        ctx.gradients = SurfelTensors(*native.gradients(surfels, wanted))
-        into = Gradients(*ctx.gradients._replace(shift=shift_gradient)) if any(wanted) else None
+        target = NativeTarget(planar(c.color), c.alpha.contiguous(), *c[2:])
+        ctx.gradients = native.gradients(tensors, wanted)
+        into = Gradients(*_surfels(ctx.gradients, shift)) if any(wanted) else None
         values = surfels.means.new_zeros(4)
         given = (*view.structures(surfels), Image(**images), Image(**by_image), target, into, values)
         native.call("texgs_rendered_loss", *given, device=values.device)
@@ -94,3 +98,9 @@ class _RenderedLoss(torch.autograd.Function):
     def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
         gradients, ctx.gradients = ctx.gradients, None  # autograd may add to what it is handed
         return None, None, None, None, *scaled(gradients, upstream)
+
+
+def _surfels(tensors: Sequence[Any], shift: Tensor | None = None) -> SurfelTensors:
+    """Return means, quats, scales, opacities and features, or their gradients, by name."""
+    *geometry, features = tensors
+    return SurfelTensors(*geometry, shift, features)

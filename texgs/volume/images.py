@@ -89,7 +89,8 @@ class Images:
         if around is not None:
             box = self.boxes[index].union(around).within(*self.size)
             planes = planes[:, box.top : box.bottom, box.left : box.right]
-            camera, share = camera.crop(*box), planes[0].numel() / self.planes[0, 0].numel()
+            camera = camera.crop(*box)
+            share = camera.width * camera.height / (self.cameras[index].width * self.cameras[index].height)
         planes = planes.to(device) / 255
         color = planes[:3].permute(1, 2, 0)
         return Target(color, planes[3], camera.to(device), self.lights[index], share)

@@ -34,6 +34,10 @@ TEXGS_API int32_t texgs_adam(int64_t n_parameters, const texgs_learned*, float t
 TEXGS_API int32_t texgs_screen_bounds(int64_t n, int32_t axes, const float* means, const float* scales,
                                       const float* viewmat, float reach, float* bounds, void* stream);
 
+/* Adds to sums [n] the length of gradients [n, 2] times `across` and `down`, and 1 to counts [n] where it is not 0. */
+TEXGS_API int32_t texgs_observe(int64_t n, const float* gradient, float across, float down, float* sums, float* counts,
+                                void* stream);
+
 enum { TEXGS_COLORS = 3 }; /* channels that are colour; those behind them are attributes */
 
 /* What a view should look like, and the weights of its losses. */

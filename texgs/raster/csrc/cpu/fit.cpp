@@ -3,6 +3,7 @@
 #include "../texgs_fit.h"
 
 #include <algorithm>
+#include <cmath>
 #include <mutex>
 
 #include "../rendered_loss.h"
@@ -54,5 +55,17 @@ int32_t texgs_screen_bounds(int64_t n, int32_t axes, const float* means, const f
         });
         const float found[5] = {all.nearest, all.left, all.right, all.top, all.bottom};
         std::copy(found, found + 5, bounds);
+    });
+}
+
+int32_t texgs_observe(int64_t n, const float* gradient, float across, float down, float* sums, float* counts, void*) {
+    return guarded([&] {
+        parallel_for(n, kFloatRange, [&](int64_t begin, int64_t end, int) {
+            for (int64_t i = begin; i < end; ++i) {
+                const float x = across * gradient[2 * i], y = down * gradient[2 * i + 1];
+                const float length = std::sqrt(x * x + y * y);
+                sums[i] += length, counts[i] += length > 0.0f ? 1.0f : 0.0f;
+            }
+        });
     });
 }

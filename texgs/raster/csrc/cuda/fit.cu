@@ -29,6 +29,14 @@ __global__ __launch_bounds__(kBlock) void adam_kernel(const Table table, float t
     p.values[i] = fma(p.keep, p.values[i], -(p.rate * first / fma(p.correction, sqrt(second), epsilon)));
 }
 
+__global__ __launch_bounds__(kBlock) void observe_kernel(int64_t n, const float* gradient, float across, float down,
+                                                         float* sums, float* counts) {
+    const int64_t i = int64_t(blockIdx.x) * kBlock + threadIdx.x;
+    if (i >= n) return;
+    const float x = across * gradient[2 * i], y = down * gradient[2 * i + 1], length = sqrt(fma(x, x, y * y));
+    sums[i] += length, counts[i] += length > 0.0f ? 1.0f : 0.0f;
+}
+
 // Nearest, left, -right, top, -bottom: the least of each counts.
 struct Bounds {
     float v[5] = {kHuge, kHuge, kHuge, kHuge, kHuge};
@@ -115,5 +123,13 @@ int32_t texgs_screen_bounds(int64_t n, int32_t axes, const float* means, const f
         launch(spheres_kernel, blocks, kBlock, stream, n, axes, means, scales, viewmat, reach, parts);
         const Bounds* from = parts;
         launch(gather_kernel, int64_t(1), kBlock, stream, blocks, from, bounds);
+    });
+}
+
+int32_t texgs_observe(int64_t n, const float* gradient, float across, float down, float* sums, float* counts,
+                      void* on) {
+    if (n == 0) return TEXGS_OK;
+    return on_device_of(sums, on, [&](cudaStream_t stream) {
+        launch(observe_kernel, blocks_for(n, kBlock), kBlock, stream, n, gradient, across, down, sums, counts);
     });
 }
