@@ -4,12 +4,17 @@ import pytest
 import torch
 from torch.testing import assert_close
 
+from tests.devices import device  # noqa: F401, a fixture
 from tests.fitting.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
-from texgs.fields.splats import visible_part
+from tests.raster.requirements import require_same_bits
+from texgs.fields.gaussians.model import Baked
+from texgs.fields.splats import Splats, visible_part, zeroth
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fitting.losses import view_loss
 from texgs.fitting.settings import Losses
+from texgs.raster import losses
+from texgs.raster.losses import l1_dssim, normal_consistency
 from texgs.raster.reference.losses import bilateral_smoothness, ssim
 from texgs.raster.shading import MATERIAL
 
@@ -123,3 +128,83 @@ def test_loss_and_gradients_of_the_visible_part_are_those_of_the_view():
         assert_close(
             gradient, results[1][1][name], rtol=1e-3, atol=1e-4 * scale, msg=lambda m, n=name: f"{n}: {m}"
         )
+
+
+def by_parts(parameters, shading, target, weights, shift):
+    """The same loss of what the rasterizer returns, by functions that have tests of their own, and autograd."""
+    camera, colors = target.camera, shading.colors(parameters, target.camera, target.light)
+    maps = torch.stack(list(material(parameters, "bounded").values()), dim=1) if weights.smoothness else None
+    features = colors if maps is None else torch.cat([colors, maps], dim=1)
+    white = torch.tensor([1.0] * 3 + [0.0] * (features.shape[1] - 3))
+    outputs = ("normal", "depth") if weights.normal else ()
+    shown = {"features": features, "background": white, "shift": shift, "outputs": outputs}
+    seen = Splats(parameters, shading).rasterized(camera, **shown)
+    total = l1_dssim(seen.color[..., :3], target.color, weights.dssim)
+    total = total + weights.alpha * l1_dssim(seen.alpha, target.alpha, weights.dssim)
+    if weights.normal:
+        drawn = (seen.normal, seen.depth, seen.alpha)
+        total = total + weights.normal * normal_consistency(*drawn, camera.viewmat, camera.K)
+    if weights.smoothness:
+        smoothness = losses.bilateral_smoothness(seen.color[..., 3:], target.color, target.alpha)
+        total = total + 4 * weights.smoothness * smoothness
+    return target.share * total
+
+
+def gaussians():
+    """3D Gaussians of one colour each."""
+    p = ball_seeds(60, opacity=0.6)
+    shape = {name: p[name] for name in ("means", "quats", "opacities")}
+    sh = zeroth(torch.rand(60, 3, generator=torch.Generator().manual_seed(0)))
+    return {
+        **shape,
+        "scales": torch.cat([p["scales"] - torch.arange(2), p["scales"][:, :1] + 0.5], dim=1),
+        "sh": sh,
+    }
+
+
+FITTED = {
+    "all": (per_surfel, OPTICS, ALL),
+    "color": (ball_seeds, OPTICS, Losses(alpha=0.0)),
+    "gaussians": (gaussians, Baked(), Losses()),
+}
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_gradients_are_those_of_the_parts(name, target, device):  # noqa: F811
+    given, shading, weights = FITTED[name]
+    parameters = given()
+    target = replace(target, share=0.5)
+    ours, theirs = ({x: y.clone().requires_grad_() for x, y in parameters.items()} for _ in range(2))
+    shift_gradient = torch.full((len(parameters["means"]), 2), torch.nan)
+    shift = torch.zeros_like(shift_gradient, requires_grad=True)
+    loss = view_loss(ours, shading, target, weights, shift_gradient, 1)
+    (3 * loss).backward()
+    expected = by_parts(theirs, shading, target, weights, shift)
+    (3 * expected).backward()
+    assert_close(loss, expected, rtol=1e-5, atol=0)
+    pairs = {x: (ours[x].grad, theirs[x].grad) for x in parameters} | {
+        "shift": (3 * shift_gradient, shift.grad)
+    }
+    for x, (value, other) in pairs.items():
+        scale = float(other.abs().max())
+        assert_close(value, other, rtol=2e-4, atol=2e-5 * scale, msg=lambda m, n=x: f"{n}: {m}")
+
+
+def test_any_number_of_threads_gives_the_same_bits():
+    images = ball_images(1, size=150)
+
+    def computed():
+        leaves = {name: x.clone().requires_grad_() for name, x in ball_seeds(3000).items()}
+        shift_gradient = torch.zeros(3000, 2)
+        loss = view_loss(leaves, OPTICS, images.target(0), Losses(normal=0.05), shift_gradient, 1)
+        loss.backward()
+        return {"loss": loss.detach(), "shift": shift_gradient, **{k: x.grad for k, x in leaves.items()}}
+
+    require_same_bits(computed)
+
+
+def test_without_gradients_the_value_is_the_same(target):
+    with torch.no_grad():
+        value = view_loss(per_surfel(), OPTICS, target, ALL, None, 1)
+    leaves = {name: x.clone().requires_grad_() for name, x in per_surfel().items()}
+    assert torch.equal(value, view_loss(leaves, OPTICS, target, ALL, None, 1).detach())

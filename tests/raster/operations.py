@@ -92,7 +92,7 @@ def raw_surfels(n, shared=()):
     generator = torch.Generator().manual_seed(n + 1)
     given = surfels(n, shared, "directional")
     given |= {name: torch.randn(len(given[name]), generator=generator) - 1 for name in RANGES}
-    return given | {"color": 1.6 * given["color"]}
+    return given | {"color": 2 * given["color"] - 0.2}
 
 
 def raw_blinn_phong(**given):
@@ -166,9 +166,9 @@ OPERATIONS = {
         for facing in (False, True)
     },
     "blinn_phong, raw": Operation(
-        *(partial(shading.blinn_phong, facing=True, ranges=RANGES, clamped=True), raw_blinn_phong),
-        *(raw_surfels, ("color", *MATERIAL, "means", "quats"), ("camera_position", "light")),
-        tuple((n, shared) for n in (1, 17, 3001) for shared in ((), ("shininess", "specular"), MATERIAL)),
+        *(partial(shading.blinn_phong, facing=True, ranges=RANGES), raw_blinn_phong, raw_surfels),
+        *(("color", *MATERIAL, "means", "quats"), ("camera_position", "light")),
+        tuple((n, shared) for n in (1, 17, 3001) for shared in ((), MATERIAL)),
         *((12,), (5000, ("diffuse", "shininess")), (2e-6, 1e-5)),
     ),
     "spherical_harmonics": Operation(

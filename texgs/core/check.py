@@ -1,14 +1,9 @@
 """Checks at public borders, reported by argument name: shapes, dtypes, devices, gradients, finite values."""
 
-from collections.abc import Mapping
-from functools import lru_cache
-
 import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
-
-Sizes = tuple[tuple[str, int], ...]  # of axes that have a name
 
 
 def shape(name: str, tensor: Tensor, spec: str, **known: int) -> dict[str, int]:
@@ -27,23 +22,22 @@ def shape(name: str, tensor: Tensor, spec: str, **known: int) -> dict[str, int]:
     """
     if not isinstance(tensor, Tensor):
         raise ArgumentError(f"{name}: expected a torch.Tensor, got {type(tensor).__name__}")
-    sizes = bind(tensor.shape, spec, tuple(known.items()))
+    sizes = bind(tensor.shape, spec, known)
     if sizes is None:
         expected = ", ".join(str(known.get(token, token)) for token in spec.split())
-        hint = _hint(tuple(tensor.shape), spec, tuple(known.items()))
+        hint = _hint(tuple(tensor.shape), spec, known)
         raise ShapeError(f"{name}: expected [{expected}], got {list(tensor.shape)}{hint}")
-    return dict(sizes)
+    return sizes
 
 
-@lru_cache(maxsize=256)  # loops ask the same again and again
-def bind(actual: tuple[int, ...], spec: str, known: Sizes) -> Mapping[str, int] | None:
+def bind(actual: tuple[int, ...], spec: str, known: dict[str, int]) -> dict[str, int] | None:
     """Return the sizes of the names in `spec` for a shape, or None where the shape does not fit."""
     tokens = spec.split()
     if len(tokens) != len(actual):
         return None
     sizes: dict[str, int] = {}
     for token, size in zip(tokens, actual, strict=True):
-        expected = int(token) if token.isdigit() else {**dict(known), **sizes}.get(token, size)
+        expected = int(token) if token.isdigit() else {**known, **sizes}.get(token, size)
         if size != expected:
             return None
         if not token.isdigit():
@@ -51,7 +45,7 @@ def bind(actual: tuple[int, ...], spec: str, known: Sizes) -> Mapping[str, int] 
     return sizes
 
 
-def _hint(actual: tuple[int, ...], spec: str, known: Sizes) -> str:
+def _hint(actual: tuple[int, ...], spec: str, known: dict[str, int]) -> str:
     """Return what a user most likely did: a transpose, or a missing or superfluous axis."""
     remedies = (
         (len(actual) == 2, actual[::-1], "did you transpose?"),

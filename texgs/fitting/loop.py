@@ -9,12 +9,11 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import FitError
 from texgs.fields.optimizer import Optimizer, Rate
-from texgs.fields.splats import Shading, join, visible_part
+from texgs.fields.splats import Shading, Splats, join, visible_part
 from texgs.fitting.checkpoint import ResumableFit
 from texgs.fitting.densify import DensityControl
-from texgs.fitting.losses import render_view, view_loss
+from texgs.fitting.losses import view_loss
 from texgs.fitting.settings import Phase, Rates
-from texgs.raster.arguments import pinhole
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 
@@ -36,8 +35,6 @@ class Fit(ResumableFit):
         super().__init__(phase.iterations)
         self.shading, self.images, self.phase, self.seed = shading, images, phase, seed
         self.order: tuple[int, list[int]] = (-1, [])  # an epoch and its views
-        for camera in images.cameras:
-            pinhole(camera.viewmat, camera.K)
         size = extent(images.cameras, parameters["means"])
         self.optimizer = Optimizer(parameters, rates(parameters, phase.rates, size))
         means = self.parameters["means"]
@@ -83,7 +80,8 @@ class Fit(ResumableFit):
     def psnr(self) -> float:
         """Return the PSNR in dB of the first training view as it is now."""
         target = self.images.target(0, self.parameters["means"].device)
-        error = (render_view(join(self.parameters), self.shading, target).clamp(0, 1) - target.color).square()
+        now = Splats(join(self.parameters), self.shading).render(target.camera, target.light).color
+        error = (now.clamp(0, 1) - target.color).square()
         return -10 * math.log10(max(float(error.mean()), 1e-10))
 
     def view_of(self, iteration: int) -> int:

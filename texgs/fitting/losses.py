@@ -1,19 +1,24 @@
-"""The loss of one view."""
+"""The loss of one view, with its gradients."""
 
-from collections.abc import Mapping
-from typing import cast
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any, cast
 
 import torch
 from torch import Tensor
 
-from texgs.fields.splats import GEOMETRY, Shading, Splats
+from texgs.fields.splats import GEOMETRY, Shading
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fitting.settings import Losses
-from texgs.raster.compared import Comparison, rendered_loss
+from texgs.raster import arguments, native
+from texgs.raster.autograd import SCENE, Gradients, Image, SurfelTensors, View
+from texgs.raster.losses import planar, scaled
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Target
 
 SMOOTHED = len(MATERIAL)
+Compared = native.struct("texgs_target", "p color alpha, f l1 dssim alpha_l1 alpha_dssim normal smoothness")
+native.declare("texgs_rendered_loss", *SCENE, Image, Image, Compared, Gradients, "p")
 
 
 def view_loss(
@@ -27,9 +32,9 @@ def view_loss(
 ) -> Tensor:
     """Render a view and compare it: L1 + D-SSIM of colour and alpha, normals, smooth material.
 
-    `shift_gradient` [N, 2] receives the gradient of shifts on screen, in pixels. Iterations count from 1, as
-    losses may start later. `turns_normals` says whether shading has gradients into the surfels' orientation
-    and place.
+    `shift_gradient` [N, 2], dense, receives the gradient of shifts on screen, in pixels. Iterations count from
+    1, as losses may start later. `turns_normals` says whether shading has gradients into the surfels'
+    orientation and place.
     """
     camera = target.camera
     fixed = {} if turns_normals else {name: parameters[name].detach() for name in ("means", "quats")}
@@ -37,27 +42,63 @@ def view_loss(
         Tensor, shading.colors({**parameters, **fixed}, camera, target.light)
     )
     maps = material_maps(parameters, shading) if weights.smoothness > 0 else None
-    has_normals = weights.normal > 0 and iteration > weights.normal_from
     features = colors if maps is None else torch.cat([colors, maps], dim=1)
-    of_colors, of_alpha = target.share, target.share * weights.alpha
-    comparison = Comparison(
-        *(target.color, target.alpha),
-        l1=of_colors * (1 - weights.dssim),
-        dssim=of_colors * weights.dssim,
-        alpha_l1=of_alpha * (1 - weights.dssim) if weights.alpha_l1 else 0.0,
-        alpha_dssim=of_alpha * weights.dssim,
-        normal=target.share * weights.normal if has_normals else 0.0,
-        smoothness=target.share * weights.smoothness * SMOOTHED,
-    )
-    return rendered_loss(
-        *(tuple(parameters[name] for name in GEOMETRY), features),
-        *(camera, comparison, shift_gradient, shading.options),
+    geometry = tuple(parameters[name] for name in GEOMETRY)
+    surfels = arguments.surfel_tensors(geometry, None, features, None)
+    outputs = ("normal", "depth") if weights.normal > 0 and iteration > weights.normal_from else ()
+    seen = (camera.viewmat.contiguous(), camera.K.contiguous(), camera.width, camera.height)
+    behind = background(surfels.channels, features.device)
+    view = View(*seen, frozenset(outputs), shading.options, behind, raw=True)
+    tensors = (*surfels[: len(geometry)], surfels.features)
+    wanted = [torch.is_grad_enabled() and x.requires_grad for x in tensors]
+    return _ViewLoss.apply(
+        view, compared(target, weights), (shift_gradient, weights.alpha > 0), wanted, *tensors
     )
 
 
-def render_view(parameters: Mapping[str, Tensor], shading: Shading, target: Target) -> Tensor:
-    """Render the colours [H, W, 3] of a view over white."""
-    return Splats(parameters, shading).render(target.camera, target.light).color
+def compared(target: Target, weights: Losses) -> native.Struct:
+    """Return what the library compares a view with, and the weights of its losses."""
+    l1 = 1 - weights.dssim
+    of_alpha = (weights.alpha * l1 * weights.alpha_l1, weights.alpha * weights.dssim)
+    factors = (l1, weights.dssim, *of_alpha, weights.normal, weights.smoothness * SMOOTHED)
+    images = (planar(target.color), target.alpha.contiguous())
+    return Compared(*images, *(target.share * factor for factor in factors))
+
+
+class _ViewLoss(torch.autograd.Function):
+    """Gradients are there with the value, before they are asked for; autograd hands them on, once."""
+
+    @staticmethod
+    def forward(
+        ctx: Any, view: View, target: native.Struct, observed: tuple, wanted: list[bool], *tensors: Tensor
+    ) -> Tensor:
+        surfels, (shift_gradient, has_alpha) = named(tensors), observed
+        images = view.images(surfels)
+        by_image = {name: torch.empty_like(x) for name, x in images.items() if has_alpha or name != "alpha"}
+        ctx.gradients = native.gradients(tensors, wanted)
+        into = Gradients(*named(ctx.gradients, shift_gradient)) if any(wanted) else None
+        values = surfels.means.new_zeros(4)
+        given = (*view.structures(surfels), Image(**images), Image(**by_image), target, into, values)
+        native.call("texgs_rendered_loss", *given, device=values.device)
+        return values.sum()
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
+        gradients, ctx.gradients = ctx.gradients, None  # autograd may add to what it is handed
+        return *[None] * 4, *scaled(gradients, upstream)
+
+
+def named(tensors: Sequence[Any], shift: Tensor | None = None) -> SurfelTensors:
+    """Return means, quats, scales, opacities and features, or their gradients, by name."""
+    *geometry, features = tensors
+    return SurfelTensors(*geometry, shift, features)
+
+
+@cache
+def background(channels: int, device: torch.device) -> Tensor:
+    """Return white behind colours, and 0 behind material [channels]."""
+    return torch.tensor([1.0] * 3 + [0.0] * (channels - 3), device=device)
 
 
 def material_maps(parameters: Mapping[str, Tensor], shading: Shading) -> Tensor | None:

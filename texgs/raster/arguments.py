@@ -1,7 +1,6 @@
 """Checks of what the rasterizer is called with; what passes comes out dense."""
 
 from collections.abc import Collection, Mapping, Sequence
-from functools import lru_cache
 from math import inf, isfinite
 from operator import index, mul
 
@@ -34,6 +33,8 @@ AXES = {
 }
 
 
+PASSED: dict[tuple, dict[str, int]] = {}  # sizes by all that is asked of tensors: loops ask again and again
+MOST_PASSED = 4096
 Inputs = Mapping[str, tuple[Tensor | None, str]]  # by name: a tensor, if any, and axes as in `check.shape`
 
 
@@ -43,37 +44,24 @@ def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -
     `constant` names those for which there is no gradient, `cpu` says why other devices are refused.
     """
     given = {name: tensor for name, (tensor, _) in tensors.items() if tensor is not None}
-    alike = {(x.dtype, x.device) if isinstance(x, Tensor) else None for x in given.values()}
-    shapes = tuple([(tensors[name][1], x.shape) for name, x in given.items()]) if None not in alike else ()
-    sizes = _sizes(shapes)
-    if sizes is None or len(alike) != 1 or cpu or next(iter(alike))[0] != torch.float32:
-        sizes = _require_one_by_one(given, tensors, cpu)
+    about = [
+        (getattr(x, "shape", None), getattr(x, "dtype", None), getattr(x, "device", None))
+        for x in given.values()
+    ]
+    key = (cpu, *[(name, tensors[name][1]) for name in given], *about)
+    if (sizes := PASSED.get(key)) is None:
+        sizes = {}
+        for name, tensor in given.items():
+            sizes |= check.shape(name, tensor, tensors[name][1], **sizes)
+        for name, tensor in given.items():
+            check.floating(name, tensor)
+            if cpu and tensor.device.type != "cpu":
+                raise DeviceError(f"{name}: expected a tensor on cpu, got {tensor.device}; {cpu}")
+        check.same_device(**given)
+        if len(PASSED) >= MOST_PASSED:
+            PASSED.clear()
+        PASSED[key] = sizes
     check.constant(**{name: given.get(name) for name in constant})
-    return sizes
-
-
-@lru_cache(maxsize=1024)  # training loops ask the same again and again
-def _sizes(shapes: tuple[tuple[str, tuple[int, ...]], ...]) -> dict[str, int] | None:
-    """Return the sizes of the axes of shapes, each with its axes; None where one does not fit."""
-    sizes: dict[str, int] = {}
-    for axes, shape in shapes:
-        found = check.bind(shape, axes, tuple(sizes.items()))
-        if found is None:
-            return None
-        sizes |= found
-    return sizes
-
-
-def _require_one_by_one(given: Mapping[str, Tensor], tensors: Inputs, cpu: str) -> dict[str, int]:
-    """Return the sizes of axes, or say which tensor is wrong, and how."""
-    sizes: dict[str, int] = {}
-    for name, tensor in given.items():
-        sizes |= check.shape(name, tensor, tensors[name][1], **sizes)
-    for name, tensor in given.items():
-        check.floating(name, tensor)
-        if cpu and tensor.device.type != "cpu":
-            raise DeviceError(f"{name}: expected a tensor on cpu, got {tensor.device}; {cpu}")
-    check.same_device(**given)
     return sizes
 
 
@@ -173,9 +161,8 @@ def view(
         raise ArgumentError(f"width, height: expected whole numbers, got {size[0]!r}, {size[1]!r}") from None
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise ArgumentError(f"width, height: expected 1 to {MAX_SIDE} pixels, got {width} x {height}")
-    if depth_range is not None:
-        ranges = {"depth_range": (depth_range, f"2 {height} {width}")}
-        require({"means": (surfels.means, "N 3"), **ranges}, constant=ranges)
+    ranges = {"depth_range": (depth_range, f"2 {height} {width}")}
+    require({"means": (surfels.means, "N 3"), **ranges}, constant=ranges)
     if options.check_finite:
         check.finite(**surfels._asdict(), **{name: x for name, (x, _) in constant.items()})
     planes = surfels.channels + 3 * len(wanted) + 2

@@ -2,7 +2,6 @@
 
 from ctypes import byref
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import torch
@@ -86,18 +85,13 @@ class View:
         means, quats, scales, opacities, shift, *colors = surfels
         geometry = (*scales.shape, means, quats, scales, opacities, self.raw, shift)
         n_texels = 0 if surfels.texels is None else len(surfels.texels)
-        layout = (self.sizes, self.offsets, n_texels)
-        return (Surfels(*geometry, surfels.channels, *colors, *layout), *self._constants)
-
-    @cached_property
-    def _constants(self) -> tuple[native.Struct, ...]:
-        """The camera and options as the library takes them."""
+        scene = Surfels(*geometry, surfels.channels, *colors, self.sizes, self.offsets, n_texels)
         o = self.options
         low_pass = min(o.low_pass, 1e30)  # infinite: no filter; the library multiplies it by 0 at the centre
         far = min(o.far, 1e30)  # infinite: far / (far - near) is 1
         filters = (low_pass, o.filter_sigma, o.dilation, o.antialiased)
         options = RenderOptions(self.background, *filters, o.alpha_min, o.transmittance_min, o.near, far)
-        return Camera(self.viewmat, self.K, self.width, self.height, self.depth_range), options
+        return scene, Camera(self.viewmat, self.K, self.width, self.height, self.depth_range), options
 
 
 def bin_surfels(surfels: SurfelTensors, view: View, images: dict[str, Tensor]) -> native.Handle:

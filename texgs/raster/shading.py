@@ -1,7 +1,7 @@
 """Colour of surfels: Blinn-Phong shading, and spherical harmonics that depend on the view."""
 
-from collections.abc import Mapping
-from functools import lru_cache
+from collections.abc import Mapping, Sequence
+from ctypes import c_float
 from math import pi, sqrt
 from typing import Any
 
@@ -14,12 +14,10 @@ from texgs.raster.arguments import require
 
 MATERIAL = ("ambient", "diffuse", "specular", "shininess")
 Y00 = 0.5 / sqrt(pi)  # the constant harmonic
-Ranges = Mapping[str, tuple[float, float]]  # of factors, by the name in MATERIAL
-NO_RANGES: Ranges = {}
+Ranges = Mapping[str, tuple[float, float]]
 DEGREES = {1: 0, 4: 1, 9: 2, 16: 3}  # of spherical harmonics, by number of coefficients
-Factors = native.struct("texgs_factors", "i shared raw, 4f low span")
-native.declare("texgs_blinn_phong", "n ppppp", Factors, "pppp ii pp")
-native.declare("texgs_blinn_phong_backward", "n ppppp", Factors, "pppp ii pp ppppppp")
+native.declare("texgs_blinn_phong", "n ppppp i pppp ii pp")
+native.declare("texgs_blinn_phong_backward", "n ppppp i pppp ii p pp ppppppp")
 native.declare("texgs_spherical_harmonics", "n i ppp p")
 native.declare("texgs_spherical_harmonics_backward", "n i ppp pp pp")
 
@@ -36,8 +34,7 @@ def blinn_phong(
     light: Tensor | None = None,  # [3]
     *,
     facing: bool = False,
-    ranges: Ranges = NO_RANGES,
-    clamped: bool = False,
+    ranges: Ranges | None = None,
 ) -> tuple[Tensor, Tensor]:
     """Shade surfels: color * (ambient + diffuse |n.l|) + specular |n.h|^shininess.
 
@@ -64,9 +61,8 @@ def blinn_phong(
         camera_position: [3] world units.
         light: [3] direction to a light far away, of any length, or None for a light at the camera.
         facing: whether the light must be in front of the face that the camera sees.
-        ranges: lowest and highest factor of what is given as raw numbers, by the name of the argument: a
-            factor is low + (high - low) * sigmoid(number).
-        clamped: whether shaded colours are clamped to [0, 1], as renderers of volumes do.
+        ranges: given, colours are clamped to [0, 1], and factors named here are given as raw numbers: they
+            are low + (high - low) * sigmoid(number).
 
     Returns:
         base [N, 3], the shaded colours, and gain [N], ambient + diffuse |n.l| or what `facing` makes of it.
@@ -80,24 +76,27 @@ def blinn_phong(
         if sizes[name] not in (sizes["N"], 1):
             raise ShapeError(f"{name}: expected [{sizes['N']}] or one for all [1], got [{sizes[name]}]")
     tensors = (x for x, _ in (*surfels.values(), *lights.values()))
-    shared = sum(1 << k for k, name in enumerate(MATERIAL) if sizes[name] == 1)
-    dense = (None if x is None else x.contiguous() for x in tensors)
-    return _BlinnPhong.apply(_factors(shared, tuple(ranges.items())), (facing, clamped), *dense)
+    return _BlinnPhong.apply(
+        (facing, ranges is not None), ranges or {}, *(None if x is None else x.contiguous() for x in tensors)
+    )
 
 
 class _BlinnPhong(torch.autograd.Function):
-    """How, then colour, material, means, quats, camera position, and the light or None."""
+    """Whether facing and clamped, ranges, then colour, material, means, quats, camera position, and the light or None."""
 
     @staticmethod
     def forward(
-        ctx: Any, factors: native.Struct, sides: tuple[bool, bool], *tensors: Tensor
+        ctx: Any, how: tuple[bool, bool], ranges: Ranges, color: Tensor, *others: Tensor
     ) -> tuple[Tensor, Tensor]:
-        color = tensors[0]
+        factors = [
+            between(*ranges[name], x) if name in ranges else x
+            for name, x in zip(MATERIAL, others, strict=False)
+        ]
+        tensors = (color, *factors, *others[4:])
         base, gain = torch.empty_like(color), color.new_empty(len(color))
-        given = (len(color), *tensors[:5], factors, *tensors[5:], *sides)
-        native.call("texgs_blinn_phong", *given, base, gain, device=color.device)
+        native.call("texgs_blinn_phong", *_arguments(tensors, how), base, gain, device=color.device)
         ctx.save_for_backward(*tensors)
-        ctx.factors, ctx.sides = factors, sides
+        ctx.how, ctx.ranges = how, ranges
         ctx.set_materialize_grads(False)
         return base, gain
 
@@ -108,18 +107,24 @@ class _BlinnPhong(torch.autograd.Function):
         grad_base = torch.zeros_like(tensors[0]) if grad_base is None else grad_base.contiguous()
         grad_gain = None if grad_gain is None else grad_gain.contiguous()
         gradients = native.gradients(tensors, ctx.needs_input_grad[2:])
-        given = (len(tensors[0]), *tensors[:5], ctx.factors, *tensors[5:], *ctx.sides)
-        results = (grad_base, grad_gain, *gradients[:7])
-        native.call("texgs_blinn_phong_backward", *given, *results, device=grad_base.device)
+        limits = [ctx.ranges.get(name, (0.0, 0.0)) for name in MATERIAL]
+        ranges = (c_float * 8)(*(x for low, high in limits for x in (low, high - low)))
+        arguments = (*_arguments(tensors, ctx.how), ranges, grad_base, grad_gain, *gradients[:7])
+        native.call("texgs_blinn_phong_backward", *arguments, device=grad_base.device)
         return None, None, *gradients
 
 
-@lru_cache(maxsize=64)
-def _factors(shared: int, ranges: tuple[tuple[str, tuple[float, float]], ...]) -> native.Struct:
-    """Return how a material becomes factors, some of them in ranges; bits of `shared` as in the library."""
-    limits = [dict(ranges).get(name, (0.0, 1.0)) for name in MATERIAL]
-    raw = sum(1 << k for k, name in enumerate(MATERIAL) if name in dict(ranges))
-    return Factors(shared, raw, tuple(low for low, _ in limits), tuple(high - low for low, high in limits))
+def _arguments(tensors: Sequence[Tensor], how: tuple[bool, bool]) -> tuple:
+    """Return the arguments of the library, with a bit for each factor of the material that is shared."""
+    shared = sum(len(x) == 1 and 1 << k for k, x in enumerate(tensors[1:5]))
+    return len(tensors[0]), *tensors[:5], shared, *tensors[5:], *how
+
+
+def between(low: float, high: float, raw: Tensor) -> Tensor:
+    """Return values in a range; without an operation that one of 0 to 1 does not need."""
+    values = raw.sigmoid()
+    values = values if high - low == 1 else (high - low) * values
+    return values if low == 0 else low + values
 
 
 def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:

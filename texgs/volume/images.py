@@ -85,14 +85,15 @@ class Images:
 
     def target(self, index: int, device: torch.device | str = "cpu", around: Box | None = None) -> Target:
         """Return one view as floats: of `around` and all that is not white, or by default the whole."""
-        planes, camera, share = self.planes[index], self.cameras[index], 1.0
-        if around is not None:
-            box = self.boxes[index].union(around).within(*self.size)
-            planes = planes[:, box.top : box.bottom, box.left : box.right]
-            camera = camera.crop(*box)
-            share = camera.width * camera.height / (self.cameras[index].width * self.cameras[index].height)
+        planes, camera, whole = self.planes[index], self.cameras[index], Box(0, 0, *self.size)
+        box = whole if around is None else self.boxes[index].union(around).within(*self.size)
+        if box != whole:
+            planes, camera = planes[:, box.top : box.bottom, box.left : box.right], camera.crop(*box)
         planes = planes.to(device) / 255
-        color = planes[:3].permute(1, 2, 0)
+        color, share = (
+            planes[:3].permute(1, 2, 0),
+            camera.width * camera.height / (whole.right * whole.bottom),
+        )
         return Target(color, planes[3], camera.to(device), self.lights[index], share)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -12,7 +12,7 @@ from texgs.core.geometry import quats_to_matrices
 from texgs.core.light import Light
 from texgs.fields.surfels.material import RANGES, require_material
 from texgs.raster import Options, Texture
-from texgs.raster.shading import MATERIAL, blinn_phong, spherical_harmonics
+from texgs.raster.shading import MATERIAL, Ranges, between, blinn_phong, spherical_harmonics
 
 FAR = 1e4  # world units: a viewer so far away sees all surfels from one direction
 LEAST = 1e-6  # share of ambient or of diffuse light, so that its logit is finite
@@ -39,7 +39,7 @@ class ShadingModel:
             return spherical_harmonics(p["sh"], p["means"], camera.position)
         colors = p["colors"] + p["palette"] if "texels" in p else p["colors"]
         raw, ranges = (p[name] for name in MATERIAL), RANGES[self.material]
-        base, gain = self.lit(colors, raw, p, camera, light, ranges=ranges, clamped=True)
+        base, gain = self.lit(colors, raw, p, camera, light, ranges)  # clamped, as renderers of volumes do
         return Texture(base, gain, p["texels"], p["sizes"], p["offsets"]) if "texels" in p else base
 
     def lit(
@@ -49,19 +49,18 @@ class ShadingModel:
         p: Mapping[str, Tensor],
         camera: Camera,
         light: Light,
-        **more: Any,
+        ranges: Ranges | None = None,
     ) -> tuple[Tensor, Tensor]:
-        """Return base [N, 3] and gain [N] of surfels with parameters `p`; factors are those of `material`.
+        """Return base [N, 3] and gain [N] of surfels with parameters `p`; factors and `ranges` as in `blinn_phong`.
 
         A viewer who is not local is far behind the camera. Normals of their own come before those of surfels.
-        `more` is as in `blinn_phong`.
         """
         viewer = camera.position if self.local_viewer else -FAR * camera.viewmat[2, :3]
         toward = None if light.kind == "headlight" else light.direction(camera).to(camera.viewmat)
         a, d, s, b = factors
         turns = p.get("normals", p["quats"])
         places = (p["means"], turns, viewer, toward)
-        return blinn_phong(colors, a, d, s, b, *places, facing=self.facing, **more)
+        return blinn_phong(colors, a, d, s, b, *places, facing=self.facing, ranges=ranges)
 
 
 def seen_normals(parameters: Mapping[str, Tensor], camera: Camera) -> Tensor:
@@ -81,13 +80,6 @@ def material(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
         name: between(*ranges[name], parameters[name]) if name in ranges else parameters[name]
         for name in MATERIAL
     }
-
-
-def between(low: float, high: float, raw: Tensor) -> Tensor:
-    """Return values in a range; without an operation that one of 0 to 1 does not need."""
-    values = raw.sigmoid()
-    values = values if high - low == 1 else (high - low) * values
-    return values if low == 0 else low + values
 
 
 def raw_material(

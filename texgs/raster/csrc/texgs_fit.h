@@ -16,10 +16,10 @@ typedef struct {
     int64_t n; /* floats */
     float* values;
     const float* gradient;
-    float *first, *second; /* running means of the gradient and of its square */
-    float keep;            /* by which values are multiplied before the step: 1 - decay */
-    float rate;            /* learning rate / (1 - beta1^t), t the number of steps with this one */
-    float correction;      /* 1 / sqrt(1 - beta2^t) */
+    float* moments;   /* [2, n] running means of the gradient, first, and of its square, second */
+    float keep;       /* by which values are multiplied before the step: 1 - decay */
+    float rate;       /* learning rate / (1 - beta1^t), t the number of steps with this one */
+    float correction; /* 1 / sqrt(1 - beta2^t) */
 } texgs_learned;
 
 /* A step of Adam with decoupled decay (Kingma and Ba 2015; Loshchilov and Hutter 2019), each parameter by itself:

@@ -37,13 +37,8 @@ TEXGS_API int32_t texgs_bilateral_smoothness(const float* attribute, const float
                                              int32_t channels, int32_t height, int32_t width, float weight,
                                              float* value, float* gradient, void* stream);
 
-/* How the numbers of a Blinn-Phong material, in the order ambient, diffuse, specular, shininess, become its factors.
- * Bit k of `shared`: number k is one for all surfels ([1]) instead of one each ([N]). Bit k of `raw`: its factor is
- * low + span * sigmoid(number) instead of the number, and so is its gradient. The structure itself lies on the host. */
-typedef struct {
-    int32_t shared, raw;
-    float low[4], span[4];
-} texgs_factors;
+/* Which parameters of a Blinn-Phong material are one number for all surfels ([1]) instead of one each ([N]). */
+enum { TEXGS_SHARED_AMBIENT = 1, TEXGS_SHARED_DIFFUSE = 2, TEXGS_SHARED_SPECULAR = 4, TEXGS_SHARED_SHININESS = 8 };
 
 /* gain = ambient + diffuse |n.l|, shaded = gain * color + specular |n.h|^shininess, n the surfel's normal, l the
  * direction to the light (`light` [3], any length, or NULL for a headlight), h halfway between it and the direction v
@@ -51,19 +46,19 @@ typedef struct {
  * gain = ambient + diffuse max(n.l, 0), and the highlight max(n.h, 0)^shininess is there only where n.l > 0. With
  * `clamped` not 0, shaded is clamped to 0 and 1. `gain` may be NULL. */
 TEXGS_API int32_t texgs_blinn_phong(int64_t n, const float* color, const float* ambient, const float* diffuse,
-                                    const float* specular, const float* shininess, const texgs_factors* factors,
-                                    const float* means, const float* quats, const float* camera_position,
-                                    const float* light, int32_t facing, int32_t clamped, float* shaded, float* gain,
-                                    void* stream);
-/* A gradient of a shared parameter is one number. Outputs and `grad_gain` may be NULL. */
+                                    const float* specular, const float* shininess, int32_t shared, const float* means,
+                                    const float* quats, const float* camera_position, const float* light,
+                                    int32_t facing, int32_t clamped, float* shaded, float* gain, void* stream);
+/* A gradient of a shared parameter is one number. `ranges` [4, 2], on the host, or NULL: of parameters that are
+ * low + span * sigmoid(number), low and span; the gradient is that of the number. Others have span 0. Outputs and
+ * `grad_gain` may be NULL. */
 TEXGS_API int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* ambient, const float* diffuse,
-                                             const float* specular, const float* shininess,
-                                             const texgs_factors* factors, const float* means, const float* quats,
-                                             const float* camera_position, const float* light, int32_t facing,
-                                             int32_t clamped, const float* grad_shaded, const float* grad_gain,
-                                             float* grad_color, float* grad_ambient, float* grad_diffuse,
-                                             float* grad_specular, float* grad_shininess, float* grad_means,
-                                             float* grad_quats, void* stream);
+                                             const float* specular, const float* shininess, int32_t shared,
+                                             const float* means, const float* quats, const float* camera_position,
+                                             const float* light, int32_t facing, int32_t clamped, const float* ranges,
+                                             const float* grad_shaded, const float* grad_gain, float* grad_color,
+                                             float* grad_ambient, float* grad_diffuse, float* grad_specular,
+                                             float* grad_shininess, float* grad_means, float* grad_quats, void* stream);
 
 /* color [N, 3] = max(0, 0.5 + sum_k Y_k(direction from the camera) sh[k]) for sh [N, (degree + 1)^2, 3]. */
 TEXGS_API int32_t texgs_spherical_harmonics(int64_t n, int32_t degree, const float* sh, const float* means,

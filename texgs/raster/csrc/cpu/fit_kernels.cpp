@@ -34,14 +34,15 @@ TEXGS_INLINE vf largest_scale(const float* scales, int axes, int64_t i, int n) {
 
 void adam_range(const AdamJob& job, const texgs_learned& p, int64_t begin, int64_t end) {
     const vf take1 = job.take1, take2 = job.take2, epsilon = job.epsilon;
+    float *const firsts = p.moments, *const seconds = p.moments + p.n;
     const vf keep = p.keep, rate = p.rate, correction = p.correction;
     for (int64_t i = begin; i < end; i += kLanes) {
         const int n = static_cast<int>(end - i < kLanes ? end - i : kLanes);
-        const vf g = load_part(p.gradient + i, n), m = load_part(p.first + i, n), v = load_part(p.second + i, n);
+        const vf g = load_part(p.gradient + i, n), m = load_part(firsts + i, n), v = load_part(seconds + i, n);
         const vf first = fma(take1, g - m, m), second = fma(take2, fma(g, g, -v), v);
         const vf step = rate * first / fma(correction, sqrt(second), epsilon);
-        store_part(p.first + i, first, n);
-        store_part(p.second + i, second, n);
+        store_part(firsts + i, first, n);
+        store_part(seconds + i, second, n);
         store_part(p.values + i, fma(keep, load_part(p.values + i, n), -step), n);
     }
 }

@@ -46,12 +46,13 @@ struct SmoothnessJob {
 
 struct BlinnPhongJob {
     const float *color, *ambient, *diffuse, *specular, *shininess;
-    texgs_factors factors;
+    int shared;  // TEXGS_SHARED_...
     const float *means, *quats, *camera_position, *light;
     bool facing, clamped;
     float *shaded, *gain;
     const float *grad_shaded, *grad_gain;
     float *grad_color, *grad_ambient, *grad_diffuse, *grad_specular, *grad_shininess, *grad_means, *grad_quats;
+    const float* ranges;  // [4, 2] or null
 };
 // Sums over surfels of the gradients of ambient, diffuse, specular and shininess.
 struct MaterialSums {

@@ -147,14 +147,14 @@ int32_t texgs_bilateral_smoothness(const float* attribute, const float* guide, c
 }
 
 int32_t texgs_blinn_phong(int64_t n, const float* color, const float* ambient, const float* diffuse,
-                          const float* specular, const float* shininess, const texgs_factors* factors,
-                          const float* means, const float* quats, const float* camera_position, const float* light,
-                          int32_t facing, int32_t clamped, float* shaded, float* gain, void*) {
+                          const float* specular, const float* shininess, int32_t shared, const float* means,
+                          const float* quats, const float* camera_position, const float* light, int32_t facing,
+                          int32_t clamped, float* shaded, float* gain, void*) {
     return guarded([&] {
         const LossKernels& kernels = loss_kernels();
         BlinnPhongJob job{};
         job.color = color, job.ambient = ambient, job.diffuse = diffuse, job.specular = specular;
-        job.shininess = shininess, job.factors = *factors, job.means = means, job.quats = quats;
+        job.shininess = shininess, job.shared = shared, job.means = means, job.quats = quats;
         job.camera_position = camera_position, job.light = light, job.facing = facing != 0, job.clamped = clamped != 0;
         job.shaded = shaded, job.gain = gain;
         parallel_for(n, kSurfelRange, [&](int64_t begin, int64_t end, int) { kernels.blinn_phong(job, begin, end); });
@@ -162,18 +162,18 @@ int32_t texgs_blinn_phong(int64_t n, const float* color, const float* ambient, c
 }
 
 int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* ambient, const float* diffuse,
-                                   const float* specular, const float* shininess, const texgs_factors* factors,
-                                   const float* means, const float* quats, const float* camera_position,
-                                   const float* light, int32_t facing, int32_t clamped, const float* grad_shaded,
+                                   const float* specular, const float* shininess, int32_t shared, const float* means,
+                                   const float* quats, const float* camera_position, const float* light, int32_t facing,
+                                   int32_t clamped, const float* ranges, const float* grad_shaded,
                                    const float* grad_gain, float* grad_color, float* grad_ambient, float* grad_diffuse,
                                    float* grad_specular, float* grad_shininess, float* grad_means, float* grad_quats,
                                    void*) {
     return guarded([&] {
         const LossKernels& kernels = loss_kernels();
-        const BlinnPhongJob job{color,        ambient,       diffuse,         specular,   shininess,   *factors,
+        const BlinnPhongJob job{color,        ambient,       diffuse,         specular,   shininess,   shared,
                                 means,        quats,         camera_position, light,      facing != 0, clamped != 0,
                                 nullptr,      nullptr,       grad_shaded,     grad_gain,  grad_color,  grad_ambient,
-                                grad_diffuse, grad_specular, grad_shininess,  grad_means, grad_quats};
+                                grad_diffuse, grad_specular, grad_shininess,  grad_means, grad_quats,  ranges};
         double material[4] = {0.0, 0.0, 0.0, 0.0};
         for (const MaterialSums& sums : collect_ranges<MaterialSums>(n, kSurfelRange, [&](int64_t begin, int64_t end) {
                  return kernels.blinn_phong_backward(job, begin, end);
@@ -181,7 +181,7 @@ int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* a
             for (int k = 0; k < 4; ++k) material[k] += sums.v[k];
         float* const out[4] = {grad_ambient, grad_diffuse, grad_specular, grad_shininess};
         for (int k = 0; k < 4; ++k)
-            if (out[k] && (factors->shared >> k & 1)) *out[k] = static_cast<float>(material[k]);
+            if (out[k] && (shared >> k & 1)) *out[k] = static_cast<float>(material[k]);
     });
 }
 

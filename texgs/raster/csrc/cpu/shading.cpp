@@ -6,7 +6,6 @@
 #include "interleaved.h"
 #include "loss_kernels.h"
 
-#include "../factors.h"
 #include "../maths.h"
 
 namespace texgs::TEXGS_ISA {
@@ -27,32 +26,15 @@ struct Lit {
     vf lobe;                     // |n_h|^shininess
 };
 
-// The factors of all surfels: those that are shared are computed once.
-class Factors {
-public:
-    explicit Factors(const BlinnPhongJob& job)
-        : form_(job.factors), numbers_{job.ambient, job.diffuse, job.specular, job.shininess} {
-        for (int k = 0; k < 4; ++k)
-            if (form_.shared >> k & 1) shared_[k] = factor(form_, k, vf(*numbers_[k]));
-    }
-    Material operator()(int64_t i, int n) const { return {at(0, i, n), at(1, i, n), at(2, i, n), at(3, i, n)}; }
+TEXGS_INLINE vf parameter(const float* p, bool shared, int64_t i, int n) {
+    return shared ? vf(*p) : load_part(p + i, n);
+}
 
-private:
-    vf at(int k, int64_t i, int n) const {
-        return form_.shared >> k & 1 ? shared_[k] : factor(form_, k, load_part(numbers_[k] + i, n));
-    }
-
-    const texgs_factors& form_;
-    const float* const numbers_[4];
-    vf shared_[4];
-};
-
-// Of a colour that is clamped to 0 and 1, in which NaN stays; and of its gradient, which passes within.
-TEXGS_INLINE vf clamped(vf a) { return select(a <= a, min(max(a, 0.0f), 1.0f), a); }
-TEXGS_INLINE vf clamped_backward(vf a, vf gradient) { return zero_unless((a >= vf(0.0f)) & (a <= vf(1.0f)), gradient); }
-TEXGS_INLINE Vec3<vf> shade(const Material& m, const Lit& s, vf gain, Vec3<vf> color) {
-    const vf highlight = m.specular * s.lobe;
-    return {fma(gain, color.x, highlight), fma(gain, color.y, highlight), fma(gain, color.z, highlight)};
+Material load_material(const BlinnPhongJob& job, int64_t i, int n) {
+    return {parameter(job.ambient, job.shared & TEXGS_SHARED_AMBIENT, i, n),
+            parameter(job.diffuse, job.shared & TEXGS_SHARED_DIFFUSE, i, n),
+            parameter(job.specular, job.shared & TEXGS_SHARED_SPECULAR, i, n),
+            parameter(job.shininess, job.shared & TEXGS_SHARED_SHININESS, i, n)};
 }
 
 TEXGS_INLINE Vec3<vf> load_vectors(const float* p, int64_t i, int n) {
@@ -106,6 +88,20 @@ Lit light_surfels(const BlinnPhongJob& job, const Material& m, int64_t i, int n)
     return s;
 }
 
+// A colour that is clamped to 0 and 1, in which NaN stays; and its gradient, which passes within.
+TEXGS_INLINE vf clamped(vf a) { return select(a <= a, min(max(a, 0.0f), 1.0f), a); }
+TEXGS_INLINE vf clamped_backward(vf a, vf gradient) { return zero_unless((a >= vf(0.0f)) & (a <= vf(1.0f)), gradient); }
+
+// The derivative of value = low + span sigmoid(x).
+TEXGS_INLINE vf sigmoid_slope(vf value, float low, float span) {
+    return (value - vf(low)) * (vf(1.0f) - (value - vf(low)) * vf(1.0f / span));
+}
+
+TEXGS_INLINE Vec3<vf> shade(const Material& m, const Lit& s, vf gain, Vec3<vf> color) {
+    const vf highlight = m.specular * s.lobe;
+    return {fma(gain, color.x, highlight), fma(gain, color.y, highlight), fma(gain, color.z, highlight)};
+}
+
 TEXGS_INLINE vf sign(vf a) { return select(a > vf(0.0f), 1.0f, select(a < vf(0.0f), -1.0f, 0.0f)); }
 
 // Gradients of the directions: of the normal into the quaternion, of the view direction into the mean.
@@ -130,10 +126,9 @@ void direction_gradients(const BlinnPhongJob& job, const Lit& s, vf by_n_l, vf b
 }  // namespace
 
 void blinn_phong_range(const BlinnPhongJob& job, int64_t begin, int64_t end) {
-    const Factors factors(job);
     for (int64_t i = begin; i < end; i += kLanes) {
         const int n = static_cast<int>(end - i < kLanes ? end - i : kLanes);
-        const Material m = factors(i, n);
+        const Material m = load_material(job, i, n);
         const Lit s = light_surfels(job, m, i, n);
         const vf gain = fma(m.diffuse, abs(s.n_l), m.ambient);
         Vec3<vf> seen = shade(m, s, gain, load_vectors(job.color, i, n));
@@ -146,11 +141,10 @@ void blinn_phong_range(const BlinnPhongJob& job, int64_t begin, int64_t end) {
 MaterialSums blinn_phong_backward_range(const BlinnPhongJob& job, int64_t begin, int64_t end) {
     float* const out[4] = {job.grad_ambient, job.grad_diffuse, job.grad_specular, job.grad_shininess};
     vf total[4] = {0.0f, 0.0f, 0.0f, 0.0f};
-    const Factors factors(job);
     for (int64_t i = begin; i < end; i += kLanes) {
         const int n = static_cast<int>(end - i < kLanes ? end - i : kLanes);
         const vm present = to_float(iota()) < vf(static_cast<float>(n));
-        const Material m = factors(i, n);
+        const Material m = load_material(job, i, n);
         const Lit s = light_surfels(job, m, i, n);
         const vf gain = fma(m.diffuse, abs(s.n_l), m.ambient);
         const Vec3<vf> color = load_vectors(job.color, i, n), seen = shade(m, s, gain, color);
@@ -162,16 +156,16 @@ MaterialSums blinn_phong_backward_range(const BlinnPhongJob& job, int64_t begin,
         const vf by_gain = job.grad_gain ? dot(color, g) + load_part(job.grad_gain + i, n) : dot(color, g);
         const vf by_highlight = g.x + g.y + g.z;
         const vf cosine = max(abs(s.n_h), kSmallest), by_lobe = by_highlight * m.specular * s.lobe;
-        const vf by_material[4] = {by_gain, by_gain * abs(s.n_l), by_highlight * s.lobe,
-                                   by_lobe * vf(kLn2) * log2(cosine)};
+        vf by_material[4] = {by_gain, by_gain * abs(s.n_l), by_highlight * s.lobe, by_lobe * vf(kLn2) * log2(cosine)};
         const vf material[4] = {m.ambient, m.diffuse, m.specular, m.shininess};
         for (int k = 0; k < 4; ++k) {
             if (!out[k]) continue;
-            const vf by_number = by_material[k] * factor_slope(job.factors, k, material[k]);
-            if (job.factors.shared >> k & 1)
-                total[k] += zero_unless(present, by_number);
+            if (job.ranges && job.ranges[2 * k + 1] > 0.0f)
+                by_material[k] *= sigmoid_slope(material[k], job.ranges[2 * k], job.ranges[2 * k + 1]);
+            if (job.shared >> k & 1)
+                total[k] += zero_unless(present, by_material[k]);
             else
-                store_part(out[k] + i, by_number, n);
+                store_part(out[k] + i, by_material[k], n);
         }
         direction_gradients(job, s, by_gain * m.diffuse * sign(s.n_l), by_lobe * m.shininess / cosine * sign(s.n_h), i,
                             n);

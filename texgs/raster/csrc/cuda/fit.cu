@@ -23,9 +23,9 @@ __global__ __launch_bounds__(kBlock) void adam_kernel(const Table table, float t
     while (k < table.n && i >= table.parameters[k].n) i -= table.parameters[k++].n;
     if (k == table.n) return;
     const texgs_learned& p = table.parameters[k];
-    const float g = p.gradient[i], first = fma(take1, g - p.first[i], p.first[i]);
-    const float second = fma(take2, fma(g, g, -p.second[i]), p.second[i]);
-    p.first[i] = first, p.second[i] = second;
+    float *const m = p.moments + i, *const v = m + p.n;
+    const float g = p.gradient[i], first = fma(take1, g - *m, *m), second = fma(take2, fma(g, g, -*v), *v);
+    *m = first, *v = second;
     p.values[i] = fma(p.keep, p.values[i], -(p.rate * first / fma(p.correction, sqrt(second), epsilon)));
 }
 
@@ -103,7 +103,7 @@ using namespace texgs::cuda;
 int32_t texgs_adam(int64_t n_parameters, const texgs_learned* parameters, float take1, float take2, float epsilon,
                    void* on) {
     if (n_parameters == 0) return TEXGS_OK;
-    return on_device_of(parameters->first, on, [&](cudaStream_t stream) {
+    return on_device_of(parameters->moments, on, [&](cudaStream_t stream) {
         for (int64_t begin = 0; begin < n_parameters; begin += kTable) {
             Table table{};
             int64_t floats = 0;

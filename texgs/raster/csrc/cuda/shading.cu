@@ -3,7 +3,8 @@
 //     gain = ambient + diffuse |n.l|,  shaded = gain * color + specular |n.h|^shininess.
 // With `facing` only ambient light is left where the light is behind the face that the camera sees. Elsewhere nothing
 // changes: v, l and so h are on one side of the surfel, and for n on that side |n.l| = n.l and |n.h| = n.h.
-#include "../factors.h"
+#include <algorithm>
+
 #include "../texgs_losses.h"
 #include "maths.cuh"
 #include "workspace.cuh"
@@ -17,27 +18,25 @@ constexpr float kSmallest = 1e-30f;  // a cosine or length below is 0
 struct Job {
     int64_t n;
     const float *color, *ambient, *diffuse, *specular, *shininess;
-    texgs_factors factors;
+    int shared;
     const float *means, *quats, *camera_position, *light;
     bool facing, clamped;
 };
 struct Gradients {
     const float *shaded, *gain;
     float *color, *material[4], *means, *quats;
-    double* sums;  // [blocks, 4] of the shared parameters
+    double* sums;     // [blocks, 4] of the shared parameters
+    float ranges[8];  // low and span
 };
 
 struct Material {
     float ambient, diffuse, specular, shininess;
 
     __device__ Material(const Job& job, int64_t i)
-        : ambient(at(job, 0, job.ambient, i)),
-          diffuse(at(job, 1, job.diffuse, i)),
-          specular(at(job, 2, job.specular, i)),
-          shininess(at(job, 3, job.shininess, i)) {}
-    __device__ static float at(const Job& job, int k, const float* numbers, int64_t i) {
-        return factor(job.factors, k, numbers[job.factors.shared >> k & 1 ? 0 : i]);
-    }
+        : ambient(job.ambient[job.shared & TEXGS_SHARED_AMBIENT ? 0 : i]),
+          diffuse(job.diffuse[job.shared & TEXGS_SHARED_DIFFUSE ? 0 : i]),
+          specular(job.specular[job.shared & TEXGS_SHARED_SPECULAR ? 0 : i]),
+          shininess(job.shininess[job.shared & TEXGS_SHARED_SHININESS ? 0 : i]) {}
 };
 
 __device__ inline Vec3<float> load(const float* p, int64_t i) { return {p[3 * i], p[3 * i + 1], p[3 * i + 2]}; }
@@ -126,6 +125,12 @@ struct ByMaterial {
     float v[4] = {};
 };
 
+// The derivative of value = low + span sigmoid(x), or 1.
+__device__ inline float sigmoid_slope(float value, const float* range) {
+    const float above = value - range[0];
+    return range[1] > 0.0f ? above * (1.0f - above / range[1]) : 1.0f;
+}
+
 __device__ ByMaterial shade_backward(const Job& job, const Gradients& out, int64_t i) {
     const Material m(job, i);
     const Lit s(job, m, i);
@@ -137,10 +142,10 @@ __device__ ByMaterial shade_backward(const Job& job, const Gradients& out, int64
     const float by_gain = dot(color, g) + (out.gain ? out.gain[i] : 0.0f), by_highlight = g.x + g.y + g.z;
     const float cosine = fmaxf(abs(s.n_h), kSmallest), by_lobe = by_highlight * m.specular * s.lobe;
     store_directions(job, out, s, by_gain * m.diffuse * sign(s.n_l), by_lobe * m.shininess / cosine * sign(s.n_h), i);
-    return {{by_gain * factor_slope(job.factors, 0, m.ambient),
-             by_gain * abs(s.n_l) * factor_slope(job.factors, 1, m.diffuse),
-             by_highlight * s.lobe * factor_slope(job.factors, 2, m.specular),
-             by_lobe * kLn2 * log2f(cosine) * factor_slope(job.factors, 3, m.shininess)}};
+    return {{by_gain * sigmoid_slope(m.ambient, out.ranges),
+             by_gain * abs(s.n_l) * sigmoid_slope(m.diffuse, out.ranges + 2),
+             by_highlight * s.lobe * sigmoid_slope(m.specular, out.ranges + 4),
+             by_lobe * kLn2 * log2f(cosine) * sigmoid_slope(m.shininess, out.ranges + 6)}};
 }
 
 __global__ __launch_bounds__(kBlock) void shade_backward_kernel(const Job job, const Gradients out) {
@@ -150,7 +155,7 @@ __global__ __launch_bounds__(kBlock) void shade_backward_kernel(const Job job, c
 #pragma unroll
     for (int k = 0; k < 4; ++k) {
         if (!out.material[k]) continue;
-        if (job.factors.shared >> k & 1) {
+        if (job.shared >> k & 1) {
             const double sum = block_sum<kBlock>(by.v[k]);
             if (threadIdx.x == 0) out.sums[4 * int64_t(blockIdx.x) + k] = sum;
         } else if (i < job.n) {
@@ -166,25 +171,25 @@ using namespace texgs;
 using namespace texgs::cuda;
 
 int32_t texgs_blinn_phong(int64_t n, const float* color, const float* ambient, const float* diffuse,
-                          const float* specular, const float* shininess, const texgs_factors* factors,
-                          const float* means, const float* quats, const float* camera_position, const float* light,
-                          int32_t facing, int32_t clamped, float* shaded, float* gain, void* on) {
+                          const float* specular, const float* shininess, int32_t shared, const float* means,
+                          const float* quats, const float* camera_position, const float* light, int32_t facing,
+                          int32_t clamped, float* shaded, float* gain, void* on) {
     return on_device_of(camera_position, on, [&](cudaStream_t stream) {
-        const Job job{n,     color, ambient,         diffuse, specular,    shininess,   *factors,
+        const Job job{n,     color, ambient,         diffuse, specular,    shininess,   shared,
                       means, quats, camera_position, light,   facing != 0, clamped != 0};
         launch(shade_kernel, blocks_for(n, kBlock), kBlock, stream, job, shaded, gain);
     });
 }
 
 int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* ambient, const float* diffuse,
-                                   const float* specular, const float* shininess, const texgs_factors* factors,
-                                   const float* means, const float* quats, const float* camera_position,
-                                   const float* light, int32_t facing, int32_t clamped, const float* grad_shaded,
+                                   const float* specular, const float* shininess, int32_t shared, const float* means,
+                                   const float* quats, const float* camera_position, const float* light, int32_t facing,
+                                   int32_t clamped, const float* ranges, const float* grad_shaded,
                                    const float* grad_gain, float* grad_color, float* grad_ambient, float* grad_diffuse,
                                    float* grad_specular, float* grad_shininess, float* grad_means, float* grad_quats,
                                    void* on) {
     return with_workspace(camera_position, on, [&](Workspace& workspace, cudaStream_t stream) {
-        const Job job{n,     color, ambient,         diffuse, specular,    shininess,   *factors,
+        const Job job{n,     color, ambient,         diffuse, specular,    shininess,   shared,
                       means, quats, camera_position, light,   facing != 0, clamped != 0};
         const int64_t blocks = blocks_for(n, kBlock);
         Gradients out{grad_shaded,
@@ -193,10 +198,12 @@ int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* a
                       {grad_ambient, grad_diffuse, grad_specular, grad_shininess},
                       grad_means,
                       grad_quats,
-                      workspace.sums.ensure<double>(4 * blocks)};
+                      workspace.sums.ensure<double>(4 * blocks),
+                      {}};
+        if (ranges) std::copy(ranges, ranges + 8, out.ranges);
         launch(shade_backward_kernel, blocks, kBlock, stream, job, out);
         for (int k = 0; k < 4; ++k)
-            if (out.material[k] && (factors->shared >> k & 1))
+            if (out.material[k] && (shared >> k & 1))
                 finish_sum(out.sums + k, blocks, 4, 0.0, 1.0, out.material[k], stream);
     });
 }
