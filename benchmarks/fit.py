@@ -1,14 +1,26 @@
-"""A step of the shading phase with every map and loss, and where its time goes."""
+"""A step of the shading phase with every map and loss, and where its time goes.
+
+`python -m benchmarks.fit OUTPUT.json TREE` times steps of `quick`'s losses, of few surfels in small views, which
+are all overhead, and of many in larger ones, by the code here and by that of another source tree, which is
+built. Two processes take turns; a ratio is the median of those of the turns.
+"""
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from collections import defaultdict
+from pathlib import Path
+from statistics import median
+from time import perf_counter
 
 import torch
 from torch import Tensor
 from torch.profiler import ProfilerActivity, profile
 
-from benchmarks import scenes
+from benchmarks import machine, scenes
+from benchmarks.command import call
 from benchmarks.report import Measurement, Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
@@ -29,12 +41,11 @@ DISTANCE = 2 * Lens().radius  # as the paper's cameras see an object of side 2
 PROFILED = 40  # steps
 LOSSES = Losses(alpha=0.1, normal=0.05, smoothness=0.01)
 RATES = Rates(*[1e-12] * 8)  # the scene stays as heavy as it is
+TURNS, STEPS, WARM = 15, {33: 200, 400: 25}, 20
+PAIRS = {33: 200, 400: 20_000}  # surfels by image size
 PARTS = {  # by what the profiler's names contain; the first that fits
-    "rasterizer, forward": ("RasterizeFunction",),
-    "rasterizer, backward": ("RasterizeFunctionBackward",),
-    "losses": ("_FusedLoss", "_FusedLossBackward"),
+    "rasterizer and losses": ("_ViewLoss", "_ViewLossBackward"),
     "shading": ("_BlinnPhong", "_BlinnPhongBackward"),
-    "Adam": ("aten::_fused_adam_", "Optimizer.step#Adam.step", "Optimizer.zero_grad#Adam.zero_grad"),
 }
 
 
@@ -53,11 +64,56 @@ def run(settings: Settings) -> Section:
     return section
 
 
-def training(size: int, n: int, device: torch.device) -> Fit:
+def beside(output: str, tree: str) -> None:
+    """Time both; print and write milliseconds and ratios."""
+    pairs = {}
+    for size, n in PAIRS.items():
+        here, there = (stepping(root, size, n) for root in (str(machine.ROOT), tree))
+        turns = [(turn(here), turn(there)) for _ in range(TURNS)]
+        here.communicate(), there.communicate()
+        new, old = (round(median(times), 4) for times in zip(*turns, strict=True))
+        ratio = round(median(mine / other for mine, other in turns), 4)
+        pairs[f"{n} surfels, {size}x{size}"] = {"new ms": new, "old ms": old, "ratio": ratio}
+    print(json.dumps(pairs, indent=1))
+    described = machine.describe(torch.device("cpu"))
+    Path(output).write_text(json.dumps({"machine": described, "steps": pairs}, indent=1) + "\n")
+
+
+def stepping(root: str, size: int, n: int) -> subprocess.Popen:
+    """Start a process that takes steps by the code of a source tree when asked."""
+    code = f"import sys; sys.path.insert(0, {root!r}); import texgs; sys.path[0] = {str(machine.ROOT)!r}; "
+    code += f"from benchmarks.fit import serve; serve({size}, {n})"
+    return subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+
+
+def turn(process: subprocess.Popen) -> float:
+    """Let a process take its steps; the median, milliseconds."""
+    process.stdin.write("\n")
+    process.stdin.flush()
+    return float(process.stdout.readline())
+
+
+def serve(size: int, n: int) -> None:
+    """Take steps for each line of the input, and print their median, milliseconds."""
+    keep_freed_memory()
+    fit = training(size, n, torch.device("cpu"), Losses(), shared=True)
+    for _ in range(WARM):
+        fit.step()
+    for _ in sys.stdin:
+        times = [perf_counter()]
+        for _ in range(STEPS[size]):
+            fit.step()
+            times.append(perf_counter())
+        print(1e3 * median(b - a for a, b in zip(times, times[1:], strict=False)), flush=True)
+
+
+def training(size: int, n: int, device: torch.device, losses: Losses = LOSSES, shared: bool = False) -> Fit:
     """The shading phase of the paper on views of a generated scene that was slightly moved."""
     raw = raw_surfels(n, device)
-    raw |= {name: raw[name].repeat(n) for name in MATERIAL}
-    phase = Phase(10**9, losses=LOSSES, rates=RATES, densify=Densify(start=10**9, stop=10**9))
+    raw |= {} if shared else {name: raw[name].repeat(n) for name in MATERIAL}
+    phase = Phase(10**9, losses=losses, rates=RATES, densify=Densify(start=10**9, stop=10**9))
     moved = raw | {"means": raw["means"] + 0.003}
     return Fit(moved, ShadingModel(), views(Surfels(raw), size), phase, seed=0)
 
@@ -102,3 +158,7 @@ def part(name: str) -> str:
         if name in names:
             return known
     return "everything else"
+
+
+if __name__ == "__main__":
+    call(beside, "benchmarks.fit")

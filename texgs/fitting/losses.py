@@ -1,7 +1,6 @@
 """The loss of one view, with its gradients."""
 
-from collections.abc import Mapping, Sequence
-from functools import cache
+from collections.abc import Mapping
 from typing import Any, cast
 
 import torch
@@ -47,8 +46,8 @@ def view_loss(
     surfels = arguments.surfel_tensors(geometry, None, features, None)
     outputs = ("normal", "depth") if weights.normal > 0 and iteration > weights.normal_from else ()
     seen = (camera.viewmat.contiguous(), camera.K.contiguous(), camera.width, camera.height)
-    behind = background(surfels.channels, features.device)
-    view = View(*seen, frozenset(outputs), shading.options, behind, raw=True)
+    background = features.new_tensor([1.0] * 3 + [0.0] * (surfels.channels - 3))  # white behind colours
+    view = View(*seen, frozenset(outputs), shading.options, background, raw=True)
     tensors = (*surfels[: len(geometry)], surfels.features)
     wanted = [torch.is_grad_enabled() and x.requires_grad for x in tensors]
     return _ViewLoss.apply(
@@ -72,11 +71,11 @@ class _ViewLoss(torch.autograd.Function):
     def forward(
         ctx: Any, view: View, target: native.Struct, observed: tuple, wanted: list[bool], *tensors: Tensor
     ) -> Tensor:
-        surfels, (shift_gradient, has_alpha) = named(tensors), observed
+        surfels, (shift_gradient, has_alpha) = SurfelTensors(*tensors[:4], features=tensors[4]), observed
         images = view.images(surfels)
         by_image = {name: torch.empty_like(x) for name, x in images.items() if has_alpha or name != "alpha"}
         ctx.gradients = native.gradients(tensors, wanted)
-        into = Gradients(*named(ctx.gradients, shift_gradient)) if any(wanted) else None
+        into = Gradients(*ctx.gradients[:4], shift_gradient, ctx.gradients[4]) if any(wanted) else None
         values = surfels.means.new_zeros(4)
         given = (*view.structures(surfels), Image(**images), Image(**by_image), target, into, values)
         native.call("texgs_rendered_loss", *given, device=values.device)
@@ -87,18 +86,6 @@ class _ViewLoss(torch.autograd.Function):
     def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
         gradients, ctx.gradients = ctx.gradients, None  # autograd may add to what it is handed
         return *[None] * 4, *scaled(gradients, upstream)
-
-
-def named(tensors: Sequence[Any], shift: Tensor | None = None) -> SurfelTensors:
-    """Return means, quats, scales, opacities and features, or their gradients, by name."""
-    *geometry, features = tensors
-    return SurfelTensors(*geometry, shift, features)
-
-
-@cache
-def background(channels: int, device: torch.device) -> Tensor:
-    """Return white behind colours, and 0 behind material [channels]."""
-    return torch.tensor([1.0] * 3 + [0.0] * (channels - 3), device=device)
 
 
 def material_maps(parameters: Mapping[str, Tensor], shading: Shading) -> Tensor | None:

@@ -34,7 +34,6 @@ AXES = {
 
 
 PASSED: dict[tuple, dict[str, int]] = {}  # sizes by all that is asked of tensors: loops ask again and again
-MOST_PASSED = 4096
 Inputs = Mapping[str, tuple[Tensor | None, str]]  # by name: a tensor, if any, and axes as in `check.shape`
 
 
@@ -44,10 +43,7 @@ def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -
     `constant` names those for which there is no gradient, `cpu` says why other devices are refused.
     """
     given = {name: tensor for name, (tensor, _) in tensors.items() if tensor is not None}
-    about = [
-        (getattr(x, "shape", None), getattr(x, "dtype", None), getattr(x, "device", None))
-        for x in given.values()
-    ]
+    about = [(x.shape, x.dtype, x.device) for x in given.values() if isinstance(x, Tensor)]
     key = (cpu, *[(name, tensors[name][1]) for name in given], *about)
     if (sizes := PASSED.get(key)) is None:
         sizes = {}
@@ -58,7 +54,7 @@ def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -
             if cpu and tensor.device.type != "cpu":
                 raise DeviceError(f"{name}: expected a tensor on cpu, got {tensor.device}; {cpu}")
         check.same_device(**given)
-        if len(PASSED) >= MOST_PASSED:
+        if len(PASSED) > 4096:
             PASSED.clear()
         PASSED[key] = sizes
     check.constant(**{name: given.get(name) for name in constant})

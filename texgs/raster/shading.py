@@ -76,22 +76,17 @@ def blinn_phong(
         if sizes[name] not in (sizes["N"], 1):
             raise ShapeError(f"{name}: expected [{sizes['N']}] or one for all [1], got [{sizes[name]}]")
     tensors = (x for x, _ in (*surfels.values(), *lights.values()))
-    return _BlinnPhong.apply(
-        (facing, ranges is not None), ranges or {}, *(None if x is None else x.contiguous() for x in tensors)
-    )
+    dense = (None if x is None else x.contiguous() for x in tensors)
+    return _BlinnPhong.apply((facing, ranges is not None), ranges or {}, *dense)
 
 
 class _BlinnPhong(torch.autograd.Function):
-    """Whether facing and clamped, ranges, then colour, material, means, quats, camera position, and the light or None."""
+    """Whether facing, and clamped; ranges; colour, material, means, quats, camera position, light or None."""
 
     @staticmethod
-    def forward(
-        ctx: Any, how: tuple[bool, bool], ranges: Ranges, color: Tensor, *others: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        factors = [
-            between(*ranges[name], x) if name in ranges else x
-            for name, x in zip(MATERIAL, others, strict=False)
-        ]
+    def forward(ctx: Any, how: tuple, ranges: Ranges, color: Tensor, *others: Tensor) -> tuple[Tensor, ...]:
+        numbers = zip(MATERIAL, others[:4], strict=True)
+        factors = (between(*ranges[name], x) if name in ranges else x for name, x in numbers)
         tensors = (color, *factors, *others[4:])
         base, gain = torch.empty_like(color), color.new_empty(len(color))
         native.call("texgs_blinn_phong", *_arguments(tensors, how), base, gain, device=color.device)
@@ -114,7 +109,7 @@ class _BlinnPhong(torch.autograd.Function):
         return None, None, *gradients
 
 
-def _arguments(tensors: Sequence[Tensor], how: tuple[bool, bool]) -> tuple:
+def _arguments(tensors: Sequence[Tensor], how: tuple) -> tuple:
     """Return the arguments of the library, with a bit for each factor of the material that is shared."""
     shared = sum(len(x) == 1 and 1 << k for k, x in enumerate(tensors[1:5]))
     return len(tensors[0]), *tensors[:5], shared, *tensors[5:], *how

@@ -90,11 +90,8 @@ class Images:
         if box != whole:
             planes, camera = planes[:, box.top : box.bottom, box.left : box.right], camera.crop(*box)
         planes = planes.to(device) / 255
-        color, share = (
-            planes[:3].permute(1, 2, 0),
-            camera.width * camera.height / (whole.right * whole.bottom),
-        )
-        return Target(color, planes[3], camera.to(device), self.lights[index], share)
+        share = camera.width * camera.height / (whole.right * whole.bottom)
+        return Target(planes[:3].permute(1, 2, 0), planes[3], camera.to(device), self.lights[index], share)
 
 
 def load(views: Sequence[View], reduce: int = 1) -> Images:

@@ -51,7 +51,7 @@ class ShadingModel:
         light: Light,
         ranges: Ranges | None = None,
     ) -> tuple[Tensor, Tensor]:
-        """Return base [N, 3] and gain [N] of surfels with parameters `p`; factors and `ranges` as in `blinn_phong`.
+        """Return base [N, 3] and gain [N] of surfels with parameters `p`; the rest is as in `blinn_phong`.
 
         A viewer who is not local is far behind the camera. Normals of their own come before those of surfels.
         """
