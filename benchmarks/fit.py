@@ -1,8 +1,8 @@
 """A step of the shading phase with every map and loss, and where its time goes.
 
-`python -m benchmarks.fit OUTPUT.json TREE` times steps of `quick`'s losses, of few surfels in small views, which
-are all overhead, and of many in larger ones, by the code here and by that of another source tree, which is
-built. Two processes take turns; a ratio is the median of those of the turns.
+`python -m benchmarks.fit OUTPUT.json TREE` times steps of `quick`'s losses, of few surfels in small views,
+which are all overhead, and of many in larger ones, by the code here and by that of another source tree, which
+is built. Two processes take turns; a ratio is the median of those of the turns.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import json
 import subprocess
 import sys
 from collections import defaultdict
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -90,6 +91,7 @@ def stepping(root: str, size: int, n: int) -> subprocess.Popen:
 
 def turn(process: subprocess.Popen) -> float:
     """Let a process take its steps; the median, milliseconds."""
+    assert process.stdin and process.stdout
     process.stdin.write("\n")
     process.stdin.flush()
     return float(process.stdout.readline())
@@ -106,7 +108,7 @@ def serve(size: int, n: int) -> None:
         for _ in range(STEPS[size]):
             fit.step()
             times.append(perf_counter())
-        print(1e3 * median(b - a for a, b in zip(times, times[1:], strict=False)), flush=True)
+        print(1e3 * median(b - a for a, b in pairwise(times)), flush=True)
 
 
 def training(size: int, n: int, device: torch.device, losses: Losses = LOSSES, shared: bool = False) -> Fit:

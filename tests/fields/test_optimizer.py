@@ -28,7 +28,7 @@ def descend(optimizer, steps):
 
 
 def oracle(steps, values, rates=RATES, betas=(0.9, 0.999)):
-    """Parameters after steps of torch.optim.AdamW as it comes, in float64: its decay is a share of the rate."""
+    """Parameters after steps of torch.optim.AdamW, in float64: its decay is a share of the rate."""
     leaves = {name: values[name].double().requires_grad_() for name in rates}
     adam = torch.optim.AdamW([{"params": [x]} for x in leaves.values()], betas=betas, eps=1e-15)
     for step in steps:

@@ -131,7 +131,7 @@ def test_loss_and_gradients_of_the_visible_part_are_those_of_the_view():
 
 
 def by_parts(parameters, shading, target, weights, shift):
-    """The same loss of what the rasterizer returns, by functions that have tests of their own, and autograd."""
+    """The same loss of what the rasterizer returns, by functions that have their own tests, and autograd."""
     camera, colors = target.camera, shading.colors(parameters, target.camera, target.light)
     maps = torch.stack(list(material(parameters, "bounded").values()), dim=1) if weights.smoothness else None
     features = colors if maps is None else torch.cat([colors, maps], dim=1)

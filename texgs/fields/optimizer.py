@@ -51,12 +51,13 @@ class Optimizer:
 
     def step(self, progress: float) -> None:
         """Take one step with the rates of now, and forget the gradients."""
-        moving = [name for name in self._rates if self.parameters[name].grad is not None]
+        gradients = ((name, self.parameters[name].grad) for name in self._rates)
+        moving = {name: gradient for name, gradient in gradients if gradient is not None}
         beta1, beta2 = self._betas
-        for name, row in zip(moving, self._table, strict=False):
+        for (name, gradient), row in zip(moving.items(), self._table, strict=False):
             x, rate = self.parameters[name], self._rates[name]
             steps = self._steps[name] = self._steps[name] + 1
-            row.n, row.values, row.gradient = x.numel(), x.data_ptr(), x.grad.data_ptr()
+            row.n, row.values, row.gradient = x.numel(), x.data_ptr(), gradient.data_ptr()
             row.moments, row.keep = self._moments[name].data_ptr(), 1 - rate.decay
             row.rate, row.correction = rate.at(progress) / (1 - beta1**steps), (1 - beta2**steps) ** -0.5
         if moving:

@@ -31,28 +31,23 @@ def view_loss(
 ) -> Tensor:
     """Render a view and compare it: L1 + D-SSIM of colour and alpha, normals, smooth material.
 
-    `shift_gradient` [N, 2], dense, receives the gradient of shifts on screen, in pixels. Iterations count from
-    1, as losses may start later. `turns_normals` says whether shading has gradients into the surfels'
-    orientation and place.
+    `shift_gradient` [N, 2], dense, receives that of shifts on screen in pixels. Iterations count from 1, as
+    losses may start later. `turns_normals` says whether shading turns and moves surfels.
     """
     camera = target.camera
     fixed = {} if turns_normals else {name: parameters[name].detach() for name in ("means", "quats")}
-    colors = cast(  # surfels have no texture yet
-        Tensor, shading.colors({**parameters, **fixed}, camera, target.light)
-    )
+    colors = cast(Tensor, shading.colors({**parameters, **fixed}, camera, target.light))  # no texture yet
     maps = material_maps(parameters, shading) if weights.smoothness > 0 else None
     features = colors if maps is None else torch.cat([colors, maps], dim=1)
-    geometry = tuple(parameters[name] for name in GEOMETRY)
-    surfels = arguments.surfel_tensors(geometry, None, features, None)
+    surfels = arguments.surfel_tensors([parameters[name] for name in GEOMETRY], None, features, None)
     outputs = ("normal", "depth") if weights.normal > 0 and iteration > weights.normal_from else ()
     seen = (camera.viewmat.contiguous(), camera.K.contiguous(), camera.width, camera.height)
     background = features.new_tensor([1.0] * 3 + [0.0] * (surfels.channels - 3))  # white behind colours
     view = View(*seen, frozenset(outputs), shading.options, background, raw=True)
-    tensors = (*surfels[: len(geometry)], surfels.features)
-    wanted = [torch.is_grad_enabled() and x.requires_grad for x in tensors]
-    return _ViewLoss.apply(
-        view, compared(target, weights), (shift_gradient, weights.alpha > 0), wanted, *tensors
-    )
+    tensors = (*surfels[:4], surfels.features)
+    wanted = [torch.is_grad_enabled() and x is not None and x.requires_grad for x in tensors]
+    observed = (shift_gradient, weights.alpha > 0)
+    return _ViewLoss.apply(view, compared(target, weights), observed, wanted, *tensors)
 
 
 def compared(target: Target, weights: Losses) -> native.Struct:
@@ -71,7 +66,7 @@ class _ViewLoss(torch.autograd.Function):
     def forward(
         ctx: Any, view: View, target: native.Struct, observed: tuple, wanted: list[bool], *tensors: Tensor
     ) -> Tensor:
-        surfels, (shift_gradient, has_alpha) = SurfelTensors(*tensors[:4], features=tensors[4]), observed
+        surfels, (shift_gradient, has_alpha) = SurfelTensors(*tensors[:4], None, tensors[4]), observed
         images = view.images(surfels)
         by_image = {name: torch.empty_like(x) for name, x in images.items() if has_alpha or name != "alpha"}
         ctx.gradients = native.gradients(tensors, wanted)

@@ -1,7 +1,7 @@
 """The native rasterizer as a differentiable function of torch, and what one call of it works on."""
 
 from ctypes import byref
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import torch
@@ -68,7 +68,9 @@ class View:
     sizes: Tensor | None = None  # [N, 2] of the texture
     offsets: Tensor | None = None  # [N]
     depth_range: Tensor | None = None  # [2, H, W] camera z
-    raw: bool = False  # scales are natural logarithms and opacities logits, and so are their gradients
+    raw: bool = field(
+        default=False, kw_only=True
+    )  # scales are natural logarithms and opacities logits, and so are their gradients
 
     def images(self, surfels: SurfelTensors) -> dict[str, Tensor]:
         """Return memory for the planar images of surfels that are wanted."""

@@ -1,8 +1,8 @@
 """The native libraries: found, opened and described to ctypes; calls with errors turned into exceptions.
 
 `libtexgs` works on CPU tensors, `libtexgs_cuda` on CUDA tensors; both export the functions of `csrc/texgs.h`,
-`texgs_losses.h`, `texgs_fit.h`, `texgs_grid.h` and `texgs_volume.h`, the first also those of `texgs_fusion.h` and
-`texgs_neural.h`. They know raw pointers only, so that one build serves every version of torch and Python.
+`texgs_losses.h`, `texgs_fit.h`, `texgs_grid.h` and `texgs_volume.h`, the first also those of `texgs_fusion.h`
+and `texgs_neural.h`. They know raw pointers only, so that one build serves every version of torch and Python.
 A module declares the structures and functions that it calls.
 """
 

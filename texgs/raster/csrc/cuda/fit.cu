@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The step of Adam, all parameters in one launch; and the part of the screen that spheres can cover.
+#include <algorithm>
+
 #include "../rendered_loss.h"
 #include "maths.cuh"
 #include "workspace.cuh"
@@ -102,8 +104,10 @@ using namespace texgs::cuda;
 
 int32_t texgs_adam(int64_t n_parameters, const texgs_learned* parameters, float take1, float take2, float epsilon,
                    void* on) {
-    if (n_parameters == 0) return TEXGS_OK;
-    return on_device_of(parameters->moments, on, [&](cudaStream_t stream) {
+    const texgs_learned* const end = parameters + n_parameters;
+    const texgs_learned* const some = std::find_if(parameters, end, [](const texgs_learned& p) { return p.n > 0; });
+    if (some == end) return TEXGS_OK;  // memory of no elements may have no address
+    return on_device_of(some->moments, on, [&](cudaStream_t stream) {
         for (int64_t begin = 0; begin < n_parameters; begin += kTable) {
             Table table{};
             int64_t floats = 0;
