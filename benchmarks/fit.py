@@ -43,7 +43,7 @@ PROFILED = 40  # steps
 LOSSES = Losses(alpha=0.1, normal=0.05, smoothness=0.01)
 RATES = Rates(*[1e-12] * 8)  # the scene stays as heavy as it is
 TURNS, STEPS, WARM = 15, {33: 200, 400: 25}, 20
-PAIRS = {33: 200, 400: 20_000}  # surfels by image size
+PAIRS = (("shells", 33, 200), ("ball", 400, 20_000), ("shells", 400, 20_000))  # scene, image size, surfels
 PARTS = {  # by what the profiler's names contain; the first that fits
     "rasterizer and losses": ("_ViewLoss", "_ViewLossBackward"),
     "shading": ("_BlinnPhong", "_BlinnPhongBackward"),
@@ -55,7 +55,7 @@ def run(settings: Settings) -> Section:
     keep_freed_memory()  # as the command line does
     section = Section()
     counts = {size: SURFELS.get(size, settings.n_surfels) for size in settings.sizes}
-    fits = {size: training(size, n, settings.device) for size, n in counts.items()}
+    fits = {size: training(size, with_maps(raw_surfels(n, settings.device))) for size, n in counts.items()}
     places = {size: {"size": size, "surfels": n} for size, n in counts.items()}
     cases = [Case("step", where, {"step": fits[size].step}) for size, where in places.items()]
     section.measurements = measure(cases, settings.rounds, settings.device, "fit")
@@ -68,22 +68,22 @@ def run(settings: Settings) -> Section:
 def beside(output: str, tree: str) -> None:
     """Time both; print and write milliseconds and ratios."""
     pairs = {}
-    for size, n in PAIRS.items():
-        here, there = (stepping(root, size, n) for root in (str(machine.ROOT), tree))
+    for scene, size, n in PAIRS:
+        here, there = (stepping(root, scene, size, n) for root in (str(machine.ROOT), tree))
         turns = [(turn(here), turn(there)) for _ in range(TURNS)]
         here.communicate(), there.communicate()
         new, old = (round(median(times), 4) for times in zip(*turns, strict=True))
         ratio = round(median(mine / other for mine, other in turns), 4)
-        pairs[f"{n} surfels, {size}x{size}"] = {"new ms": new, "old ms": old, "ratio": ratio}
+        pairs[f"{scene}, {n} surfels, {size}x{size}"] = {"new ms": new, "old ms": old, "ratio": ratio}
     print(json.dumps(pairs, indent=1))
     described = machine.describe(torch.device("cpu"))
     Path(output).write_text(json.dumps({"machine": described, "steps": pairs}, indent=1) + "\n")
 
 
-def stepping(root: str, size: int, n: int) -> subprocess.Popen:
+def stepping(root: str, scene: str, size: int, n: int) -> subprocess.Popen:
     """Start a process that takes steps by the code of a source tree when asked."""
     code = f"import sys; sys.path.insert(0, {root!r}); import texgs; sys.path[0] = {str(machine.ROOT)!r}; "
-    code += f"from benchmarks.fit import serve; serve({size}, {n})"
+    code += f"from benchmarks.fit import serve; serve({scene!r}, {size}, {n})"
     return subprocess.Popen(
         [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
@@ -91,16 +91,18 @@ def stepping(root: str, size: int, n: int) -> subprocess.Popen:
 
 def turn(process: subprocess.Popen) -> float:
     """Let a process take its steps; the median, milliseconds."""
-    assert process.stdin and process.stdout
+    assert process.stdin
+    assert process.stdout
     process.stdin.write("\n")
     process.stdin.flush()
     return float(process.stdout.readline())
 
 
-def serve(size: int, n: int) -> None:
+def serve(scene: str, size: int, n: int) -> None:
     """Take steps for each line of the input, and print their median, milliseconds."""
     keep_freed_memory()
-    fit = training(size, n, torch.device("cpu"), Losses(), shared=True)
+    raw = raw_surfels(n, torch.device("cpu"))
+    fit = training(size, raw if scene == "shells" else raw | ball(n), Losses())
     for _ in range(WARM):
         fit.step()
     for _ in sys.stdin:
@@ -111,10 +113,21 @@ def serve(size: int, n: int) -> None:
         print(1e3 * median(b - a for a, b in pairwise(times)), flush=True)
 
 
-def training(size: int, n: int, device: torch.device, losses: Losses = LOSSES, shared: bool = False) -> Fit:
+def with_maps(raw: dict[str, Tensor]) -> dict[str, Tensor]:
+    """Return surfels with a material each."""
+    return raw | {name: raw[name].repeat(len(raw["means"])) for name in MATERIAL}
+
+
+def ball(n: int) -> dict[str, Tensor]:
+    """Return the shape of surfels that cover a sphere of radius 1 once."""
+    points, normals = scenes.sphere(n)
+    scales = torch.full((n, 2), 0.6 * (4 * torch.pi / n) ** 0.5)
+    means = torch.nn.functional.normalize(points, dim=1).float()
+    return {"means": means, "quats": scenes.facing(normals.float(), torch.zeros(n)), "scales": scales.log()}
+
+
+def training(size: int, raw: dict[str, Tensor], losses: Losses = LOSSES) -> Fit:
     """The shading phase of the paper on views of a generated scene that was slightly moved."""
-    raw = raw_surfels(n, device)
-    raw |= {} if shared else {name: raw[name].repeat(n) for name in MATERIAL}
     phase = Phase(10**9, losses=losses, rates=RATES, densify=Densify(start=10**9, stop=10**9))
     moved = raw | {"means": raw["means"] + 0.003}
     return Fit(moved, ShadingModel(), views(Surfels(raw), size), phase, seed=0)

@@ -61,8 +61,9 @@ class Optimizer:
             row.moments, row.keep = self._moments[name].data_ptr(), 1 - rate.decay
             row.rate, row.correction = rate.at(progress) / (1 - beta1**steps), (1 - beta2**steps) ** -0.5
         if moving:
-            shares = (1 - beta1, 1 - beta2, EPSILON)
-            native.call("texgs_adam", len(moving), self._table, *shares, device=x.device)
+            native.call(
+                "texgs_adam", len(moving), self._table, 1 - beta1, 1 - beta2, EPSILON, device=x.device
+            )
             torch.autograd.graph.increment_version([self.parameters[name] for name in moving])
         for x in self.parameters.values():
             x.grad = None

@@ -55,8 +55,7 @@ def compared(target: Target, weights: Losses) -> native.Struct:
     l1 = 1 - weights.dssim
     of_alpha = (weights.alpha * l1 * weights.alpha_l1, weights.alpha * weights.dssim)
     factors = (l1, weights.dssim, *of_alpha, weights.normal, weights.smoothness * SMOOTHED)
-    images = (planar(target.color), target.alpha.contiguous())
-    return Compared(*images, *(target.share * factor for factor in factors))
+    return Compared(planar(target.color), target.alpha.contiguous(), *(target.share * x for x in factors))
 
 
 class _ViewLoss(torch.autograd.Function):

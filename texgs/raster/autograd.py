@@ -68,9 +68,7 @@ class View:
     sizes: Tensor | None = None  # [N, 2] of the texture
     offsets: Tensor | None = None  # [N]
     depth_range: Tensor | None = None  # [2, H, W] camera z
-    raw: bool = field(
-        default=False, kw_only=True
-    )  # scales are natural logarithms and opacities logits, and so are their gradients
+    raw: bool = field(default=False, kw_only=True)  # scales are logarithms and opacities logits
 
     def images(self, surfels: SurfelTensors) -> dict[str, Tensor]:
         """Return memory for the planar images of surfels that are wanted."""
