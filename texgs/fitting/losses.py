@@ -63,13 +63,13 @@ class _ViewLoss(torch.autograd.Function):
 
     @staticmethod
     def forward(
-        ctx: Any, view: View, target: native.Struct, observed: tuple, wanted: list[bool], *tensors: Tensor
+        ctx: Any, view: View, target: native.Struct, observed: tuple, wanted: list, *tensors: Tensor
     ) -> Tensor:
-        surfels, (shift_gradient, has_alpha) = SurfelTensors(*tensors[:4], None, tensors[4]), observed
+        surfels = SurfelTensors._make((*tensors[:4], None, tensors[4], *[None] * 3))
         images = view.images(surfels)
-        by_image = {name: torch.empty_like(x) for name, x in images.items() if has_alpha or name != "alpha"}
+        by_image = {name: torch.empty_like(x) for name, x in images.items() if observed[1] or name != "alpha"}
         ctx.gradients = native.gradients(tensors, wanted)
-        into = Gradients(*ctx.gradients[:4], shift_gradient, ctx.gradients[4]) if any(wanted) else None
+        into = Gradients(*ctx.gradients[:4], observed[0], ctx.gradients[4]) if any(wanted) else None
         values = surfels.means.new_zeros(4)
         given = (*view.structures(surfels), Image(**images), Image(**by_image), target, into, values)
         native.call("texgs_rendered_loss", *given, device=values.device)
