@@ -86,7 +86,7 @@ class Caster:
         self._channels = dict[int, tuple[native.Struct, Tensor]]()  # that were shown, of all copies
         self._prepared = list[Prepared]()  # the last PREPARED, of all copies
         if not grid.others:
-            self._channel(0)
+            self.channel(0)
 
     def with_appearance(self, appearance: Appearance) -> Self:
         """Return a caster of the same volume with another shading and sampling; nothing is read again."""
@@ -193,7 +193,7 @@ class Caster:
         self, tf: TransferFunction, by_cell: bool
     ) -> tuple[native.Struct, native.Struct, Tensor, Tensor | None]:
         """Return a function's channel, the function, how far bricks are from one that it shows, and cells."""
-        volume, extremes = self._channel(tf.channel)
+        volume, extremes = self.channel(tf.channel)
         points = points_of(tf).to(self.device)
         transfer = NativeTransfer(len(points), points)
         distance = torch.zeros(len(extremes) + PADDING, dtype=torch.uint8, device=self.device)
@@ -204,7 +204,7 @@ class Caster:
             native.call("texgs_volume_cells", volume, distance, transfer, cells, device=self.device)
         return volume, transfer, distance, cells
 
-    def _channel(self, number: int) -> tuple[native.Struct, Tensor]:
+    def channel(self, number: int) -> tuple[native.Struct, Tensor]:
         """Return a channel for the library, and the extremes of its bricks [bricks, 2]."""
         if number not in self._channels:
             grid = self._grid.channel(number)

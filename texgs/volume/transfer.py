@@ -79,6 +79,11 @@ class TransferFunction:
 
         return self.with_values(lambda t: (1 - t) * low + t * high)
 
+    def in_support(self) -> "TransferFunction":
+        """Return the same function without points beyond its support, where nothing is shown."""
+        low, high = self.support
+        return self.with_points(_cut(self.opacity, low, high), _cut(self.color, low, high))
+
     def with_values(self, of: Callable[[float], float]) -> "TransferFunction":
         """Return the function whose points are at other values, in the same order."""
         opacity, color = (

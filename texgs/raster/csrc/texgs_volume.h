@@ -86,6 +86,17 @@ typedef struct {
 TEXGS_API int32_t texgs_cast(const texgs_volume*, const texgs_transfer*, int32_t n, const uint8_t* distance,
                              const uint32_t* cells, const texgs_cast_view*, void* stream);
 
+/* What a volume is at points, and a transfer function there; each of them may be NULL. Beyond the box it is as at the
+ * nearest point of it. */
+typedef struct {
+    float* values;    /* [n] NaN where a sample of the cell is missing */
+    float* gradients; /* [n, 3] of values, per world unit: central differences, one voxel to both sides */
+    float* quats;     /* [n, 4] wxyz of length 1, which turn z to the gradient; (1, 0, 0, 0) where there is none */
+    float* colors;    /* [n, 3] of the value, or of the nearest one that the transfer function has points for */
+} texgs_lookup;
+TEXGS_API int32_t texgs_volume_lookup(const texgs_volume*, const texgs_transfer*, int64_t n, const float* points,
+                                      const texgs_lookup*, void* stream);
+
 #ifdef __cplusplus
 }
 #endif

@@ -196,6 +196,17 @@ TEXGS_MATHS Vec3<F> unit(Vec3<F> v) {
     return {select(is_known, scale * v.x, zero), select(is_known, scale * v.y, zero),
             select(is_known, scale * v.z, zero)};
 }
+// The quaternion wxyz that turns z to a unit vector on the shortest way: half a turn around x to -z, and none to 0.
+template <class F>
+TEXGS_MATHS void turn_z_to(Vec3<F> n, F (&quat)[4]) {
+    const F w = F(1.0f) + n.z, zero = 0.0f;
+    const F scale = F(1.0f) / sqrt(fma(w, w, fma(n.x, n.x, n.y * n.y)));
+    const auto is_opposite = w < F(1e-6f);
+    quat[0] = select(is_opposite, zero, w * scale);
+    quat[1] = select(is_opposite, F(1.0f), zero - n.y * scale);
+    quat[2] = select(is_opposite, zero, n.x * scale);
+    quat[3] = zero;
+}
 template <class F>
 TEXGS_MATHS F along(Vec3<F> v, const float (&d)[3]) {
     return fma(v.x, F(d[0]), fma(v.y, F(d[1]), v.z * F(d[2])));

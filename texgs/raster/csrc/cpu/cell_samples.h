@@ -43,6 +43,17 @@ public:
         first_ = truncate(first);
     }
 
+    // Loads a block around each of n cells.
+    template <class T>
+    TEXGS_INLINE void fetch_each(const T* values, const int32_t (&size)[3], const vf (&cell)[3], int n) {
+        float corner[3][kLanes];
+        for (int a = 0; a < 3; ++a) store(corner[a], cell[a]);
+        for (int i = 0; i < n; ++i)
+            copy(values, size, {int32_t(corner[0][i]), int32_t(corner[1][i]), int32_t(corner[2][i])}, i, Rows::around);
+        n_ = kLanes;
+        first_ = iota() * splat(4);
+    }
+
     // Calls use(planes) with the number of planes of a table in registers that holds a row of all blocks; 0 where
     // none does.
     template <class Use>

@@ -143,3 +143,14 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, i
         });
     });
 }
+
+int32_t texgs_volume_lookup(const texgs_volume* volume, const texgs_transfer* transfer, int64_t n, const float* points,
+                            const texgs_lookup* to, void*) {
+    return guarded([&] {
+        check_volume(*volume);
+        check_transfer(*transfer);
+        const Table table(*transfer);
+        const LookupJob job{*volume, table.view, points, *to};
+        parallel_for(n, 256, [&](int64_t begin, int64_t end, int) { volume_kernels().lookup(job, begin, end); });
+    });
+}

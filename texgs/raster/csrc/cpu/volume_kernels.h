@@ -34,20 +34,32 @@ struct CastJob {
     float lower[3], upper[3];  // corners of a box that holds all bricks in which something shows, in samples
 };
 
+struct LookupJob {
+    texgs_volume volume;
+    CastTable table;
+    const float* points;  // [n, 3]
+    texgs_lookup to;
+};
+
 struct VolumeKernels {
     // Casts the rays of the pixels [begin, end) of row y.
     void (*cast)(const CastJob&, int y, int begin, int end);
+    // Looks the points [begin, end) up.
+    void (*lookup)(const LookupJob&, int64_t begin, int64_t end);
 };
 
-// One table per instruction set, each in cast.cpp.
+// One table per instruction set, each in cast.cpp, and what stands in it besides.
 namespace portable {
 extern const VolumeKernels kVolumeKernels;
-}
+void lookup(const LookupJob&, int64_t begin, int64_t end);
+}  // namespace portable
 namespace avx2 {
 extern const VolumeKernels kVolumeKernels;
-}
+void lookup(const LookupJob&, int64_t begin, int64_t end);
+}  // namespace avx2
 namespace avx512 {
 extern const VolumeKernels kVolumeKernels;
-}
+void lookup(const LookupJob&, int64_t begin, int64_t end);
+}  // namespace avx512
 
 }  // namespace texgs

@@ -113,10 +113,12 @@ struct Spot {
     int cell[3];
     float inside[3];
 
-    __device__ Spot(const Lattice& lattice, const CastRay& ray, int k) {
+    __device__ Spot(const Lattice& lattice, const CastRay& ray, int k)
+        : Spot(lattice, [&](int a) { return fma(static_cast<float>(k) + 0.5f, ray.step[a], ray.entry[a]); }) {}
+    template <class At>
+    __device__ Spot(const Lattice& lattice, const At& at) {
         for (int a = 0; a < 3; ++a) {
-            const float at = fma(static_cast<float>(k) + 0.5f, ray.step[a], ray.entry[a]);
-            const float place = fminf(fmaxf(at, 0.0f), lattice.last[a]);
+            const float place = fminf(fmaxf(at(a), 0.0f), lattice.last[a]);
             cell[a] = static_cast<int>(fminf(floorf(place), lattice.last[a] - 1.0f));
             inside[a] = place - static_cast<float>(cell[a]);
         }
@@ -254,6 +256,38 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
         for (int c = 0; c < 3; ++c) view.normal[3 * pixel + c] = normal[c] * per_alpha;
 }
 
+// -- Points ------------------------------------------------------------------------------------------------------
+
+template <class T>
+__global__ __launch_bounds__(kThreads) void lookup_kernel(const texgs_volume volume, const texgs_transfer transfer,
+                                                          int64_t n, const float* points, const texgs_lookup to) {
+    const int64_t i = thread_index();
+    if (i >= n) return;
+    const Lattice lattice = lattice_of(volume);
+    const Samples<T> samples{static_cast<const T*>(volume.values), {volume.size[0], volume.size[1], volume.size[2]}};
+    const Spot spot(lattice, [&](int a) {
+        return fma(points[3 * i + a], static_cast<float>(lattice.per_unit[a]), static_cast<float>(lattice.middle[a]));
+    });
+    const float value = spot.value(samples), low = transfer.points[0], high = transfer.points[5 * (transfer.n - 1)];
+    if (to.values) to.values[i] = value;
+    if (to.colors) {
+        const Interval interval(transfer, fminf(fmaxf(value, low), high));
+        for (int c = 0; c < 3; ++c) to.colors[3 * i + c] = interval.column(2 + c);
+    }
+    if (!to.gradients && !to.quats) return;
+    float gradient[3];
+    for (int a = 0; a < 3; ++a) {
+        gradient[a] = spot.difference(samples, a) * static_cast<float>(0.5 * lattice.per_unit[a]);
+        if (to.gradients) to.gradients[3 * i + a] = gradient[a];
+    }
+    if (!to.quats) return;
+    const float scale = 1.0f / (high - low);
+    const Vec3<float> normal = unit(Vec3<float>{gradient[0] * scale, gradient[1] * scale, gradient[2] * scale});
+    float quat[4];
+    turn_z_to(normal, quat);
+    for (int k = 0; k < 4; ++k) to.quats[4 * i + k] = quat[k];
+}
+
 // Calls body(sample) with a sample of the volume's type.
 template <class Body>
 void with_type(const texgs_volume& volume, const Body& body) {
@@ -340,6 +374,18 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, i
             const auto kernel =
                 n == 1 ? cast_kernel<decltype(sample), 1> : cast_kernel<decltype(sample), TEXGS_CHANNELS>;
             launch(kernel, int64_t(tiles) * rows, kThreads, stream, *volume, channels, distance, cells, *view, tiles);
+        });
+    });
+}
+
+int32_t texgs_volume_lookup(const texgs_volume* volume, const texgs_transfer* transfer, int64_t n, const float* points,
+                            const texgs_lookup* to, void* on) {
+    return on_device_of(points, on, [&](cudaStream_t stream) {
+        check_volume(*volume);
+        check_points(*transfer);
+        with_type(*volume, [&](auto sample) {
+            launch(lookup_kernel<decltype(sample)>, blocks_for(n, kThreads), kThreads, stream, *volume, *transfer, n,
+                   points, *to);
         });
     });
 }
