@@ -96,7 +96,7 @@ def test_each_point_is_looked_up_by_itself(count):
 
 def test_other_outputs_and_points_are_refused():
     lookup = Lookup(Caster(ball(9), Appearance()), SHELLS)
-    with pytest.raises(ArgumentError, match="outputs: expected some of values, .*, got curvature"):
+    with pytest.raises(ArgumentError, match=r"outputs: expected some of values, .*, got curvature"):
         lookup.at(torch.zeros(1, 3), ["curvature"])
     with pytest.raises(ShapeError, match="points"):
         lookup.at(torch.zeros(3), ["values"])
