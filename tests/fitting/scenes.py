@@ -100,9 +100,10 @@ def phase(iterations=60, densify=None, losses=None, rates=None, **options):
     )
 
 
-def new_fit(images=None, parameters=None, seed=0, **options):
+def new_fit(images=None, parameters=None, seed=0, held=None, **options):
     """A fit of the ball."""
-    return Fit(parameters or ball_seeds(), ShadingModel(), images or ball_images(), phase(**options), seed)
+    start = parameters or ball_seeds()
+    return Fit(start, ShadingModel(), images or ball_images(), phase(**options), seed, held)
 
 
 def run(fit, iterations=None):
@@ -115,7 +116,7 @@ def run(fit, iterations=None):
 
 def model_of(fit):
     """The surfels of a fit as they are now."""
-    return Surfels({name: x.detach() for name, x in fit.parameters.items()}, fit.shading)
+    return Surfels({name: x.detach() for name, x in fit.fitted.items()}, fit.shading)
 
 
 def is_finite(parameters):

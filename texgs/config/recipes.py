@@ -37,7 +37,20 @@ class FitKeys:
         "range of the factors of materials: bounded, or as wide as in the paper",
         choices=("bounded", "paper"),
     )
-    first_material: Material = key(Material, "material before the shading phase")
+    attributes: str = key(
+        "auto",
+        "what colours, normals and material of the shading phase start from; auto: the volume and the light "
+        "of its views where there is one; learned: the phase before, and first_material",
+        choices=("auto", "learned"),
+    )
+    hold: float | None = key(
+        None,
+        "share of their differences from the volume that an iteration takes away; 0: they only start there; "
+        "default by how alike its normals are from one surfel to the next",
+        least=0,
+        most=1,
+    )
+    first_material: Material = key(Material, "material before the shading phase, of learned attributes")
     seeds: Seeds = key(Seeds, "where surfels start")
     surfels: Phase = key(Phase, "phase 1, with spherical harmonics")
     shading: Phase = key(Phase, "phase 2, with Blinn-Phong")

@@ -1,5 +1,7 @@
 """Colours and normals that surfels have from their volume; fits learn how they differ from these."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -7,48 +9,61 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from texgs.volume.caster import Caster
 from texgs.volume.lookup import Lookup
+from texgs.volume.transfer import TransferFunction
 
-NEIGHBOURS = 3
-# Normals of neighbours are alike in smooth data: from the first mean cosine on, those of the volume are better
-# than learned ones, and from the second on they are held with all strength. In noise, and where surfels are
-# farther apart than a surface bends, views average many samples, which are better than one.
-ALIKE, SAME = 0.96, 0.98
-HOLD = 0.02  # the share of a difference that an iteration takes away, at most
+HELD = ("colors", "normals")
+NEIGHBOURS = 3  # of a surfel, whose normals are compared
+# Where data are smooth, normals of the volume are better than learned ones; where they are noisy, or bend
+# from one surfel to the next, learned ones are, which average many samples. Between these two coherences the
+# strength of the hold grows from none to all.
+ROUGH, SMOOTH = 0.96, 0.98
+HOLD = 0.02  # all of it
 
 
 @dataclass(frozen=True, eq=False)
 class Attributes:
-    """What a volume says of surfels, and how strongly their differences from it are held to 0."""
+    """What a volume says of surfels, and how strongly they are held to it."""
 
     lookup: Lookup
-    hold: float  # share that an iteration takes away; 0: the volume is where they start, and no more
+    coherence: float  # how alike its normals are from one surfel to the next, 0 to 1
+    hold: float  # share of a difference that an iteration takes away; 0: the volume is no more than the start
+
+    @classmethod
+    def of(cls, caster: Caster, tf: TransferFunction, means: Tensor, hold: float | None = None) -> Attributes:
+        """Return what a volume says of what a function shows, for surfels with means [N, 3].
+
+        Coherence says how strongly they are held where `hold` does not.
+        """
+        lookup = Lookup(caster, tf)
+        alike = coherence(lookup, means)
+        share = min(max((alike - ROUGH) / (SMOOTH - ROUGH), 0.0), 1.0)
+        return cls(lookup, alike, HOLD * share if hold is None else hold)
 
     def at(self, means: Tensor) -> dict[str, Tensor]:
         """Return `colors` [N, 3] and `normals` [N, 4], quaternions whose third axis is the gradient."""
         seen = self.lookup.at(means, ("colors", "quats"))
         return {"colors": seen["colors"], "normals": seen["quats"]}
 
-    def added_to(self, parameters: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Return parameters in which differences from the volume are colours and normals."""
-        own = self.at(parameters["means"])
-        return {name: x + own[name] if name in own else x for name, x in parameters.items()}
+    def added_to(self, differences: Mapping[str, Tensor]) -> dict[str, Tensor]:
+        """Return parameters of surfels whose colours and normals are given as differences from the volume."""
+        own = self.at(differences["means"])
+        return {name: x + own[name] if name in own else x for name, x in differences.items()}
 
 
 def coherence(lookup: Lookup, means: Tensor) -> float:
-    """Return how alike the volume's normals are from one surfel [N, 3] to the next: a mean cosine, 0 to 1.
+    """Return the mean cosine of the angle between the normals at points [N, 3] and at their neighbours.
 
-    The light sees no difference between a normal and its opposite.
+    Light sees no difference between a normal and its opposite, so that cosines count without their sign. It
+    is 0 for fewer points than have neighbours.
     """
     from scipy.spatial import cKDTree
 
-    gradients = lookup.at(means, ("gradients",))["gradients"].cpu()
-    normals, places = normalize(gradients, dim=1), means.detach().cpu().numpy()
+    if len(means) <= NEIGHBOURS:
+        return 0.0
+    normals = normalize(lookup.at(means, ("gradients",))["gradients"].cpu(), dim=1)
+    places = means.detach().cpu().numpy()
     _, near = cKDTree(places).query(places, k=1 + NEIGHBOURS)
     cosines = (normals[:, None] * normals[torch.from_numpy(near[:, 1:])]).sum(dim=2)
     return float(cosines.abs().mean())
-
-
-def hold_of(alike: float) -> float:
-    """Return how strongly surfels are held to a volume of some coherence."""
-    return HOLD * min(max((alike - ALIKE) / (SAME - ALIKE), 0.0), 1.0)

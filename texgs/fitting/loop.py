@@ -10,6 +10,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import FitError
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.splats import Shading, Splats, join, visible_part
+from texgs.fitting.attributes import HELD, Attributes
 from texgs.fitting.checkpoint import ResumableFit
 from texgs.fitting.densify import DensityControl
 from texgs.fitting.losses import view_loss
@@ -24,26 +25,45 @@ SMALLEST = 1e-3  # distance, world units
 class Fit(ResumableFit):
     """One phase of surfels or 3D Gaussians, from raw parameters, on training views.
 
+    Surfels that are held start with the attributes of their volume, not with those among the parameters, and
+    learn the differences.
+
     With the same seed of the order of views and of splits, machine and versions results are equal.
     """
 
     unit = "view"
 
     def __init__(
-        self, parameters: Mapping[str, Tensor], shading: Shading, images: Images, phase: Phase, seed: int
+        self,
+        parameters: Mapping[str, Tensor],
+        shading: Shading,
+        images: Images,
+        phase: Phase,
+        seed: int,
+        held: Attributes | None = None,
     ) -> None:
         super().__init__(phase.iterations)
+        self.held = held
+        if held is not None:
+            zeros = {name: torch.zeros_like(x) for name, x in parameters.items() if name in HELD}
+            parameters = {**parameters, **zeros}
         self.shading, self.images, self.phase, self.seed = shading, images, phase, seed
         self.order: tuple[int, list[int]] = (-1, [])  # an epoch and its views
         size = extent(images.cameras, parameters["means"])
-        self.optimizer = Optimizer(parameters, rates(parameters, phase.rates, size))
+        hold = 0.0 if held is None else held.hold
+        self.optimizer = Optimizer(parameters, rates(parameters, phase.rates, size, hold))
         means = self.parameters["means"]
         self.control = DensityControl(phase.densify, len(means), size, means.device)
 
     @property
     def parameters(self) -> dict[str, Tensor]:
-        """Raw parameters of now."""
+        """What learns, as it is now."""
         return self.optimizer.parameters
+
+    @property
+    def fitted(self) -> dict[str, Tensor]:
+        """Raw parameters of the surfels or Gaussians of now; differentiable in `parameters`."""
+        return self.parameters if self.held is None else self.held.added_to(self.parameters)
 
     def run(self) -> Iterator[int]:
         """Iterate to the end of the phase."""
@@ -60,7 +80,7 @@ class Fit(ResumableFit):
         target = visible_part(self.images, self.view_of(self.iteration), p, self.shading.options)
         is_observed = self.iteration <= phase.densify.stop
         shifts = p["means"].new_empty(len(p["means"]), 2) if is_observed else None
-        visible = join(p, min(phase.sh_degree, self.iteration // phase.sh_every))
+        visible = join(self.fitted, min(phase.sh_degree, self.iteration // phase.sh_every))
         loss = view_loss(
             visible, self.shading, target, phase.losses, shifts, self.iteration, phase.turns_normals
         )
@@ -80,7 +100,7 @@ class Fit(ResumableFit):
     def psnr(self) -> float:
         """Return the PSNR in dB of the first training view as it is now."""
         target = self.images.target(0, self.parameters["means"].device)
-        now = Splats(join(self.parameters), self.shading).render(target.camera, target.light).color
+        now = Splats(join(self.fitted), self.shading).render(target.camera, target.light).color
         error = (now.clamp(0, 1) - target.color).square()
         return -10 * math.log10(max(float(error.mean()), 1e-10))
 
@@ -126,10 +146,12 @@ def spread(points: Tensor) -> float:
     return float((points - points.mean(dim=0)).norm(dim=1).max()) if len(points) else 0.0
 
 
-def rates(names: Iterable[str], r: Rates, size: float) -> dict[str, Rate]:
+def rates(names: Iterable[str], r: Rates, size: float, hold: float = 0.0) -> dict[str, Rate]:
     """Return the rate of each parameter that learns; `size` is the extent of the cameras."""
     starts = {"quats": r.quats, "scales": r.scales, "opacities": r.opacities, "colors": r.colors}
     starts |= {"normals": r.quats, "sh": r.sh, "sh_rest": r.sh_rest, **dict.fromkeys(MATERIAL, r.material)}
-    chosen = {name: Rate(starts[name], r.final) for name in names if name in starts}
+    chosen = {
+        name: Rate(starts[name], r.final, hold if name in HELD else 0.0) for name in names if name in starts
+    }
     chosen["means"] = Rate(size * r.means, r.means_final)
     return {name: rate for name, rate in chosen.items() if rate.start > 0}

@@ -21,6 +21,7 @@ from texgs.fitting.ends import Points, ends_of_rays
 from texgs.fitting.hull import Box, hull_points, mean_colors, random_points
 from texgs.fitting.loop import Fit
 from texgs.fitting.settings import Densify, Losses, Phase, Rates, Seeds
+from texgs.raster.shading import MATERIAL
 from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
 from texgs.volume.images import Images, smaller
@@ -124,16 +125,24 @@ def ends_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed
             f"{views.folder}: seeds.kind=volume needs a volume and views that name their transfer function; "
             "seeds.kind=visible needs neither"
         )
-    named = views.metadata["tf"]
-    points = {key: named[key] for key in named if key != "name"} if isinstance(named, Mapping) else named
-    look = Appearance(opacity_unit=views.metadata.get("opacity_unit", Appearance.opacity_unit))
-    caster, tf = Caster(volume, look), TransferFunction.from_dict(points)
+    caster, look, tf = shown_volume(volume, views)
     for factor in (max(max(images.size) // GLANCE, 1), 1):
         cameras = [smaller(camera, factor) for camera in images.cameras]
         ends = ends_of_rays(caster, look, tf, cameras, most, seed)
         if len(ends.places) == most:
             break
     return ends
+
+
+def shown_volume(
+    volume: Grid, views: ViewSet, device: torch.device | str = "cpu"
+) -> tuple[Caster, Appearance, TransferFunction]:
+    """Return what casts rays through a volume as its views show it, how it looks there, and the function."""
+    told, named = views.metadata, views.metadata["tf"]
+    shading = {name: told["shading"][name] for name in MATERIAL if name in (told.get("shading") or {})}
+    look = Appearance(**shading, opacity_unit=told.get("opacity_unit", Appearance.opacity_unit))
+    points = {key: named[key] for key in named if key != "name"} if isinstance(named, Mapping) else named
+    return Caster(volume, look, device), look, TransferFunction.from_dict(points)
 
 
 def tell_fewer(views: ViewSet, found: int, count: int) -> None:

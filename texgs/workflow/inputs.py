@@ -80,6 +80,12 @@ def model_of(stage: str) -> Callable[[Config], dict[str, Path]]:
     return lambda config: {"model": made("phase", config, stage), **view_set(config)}
 
 
+def start_of_shading(config: Config) -> dict[str, Path]:
+    """Return what the shading phase starts from: the model, the views, and the volume if they are of one."""
+    from_volume = config.fit.attributes == "auto" and config.dataset.views_folder is None
+    return {**model_of("surfels")(config), **(prepared_volume(config) if from_volume else {})}
+
+
 def last_phase(config: Config) -> str:
     """Return the phase of a fit that makes what scenes are composed of."""
     return fit_specs()[config.fit.field].phases[-1]

@@ -9,6 +9,8 @@ RANGES = {  # that factors can be in, by the range of materials, see `fit.materi
     "paper": {"specular": (0.0, 5.0), "shininess": (0.0, 50.0)},  # those of the release
 }
 
+MARGIN = 1e-4  # of a range, to its ends, which no material reaches
+
 
 def require_material(factors: Mapping[str, float], kind: str) -> None:
     """Require factors that a range of materials can express."""
@@ -18,3 +20,12 @@ def require_material(factors: Mapping[str, float], kind: str) -> None:
                 f"fit.first_material.{name}: expected a value between {low:g} and {high:g}, as "
                 f"material_range={kind} has them, got {factors[name]:g}"
             )
+
+
+def nearest_material(factors: Mapping[str, float], kind: str) -> dict[str, float]:
+    """Return the factors that a range of materials can express and that are nearest to others."""
+    nearest = dict(factors)
+    for name, (low, high) in RANGES[kind].items():
+        margin = MARGIN * (high - low)
+        nearest[name] = min(max(factors[name], low + margin), high - margin)
+    return nearest

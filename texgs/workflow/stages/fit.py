@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from texgs.fields.field import Field
     from texgs.fields.surfels.model import Surfels
     from texgs.fields.surfels.shading import ShadingModel
+    from texgs.fitting.attributes import Attributes
 
 PHASE = Rule("phase", "{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",), target="fits", gpu=("fit",))
 
@@ -54,7 +55,11 @@ class FitJob(FitTask[Recipe]):
         return cls(fit, views, images, output, torch_device(fit.device), fit.seed, title, metadata, volume)
 
     def run(
-        self, parameters: Mapping[str, Tensor], shading: ShadingModel, phase: Phase
+        self,
+        parameters: Mapping[str, Tensor],
+        shading: ShadingModel,
+        phase: Phase,
+        held: Attributes | None = None,
     ) -> tuple[Surfels, float, list[float]]:
         """Run the loop of surfels from the last checkpoint in the folder, if there is one.
 
@@ -68,13 +73,11 @@ class FitJob(FitTask[Recipe]):
         from texgs.fitting.densify import is_shared
         from texgs.fitting.loop import Fit
 
-        fit = Fit(parameters, shading, self.images, phase, self.seed)
+        fit = Fit(parameters, shading, self.images, phase, self.seed, held)
         seconds = run_to_end(fit, self.output / FOLDER, self.title)
-        order = z_order_of(fit.parameters["means"].detach())
-        ordered = {
-            name: x.detach() if is_shared(name, x) else x.detach()[order]
-            for name, x in fit.parameters.items()
-        }
+        fitted = {name: x.detach() for name, x in fit.fitted.items()}
+        order = z_order_of(fitted["means"])
+        ordered = {name: x if is_shared(name, x) else x[order] for name, x in fitted.items()}
         return Surfels(ordered, shading), seconds, fit.losses
 
     def outcome(

@@ -10,7 +10,7 @@ from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
 from texgs.workflow.stages.settings import Recipe
 
 # Keys of a recipe that later stages read.
-LATER = ("normals", "materials", "first_material", "shading", "texture")
+LATER = ("normals", "materials", "attributes", "hold", "first_material", "shading", "texture")
 
 
 @dataclass(kw_only=True)

@@ -1,0 +1,89 @@
+"""Attributes from a volume whose surfaces are spheres, and from noise."""
+
+import numpy as np
+import pytest
+import torch
+from torch.nn.functional import normalize
+
+from tests.volume.scenes import SHELLS, ball
+from texgs.core.geometry import quats_to_matrices
+from texgs.fields.surfels.model import Surfels
+from texgs.fitting.attributes import HOLD, Attributes, coherence
+from texgs.volume.caster import Caster
+from texgs.volume.grid import Grid
+from texgs.volume.lookup import Lookup
+from texgs.volume.render import Appearance
+from texgs.volume.transfer import TransferFunction
+
+from .scenes import assert_same, ball_seeds, new_fit, run
+
+ALL = TransferFunction(((-9, 0.5), (9, 0.5)), ((-9, 0, 0, 0), (9, 1, 1, 1)))
+
+
+def seeds(count=80):
+    return {**ball_seeds(count), "normals": torch.ones(count, 4)}
+
+
+def held_to(grid, hold=None, tf=SHELLS, means=None):
+    means = ball_seeds(1000)["means"] if means is None else means
+    return Attributes.of(Caster(grid, Appearance()), tf, means, hold)
+
+
+def noise():
+    return Grid(np.random.default_rng(0).normal(size=(48, 48, 48)).astype(np.float32))
+
+
+def test_normals_are_the_radii_of_spheres_and_colors_those_of_the_function():
+    means = ball_seeds(1000)["means"]
+    seen = held_to(ball(), tf=ALL).at(means)
+    along = (quats_to_matrices(seen["normals"])[..., 2] * normalize(means, dim=1)).sum(dim=1)
+    assert along[means.norm(dim=1) > 0.05].max() < -0.99  # the ball is brightest in the middle
+    value = 1 - 2 * means.norm(dim=1, keepdim=True)
+    torch.testing.assert_close(seen["colors"], ((value + 9) / 18).expand(-1, 3), atol=2e-3, rtol=0)
+
+
+def test_surfels_are_held_where_normals_are_alike_and_not_in_noise():
+    smooth, rough = held_to(ball()), held_to(noise())
+    assert smooth.coherence > 0.98
+    assert smooth.hold == HOLD
+    assert rough.coherence < 0.6  # that of random directions is 0.5
+    assert rough.hold == 0
+    assert held_to(noise(), hold=0.3).hold == 0.3
+
+
+def test_coherence_is_the_mean_cosine_to_the_nearest_three_by_brute_force():
+    lookup, means = Lookup(Caster(noise(), Appearance()), SHELLS), ball_seeds(50)["means"]
+    n = normalize(lookup.at(means, ["gradients"])["gradients"].double(), dim=1)
+    near = torch.cdist(means, means).fill_diagonal_(torch.inf).topk(3, largest=False).indices
+    expected = (n[:, None] * n[near]).sum(dim=2).abs().mean()
+    assert coherence(lookup, means) == pytest.approx(float(expected), abs=1e-6)
+    assert coherence(lookup, means[:3]) == 0
+
+
+def test_held_surfels_start_as_the_volume_and_learn_differences():
+    held = held_to(ball(), hold=0.1)
+    fit = new_fit(parameters=seeds(), held=held, iterations=60)
+    assert_same(held.at(fit.parameters["means"]), {name: fit.fitted[name] for name in ("colors", "normals")})
+    run(fit)
+    own = held.at(fit.parameters["means"])
+    for name in ("colors", "normals"):
+        torch.testing.assert_close(fit.fitted[name] - own[name], fit.parameters[name], atol=1e-6, rtol=0)
+        assert fit.parameters[name].any()
+    Surfels({name: x.detach() for name, x in fit.fitted.items()})
+
+
+def test_the_more_they_are_held_the_nearer_they_stay():
+    distances = []
+    for hold in (0.0, 0.02, 0.5):
+        fit = run(new_fit(parameters=seeds(), held=held_to(ball(), hold), iterations=60))
+        distances.append(float(fit.parameters["colors"].detach().abs().mean()))
+    assert distances[0] > 1.2 * distances[1] > 4 * distances[2]
+
+
+def test_a_held_fit_that_was_stopped_ends_with_the_same_bits():
+    held = held_to(ball(), hold=0.05)
+    whole = run(new_fit(parameters=seeds(), held=held))
+    stopped = run(new_fit(parameters=seeds(), held=held), 35)
+    resumed = new_fit(parameters=seeds(), held=held)
+    resumed.restore(stopped.state())
+    assert_same(run(resumed).fitted, whole.fitted)
