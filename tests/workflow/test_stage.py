@@ -68,13 +68,16 @@ def test_a_phase_is_not_changed_by_what_later_ones_read():
         ("surfels", "fit=quick fit.seeds.kind=visible", False),
         ("surfels", "fit=paper", False),
         ("surfels", "dataset=vortex fit=quick", False),
-        ("shading", "fit=quick", False),
+        ("shading", "fit=quick", True),
+        ("shading", "fit=quick fit.attributes=learned", False),
+        ("shading", "fit=paper", False),
+        ("shading", "dataset=vortex fit=quick", False),
         ("gaussians", "fit=gaussians_quick", True),
         ("gaussians", "fit=gaussians", False),
         ("voxels", "fit=plenoxels_quick", False),
     ],
 )
-def test_a_fit_reads_the_volume_where_seeds_may_come_from_it(tmp_path, stage, words, reads):
+def test_a_fit_reads_the_volume_where_it_may_start_from_it(tmp_path, stage, words, reads):
     (tmp_path / "vortex" / "TF01").mkdir(parents=True)
     (tmp_path / "vortex" / "TF01" / "transforms_train.json").write_text("{}")
     config = compose(("dataset=engine", "tf=TF01", f"data_folder={tmp_path}", *words.split()))
