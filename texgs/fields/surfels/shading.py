@@ -58,8 +58,9 @@ class ShadingModel:
         viewer = camera.position if self.local_viewer else -FAR * camera.viewmat[2, :3]
         toward = None if light.kind == "headlight" else light.direction(camera).to(camera.viewmat)
         turns = p.get("normals", p["quats"])
-        places = (p["means"], turns, viewer, toward)
-        return blinn_phong(colors, *factors, *places, facing=self.facing, ranges=ranges)
+        a, d, s, b = factors
+        means, facing = p["means"], self.facing
+        return blinn_phong(colors, a, d, s, b, means, turns, viewer, toward, facing=facing, ranges=ranges)
 
 
 def seen_normals(parameters: Mapping[str, Tensor], camera: Camera) -> Tensor:
