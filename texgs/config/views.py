@@ -15,7 +15,7 @@ class CameraPath:
 
     kind: str = key("icosphere", "arrangement of the cameras", choices=("icosphere", "spiral", "orbit"))
     frequency: int = key(3, "frequency f of the icosphere, which has 10 f^2 + 2 views", least=1)
-    count: int = key(181, "number of views of a spiral or orbit", least=1)
+    count: int = key(61, "number of views of a spiral or orbit", least=1)
     polar: float = key(15.0, "angle of an orbit above the horizon", "degrees", least=-90, most=90)
 
 
@@ -72,7 +72,7 @@ class ViewKeys:
         choices=("cpu", "gpu", "vtk"),
     )
     geometry: bool = key(False, "also write depth and normals of the test views, geometry/*.npz")
-    turntable: int = key(36, "number of frames of the turntable", least=1)
+    turntable: int = key(24, "number of frames of the turntable", least=1)
 
     def lens(self, frame: Frame | None) -> Lens:
         """Return what all cameras have in common.
