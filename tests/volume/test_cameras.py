@@ -96,3 +96,22 @@ def test_cameras_are_spread_evenly_over_a_path():
     assert len(places) == 61
     assert {after - before for before, after in pairwise(places)} <= {2, 3}
     assert cameras.spread(path, 1) == path[:1]
+
+
+def test_the_first_cameras_are_each_the_farthest_from_those_before():
+    views = cameras.icosphere(3, LENS)
+    places, order = positions(views), cameras.farthest_first(views)
+    assert sorted(order) == list(range(92))
+    assert order[0] == 0
+    for count in range(1, 92):
+        apart = np.linalg.norm(places[:, None] - places[order[:count]], axis=2).min(axis=1)
+        assert apart[order[count]] == pytest.approx(apart.max(), rel=1e-6)
+    assert cameras.farthest_first([views[0]] * 3) == [0, 1, 2]
+
+
+@pytest.mark.parametrize(("count", "degrees"), [(54, 25), (98, 20)])
+def test_a_part_of_the_training_views_leaves_no_side_out(count, degrees):
+    views = cameras.icosphere(4, LENS)
+    directions = positions(views) / RADIUS
+    chosen = directions[cameras.farthest_first(views)[:count]]
+    assert (directions @ chosen.T).max(axis=1).min() > np.cos(np.radians(degrees))

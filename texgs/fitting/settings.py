@@ -120,7 +120,13 @@ class TextureKeys:
     texels: int | None = key(
         None, "texels in all, of one edge; default where they are seen, about one per pixel", least=1
     )
-    sweeps: int = key(3, "sweeps of the least-squares solver over all views", least=0)
+    sweeps: int = key(1, "sweeps of the least-squares solver over its views", least=0)
+    views: float = key(
+        0.9,
+        "share of training views, spread, that the solver sees; the others, or all, tell how far texels go",
+        above=0,
+        most=1,
+    )
     iterations: int = key(0, "iterations of Adam on L1 + D-SSIM after the solver", least=0)
     rate: float = key(0.0025, "rate of Adam at the start, of texels", least=0)
     palette_rate: float = key(

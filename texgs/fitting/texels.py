@@ -14,8 +14,10 @@ from texgs.fitting.settings import TextureKeys
 from texgs.fitting.texture_solve import refine, solve
 from texgs.raster import Texture
 from texgs.raster.arguments import MOST_TEXELS
+from texgs.volume.cameras import farthest_first
 from texgs.volume.images import Images
 
+LOOKED = 54  # views, spread, that tell what is seen of surfels
 HALVINGS = 40  # of the interval that the edge of texels is searched in
 
 
@@ -84,7 +86,7 @@ def mean_unlit_color(model: Surfels, sight: "Sight") -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What the training views see of each surfel."""
+    """What spread training views see of each surfel."""
 
     largest: Tensor
     """[N] largest blending weight in any view, 0 where no view shows the surfel."""
@@ -94,12 +96,12 @@ class Sight:
     """[N] sum of weight * gain^2 over the pixels of a view that shows it. It bounds the sum of the surfel's
     rows of A'A 1, A being the weights of texels in pixels."""
     shown: Tensor
-    """[N] sum of blending weights over all views."""
+    """[N] sum of blending weights over these views."""
 
 
 @torch.no_grad()
 def look(model: Surfels, images: Images, title: str) -> Sight:
-    """Gather what all views show of a textured model, whatever its texels.
+    """Gather what views show of a textured model, whatever its texels: `LOOKED` of them, spread.
 
     A surfel seen by few views has a small mean curvature and still a large one where it is seen;
     `curvature` is therefore the mean over views weighted by itself, sum c^2 / sum c, and at least half of
@@ -109,7 +111,7 @@ def look(model: Surfels, images: Images, title: str) -> Sight:
     n = len(means)
     largest, shown, total, squares, steepest = means.new_zeros(5, n)
     pixel = means.new_full((n,), torch.inf)
-    for index in progress(range(len(images)), title=f"{title}, sight", unit="view"):
+    for index in progress(farthest_first(images.cameras)[:LOOKED], title=f"{title}, sight", unit="view"):
         target = visible_part(images, index, model.parameters, model.shading.options)
         camera = target.camera
         texture = model.shading.colors(model.parameters, camera, target.light)

@@ -1,6 +1,8 @@
 """Texels from images by least squares or Adam: with geometry and shading frozen, images are linear."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from math import ceil
 
 import torch
 from torch import Tensor
@@ -15,12 +17,13 @@ from texgs.fitting.checkpoint import require_finite
 from texgs.fitting.settings import TextureKeys
 from texgs.raster import Texture
 from texgs.raster.losses import l1_dssim
-from texgs.volume.images import Images, Target
+from texgs.volume.cameras import farthest_first
+from texgs.volume.images import Images
 
-STEP = 0.6  # of a Newton step in a typical view: 2 is the limit of stability, and views differ
-LAST_STEP = 0.06  # noise of single views averages out as steps fall
+STEP = 1.3  # of a Newton step in a typical view: 2 is the limit of stability, and views differ
+LAST_STEP = 0.3  # noise of single views averages out as steps fall
 FARTHEST = 1.0  # texels from the colours of their surfels: more brings noise of views that hardly see them
-CHECKED = 12  # views in which texels must have lowered the error
+CHECKED = 12  # views, about, that tell how far to go
 STRUCTURE = 1e-3  # weight of D-SSIM against half the mean squared error
 DSSIM = 0.2  # share of D-SSIM in what Adam follows
 
@@ -33,19 +36,21 @@ def solve(
     A step divides the gradient by an estimate of the row sums A'A 1 of the Hessian in one view, A being the
     weights of texels in its pixels: by the row sums themselves, no eigenvalue would exceed 1. To the estimate
     `keys.ridge` times its median is added, which keeps texels that are hardly seen in place.
-    `of_surfels` is the curvature [N] of the model, see `texels.Sight`. Texels that do not lower the squared
-    error are not taken.
+    `of_surfels` is the curvature [N] of the model, see `texels.Sight`. Texels follow the noise of views, too:
+    they go as far as it helps other views, see `share_of`.
     """
     texels = model.parameters["texels"].clone().requires_grad_()
     moving = replace(model, parameters={**model.parameters, "texels": texels})
     scale = _inverse(curvature(model.parameters["sizes"], of_surfels), keys.ridge)
     generator = torch.Generator().manual_seed(seed)
-    order = [i for _ in range(keys.sweeps) for i in torch.randperm(len(images), generator=generator).tolist()]
+    spread, count = farthest_first(images.cameras), ceil(keys.views * len(images))
+    turns = [torch.randperm(count, generator=generator) for _ in range(keys.sweeps)]
+    order = [spread[place] for place in torch.cat(turns).tolist()]
     for step, index in enumerate(progress(order, title=title, unit="view")):
         target = visible_part(images, index, model.parameters, model.shading.options)
         image = moving.render(target.camera, target.light).color
         structure = STRUCTURE * image.numel() * l1_dssim(image, target.color, 1.0)
-        loss = 0.5 * squared_error(image, target) + structure
+        loss = 0.5 * (image - target.color).square().sum() + structure
         (gradient,) = torch.autograd.grad(loss, texels)
         rate = STEP * (LAST_STEP / STEP) ** (step / len(order))
         with torch.no_grad():
@@ -53,21 +58,25 @@ def solve(
     advice = "the training views or the model of the phase before are damaged"
     require_finite("texture", {"texels": texels}, advice)
     solved = replace(model, parameters={**model.parameters, "texels": texels.detach()})
-    return solved if sampled_error(solved, images) <= sampled_error(model, images) else model
-
-
-def squared_error(image: Tensor, target: Target) -> Tensor:
-    """Return the sum [] over pixels and channels."""
-    return (image - target.color).square().sum()
+    share = share_of(solved, model, images, sorted(spread[count:]) or range(len(images)))
+    kept = model.parameters["texels"].lerp(texels.detach(), share)
+    return replace(model, parameters={**model.parameters, "texels": kept})
 
 
 @torch.no_grad()
-def sampled_error(model: Surfels, images: Images) -> float:
-    """Return the squared error of some views, evenly spaced, with colours clamped as on a screen."""
-    device = model.device
-    targets = [images.target(i, device) for i in range(0, len(images), max(1, len(images) // CHECKED))]
-    errors = [squared_error(model.render(t.camera, t.light).color.clamp(0, 1), t) for t in targets]
-    return float(torch.stack(errors).sum())
+def share_of(solved: Surfels, start: Surfels, images: Images, views: Sequence[int]) -> float:
+    """Return how much in [0, 1] of the way from a model to a solved one has the least squared error.
+
+    Images are linear in texels: it is <residual, change> / <change, change> over some `CHECKED` views.
+    """
+    along = across = 0.0
+    for index in views[:: max(1, len(views) // CHECKED)]:
+        target = visible_part(images, index, start.parameters, start.shading.options)
+        before = start.render(target.camera, target.light).color
+        change = solved.render(target.camera, target.light).color - before
+        along += float((change * (target.color - before)).sum(dtype=torch.float64))
+        across += float(change.square().sum(dtype=torch.float64))
+    return min(max(along / across, 0.0), 1.0) if across else 0.0
 
 
 def curvature(sizes: Tensor, of_surfels: Tensor) -> Tensor:

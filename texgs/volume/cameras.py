@@ -6,6 +6,7 @@ from math import asin, atan2, degrees, sqrt
 from typing import TypeVar
 
 import numpy as np
+import torch
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
@@ -60,6 +61,18 @@ def spread(path: Sequence[T], count: int) -> list[T]:
     """Return so many cameras or views of a path, evenly spread and in its order; all, if it has no more."""
     count = min(count, len(path))
     return [path[index * len(path) // count] for index in range(count)]
+
+
+def farthest_first(cameras: Sequence[Camera]) -> list[int]:
+    """Return the places of all cameras, each the farthest from those before it: any first few are spread."""
+    positions = torch.stack([camera.position for camera in cameras]).double()
+    apart = torch.cdist(positions, positions)  # [V, V]
+    order, nearest = [0], apart[0]
+    for _ in cameras[1:]:
+        nearest = nearest.index_fill(0, torch.tensor(order), -1)  # each is taken once
+        order.append(int(nearest.argmax()))
+        nearest = torch.minimum(nearest, apart[order[-1]])
+    return order
 
 
 def _orbit(azimuth: float, polar: float, lens: Lens) -> Camera:

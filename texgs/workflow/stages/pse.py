@@ -29,8 +29,8 @@ PICTURES = {
     "relight.png": "A light in front that moves from below to above, by its azimuth and polar angle",
 }
 BELOW = "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
-COMPARED = 6  # views around the object, one of which is shown
-CHECKED = 64  # views with lights and edits at random
+COMPARED = 3  # views around the object, one of which is shown
+CHECKED = 39  # views with lights and edits at random
 POLAR = 20.0  # of these views, degrees
 LEFT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
 SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in the paper's figure, degrees
