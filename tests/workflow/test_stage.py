@@ -52,7 +52,7 @@ def test_a_phase_is_not_changed_by_what_later_ones_read():
     of_tf = ("tf=TF01", "fit=quick")
     before = {name: digest(name, *of_tf) for name in ("surfels", "shading", "texture", "compose")}
     for change, changed in {
-        "fit.texture.sweeps=1": {"texture", "compose"},
+        "fit.texture.sweeps=2": {"texture", "compose"},
         "fit.shading.iterations=10": {"shading", "texture", "compose"},
         "fit.materials=surfel": {"shading", "texture", "compose"},
         "fit.low_pass=3": set(before),

@@ -32,7 +32,7 @@ LEAST = 100  # points
 HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of their own
 GLANCE = 3  # times smaller views, which say where rays end
 RATES = Rates(quats=0.016, scales=0.05, opacities=0.1)
-TEXTURE = TextureKeys(sweeps=1)
+TEXTURE = TextureKeys()
 LitCamera = tuple[Camera, Light]
 
 
