@@ -89,7 +89,7 @@ def test_rows_are_what_differs(recipes, edits, expected):
     [
         (["quick", "default"], [], ("fit.materials", "surfel", "shared", "quick, default")),  # they share it
         (["quick", "default"], [], ("fit.shading.iterations", "20000", "1000", "quick")),
-        (["quick", "default"], [], ("fit.shading.iterations", "20000", "8000", "default")),
+        (["quick", "default"], [], ("fit.shading.iterations", "20000", "4000", "default")),
         ([], ["style", "style_untextured"], ("edit.image.recipe.iterations", "3000", "100", STYLES)),
         ([], ["style", "style_untextured"], ("edit.image.recipe.lambda_s", "0.9", "1", STYLES)),
         ([], ["text_quick"], ("edit.text.recipe.views", "nearest", "axes", "text_quick")),
