@@ -9,5 +9,4 @@ def shorten(patch: pytest.MonkeyPatch, *, frequency: int, surfels: int, iteratio
     """Let `fit_now` take so many surfels and iterations of each pass, and views of an icosphere."""
     patch.setattr(now, "FREQUENCY", frequency)
     patch.setattr(now, "SURFELS", surfels)
-    for name in ("OPAQUE", "TRANSLUCENT"):
-        patch.setattr(now, name, getattr(now, name)._replace(iterations=(iterations, iterations)))
+    patch.setattr(now, "PASSES", (iterations, iterations))

@@ -11,7 +11,7 @@ from texgs.core.geometry import quats_to_matrices
 from texgs.core.lens import Lens
 from texgs.fitting.hull import hull_points, mean_colors
 from texgs.fitting.now import cast_views
-from texgs.fitting.seeds import box_of, read_points, seed_surfels, shrunk, surfels_at
+from texgs.fitting.seeds import box_of, read_points, seed_surfels, surfels_at
 from texgs.fitting.settings import Seeds
 from texgs.volume.cameras import icosphere
 from texgs.volume.caster import Caster
@@ -139,17 +139,6 @@ def test_visible_surfels_are_on_the_opaque_ball_not_in_it():
     depth = [torch.quantile(x["means"].norm(dim=1), 0.25) / RADIUS for x in (filled, seen)]
     assert depth[0] == pytest.approx(0.25 ** (1 / 3), abs=0.06)
     assert depth[1] > 0.78
-
-
-def test_images_are_shrunk_by_averages_and_the_rest_is_cut():
-    camera = cameras(1, size=11)[0]
-    planes = torch.rand(4, 11, 11, generator=random_numbers())
-    images = images_of([planes], [camera])
-    small = shrunk(images, 2)
-    blocks = images.planes[0, :, :10, :10].float().reshape(4, 5, 2, 5, 2).mean(dim=(2, 4))
-    assert (small.planes[0].float() - blocks).abs().max() <= 0.5
-    assert (small.cameras[0].width, small.cameras[0].height) == (5, 5)
-    assert shrunk(images, 0) is images
 
 
 def test_given_points_come_first(tmp_path):

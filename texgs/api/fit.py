@@ -111,7 +111,8 @@ def fit_now_into(
     made_of = SceneVolume(copied(volume, folder), functions, look)
     caster = Caster(volume.grid, look, device)
     for name, tf in functions.items():
-        *_, model = fit_now(caster, look, tf, frame.lens(width=size, height=size), name, seed)
+        lens = frame.lens(width=size, height=size)
+        (model,) = fit_now(caster, look, tf, lens, name, seed, soon=False)
         models[name] = SceneModel(write_model(files[name], model))
     return write_scene(folder / SCENE, Models(models, volume=made_of, frame=frame, space=volume.grid.world))
 

@@ -11,10 +11,12 @@ from texgs.core.camera import Camera
 from texgs.core.geometry import z_order_of
 from texgs.core.light import HEADLIGHT
 from texgs.volume.caster import Caster
+from texgs.volume.images import smaller
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
-PIXELS = 4000  # of each view, whose rays are followed
+GLANCE = 64  # pixels of the longer side of views whose rays are followed, about
+PIXELS = 4000  # of each view
 FAINT = 0.02  # alpha below which a pixel shows nothing to speak of
 DENSEST = 1 - 1e-6  # opacity of a point
 
@@ -33,15 +35,25 @@ def ends_of_rays(
     """Return where rays of random pixels lose some part of their light, another one in each view.
 
     So there are as many ends on a layer as it shows, also behind others. They are on the CPU, `most` of them
-    or fewer.
+    or fewer: small views are enough where they show so many.
     """
     unlit = caster.with_appearance(replace(look, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
+    glance = max(cameras[0].width, cameras[0].height) // GLANCE
+    for reduction in sorted({max(glance, 1), 1}, reverse=True):
+        points = ends_in(unlit, tf, [smaller(camera, reduction) for camera in cameras], most, seed)
+        if len(points.places) == most:
+            break
+    return points
+
+
+def ends_in(caster: Caster, tf: TransferFunction, cameras: list[Camera], most: int, seed: int) -> Points:
+    """Return where rays of views end, `most` of them or fewer, along a Z curve."""
     generator = torch.Generator().manual_seed(seed)
     count, parts = len(cameras), []
     shares = (torch.randperm(count, generator=generator) + 0.5) / count  # spread evenly, in random order
     for camera, left in zip(cameras, shares.tolist(), strict=True):
         thick = thickened(tf, math.log(0.5) / math.log(left))  # half of its light is left where `left` was
-        parts.append(ends_of(unlit, thick, camera, generator))
+        parts.append(ends_of(caster, thick, camera, generator))
     points = Points(*map(torch.cat, zip(*parts, strict=True)))
     chosen = torch.randperm(len(points.places), generator=generator)[:most]
     ordered = chosen[z_order_of(points.places[chosen])]

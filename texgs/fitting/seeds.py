@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from torch import Tensor
-from torch.nn.functional import avg_pool2d, normalize
+from torch.nn.functional import normalize
 
 from texgs.core.errors import ArgumentError, located
 from texgs.core.geometry import facing
@@ -24,7 +24,7 @@ from texgs.fitting.settings import Densify, Losses, Phase, Rates, Seeds
 from texgs.raster.shading import MATERIAL
 from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
-from texgs.volume.images import Images, smaller
+from texgs.volume.images import Images, shrunk
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
@@ -34,7 +34,6 @@ HALF_SIZE = 1.1  # of the cube around the origin where nothing else is known, in
 SIDE = 1.0  # the longest side of data where views do not say, world units
 GREY = 0.5  # the colour of random seeds
 USUAL = 10_000  # seeds, where nothing says how many
-GLANCE = 64  # pixels of the longer side of views whose rays find seeds in a volume, about
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
 SMALLEST = 1e-4  # scale, world units
 # A quick fit finds what is seen of more surfels than are kept.
@@ -74,12 +73,13 @@ def seed_surfels(
         kind = "points" if given.is_file() else "volume" if has_volume else "visible"
     count = seeds.count or (most if kind == "volume" else None) or USUAL
     generator = torch.Generator().manual_seed(seed)
+    if kind == "volume":
+        ends = points_in(volume, views, images, count, seed)
+        tell_fewer(views, len(ends.places), count)
+        return surfels_on(ends, seeds.opacity, generator), ends.colors
     colors: Tensor | None = None
-    normals: Tensor | None = None
     if kind == "points":
         points, colors = read_points(given)
-    elif kind == "volume":
-        points, normals, colors = ends_in(volume, views, images, count, seed)
     elif kind == "random":
         points = random_points(box_of(views, half_size), count, generator)
         colors = torch.full_like(points, GREY)
@@ -91,8 +91,6 @@ def seed_surfels(
     if colors is None:
         colors = mean_colors(images, points)
     surfels = surfels_at(points, seeds.opacity, generator)
-    if normals is not None:
-        surfels["quats"] = facing(normals)
     if kind != "visible":
         return surfels, colors
     return most_seen(surfels, colors, images, count, seed)
@@ -118,20 +116,15 @@ def seed_gaussians(
     return {**surfels, "scales": torch.cat([surfels["scales"], thickness], dim=1), **split(sh)}
 
 
-def ends_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed: int) -> Points:
-    """Return where rays of all views, small ones if these do, end in what they show of a volume."""
+def points_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed: int) -> Points:
+    """Return where rays of all views end in what they show of a volume."""
     if volume is None or "tf" not in views.metadata:
         raise ArgumentError(
             f"{views.folder}: seeds.kind=volume needs a volume and views that name their transfer function; "
             "seeds.kind=visible needs neither"
         )
     caster, look, tf = shown_volume(volume, views)
-    for factor in (max(max(images.size) // GLANCE, 1), 1):
-        cameras = [smaller(camera, factor) for camera in images.cameras]
-        ends = ends_of_rays(caster, look, tf, cameras, most, seed)
-        if len(ends.places) == most:
-            break
-    return ends
+    return ends_of_rays(caster, look, tf, images.cameras, most, seed)
 
 
 def shown_volume(
@@ -214,6 +207,11 @@ def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> di
     }
 
 
+def surfels_on(points: Points, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
+    """Return raw geometry of round surfels at points, which face along their normals."""
+    return {**surfels_at(points.places, opacity, generator), "quats": facing(points.normals)}
+
+
 def most_seen(
     surfels: Mapping[str, Tensor], colors: Tensor, images: Images, count: int, seed: int
 ) -> tuple[dict[str, Tensor], Tensor]:
@@ -236,11 +234,3 @@ def shown(model: Surfels, images: Images) -> Tensor:
         statistics = model.render(camera.to(model.device), light, outputs=("statistics",)).statistics
         total += statistics.weight_sum  # type: ignore[union-attr]
     return total
-
-
-def shrunk(images: Images, factor: int) -> Images:
-    """Average factor x factor pixels; incomplete blocks at the right and bottom are cut off."""
-    if factor <= 1:
-        return images
-    planes = torch.stack([avg_pool2d(view.float(), factor).round().to(torch.uint8) for view in images.planes])
-    return Images(planes, [smaller(camera, factor) for camera in images.cameras], images.lights)

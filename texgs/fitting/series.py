@@ -15,14 +15,12 @@ from texgs.fields.surfels.model import TEXTURE, Surfels
 from texgs.fields.surfels.step_file import UNITS
 from texgs.fields.surfels.texels import untextured
 from texgs.fitting.ends import Points, ends_of_rays
-from texgs.fitting.now import HEADLIGHTS, SURFELS, cast_views, lit_cameras, refined, surfels_on
-from texgs.fitting.now import RATES as RATES_OF_SEEDS
-from texgs.fitting.seeds import shown
+from texgs.fitting.now import HEADLIGHTS, OPACITY, PHASE, SURFELS, cast_views, lit_cameras, refined
+from texgs.fitting.seeds import shown, surfels_on
 from texgs.fitting.settings import Rates
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
-from texgs.volume.images import smaller
 from texgs.volume.motion import Motion, motion
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
@@ -32,7 +30,7 @@ STEP = 1.0  # voxels between the samples of views
 ROUNDS = 3  # through all views: a part of one would bend surfels towards the views that are in it
 SLOWER = 0.3  # times the rates of surfels that start anywhere
 MOVED = UNITS.keys() - {"normals"}  # these turn as fast as surfels
-RATES = Rates(**{name: SLOWER * getattr(RATES_OF_SEEDS, name) for name in MOVED}, material=0.0)
+RATES = Rates(**{name: SLOWER * getattr(PHASE.rates, name) for name in MOVED}, material=0.0)
 SHARE = 0.1  # of all surfels: so many of those that show least are planted where most is missing
 FEWEST = 4  # surfels to plant: of fewer the size is not known, see `surfels_at`
 HIDDEN = -12.0  # raw opacity of surfels where nothing is to be seen
@@ -89,11 +87,12 @@ class Follower:
     ) -> dict[str, Tensor]:
         """Plant surfels without texels, and fit all to views of a volume."""
         images = cast_views(caster, self._tf, lit_cameras(lens, seed), f"{title}, views")
-        glances = [smaller(camera, 2) for camera in images.cameras[::HEADLIGHTS]]
-        points = ends_of_rays(caster, self._look, self._tf, glances, SURFELS, seed)
-        weights = shown(Surfels(plain, self._shading).to(caster.device), images[::HEADLIGHTS]).cpu()
+        headlit = images[::HEADLIGHTS]
+        points = ends_of_rays(caster, self._look, self._tf, headlit.cameras, SURFELS, seed)
+        weights = shown(Surfels(plain, self._shading).to(caster.device), headlit).cpu()
         model = Surfels(planted(plain, points, weights, seed), self._shading).to(caster.device)
-        return refined(model, images, ROUNDS * len(images), RATES, seed, title)
+        phase = replace(PHASE, iterations=ROUNDS * len(images), rates=RATES)
+        return dict(refined(model, images, phase, seed, title).parameters)
 
 
 def lens_of(grid: Grid, tf: TransferFunction) -> Lens | None:
@@ -171,6 +170,7 @@ def planted(
     kept = torch.ones(n, dtype=torch.bool).index_fill_(0, least, False)
     distances, _ = cKDTree(parameters["means"][kept].numpy()).query(points.places.numpy())
     far = torch.from_numpy(distances).argsort(descending=True)[:count]
-    new = {name: x[far] for name, x in surfels_on(points, seed).items()}
+    start = surfels_on(points, OPACITY, torch.Generator().manual_seed(seed)) | {"colors": points.colors}
+    new = {name: x[far] for name, x in start.items()}
     new["normals"] = new["quats"]
     return {name: x.index_copy(0, least, new[name]) if name in new else x for name, x in parameters.items()}

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import avg_pool2d
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
@@ -137,6 +138,14 @@ def smaller(camera: Camera, reduce: int) -> Camera:
     K = camera.K.clone()
     K[:2] /= reduce
     return replace(camera, K=K, width=camera.width // reduce, height=camera.height // reduce)
+
+
+def shrunk(images: Images, factor: int) -> Images:
+    """Average factor x factor pixels; incomplete blocks at the right and bottom are cut off."""
+    if factor <= 1:
+        return images
+    planes = torch.stack([avg_pool2d(view.float(), factor).round().to(torch.uint8) for view in images.planes])
+    return Images(planes, [smaller(camera, factor) for camera in images.cameras], images.lights)
 
 
 def content_box(planes: np.ndarray) -> Box:
