@@ -9,8 +9,12 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from texgs.fields.surfels.material import nearest_material
+from texgs.fields.surfels.shading import raw_material
+from texgs.raster.shading import MATERIAL
 from texgs.volume.caster import Caster
 from texgs.volume.lookup import Lookup
+from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
 HELD = ("colors", "normals")
@@ -27,11 +31,19 @@ class Attributes:
     """What a volume says of surfels, and how strongly they are held to it."""
 
     lookup: Lookup
+    look: Appearance
     coherence: float  # how alike its normals are from one surfel to the next, 0 to 1
     hold: float  # share of a difference that an iteration takes away; 0: the volume is no more than the start
 
     @classmethod
-    def of(cls, caster: Caster, tf: TransferFunction, means: Tensor, hold: float | None = None) -> Attributes:
+    def of(
+        cls,
+        caster: Caster,
+        look: Appearance,
+        tf: TransferFunction,
+        means: Tensor,
+        hold: float | None = None,
+    ) -> Attributes:
         """Return what a volume says of what a function shows, for surfels with means [N, 3].
 
         Coherence says how strongly they are held where `hold` does not.
@@ -39,7 +51,21 @@ class Attributes:
         lookup = Lookup(caster, tf)
         alike = coherence(lookup, means)
         share = min(max((alike - ROUGH) / (SMOOTH - ROUGH), 0.0), 1.0)
-        return cls(lookup, alike, HOLD * share if hold is None else hold)
+        return cls(lookup, look, alike, HOLD * share if hold is None else hold)
+
+    @property
+    def held(self) -> Attributes | None:
+        """What a fit holds surfels to."""
+        return self if self.hold > 0 else None
+
+    def start(self, means: Tensor, kind: str) -> dict[str, Tensor]:
+        """Return colours, normals and one raw material of surfels with means [N, 3], before a fit.
+
+        The material is that of the views, or the nearest that materials of a kind can express.
+        """
+        factors = {name: getattr(self.look, name) for name in MATERIAL}
+        material = raw_material(**nearest_material(factors, kind), kind=kind)
+        return {**self.at(means), **{name: x.to(means) for name, x in material.items()}}
 
     def at(self, means: Tensor) -> dict[str, Tensor]:
         """Return `colors` [N, 3] and `normals` [N, 4], quaternions whose third axis is the gradient."""

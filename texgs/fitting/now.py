@@ -11,7 +11,8 @@ from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light, random_lights
 from texgs.core.progress import progress
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.shading import ShadingModel, in_full_light, raw_material
+from texgs.fields.surfels.shading import ShadingModel, in_full_light
+from texgs.fitting.attributes import Attributes
 from texgs.fitting.ends import ends_of_rays
 from texgs.fitting.loop import Fit
 from texgs.fitting.seeds import surfels_on
@@ -34,7 +35,7 @@ PHASE = Phase(
     losses=Losses(alpha=0.0),
     densify=Densify(stop=0),
 )
-PASSES = 400, 900  # iterations of the first model, and of the finer one
+PASSES = 400, 1000  # iterations of the first model, and of the finer one
 TEXTURE = TextureKeys()
 LitCamera = tuple[Camera, Light]
 
@@ -51,9 +52,8 @@ def fit_now(
 ) -> Iterator[Surfels]:
     """Yield a first textured model of what a function shows of a volume, then a finer one.
 
-    The material starts at that of the volume, and surfels where its rays end, with its normals and colours:
-    nothing has to be found first, so that density control is not needed. Texels see the views under a
-    headlight.
+    Surfels start where rays end, and as the volume has them there, see `Attributes`: nothing has to be found
+    first, so that density control is not needed. Texels see the views under a headlight.
 
     Args:
         caster: of the volume.
@@ -77,23 +77,25 @@ def fit_now(
     images = cast_views(caster, tf, chosen, f"{title}, views")
     headlit = images[: len(chosen) - len(others)]
     shading = ShadingModel(local_viewer=caster.local_viewer)
-    factors = (look.ambient, look.diffuse, look.specular, look.shininess)
     start = surfels_on(points, OPACITY, torch.Generator().manual_seed(seed))
-    start |= {"colors": points.colors} | raw_material(*factors, kind=shading.material)
-    model = Surfels({name: x.to(caster.device) for name, x in start.items()}, shading)
+    start = {name: x.to(caster.device) for name, x in start.items()}
+    volume = Attributes.of(caster, look, tf, start["means"])
+    model = Surfels(start | volume.start(start["means"], shading.material), shading)
     for number, iterations in enumerate(PASSES if soon else PASSES[-1:], 1):
         phase = replace(PHASE, iterations=iterations)
-        model = refined(model, images, phase, seed, f"{title}, pass {number}")
+        model = refined(model, images, phase, seed, f"{title}, pass {number}", volume.held)
         lit_fully = replace(model, parameters=in_full_light(model.parameters, shading.material))
         yield texturize(lit_fully, headlit, TEXTURE, seed, f"{title}, texture")
 
 
-def refined(model: Surfels, images: Images, phase: Phase, seed: int, title: str) -> Surfels:
+def refined(
+    model: Surfels, images: Images, phase: Phase, seed: int, title: str, held: Attributes | None = None
+) -> Surfels:
     """Return a model of a phase that starts with another one."""
-    fit = Fit(model.parameters, model.shading, images, phase, seed)
+    fit = Fit(model.parameters, model.shading, images, phase, seed, held)
     for _ in progress(fit.run(), phase.iterations, title=title, unit="view"):
         pass
-    return replace(model, parameters={name: x.detach() for name, x in fit.parameters.items()})
+    return replace(model, parameters={name: x.detach() for name, x in fit.fitted.items()})
 
 
 def lit_cameras(lens: Lens, seed: int) -> list[LitCamera]:

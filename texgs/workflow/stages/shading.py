@@ -29,7 +29,6 @@ class ShadingRecipe(Recipe):
     material_range: str = read("fit.material_range")
     materials: str = read("fit.materials")
     normals: str = read("fit.normals")
-    attributes: str = read("fit.attributes")
     hold: float | None = read("fit.hold")
     first_material: Material = read("fit.first_material")
     changed: bool = read(lambda config: is_changed(config.fit, LATER))
@@ -73,27 +72,23 @@ def start_of(
     Colours, normals and material are those of the volume where there is one.
     """
     from texgs.fields.splats import base_color
-    from texgs.fields.surfels.material import nearest_material
     from texgs.fields.surfels.shading import raw_material
     from texgs.fitting.attributes import Attributes
     from texgs.fitting.seeds import shown_volume
 
     start = {name: x for name, x in before.parameters.items() if name not in HARMONICS}
-    start["colors"] = base_color(before.parameters["sh"])
-    if fit.normals == "own" and turns_normals:
-        start["normals"] = start["quats"].clone()
-    factors, held, notes = asdict(fit.first_material), None, {}
-    if job.volume is not None and fit.attributes == "auto":
-        caster, look, tf = shown_volume(job.volume, job.views, job.device)
-        own_material = {name: getattr(look, name) for name in factors}
-        factors = nearest_material(own_material, fit.material_range)
-        volume = Attributes.of(caster, tf, start["means"], fit.hold)
-        notes = {"coherence": volume.coherence, "hold": volume.hold}
-        start |= {name: x for name, x in volume.at(start["means"]).items() if name in start}
-        held = volume if volume.hold > 0 else None
-    first = raw_material(**factors, kind=fit.material_range)
+    start |= {"colors": base_color(before.parameters["sh"]), "normals": start["quats"].clone()}
+    material = raw_material(**asdict(fit.first_material), kind=fit.material_range)
+    start |= material
+    held, notes = None, {}
+    if job.volume is not None:
+        volume = Attributes.of(*shown_volume(job.volume, job.views, job.device), start["means"], fit.hold)
+        start |= volume.start(start["means"], fit.material_range)
+        held, notes = volume.held, {"coherence": volume.coherence, "hold": volume.hold}
+    if fit.normals == "surfel" or not turns_normals:
+        del start["normals"]
     rows = 1 if fit.materials == "shared" else len(before)
-    start |= {name: value.to(job.device).repeat(rows) for name, value in first.items()}
+    start |= {name: start[name].to(job.device).repeat(rows) for name in material}
     return start, held, notes
 
 
