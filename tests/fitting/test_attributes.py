@@ -8,6 +8,7 @@ from torch.nn.functional import normalize
 from tests.volume.scenes import SHELLS, ball
 from texgs.core.geometry import quats_to_matrices
 from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import material
 from texgs.fitting.attributes import HOLD, Attributes, coherence
 from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
@@ -24,9 +25,9 @@ def seeds(count=80):
     return {**ball_seeds(count), "normals": torch.ones(count, 4)}
 
 
-def held_to(grid, hold=None, tf=SHELLS, means=None):
-    means = ball_seeds(1000)["means"] if means is None else means
-    return Attributes.of(Caster(grid, Appearance()), tf, means, hold)
+def held_to(grid, hold=None, tf=SHELLS, look=None):
+    look = look or Appearance()
+    return Attributes.of(Caster(grid, look), look, tf, ball_seeds(1000)["means"], hold)
 
 
 def noise():
@@ -48,7 +49,17 @@ def test_surfels_are_held_where_normals_are_alike_and_not_in_noise():
     assert smooth.hold == HOLD
     assert rough.coherence < 0.6  # that of random directions is 0.5
     assert rough.hold == 0
+    assert rough.held is None
     assert held_to(noise(), hold=0.3).hold == 0.3
+
+
+def test_the_material_is_that_of_the_views_as_far_as_it_can_be():
+    look = Appearance(ambient=0.2, diffuse=0.6, specular=0.0, shininess=300)
+    start = held_to(ball(), look=look).start(ball_seeds(9)["means"], "bounded")
+    factors = {name: float(x) for name, x in material(start, "bounded").items()}
+    assert factors == pytest.approx(
+        {"ambient": 0.2, "diffuse": 0.6, "specular": 0, "shininess": 100}, abs=0.02
+    )
 
 
 def test_coherence_is_the_mean_cosine_to_the_nearest_three_by_brute_force():

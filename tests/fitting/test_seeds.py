@@ -141,10 +141,10 @@ def test_visible_surfels_are_on_the_opaque_ball_not_in_it():
     assert depth[1] > 0.78
 
 
-def test_given_points_come_first(tmp_path):
+def test_given_points_are_taken_as_they_are(tmp_path):
     colors = {name: ("uchar", [0, 51, 102, 153, 255]) for name in ("red", "green", "blue")}
     write_ply(tmp_path / "points3d.ply", {**xyz(), **colors})
-    parameters, seed_colors = seeds(tmp_path, count=2)
+    parameters, seed_colors = seeds(tmp_path, kind="points", count=2)
     expected = torch.tensor([[0.0, 1.0, 2.0]]) + 0.25 * torch.arange(5)[:, None]
     assert torch.equal(parameters["means"], expected)
     torch.testing.assert_close(seed_colors, torch.tensor([0.0, 0.2, 0.4, 0.6, 1.0])[:, None].repeat(1, 3))
@@ -153,7 +153,7 @@ def test_given_points_come_first(tmp_path):
 def test_points_without_colours_take_those_of_the_views(tmp_path):
     write_ply(tmp_path / "points3d.ply", {name: ("double", [0.0, 0.1, 0.0, 0.1, 0.05]) for name in "xyz"})
     images = ball_images()
-    parameters, colors = seeds(tmp_path, images)
+    parameters, colors = seeds(tmp_path, images, kind="points")
     assert torch.equal(colors, mean_colors(images, parameters["means"]))
     write_ply(tmp_path / "a.ply", {**xyz(), **{c: ("float", [0.5] * 5) for c in ("red", "green", "blue")}})
     assert torch.equal(read_points(tmp_path / "a.ply")[1], torch.full((5, 3), 0.5)), "they may be floats"
@@ -190,7 +190,7 @@ def test_mistakes_in_points_are_named(tmp_path, columns, end, message):
     write_ply(path, columns)
     path.write_bytes(path.read_bytes()[:end])
     with pytest.raises(ArgumentError, match=message):
-        seeds(tmp_path)
+        seeds(tmp_path, kind="points")
 
 
 @pytest.mark.parametrize(
@@ -232,7 +232,7 @@ def test_arguments_out_of_range_are_named():
 def test_points_published_with_the_paper_are_near_what_its_views_show():
     views = read_views(real_data("vortex/TF01"))
     images = load(views.train[:3], 8)
-    parameters, colors = seed_surfels(images, views, Seeds(count=1, half_size=1.1), 0)
+    parameters, colors = seed_surfels(images, views, Seeds("points"), 0)
     assert len(parameters["means"]) == len(colors) > 9000
     assert (mean_colors(images, parameters["means"]) - colors).abs().mean() < 0.15
 

@@ -60,18 +60,16 @@ def seed_surfels(
     "points" are all in the folder's points3d.ply; "volume", where rays of views through it end, with its
     normals, see `ends_of_rays`: each part has its share, however thin or small; "hull", points that no view
     sees through; "visible", those of them that a quick fit finds to be seen, as hidden ones never show and
-    still count under the cap of density control; "random", grey ones in the box; "auto", points if there are
-    any, else those of the volume if there is one, else visible. Opacity is that before the quick fit. Of the
-    half size see `box_of`. By default there are as many in a volume as density control keeps, `most`.
+    still count under the cap of density control; "random", grey ones in the box; "auto", those of the volume
+    if there is one, else visible. Opacity is that before the quick fit. Of the half size see `box_of`. By
+    default there are as many that show something as density control keeps, `most`.
     """
     kind, half_size = seeds.kind, seeds.half_size
     if not 0 < seeds.opacity < 1:
         raise ArgumentError(f"seeds.opacity: expected a value between 0 and 1, got {seeds.opacity}")
-    given = views.folder / POINTS
     if kind == "auto":
-        has_volume = volume is not None and "tf" in views.metadata
-        kind = "points" if given.is_file() else "volume" if has_volume else "visible"
-    count = seeds.count or (most if kind == "volume" else None) or USUAL
+        kind = "volume" if volume is not None and "tf" in views.metadata else "visible"
+    count = seeds.count or (most if kind in ("volume", "visible") else None) or USUAL
     generator = torch.Generator().manual_seed(seed)
     if kind == "volume":
         ends = points_in(volume, views, images, count, seed)
@@ -79,7 +77,7 @@ def seed_surfels(
         return surfels_on(ends, seeds.opacity, generator), ends.colors
     colors: Tensor | None = None
     if kind == "points":
-        points, colors = read_points(given)
+        points, colors = read_points(views.folder / POINTS)
     elif kind == "random":
         points = random_points(box_of(views, half_size), count, generator)
         colors = torch.full_like(points, GREY)

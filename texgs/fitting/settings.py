@@ -85,14 +85,13 @@ class Seeds:
 
     kind: str = key(
         "auto",
-        "where seeds are; auto: points of the views if there are any, else where rays end in the volume if "
-        "there is one, else visible",
+        "where seeds are; auto: where rays end in the volume if there is one, else visible",
         choices=SEEDS,
     )
     count: int | None = key(
         None,
-        "number of seeds; default in a volume as many as density control keeps, else 10000; given points are "
-        "taken as they are",
+        "number of seeds; default of volume and visible as many as density control keeps, else 10000; given "
+        "points are taken as they are",
         least=1,
     )
     opacity: float = key(0.1, "opacity of each seed", above=0, below=1)
