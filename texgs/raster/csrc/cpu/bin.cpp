@@ -1,28 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which blocks of which tiles a projected surfel reaches: exact tests of its ellipse and its low-pass disc against
-// the rectangles of pixel centres of all sixteen blocks of a tile at once, and of its depths against theirs.
+// the rectangles of pixel centres of all blocks of a tile, and of its depths against theirs.
+#include "blocks.h"
 #include "isa.h"
-#include "kernels.h"
-#include "simd.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {
 
-constexpr int kParts = kBlocks / kLanes;
+constexpr int kGroups = kBlocks / kLanes;  // of blocks, a lane for each
 constexpr int kAhead = 12;
-constexpr float kBlockSpan = 3.0f;  // between the outer pixel centres of a block
+constexpr float kWidth = 3.0f, kHeight = kBlockPixels / 4 - 1.0f;  // between the outer pixel centres of a block
 
 struct BlockCorners {
-    vf x[kParts], y[kParts];  // first pixel centre of each block, from the tile's origin
+    vf x[kGroups], y[kGroups];  // first pixel centre of each block, from the tile's origin
 };
 
 BlockCorners block_corners() {
     BlockCorners c;
-    for (int p = 0; p < kParts; ++p) {
+    for (int p = 0; p < kGroups; ++p) {
         float x[kLanes], y[kLanes];
         for (int i = 0; i < kLanes; ++i) {
             const int block = p * kLanes + i;
-            x[i] = 4.0f * (block & 3) + 0.5f, y[i] = 4.0f * (block >> 2) + 0.5f;
+            x[i] = block_column(block) + 0.5f, y[i] = block_row(block) + 0.5f;
         }
         c.x[p] = load(x), c.y[p] = load(y);
     }
@@ -59,12 +58,12 @@ struct Test {
 
 TEXGS_INLINE uint32_t block_mask(const Test& t, bool with_disc, const BlockCorners& corners, float left, float top) {
     uint32_t mask = 0;
-    for (int p = 0; p < kParts; ++p) {
+    for (int p = 0; p < kGroups; ++p) {
         const vf x = corners.x[p] + vf(left), y = corners.y[p] + vf(top);
         const vf x0 = x - t.ex, y0 = y - t.ey;
-        vm hit = t.ellipse(x0, y0, x0 + vf(kBlockSpan), y0 + vf(kBlockSpan));
+        vm hit = t.ellipse(x0, y0, x0 + vf(kWidth), y0 + vf(kHeight));
         if (with_disc) {
-            const vf dx = clamp(t.cx, x, x + vf(kBlockSpan)) - t.cx, dy = clamp(t.cy, y, y + vf(kBlockSpan)) - t.cy;
+            const vf dx = clamp(t.cx, x, x + vf(kWidth)) - t.cx, dy = clamp(t.cy, y, y + vf(kHeight)) - t.cy;
             hit = hit | (fma(dx, dx, dy * dy) <= t.disc);
         }
         mask |= bits(hit) << (p * kLanes);
@@ -74,14 +73,13 @@ TEXGS_INLINE uint32_t block_mask(const Test& t, bool with_disc, const BlockCorne
 
 // Blocks of a tile in which some depth counts that the surfel has.
 TEXGS_INLINE uint32_t depth_mask(const Raster& r, uint32_t tile, const Footprint& foot) {
-    const float* nearest = r.block_ranges + int64_t(tile) * 2 * kBlocks;
-    uint32_t mask = 0;
-    for (int p = 0; p < kParts; ++p) {
-        const vm counts = (load(nearest + p * kLanes) <= vf(foot.farthest)) &
-                          (vf(foot.nearest) <= load(nearest + kBlocks + p * kLanes));
-        mask |= bits(counts) << (p * kLanes);
+    const float* nearest = r.square_ranges + int64_t(tile) * 2 * kSquares;
+    uint32_t squares = 0;
+    for (int i = 0; i < kSquares; i += kLanes) {
+        const vm counts = (load(nearest + i) <= vf(foot.farthest)) & (vf(foot.nearest) <= load(nearest + kSquares + i));
+        squares |= bits(counts) << i;
     }
-    return mask;
+    return blocks_of(squares);
 }
 
 }  // namespace
@@ -100,8 +98,8 @@ int64_t bin_surfels(const Raster& r, const uint32_t* order, int64_t begin, int64
             for (int x = foot.x0; x < foot.x1; ++x) {
                 const uint32_t tile = static_cast<uint32_t>(y * r.tiles_x + x);
                 uint32_t mask = block_mask(test, foot.disc >= 0, corners, float(x * kTile), float(y * kTile));
-                if (r.block_ranges) mask &= depth_mask(r, tile, foot);
-                *next = {tile, id, rank, static_cast<uint16_t>(mask), foot.flags};
+                if (r.square_ranges) mask &= depth_mask(r, tile, foot);
+                *next = {tile, id, rank, mask};
                 const uint32_t hit = mask != 0;  // no branch: misses are overwritten
                 next += hit, rank += hit, per_tile[tile] += hit;
             }

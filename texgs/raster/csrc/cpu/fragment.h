@@ -2,14 +2,13 @@
 // What forward, backward and contribute share: the records of a tile brought close, and a surfel's fragments in one
 // block.
 #pragma once
-#include "kernels.h"
+#include "blocks.h"
 #include "primitives.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {
 
-constexpr int kParts = kBlockPixels / kLanes;  // vectors in a block
-constexpr int kChunk = 128;                    // surfels of a tile worked on at a time; their records stay in L1
+constexpr int kChunk = 128;  // surfels of a tile worked on at a time; their records stay in L1
 constexpr int kMaxChannels = TEXGS_MAX_CHANNELS + 3;
 
 // Calls body with n, 1 to Most, as a constant: loops over channels unroll, and their sums stay in registers.
@@ -50,8 +49,8 @@ struct TilePixels {
         : is_cut(r.camera.depth_range && r.tile_begin[tile] < r.tile_begin[tile + 1]) {
         const int left = tile % r.tiles_x * kTile, top = tile / r.tiles_x * kTile;
         for (int b = 0; b < kBlocks; ++b) {
-            block_x[b] = static_cast<float>(left + 4 * (b & 3));
-            block_y[b] = static_cast<float>(top + 4 * (b >> 2));
+            block_x[b] = static_cast<float>(left + block_column(b));
+            block_y[b] = static_cast<float>(top + block_row(b));
         }
         for (int p = 0; p < kParts; ++p) {
             float x[kLanes], y[kLanes];
@@ -192,7 +191,7 @@ struct alignas(64) Chunk {
             masks[i] = pair.mask;
             slots[i] = pair.slot;
             surfels[i] = pair.surfel;
-            flags[i] = static_cast<uint8_t>(pair.flags);
+            flags[i] = r.flags[pair.surfel];
         }
         for (int i = n; i < kChunk && i % 16; ++i) masks[i] = 0;
         channels = records[0].color;
@@ -215,22 +214,13 @@ private:
 
 // Indices of the surfels whose mask has the bit of `block`; `masks` is padded with zeros to a multiple of 16.
 TEXGS_INLINE int list_block(const uint32_t* masks, int n, int block, int32_t* list) {
-    int count = 0;
-#if defined(TEXGS_AVX512)
-    const __m512i bit = _mm512_set1_epi32(1 << block);
-    for (int i = 0; i < n; i += 16) {
-        const __mmask16 hit = _mm512_test_epi32_mask(_mm512_loadu_si512(masks + i), bit);
-        const __m512i index = _mm512_add_epi32(iota().v, _mm512_set1_epi32(i));
-        _mm512_storeu_si512(list + count, _mm512_maskz_compress_epi32(hit, index));
-        count += static_cast<int>(_mm_popcnt_u32(hit));
+    int listed = 0;
+    for (int i = 0; i < n; i += kLanes) {
+        const vm hit = is_set(load(reinterpret_cast<const int32_t*>(masks + i)), splat(block));
+        store_chosen(list + listed, splat(i) + iota(), hit);
+        listed += count(hit);
     }
-#else
-    for (int i = 0; i < n; ++i) {
-        list[count] = i;
-        count += masks[i] >> block & 1;
-    }
-#endif
-    return count;
+    return listed;
 }
 
 // Pixels of a block that lie inside the image and in whose depth range something may lie, as 1 and 0.

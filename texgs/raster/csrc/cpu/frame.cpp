@@ -42,22 +42,22 @@ void clear(void* memory, int64_t bytes) {
     });
 }
 
-// The smallest and the largest depth that counts in each block of a tile: none does outside of the image, nor where
+// The smallest and the largest depth that counts in each square of a tile: none does outside of the image, nor where
 // the range of a pixel is empty.
-void block_ranges(const Raster& r, int tile, float* nearest) {
-    float* farthest = nearest + kBlocks;
-    std::fill_n(nearest, kBlocks, std::numeric_limits<float>::infinity());
-    std::fill_n(farthest, kBlocks, -std::numeric_limits<float>::infinity());
+void square_ranges(const Raster& r, int tile, float* nearest) {
+    float* farthest = nearest + kSquares;
+    std::fill_n(nearest, kSquares, std::numeric_limits<float>::infinity());
+    std::fill_n(farthest, kSquares, -std::numeric_limits<float>::infinity());
     const int width = r.camera.width, left = tile % r.tiles_x * kTile, top = tile / r.tiles_x * kTile;
     const int columns = std::min(kTile, width - left), rows = std::min(kTile, r.camera.height - top);
     for (int y = 0; y < rows; ++y) {
         const float* near = r.camera.depth_range + int64_t(top + y) * width + left;
         const float* far = near + int64_t(width) * r.camera.height;
         for (int x = 0; x < columns; ++x) {
-            const int block = y / 4 * 4 + x / 4;
+            const int square = y / 4 * 4 + x / 4;
             if (!(near[x] < far[x])) continue;
-            nearest[block] = std::min(nearest[block], near[x]);
-            farthest[block] = std::max(farthest[block], far[x]);
+            nearest[square] = std::min(nearest[square], near[x]);
+            farthest[square] = std::max(farthest[square], far[x]);
         }
     }
 }
@@ -92,6 +92,7 @@ int64_t texgs_frame::project() {
     const int64_t n = raster.surfels.n;
     raster.records = records_.ensure<Record>(n);
     raster.footprints = footprints_.ensure<Footprint>(n);
+    raster.flags = flags_.ensure<uint8_t>(n);
     raster.normals = raster.with_normal ? normals_.ensure<float>(3 * n) : nullptr;
     raster.depth_keys = keys_.ensure<uint32_t>(n);
     std::atomic<int64_t> candidates{0};
@@ -107,15 +108,15 @@ int64_t texgs_frame::project() {
     return candidates;
 }
 
-// Finds the depths that count in each block, where there are ranges of them.
+// Finds the depths that count in each square, where there are ranges of them.
 void texgs_frame::bound_depths() {
     if (!raster.camera.depth_range) return;
-    float* ranges = block_ranges_.ensure<float>(int64_t(tiles_of(raster)) * 2 * kBlocks);
+    float* ranges = square_ranges_.ensure<float>(int64_t(tiles_of(raster)) * 2 * kSquares);
     parallel_for(tiles_of(raster), 16, [&](int64_t begin, int64_t end, int) {
         for (int64_t tile = begin; tile < end; ++tile)
-            block_ranges(raster, static_cast<int>(tile), ranges + tile * 2 * kBlocks);
+            square_ranges(raster, static_cast<int>(tile), ranges + tile * 2 * kSquares);
     });
-    raster.block_ranges = ranges;
+    raster.square_ranges = ranges;
 }
 
 // A stable counting sort of the depth-ordered surfels into tiles. Each part of the order lists and counts its own
@@ -165,7 +166,7 @@ void texgs_frame::bin_tiles(const uint32_t* order, int64_t visible, int64_t most
     parallel_for(parts, 1, [&](int64_t p, int64_t, int) {
         uint32_t* at = per_tile + p * tiles;
         for (const Candidate* c = part_begin[p]; c != part_end[p]; ++c)
-            out[at[c->tile]++] = {c->surfel, slot_begin[c->surfel] + c->rank, c->mask, c->flags};
+            out[at[c->tile]++] = {c->surfel, slot_begin[c->surfel] + c->rank, c->mask};
     });
     raster.tile_begin = tile_begin;
     raster.slot_begin = slot_begin;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the passes over a view share, and the table of kernels that each instruction set provides.
 //
-// Screen: tiles of 16x16 pixels, each of 4x4 blocks of 4x4 pixels. A block is the unit of culling and of vector work;
-// inside tiles, planes of pixels are stored block by block ("block-linear"): index = 16 block + 4 y + x.
+// Screen: tiles of 16x16 pixels, each of 4x4 squares of 4x4 pixels. Inside tiles, planes of pixels are stored square by
+// square ("block-linear"): index = 16 square + 4 y + x. What blocks are depends on the instruction set (blocks.h).
 #pragma once
 #include <cstdint>
 
@@ -12,8 +12,8 @@ namespace texgs {
 
 constexpr int kTile = 16;
 constexpr int kTilePixels = kTile * kTile;
-constexpr int kBlocks = 16;       // per tile, 4 x 4
-constexpr int kBlockPixels = 16;  // 4 x 4
+constexpr int kSquares = 16;       // per tile, 4 x 4
+constexpr int kSquarePixels = 16;  // 4 x 4
 constexpr int kRecordChannels = 3;
 constexpr int kSlotAlign = 16;  // floats in a cache line
 
@@ -28,8 +28,8 @@ struct alignas(64) Record {
 static_assert(sizeof(Record) == 64);
 
 // What the fragments of a projected surfel have to look out for; most surfels have neither.
-constexpr uint16_t kClipped = 1;   // the near plane may cut it
-constexpr uint16_t kFiltered = 2;  // the low-pass filter may rule some of its fragments
+constexpr uint8_t kClipped = 1;   // the near plane may cut it
+constexpr uint8_t kFiltered = 2;  // the low-pass filter may rule some of its fragments
 
 // Where a projected surfel or Gaussian is visible: an ellipse (centre, inverse covariance scaled to level 1) and a
 // disc.
@@ -37,20 +37,17 @@ struct alignas(64) Footprint {
     float ex, ey, xx, xy, yy;
     float cx, cy, disc;       // disc: squared radius, negative where the ellipse covers it
     uint16_t x0, y0, x1, y1;  // tiles, half open; empty where culled
-    uint16_t flags;
     float nearest, farthest;  // camera z of its fragments
 };
 
 // One surfel in one tile, with the mask of blocks it reaches and the place of its gradient.
 struct Pair {
-    uint32_t surfel, slot;
-    uint16_t mask, flags;
+    uint32_t surfel, slot, mask;
 };
 
 // One surfel before sorting into tiles.
 struct Candidate {
-    uint32_t tile, surfel, rank;  // rank: how many of the surfel's tiles come before
-    uint16_t mask, flags;
+    uint32_t tile, surfel, rank, mask;  // rank: how many of the surfel's tiles come before
 };
 
 // Texel gradients of one pair: those of the part of the texture that the tile touches, four floats a texel; or, for
@@ -79,10 +76,11 @@ struct Raster {
 
     Record* records;        // [N]
     Footprint* footprints;  // [N]
+    uint8_t* flags;         // [N] kClipped, kFiltered
     float* normals;         // [N, 3] facing the camera
     uint32_t* depth_keys;   // [N] ordered as the depths; kCulled where invisible
 
-    const float* block_ranges;   // [tiles, 2, 16] smallest and largest depth that counts in a block; NULL: all do
+    const float* square_ranges;   // [tiles, 2, 16] smallest and largest depth that counts in a square; NULL: all do
     const uint32_t* tile_begin;  // [tiles + 1] into pairs
     const Pair* pairs;
     const uint32_t* slot_begin;  // [N + 1] slots of a surfel, in surfel order

@@ -47,8 +47,8 @@ constexpr float kDepthError = 1e-3f;  // of the depth of a fragment, as a share 
 struct BoundLanes {
     Lanes cx, cy, ex, ey, xx, xy, yy, disc, x0, y0, x1, y1, nearest, farthest;
     Box<float> box(int i) const { return {x0[i], y0[i], x1[i], y1[i]}; }
-    void store(Footprint& out, int i, uint16_t flags) const {
-        out = {ex[i], ey[i], xx[i], xy[i], yy[i], cx[i], cy[i], disc[i], 0, 0, 0, 0, flags, nearest[i], farthest[i]};
+    void store(Footprint& out, int i) const {
+        out = {ex[i], ey[i], xx[i], xy[i], yy[i], cx[i], cy[i], disc[i], 0, 0, 0, 0, nearest[i], farthest[i]};
     }
 };
 BoundLanes bound_lanes(const Centres& c, const Bounds<vf>& b, vf depth, vf reach) {
@@ -103,8 +103,8 @@ void project_lanes(const Raster& r, const View& view, float diagonal, int64_t fi
         records.store(record, i);
         if (colors)
             for (int k = 0; k < r.channels; ++k) record.color[k] = colors[id * r.channels + k];
-        const int flags = (clipped >> i & 1 ? kClipped : 0) | (filtered >> i & 1 ? kFiltered : 0);
-        bounds.store(foot, i, static_cast<uint16_t>(flags));
+        r.flags[id] = (clipped >> i & 1 ? kClipped : 0) | (filtered >> i & 1 ? kFiltered : 0);
+        bounds.store(foot, i);
         Box<float> box = bounds.box(i);
         if constexpr (!P::kAffine)
             if (behind >> i & 1) {

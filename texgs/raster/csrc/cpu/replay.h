@@ -10,13 +10,13 @@
 namespace texgs::TEXGS_ISA {
 namespace {
 
-constexpr int kGroupEntries = 64;  // at least; the last surfel may add fifteen more
+constexpr int kGroupEntries = 64;  // at least; the last surfel may go beyond
 constexpr int kMaxEntries = kGroupEntries + kBlocks;
 constexpr int kVectors = kMaxEntries * kParts;  // vectors of pixels in a group
 
 struct alignas(64) Group {
-    int32_t surfel[kMaxEntries + 16];  // place in the chunk
-    int32_t block[kMaxEntries + 16];
+    int32_t surfel[kMaxEntries + kLanes];  // place in the chunk
+    int32_t block[kMaxEntries + kLanes];
     int first[kChunk + 1];  // entries of the k-th surfel of the group: [first[k], first[k + 1])
     int place[kChunk];      // its place in the chunk
     int surfels, entries;
@@ -42,17 +42,12 @@ struct alignas(64) Group {
 
 private:
     TEXGS_INLINE void append(int next, uint32_t mask) {
-#if defined(TEXGS_AVX512)
-        _mm512_storeu_si512(block + entries, _mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), iota().v));
-        _mm512_storeu_si512(surfel + entries, _mm512_set1_epi32(next));
-        entries += static_cast<int>(_mm_popcnt_u32(mask));
-#else
-        for (int b = 0; b < kBlocks; ++b) {
-            block[entries] = b;
-            surfel[entries] = next;
-            entries += mask >> b & 1;
+        for (int first = 0; first < kBlocks; first += kLanes) {
+            const vm hit = mask_of(mask >> first);
+            store_chosen(block + entries, splat(first) + iota(), hit);
+            store(surfel + entries, splat(next));
+            entries += count(hit);
         }
-#endif
     }
 };
 
@@ -117,9 +112,7 @@ TEXGS_INLINE void stream_sums(const vf sums[16], float* out) {
     const __m512 low = fold(quad[0], quad[1], even128, odd128), high = fold(quad[2], quad[3], even128, odd128);
     stream(out, fold(low, high, even128, odd128));
 #else
-    alignas(64) float line[16];
-    for (int k = 0; k < 16; ++k) line[k] = sum(sums[k]);
-    for (int k = 0; k < 16; k += kLanes) stream(out + k, load(line + k));
+    for (int k = 0; k < 16; k += kLanes) stream(out + k, sums_of(sums + k));
 #endif
 }
 TEXGS_INLINE void stream_zeros(float* out, int n) {

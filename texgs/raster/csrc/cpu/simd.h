@@ -46,21 +46,6 @@
 namespace texgs::TEXGS_ISA {
 namespace {
 
-// Writes the lanes of `a` chosen by `m` one after the other; up to kLanes floats at `p` may be overwritten.
-TEXGS_INLINE void store_chosen(float* p, vf a, vm m) {
-#if defined(TEXGS_AVX512)
-    _mm512_storeu_ps(p, _mm512_maskz_compress_ps(m.v, a.v));
-#else
-    float lanes[kLanes];
-    store(lanes, a);
-    const unsigned chosen = bits(m);
-    for (int i = 0; i < kLanes; ++i) {
-        *p = lanes[i];
-        p += chosen >> i & 1;
-    }
-#endif
-}
-
 // Copies four numbers as floats.
 template <class T>
 TEXGS_INLINE void copy_quad(float* to, const T* from) {

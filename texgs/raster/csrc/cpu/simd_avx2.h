@@ -57,6 +57,10 @@ TEXGS_INLINE vm operator&(vm a, vm b) { return {_mm256_and_ps(a.v, b.v)}; }
 TEXGS_INLINE vm operator|(vm a, vm b) { return {_mm256_or_ps(a.v, b.v)}; }
 TEXGS_INLINE vm operator~(vm a) { return {_mm256_xor_ps(a.v, _mm256_castsi256_ps(_mm256_set1_epi32(-1)))}; }
 TEXGS_INLINE unsigned bits(vm m) { return static_cast<unsigned>(_mm256_movemask_ps(m.v)); }
+TEXGS_INLINE vm mask_of(unsigned b) {
+    const __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(static_cast<int>(b)), bit), bit))};
+}
 TEXGS_INLINE int count(vm m) { return static_cast<int>(_mm_popcnt_u32(bits(m))); }
 TEXGS_INLINE vf select(vm m, vf a, vf b) { return _mm256_blendv_ps(b.v, a.v, m.v); }
 TEXGS_INLINE vf zero_unless(vm m, vf a) { return _mm256_and_ps(m.v, a.v); }
@@ -87,6 +91,14 @@ TEXGS_INLINE float sum(vf a) {
     s = _mm_add_ps(s, _mm_movehl_ps(s, s));
     return _mm_cvtss_f32(_mm_add_ss(s, _mm_movehdup_ps(s)));
 }
+// Lane k: the sum of a[k]. Rounds of halving add pairs of vectors after interleaving them, so that each keeps its own.
+TEXGS_INLINE vf sums_of(const vf a[kLanes]) {
+    const auto fold = [](__m256 x, __m256 y) { return _mm256_add_ps(_mm256_unpacklo_ps(x, y), _mm256_unpackhi_ps(x, y)); };
+    const auto fold_pairs = [](__m256 x, __m256 y) { return _mm256_add_ps(_mm256_shuffle_ps(x, y, 0x44), _mm256_shuffle_ps(x, y, 0xee)); };
+    const __m256 low = fold_pairs(fold(a[0].v, a[1].v), fold(a[2].v, a[3].v));
+    const __m256 high = fold_pairs(fold(a[4].v, a[5].v), fold(a[6].v, a[7].v));
+    return _mm256_add_ps(_mm256_permute2f128_ps(low, high, 0x20), _mm256_permute2f128_ps(low, high, 0x31));
+}
 TEXGS_INLINE float largest(vf a) {
     __m128 s = _mm_max_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
     s = _mm_max_ps(s, _mm_movehl_ps(s, s));
@@ -104,6 +116,23 @@ TEXGS_INLINE vf mantissa(vf a) {
     const __m256i m = _mm256_and_si256(_mm256_castps_si256(a.v), _mm256_set1_epi32(0x007fffff));
     return _mm256_castsi256_ps(_mm256_or_si256(m, _mm256_set1_epi32(0x3f800000)));
 }
+
+// For each mask of eight bits, the places of those set, then of the others.
+struct Orders {
+    uint8_t of[256][8] = {};
+    constexpr Orders() {
+        for (int mask = 0; mask < 256; ++mask) {
+            int n = 0;
+            for (int wanted = 1; wanted >= 0; --wanted)
+                for (int i = 0; i < 8; ++i)
+                    if ((mask >> i & 1) == wanted) of[mask][n++] = static_cast<uint8_t>(i);
+        }
+    }
+};
+constexpr Orders kOrders;
+TEXGS_INLINE __m256i chosen_first(vm m) { return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kOrders.of[bits(m)]))); }
+TEXGS_INLINE void store_chosen(float* p, vf a, vm m) { store(p, _mm256_permutevar8x32_ps(a.v, chosen_first(m))); }
+TEXGS_INLINE void store_chosen(int32_t* p, vi a, vm m) { store(p, vi{_mm256_permutevar8x32_epi32(a.v, chosen_first(m))}); }
 
 TEXGS_INLINE vf running_product(vf a) {
     const __m256 one = _mm256_set1_ps(1.0f);

@@ -58,6 +58,7 @@ TEXGS_INLINE vm operator&(vm a, vm b) { return {static_cast<__mmask16>(a.v & b.v
 TEXGS_INLINE vm operator|(vm a, vm b) { return {static_cast<__mmask16>(a.v | b.v)}; }
 TEXGS_INLINE vm operator~(vm a) { return {static_cast<__mmask16>(~a.v)}; }
 TEXGS_INLINE unsigned bits(vm m) { return m.v; }
+TEXGS_INLINE vm mask_of(unsigned b) { return {static_cast<__mmask16>(b)}; }  // its lowest bits, one a lane
 TEXGS_INLINE int count(vm m) { return static_cast<int>(_mm_popcnt_u32(m.v)); }
 TEXGS_INLINE vf select(vm m, vf a, vf b) { return _mm512_mask_mov_ps(b.v, m.v, a.v); }
 TEXGS_INLINE vf zero_unless(vm m, vf a) { return _mm512_maskz_mov_ps(m.v, a.v); }
@@ -90,6 +91,10 @@ TEXGS_INLINE vf round(vf a) { return _mm512_roundscale_ps(a.v, _MM_FROUND_TO_NEA
 TEXGS_INLINE vf scale_by_power(vf x, vf k) { return _mm512_scalef_ps(x.v, k.v); }
 TEXGS_INLINE vf exponent(vf a) { return _mm512_getexp_ps(a.v); }
 TEXGS_INLINE vf mantissa(vf a) { return _mm512_getmant_ps(a.v, _MM_MANT_NORM_1_2, _MM_MANT_SIGN_src); }
+
+// Writes the lanes of `a` chosen by `m` one after the other; up to kLanes numbers at `p` may be overwritten.
+TEXGS_INLINE void store_chosen(float* p, vf a, vm m) { store(p, _mm512_maskz_compress_ps(m.v, a.v)); }
+TEXGS_INLINE void store_chosen(int32_t* p, vi a, vm m) { store(p, vi{_mm512_maskz_compress_epi32(m.v, a.v)}); }
 
 // Lane i: the product of lanes 0 to i.
 TEXGS_INLINE vf running_product(vf a) {

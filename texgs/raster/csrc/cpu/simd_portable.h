@@ -76,6 +76,7 @@ TEXGS_INLINE vm operator~(vm a) { return {~a.v}; }
 TEXGS_INLINE unsigned bits(vm m) {
     return (m.v[0] & 1u) | (m.v[1] & 2u) | (m.v[2] & 4u) | (m.v[3] & 8u);
 }
+TEXGS_INLINE vm mask_of(unsigned b) { vm m; TEXGS_EACH m.v[i] = -int32_t(b >> i & 1); return m; }
 TEXGS_INLINE int count(vm m) { return -(m.v[0] + m.v[1] + m.v[2] + m.v[3]); }
 TEXGS_INLINE vf select(vm m, vf a, vf b) { return choose(m.v, a.v, b.v); }
 TEXGS_INLINE vf min(vf a, vf b) { return select(a < b, a, b); }
@@ -107,11 +108,14 @@ TEXGS_INLINE vi gather(const int32_t* p, vi k) { vi r; TEXGS_EACH r.v[i] = p[k.v
 TEXGS_INLINE vi iota() { return {int4{0, 1, 2, 3}}; }
 TEXGS_INLINE vf gather(const float* p, vi k) { vf r; TEXGS_EACH r.v[i] = p[k.v[i]]; return r; }
 TEXGS_INLINE float sum(vf a) { return (a.v[0] + a.v[2]) + (a.v[1] + a.v[3]); }
+TEXGS_INLINE vf sums_of(const vf a[kLanes]) { vf r; TEXGS_EACH r.v[i] = sum(a[i]); return r; }
 TEXGS_INLINE float largest(vf a) {
     float r = a.v[0];
     TEXGS_EACH r = a.v[i] > r ? a.v[i] : r;
     return r;
 }
+TEXGS_INLINE void store_chosen(float* p, vf a, vm m) { TEXGS_EACH *p = a.v[i], p -= m.v[i]; }
+TEXGS_INLINE void store_chosen(int32_t* p, vi a, vm m) { TEXGS_EACH *p = a.v[i], p -= m.v[i]; }
 TEXGS_INLINE vf running_product(vf a) { for (int i = 1; i < kLanes; ++i) a.v[i] = a.v[i] * a.v[i - 1]; return a; }
 // Lanes as integers of the same bits, and back.
 TEXGS_INLINE int4 as_int(vf a) { int4 r; std::memcpy(&r, &a.v, sizeof r); return r; }
