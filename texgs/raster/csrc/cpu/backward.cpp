@@ -88,29 +88,31 @@ TEXGS_INLINE void blend_entries(BackwardScratch& s, const Limits& limits) {
 
 // -- Per surfel -------------------------------------------------------------------------------------------------------
 
-// Sums over the surfel's entries, to its slot: geometry, then channels. N > 0: all channels fit into the first line and
-// are summed on the way; more would not leave registers for the geometry.
+// Sums over the surfel's entries, to its slot: geometry, then channels. N > 0: all channels fit into the first line.
+// They are summed on the way where that leaves registers for the geometry.
 template <class P, bool Depth, bool Textured, int N>
 TEXGS_INLINE void add_surfel(const Raster& r, BackwardScratch& s, const TilePixels& pixels, int k) {
     const int begin = s.group.first[k], end = s.group.first[k + 1], place = s.group.place[k];
     const unsigned flags = s.chunk.flags[place];
     const vf cx = s.chunk.records[place].cx, cy = s.chunk.records[place].cy;
     FragmentSums<P> sums;
-    vf channels[N + 1];
-    for (int c = 0; c < N; ++c) channels[c] = 0.0f;
+    constexpr int used = Depth ? P::Sums::kAll : P::Sums::kGeometry, room = kLine - used;
+    constexpr int on_the_way = kRegisters >= 32 ? N : 0;
+    vf channels[on_the_way + 1];
+    for (int c = 0; c < on_the_way; ++c) channels[c] = 0.0f;
     for (int e = begin; e < end; ++e)
         for (int part = 0; part < kParts; ++part) {
             const int block = s.group.block[e], i = e * kParts + part, pixel = block * kBlockPixels + part * kLanes;
             const Pixels at = pixels.of(block, part);
             const vf w = load(s.weight[i]);
             sums.template add<Depth, Textured>(r, s, flags, i, pixel, at.x - cx, at.y - cy, w);
-            for (int c = 0; c < N; ++c)
+            for (int c = 0; c < on_the_way; ++c)
                 channels[c] = fma(w, load(s.p.data + (kGradient + c) * kTilePixels + pixel), channels[c]);
         }
-    constexpr int used = Depth ? P::Sums::kAll : P::Sums::kGeometry, room = kLine - used;
     vf line[kLine];
     sums.template put<Depth>(line);
-    for (int c = 0; c < room; ++c) line[used + c] = c < N ? channels[c] : vf(0.0f);
+    for (int c = 0; c < room; ++c) line[used + c] = c < on_the_way ? channels[c] : vf(0.0f);
+    if constexpr (on_the_way < N) weigh_planes<N>(s.group, begin, end, s.weight[0], s.p[kGradient], line + used);
     float* slot = r.slots + int64_t(s.chunk.slots[place]) * r.slot_stride;
     if constexpr (N == 0) {
         const int first = r.channels < room ? r.channels : room;

@@ -7,6 +7,7 @@ namespace texgs::TEXGS_ISA {
 namespace {
 
 constexpr int kLanes = 8;
+constexpr int kRegisters = 16;
 struct vm {
     __m256 v;
 };

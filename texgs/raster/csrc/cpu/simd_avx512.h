@@ -7,6 +7,7 @@ namespace texgs::TEXGS_ISA {
 namespace {
 
 constexpr int kLanes = 16;
+constexpr int kRegisters = 32;
 struct vm {
     __mmask16 v;
 };

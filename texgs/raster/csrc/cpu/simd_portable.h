@@ -8,6 +8,7 @@ namespace texgs::TEXGS_ISA {
 namespace {
 
 constexpr int kLanes = 4;
+constexpr int kRegisters = 16;
 #define TEXGS_EACH for (int i = 0; i < kLanes; ++i)
 
 #if defined(__GNUC__)
