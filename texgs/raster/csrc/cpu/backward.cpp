@@ -72,7 +72,7 @@ TEXGS_INLINE void blend_entries(BackwardScratch& s, const Limits& limits) {
     for (int i = 0; i < s.group.entries * kParts; ++i) {
         float* at = s.p.data + s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
         const float* value = channels + s.group.surfel[i / kParts] * stride;
-        const vf alpha = alpha_of(load(s.alpha[i]), limits);
+        const vf alpha = load(s.alpha[i]);
         vf q = load(N ? at + kConstant * kTilePixels : s.q[i]);
         for (int c = 0; c < N; ++c) q = fma(load(at + (kGradient + c) * kTilePixels), value[c], q);
         if constexpr (Depth) q = fma_where(alpha > vf(0.0f), load(s.z[i]), load(s.d.depth + (at - s.p.data)), q);

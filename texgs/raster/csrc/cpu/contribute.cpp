@@ -28,10 +28,10 @@ TEXGS_INLINE void blend_entries(ContributeScratch& s, const TilePixels& pixels, 
             store(s.weight[e * kParts + part],
                   evaluate<P>(s.chunk.records[place], s.chunk.flags[place], at, limits).log2_alpha);
         }
+    take_alphas(s.weight, s.group.entries * kParts, limits);
     for (int i = 0; i < s.group.entries * kParts; ++i) {
         const int pixel = s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
-        const vf alpha = alpha_of(load(s.weight[i]), limits);
-        store(s.weight[i], blend(alpha, s.transmittance + pixel, limits).weight);
+        store(s.weight[i], blend(load(s.weight[i]), s.transmittance + pixel, limits).weight);
     }
 }
 

@@ -43,6 +43,7 @@ TEXGS_INLINE void intersect(ForwardScratch& s, Batch batch, Pixels at, const Lim
         if constexpr (Depth) store(s.depth[j], depth_of<P>(record, f));
         if constexpr (Textured) store(s.u[j], f.u), store(s.v[j], f.v);
     }
+    take_alphas(s.weight, batch.n, limits);
 }
 
 // Turns alphas into weights and blends the first N channels, which lie in the records. A pixel that has ended keeps
@@ -53,7 +54,7 @@ TEXGS_INLINE bool weigh(ForwardScratch& s, Batch batch, int pixel, const Limits&
     vf T = load(s.transmittance + pixel), alpha = load(s.alpha + pixel), color[N + 1];
     for (int c = 0; c < N; ++c) color[c] = load(s.color[c] + pixel);
     for (int j = 0; j < batch.n; ++j) {
-        const vf a = alpha_of(load(s.weight[j]), limits);
+        const vf a = load(s.weight[j]);
         const vf remaining = fnma(a, T, T);
         const vf w = zero_unless(remaining >= limits.transmittance_min, a * T);
         alpha += w;

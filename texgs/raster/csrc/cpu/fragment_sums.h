@@ -46,6 +46,7 @@ TEXGS_INLINE void evaluate_entries(BackwardScratch& s, const TilePixels& pixels,
         store(s.by_U[i], by_U), store(s.by_V[i], by_V), store(s.by_W[i], by_W);
         if constexpr (Depth || Textured) store(s.inverse_w[i], f.inverse_w);
     }
+    take_alphas(s.alpha, s.group.entries * kParts, limits);
 }
 
 // Sums over the fragments of one P. add() takes those of one vector of pixels, (dx, dy) from the centre, of weights w;

@@ -105,9 +105,9 @@ TEXGS_INLINE float largest(vf a) {
     s = _mm_max_ps(s, _mm_movehl_ps(s, s));
     return _mm_cvtss_f32(_mm_max_ss(s, _mm_movehdup_ps(s)));
 }
-TEXGS_INLINE vf scale_by_power(vf x, vf k) {  // k in [-126, 127]
-    const __m256i e = _mm256_slli_epi32(_mm256_add_epi32(_mm256_cvtps_epi32(k.v), _mm256_set1_epi32(127)), 23);
-    return _mm256_mul_ps(x.v, _mm256_castsi256_ps(e));
+TEXGS_INLINE vf scale_by_power(vf x, vf k) {  // adds to the exponent of x: what comes out is normal, too
+    const __m256i e = _mm256_slli_epi32(_mm256_cvtps_epi32(k.v), 23);
+    return _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(x.v), e));
 }
 TEXGS_INLINE vf exponent(vf a) {  // a > 0, normal
     const __m256i e = _mm256_srli_epi32(_mm256_castps_si256(a.v), 23);

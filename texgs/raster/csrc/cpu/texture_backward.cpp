@@ -44,7 +44,7 @@ TEXGS_INLINE void evaluate_entries(TextureScratch& s, const TilePixels& pixels, 
             store(s.alpha[i], f.log2_alpha);
             store(s.x[i], at.x), store(s.y[i], at.y);
         }
-    for (int i = 0; i < s.group.entries * kParts; ++i) store(s.alpha[i], alpha_of(load(s.alpha[i]), limits));
+    take_alphas(s.alpha, s.group.entries * kParts, limits);
 }
 
 // Vectors of 16 in which the sums of a channel of so many texels are kept; 0: they are scattered to memory.
