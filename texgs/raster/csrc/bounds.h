@@ -27,6 +27,7 @@ struct Bounds {
     F disc;                // squared radius of the disc, -1 where the ellipse covers it
     Mask<F> behind;        // the ellipse is not one: the surfel reaches behind the camera
     Box<F> box;            // of ellipse and disc
+    F sx, sy;              // half the sides of the ellipse's box
 };
 
 // What of a projected primitive is on screen, and what its fragments have to look out for.
@@ -94,9 +95,9 @@ TEXGS_MATHS Bounds<F> bound(const SurfelProjection<F>& r, F cut, F cx, F cy, flo
     const F smallest = half_trace - sqrt(fma(split, split, xy * xy)) - grow;
     const F reach = radius + sqrt((b.ex - cx) * (b.ex - cx) + (b.ey - cy) * (b.ey - cy));
     b.disc = select(reach * reach < smallest, -1.0f, radius2);
-    const F sx = sqrt(xx), sy = sqrt(yy);
-    b.box = {min(b.ex - sx, cx - radius), min(b.ey - sy, cy - radius), max(b.ex + sx, cx + radius),
-             max(b.ey + sy, cy + radius)};
+    b.sx = sqrt(xx), b.sy = sqrt(yy);
+    b.box = {min(b.ex - b.sx, cx - radius), min(b.ey - b.sy, cy - radius), max(b.ex + b.sx, cx + radius),
+             max(b.ey + b.sy, cy + radius)};
     return b;
 }
 
@@ -138,7 +139,8 @@ TEXGS_MATHS Outline<F> outline(const Gaussian<F>&, const GaussianProjection<F>& 
     const F inverse = F(1.0f) / determinant, sx = sqrt(xx), sy = sqrt(yy);
     const Mask<F> none = F(0.0f) < F(0.0f), all = F(0.0f) <= F(0.0f);
     out.bounds = {cx,           cy,    yy * inverse, -(xy * inverse),
-                  xx * inverse, -1.0f, none,         {cx - sx, cy - sy, cx + sx, cy + sy}};
+                  xx * inverse, -1.0f, none,         {cx - sx, cy - sy, cx + sx, cy + sy},
+                  sx,           sy};
     out.visible = is_visible(r.pose, r.opacity, cx, cy, o) & (determinant < F(1e30f));
     out.clipped = none, out.never_filtered = all, out.reach = 0.0f;
     return out;

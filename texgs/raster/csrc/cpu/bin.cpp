@@ -1,72 +1,87 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which blocks of which tiles a projected surfel reaches: exact tests of its ellipse and its low-pass disc against
 // the rectangles of pixel centres of all blocks of a tile, and of its depths against theirs.
+//
+// What an ellipse has in common with a row of blocks is as wide as an interval of it, and reaches those blocks of the
+// row that meet the interval.
 #include "blocks.h"
 #include "isa.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {
 
-constexpr int kGroups = kBlocks / kLanes;  // of blocks, a lane for each
 constexpr int kAhead = 12;
 constexpr float kWidth = 3.0f, kHeight = kBlockPixels / 4 - 1.0f;  // between the outer pixel centres of a block
+// Vectors with a lane for each row of blocks, where they hold no more, and columns of blocks looked at one by one.
+constexpr int kRowVectors = kBlocksDown > kLanes ? kBlocksDown / kLanes : 1;
+constexpr int kColumns = kBlocks / (kRowVectors * kLanes);
 
 struct BlockCorners {
-    vf x[kGroups], y[kGroups];  // first pixel centre of each block, from the tile's origin
-};
+    vf x[kColumns], y[kRowVectors];  // first pixel centres, from the tile's origin
 
-BlockCorners block_corners() {
-    BlockCorners c;
-    for (int p = 0; p < kGroups; ++p) {
-        float x[kLanes], y[kLanes];
-        for (int i = 0; i < kLanes; ++i) {
-            const int block = p * kLanes + i;
-            x[i] = block_column(block) + 0.5f, y[i] = block_row(block) + 0.5f;
-        }
-        c.x[p] = load(x), c.y[p] = load(y);
+    BlockCorners() {
+        const auto centres = [](auto place, int first) {
+            float lanes[kLanes];
+            for (int i = 0; i < kLanes; ++i) lanes[i] = 0.5f + place(first + i);
+            return load(lanes);
+        };
+        for (int c = 0; c < kColumns; ++c) x[c] = centres(block_column, c * kBlocksDown);
+        for (int v = 0; v < kRowVectors; ++v) y[v] = centres(block_row, v * kLanes);
     }
-    return c;
-}
+};
 
 TEXGS_INLINE vf clamp(vf a, vf low, vf high) { return min(max(a, low), high); }
 
 // Constants of a surfel's test, spread over the lanes once.
 struct Test {
-    vf ex, ey, xx, xy, yy, slope_x, slope_y, cx, cy, disc;
+    vf ex, ey, slope, width, height, per_height, tip, cx, cy, disc;
     TEXGS_INLINE Test(const Footprint& f)
         : ex(f.ex),
           ey(f.ey),
-          xx(f.xx),
-          xy(f.xy),
-          yy(f.yy),
-          slope_x(f.xx > 0 ? -f.xy / f.xx : 0),
-          slope_y(f.yy > 0 ? -f.xy / f.yy : 0),
+          slope(f.slope),
+          width(f.width),
+          height(f.height),
+          per_height(1.0f / f.height),
+          tip(f.tip),
           cx(f.cx),
           cy(f.cy),
           disc(f.disc) {}
 
-    // The smallest value of the ellipse's form over a rectangle is on the edges that face its centre: on each, the
-    // unconstrained minimum along the edge, clamped to it.
-    TEXGS_INLINE vm ellipse(vf x0, vf y0, vf x1, vf y1) const {
-        const vf near_x = clamp(0.0f, x0, x1), near_y = clamp(0.0f, y0, y1);
-        const vf on_x = clamp(slope_y * near_x, y0, y1), on_y = clamp(slope_x * near_y, x0, x1);
-        const vf first = value(near_x, on_x), second = value(on_y, near_y);
-        return min(first, second) <= vf(1.0f);
+    // Where the ellipse ends to the right at height y, to the left at -y.
+    TEXGS_INLINE vf end(vf y) const {
+        const vf share = y * per_height, rounding = 1e-6f;
+        return fma(slope, y, width * sqrt(max(fnma(share, share, vf(1.0f) + rounding), 0.0f)));
     }
-    TEXGS_INLINE vf value(vf x, vf y) const { return fma(x, fma(xx, x, vf(2.0f) * xy * y), yy * y * y); }
+};
+
+// What rows of blocks hold of a surfel: of the ellipse its interval, of the disc half of it squared, about cx.
+struct Intervals {
+    vf left, right, disc;
+    vm reached;  // by the ellipse
+
+    TEXGS_INLINE Intervals(const Test& t, vf y) {
+        const vf y0 = y - t.ey, y1 = y0 + vf(kHeight);
+        right = t.end(clamp(t.tip, y0, y1));
+        left = -t.end(clamp(t.tip, -y1, -y0));
+        reached = abs(clamp(0.0f, y0, y1)) <= t.height;
+        const vf dy = clamp(t.cy, y, y + vf(kHeight)) - t.cy;
+        disc = fnma(dy, dy, t.disc);
+    }
 };
 
 TEXGS_INLINE uint32_t block_mask(const Test& t, bool with_disc, const BlockCorners& corners, float left, float top) {
     uint32_t mask = 0;
-    for (int p = 0; p < kGroups; ++p) {
-        const vf x = corners.x[p] + vf(left), y = corners.y[p] + vf(top);
-        const vf x0 = x - t.ex, y0 = y - t.ey;
-        vm hit = t.ellipse(x0, y0, x0 + vf(kWidth), y0 + vf(kHeight));
-        if (with_disc) {
-            const vf dx = clamp(t.cx, x, x + vf(kWidth)) - t.cx, dy = clamp(t.cy, y, y + vf(kHeight)) - t.cy;
-            hit = hit | (fma(dx, dx, dy * dy) <= t.disc);
+    for (int v = 0; v < kRowVectors; ++v) {
+        const Intervals in(t, corners.y[v] + vf(top));
+        for (int c = 0; c < kColumns; ++c) {
+            const vf x = corners.x[c] + vf(left), x0 = x - t.ex;
+            vm hit = in.reached & (x0 <= in.right) & (in.left <= x0 + vf(kWidth));
+            if (with_disc) {
+                const vf dx = clamp(t.cx, x, x + vf(kWidth)) - t.cx;
+                hit = hit | (dx * dx <= in.disc);
+            }
+            mask |= bits(hit) << (c * kBlocksDown + v * kLanes);
         }
-        mask |= bits(hit) << (p * kLanes);
     }
     return mask;
 }
@@ -86,7 +101,7 @@ TEXGS_INLINE uint32_t depth_mask(const Raster& r, uint32_t tile, const Footprint
 
 int64_t bin_surfels(const Raster& r, const uint32_t* order, int64_t begin, int64_t end, Candidate* out,
                     uint32_t* per_tile, uint32_t* per_surfel) {
-    const BlockCorners corners = block_corners();
+    const BlockCorners corners;
     Candidate* next = out;
     for (int64_t i = begin; i < end; ++i) {
         const uint32_t id = order[i];

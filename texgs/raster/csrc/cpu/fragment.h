@@ -239,7 +239,7 @@ TEXGS_INLINE void for_rows(const Raster& r, int tile, Visit visit) {
     const int left = tile % r.tiles_x * kTile, top = tile / r.tiles_x * kTile, width = r.camera.width;
     const int columns = width - left < kTile ? width - left : kTile;
     const int rows = r.camera.height - top < kTile ? r.camera.height - top : kTile;
-    const auto index = [](int x, int y) { return 16 * ((y >> 2) * 4 + (x >> 2)) + 4 * (y & 3); };
+    const auto index = [](int x, int y) { return kBlockPixels * block_of(x, y) + 4 * y % kBlockPixels; };
     if (columns == kTile && rows == kTile) {
         for (int y = 0; y < kTile; ++y)
             for (int x = 0; x < kTile; x += 4) visit(int64_t(top + y) * width + left + x, index(x, y), 4);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the passes over a view share, and the table of kernels that each instruction set provides.
 //
-// Screen: tiles of 16x16 pixels, each of 4x4 squares of 4x4 pixels. Inside tiles, planes of pixels are stored square by
-// square ("block-linear"): index = 16 square + 4 y + x. What blocks are depends on the instruction set (blocks.h).
+// Screen: tiles of 16x16 pixels, each of 4x4 squares of 4x4 pixels. Inside tiles, planes of pixels are stored block by
+// block ("block-linear"). What blocks are depends on the instruction set (blocks.h).
 #pragma once
 #include <cstdint>
 
@@ -31,10 +31,10 @@ static_assert(sizeof(Record) == 64);
 constexpr uint8_t kClipped = 1;   // the near plane may cut it
 constexpr uint8_t kFiltered = 2;  // the low-pass filter may rule some of its fragments
 
-// Where a projected surfel or Gaussian is visible: an ellipse (centre, inverse covariance scaled to level 1) and a
-// disc.
+// Where a projected surfel or Gaussian is visible: an ellipse and a disc. At the height y above its centre the ellipse
+// holds the interval slope y +- width sqrt(1 - (y / height)^2), which ends farthest to the right at y = tip.
 struct alignas(64) Footprint {
-    float ex, ey, xx, xy, yy;
+    float ex, ey, slope, width, height, tip;
     float cx, cy, disc;       // disc: squared radius, negative where the ellipse covers it
     uint16_t x0, y0, x1, y1;  // tiles, half open; empty where culled
     float nearest, farthest;  // camera z of its fragments

@@ -45,15 +45,16 @@ constexpr float kDepthError = 1e-3f;  // of the depth of a fragment, as a share 
 
 // Their ellipses, discs, boxes and depths.
 struct BoundLanes {
-    Lanes cx, cy, ex, ey, xx, xy, yy, disc, x0, y0, x1, y1, nearest, farthest;
+    Lanes cx, cy, ex, ey, slope, width, height, tip, disc, x0, y0, x1, y1, nearest, farthest;
     Box<float> box(int i) const { return {x0[i], y0[i], x1[i], y1[i]}; }
     void store(Footprint& out, int i) const {
-        out = {ex[i], ey[i], xx[i], xy[i], yy[i], cx[i], cy[i], disc[i], 0, 0, 0, 0, nearest[i], farthest[i]};
+        out = {ex[i], ey[i], slope[i], width[i], height[i], tip[i], cx[i], cy[i], disc[i], 0, 0, 0, 0, nearest[i], farthest[i]};
     }
 };
 BoundLanes bound_lanes(const Centres& c, const Bounds<vf>& b, vf depth, vf reach) {
     const vf nearest = (depth - reach) * vf(1.0f - kDepthError), farthest = (depth + reach) * vf(1.0f + kDepthError);
-    return {c.x, c.y, b.ex, b.ey, b.xx, b.xy, b.yy, b.disc, b.box.x0, b.box.y0, b.box.x1, b.box.y1, nearest, farthest};
+    const vf width = sqrt(vf(1.0f) / b.xx), tip = -(b.xy / b.yy) * b.sx;
+    return {c.x, c.y, b.ex, b.ey, -(b.xy / b.xx), width, b.sy, tip, b.disc, b.box.x0, b.box.y0, b.box.x1, b.box.y1, nearest, farthest};
 }
 
 // The box of surfel i, which reaches behind the camera.
@@ -110,7 +111,7 @@ void project_lanes(const Raster& r, const View& view, float diagonal, int64_t fi
             if (behind >> i & 1) {
                 box = cut_box(r, view, q, c, seen.cut, i);
                 foot.ex = foot.cx, foot.ey = foot.cy;  // they may not be finite
-                foot.xx = foot.xy = foot.yy = 0;       // no ellipse: every block of the box
+                foot.slope = foot.tip = 0, foot.width = foot.height = 1e18f;  // no ellipse: every block of the box
             }
         if (!cover_tiles(box, r.tiles_x, r.tiles_y, foot)) continue;
         std::memcpy(&r.depth_keys[id], &record.zp, sizeof(float));  // positive floats sort as integers
