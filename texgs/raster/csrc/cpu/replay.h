@@ -10,7 +10,7 @@
 namespace texgs::TEXGS_ISA {
 namespace {
 
-constexpr int kGroupEntries = 64;  // at least; the last surfel may go beyond
+constexpr int kGroupEntries = 1024 / kLanes;  // at least; the last surfel may go beyond
 constexpr int kMaxEntries = kGroupEntries + kBlocks;
 constexpr int kVectors = kMaxEntries * kParts;  // vectors of pixels in a group
 
