@@ -61,7 +61,7 @@ public:
         if (n_ <= 4) return use(Planes<1>());
         if constexpr (kTableTexels >= 32)
             if (n_ <= 8) return use(Planes<2>());
-        return use(Planes<kTableTexels >= 4 * kLanes ? kTableTexels / 16 : 0>());
+        return use(Planes<kTableTexels >= 4 * kLanes ? 4 * kLanes / 16 : 0>());
     }
 
     // Column x of row (y, z) of each lane's block.

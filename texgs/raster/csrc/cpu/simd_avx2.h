@@ -144,12 +144,13 @@ TEXGS_INLINE vf running_product(vf a) {
 
 // -- Tables in registers: up to kTableTexels floats, 16 to a plane ---------------------------------------------------
 
-constexpr int kTableTexels = 32;
+constexpr int kTableTexels = 64;
 template <int Planes>
 TEXGS_INLINE vf table_lookup(const float* p, vi index) {
-    if constexpr (Planes == 2) {
-        const vf first = table_lookup<1>(p, index), second = table_lookup<1>(p + 16, index);
-        return _mm256_blendv_ps(first.v, second.v, _mm256_castsi256_ps(_mm256_slli_epi32(index.v, 27)));  // bit 4
+    if constexpr (Planes > 1) {  // the highest bit of the index picks a half of the table
+        constexpr int half = Planes / 2;
+        const vf first = table_lookup<half>(p, index), second = table_lookup<half>(p + 16 * half, index);
+        return _mm256_blendv_ps(first.v, second.v, _mm256_castsi256_ps(_mm256_slli_epi32(index.v, Planes == 2 ? 27 : 26)));
     }
     const __m256 low = _mm256_permutevar8x32_ps(load(p).v, index.v), high = _mm256_permutevar8x32_ps(load(p + 8).v, index.v);
     return _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32(index.v, 28)));  // bit 3 to the sign
