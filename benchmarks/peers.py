@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import torch
 from torch.nn.functional import pad
 
-from benchmarks import gsplat_cpu, instruction_sets, workload
+from benchmarks import gsplat_cpu, workload
 from benchmarks.gsplat_cpu import LIKE_GSPLAT, OURS
 from benchmarks.report import Measurement, Section
 from benchmarks.settings import Settings
@@ -18,13 +18,12 @@ OUTPUTS = ("normal", "median")  # what gsplat always renders besides the colour
 
 
 def run(settings: Settings) -> Section:
-    """Time gsplat's torch functions and weaker instruction sets on a CPU, and gsplat on a GPU."""
+    """Time gsplat's torch functions on a CPU, and gsplat on a GPU."""
     section = Section()
     if settings.device.type == "cuda":
         compare(settings, section)
     else:
-        for peer in (gsplat_cpu, instruction_sets):
-            peer.compare(settings, section)
+        gsplat_cpu.compare(settings, section)
     return section
 
 

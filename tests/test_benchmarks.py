@@ -60,7 +60,8 @@ def test_passes_and_peers(everything):
     names = {m["name"] for m in sections["rasterize"]["measurements"]}
     passes = {f"pass {name}" for name in ("project", "sort", "bin", "forward", "backward", "reduce")}
     assert names == {"forward", "step", "step forward", "step backward", "step Adam"} | passes
-    measured, skipped = sections["peers"]["measurements"], sections["peers"]["skipped"]
+    both = (sections["peers"], sections["instruction_sets"])
+    measured, skipped = ([each for part in both for each in part[key]] for key in ("measurements", "skipped"))
     peers = [m["parameters"]["peer"] for m in measured] + [each["name"] for each in skipped]
     for peer in ("gsplat's torch functions", "avx512", "avx2", "portable"):
         assert any(peer in name for name in peers), peer
