@@ -11,7 +11,10 @@ import torch
 from benchmarks.scenes import KINDS
 from texgs.core.errors import ArgumentError
 
-NAMES = "rasterize outputs primitives losses peers instruction_sets memory views fit scene convolution style voxels"
+NAMES = (
+    "rasterize outputs primitives losses peers instruction_sets memory views fit scene convolution style"
+    " voxels"
+)
 SECTIONS = tuple(NAMES.split())
 ROUNDS = 5  # visits to each case, see timing.py
 

@@ -138,9 +138,8 @@ TEXGS_MATHS Outline<F> outline(const Gaussian<F>&, const GaussianProjection<F>& 
     const F determinant = fma(out.cut * out.cut, r.area + r.growth, grow * (out.cut * (r.xx + r.yy) + grow));
     const F inverse = F(1.0f) / determinant, sx = sqrt(xx), sy = sqrt(yy);
     const Mask<F> none = F(0.0f) < F(0.0f), all = F(0.0f) <= F(0.0f);
-    out.bounds = {cx,           cy,    yy * inverse, -(xy * inverse),
-                  xx * inverse, -1.0f, none,         {cx - sx, cy - sy, cx + sx, cy + sy},
-                  sx,           sy};
+    out.bounds = {
+        cx, cy, yy * inverse, -(xy * inverse), xx * inverse, -1.0f, none, {cx - sx, cy - sy, cx + sx, cy + sy}, sx, sy};
     out.visible = is_visible(r.pose, r.opacity, cx, cy, o) & (determinant < F(1e30f));
     out.clipped = none, out.never_filtered = all, out.reach = 0.0f;
     return out;

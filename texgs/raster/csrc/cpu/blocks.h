@@ -9,14 +9,14 @@ namespace texgs::TEXGS_ISA {
 namespace {
 
 constexpr int kBlockPixels = kLanes < kSquarePixels ? kSquarePixels / 2 : kSquarePixels;
-constexpr int kBlocks = kTilePixels / kBlockPixels;  // per tile, a bit of a mask each
+constexpr int kBlocks = kTilePixels / kBlockPixels;    // per tile, a bit of a mask each
 constexpr int kHalves = kSquarePixels / kBlockPixels;  // blocks in a square
 constexpr int kBlocksDown = kBlocks / 4;               // across there are four
 constexpr int kParts = kBlockPixels / kLanes;          // vectors in a block
 static_assert(kBlocks <= 32);
 
-// Where a block begins in its tile, in pixels, and which block a pixel is in. Squares are numbered row by row, halves of
-// them column by column: then a vector holds a row or a column.
+// Where a block begins in its tile, in pixels, and which block a pixel is in. Squares are numbered row by row, halves
+// of them column by column: then a vector holds a row or a column.
 inline int block_column(int block) { return 4 * (kHalves == 1 ? block % 4 : block / kBlocksDown); }
 inline int block_row(int block) { return kHalves == 1 ? block / 4 * 4 : block % kBlocksDown * 2; }
 TEXGS_INLINE int block_of(int x, int y) { return kHalves == 1 ? y / 4 * 4 + x / 4 : x / 4 * kBlocksDown + y / 2; }

@@ -86,8 +86,8 @@ struct Limits {
 };
 
 // A primitive's fragments in a vector of pixels, before blending. Where they are, what alpha that gives and what is
-// blended are computed in loops of their own, the second by take_alphas: in one, the chain of operations is too long for
-// the machine to overlap enough of them, and the whole takes 1.4 times as long.
+// blended are computed in loops of their own, the second by take_alphas: in one, the chain of operations is too long
+// for the machine to overlap enough of them, and the whole takes 1.4 times as long.
 struct Fragments {
     vf log2_alpha;  // before take_alphas
     vf u, v;        // intersection, standard deviations

@@ -40,7 +40,8 @@ private:
     void texture_gradients();
 
     texgs::DepthSort sort_;
-    texgs::Buffer records_, footprints_, flags_, normals_, keys_, candidates_, part_begin_, per_tile_, per_surfel_, tile_begin_,
-        pairs_, slot_begin_, square_ranges_, scratch_, median_stop_, moments_, slots_, texel_parts_, zeros_;
+    texgs::Buffer records_, footprints_, flags_, normals_, keys_, candidates_, part_begin_, per_tile_, per_surfel_,
+        tile_begin_, pairs_, slot_begin_, square_ranges_, scratch_, median_stop_, moments_, slots_, texel_parts_,
+        zeros_;
     std::vector<std::unique_ptr<texgs::BlockArena>> arenas_;
 };

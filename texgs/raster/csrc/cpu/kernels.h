@@ -80,7 +80,7 @@ struct Raster {
     float* normals;         // [N, 3] facing the camera
     uint32_t* depth_keys;   // [N] ordered as the depths; kCulled where invisible
 
-    const float* square_ranges;   // [tiles, 2, 16] smallest and largest depth that counts in a square; NULL: all do
+    const float* square_ranges;  // [tiles, 2, 16] smallest and largest depth that counts in a square; NULL: all do
     const uint32_t* tile_begin;  // [tiles + 1] into pairs
     const Pair* pairs;
     const uint32_t* slot_begin;  // [N + 1] slots of a surfel, in surfel order

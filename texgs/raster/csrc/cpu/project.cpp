@@ -48,13 +48,15 @@ struct BoundLanes {
     Lanes cx, cy, ex, ey, slope, width, height, tip, disc, x0, y0, x1, y1, nearest, farthest;
     Box<float> box(int i) const { return {x0[i], y0[i], x1[i], y1[i]}; }
     void store(Footprint& out, int i) const {
-        out = {ex[i], ey[i], slope[i], width[i], height[i], tip[i], cx[i], cy[i], disc[i], 0, 0, 0, 0, nearest[i], farthest[i]};
+        out = {ex[i],   ey[i], slope[i], width[i], height[i], tip[i],     cx[i],      cy[i],
+               disc[i], 0,     0,        0,        0,         nearest[i], farthest[i]};
     }
 };
 BoundLanes bound_lanes(const Centres& c, const Bounds<vf>& b, vf depth, vf reach) {
     const vf nearest = (depth - reach) * vf(1.0f - kDepthError), farthest = (depth + reach) * vf(1.0f + kDepthError);
     const vf width = sqrt(vf(1.0f) / b.xx), tip = -(b.xy / b.yy) * b.sx;
-    return {c.x, c.y, b.ex, b.ey, -(b.xy / b.xx), width, b.sy, tip, b.disc, b.box.x0, b.box.y0, b.box.x1, b.box.y1, nearest, farthest};
+    return {c.x,    c.y,      b.ex,     b.ey,     -(b.xy / b.xx), width,   b.sy,    tip,
+            b.disc, b.box.x0, b.box.y0, b.box.x1, b.box.y1,       nearest, farthest};
 }
 
 // The box of surfel i, which reaches behind the camera.
@@ -110,7 +112,7 @@ void project_lanes(const Raster& r, const View& view, float diagonal, int64_t fi
         if constexpr (!P::kAffine)
             if (behind >> i & 1) {
                 box = cut_box(r, view, q, c, seen.cut, i);
-                foot.ex = foot.cx, foot.ey = foot.cy;  // they may not be finite
+                foot.ex = foot.cx, foot.ey = foot.cy;                         // they may not be finite
                 foot.slope = foot.tip = 0, foot.width = foot.height = 1e18f;  // no ellipse: every block of the box
             }
         if (!cover_tiles(box, r.tiles_x, r.tiles_y, foot)) continue;
