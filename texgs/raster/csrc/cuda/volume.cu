@@ -113,12 +113,9 @@ struct Spot {
     int cell[3];
     float inside[3];
 
-    __device__ Spot(const Lattice& lattice, const CastRay& ray, int k)
-        : Spot(lattice, [&](int a) { return fma(static_cast<float>(k) + 0.5f, ray.step[a], ray.entry[a]); }) {}
-    template <class At>
-    __device__ Spot(const Lattice& lattice, const At& at) {
+    __device__ Spot(const Lattice& lattice, const float (&at)[3]) {
         for (int a = 0; a < 3; ++a) {
-            const float place = fminf(fmaxf(at(a), 0.0f), lattice.last[a]);
+            const float place = fminf(fmaxf(at[a], 0.0f), lattice.last[a]);
             cell[a] = static_cast<int>(fminf(floorf(place), lattice.last[a] - 1.0f));
             inside[a] = place - static_cast<float>(cell[a]);
         }
@@ -204,7 +201,7 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
             k = leap(ray, k, place, brick, far);
             continue;
         }
-        const Spot spot(lattice, ray, k);
+        const Spot spot(lattice, place);
         if (cells && !spot.is_among(cells + 2 * at_brick, brick)) {
             ++k;
             continue;
@@ -265,9 +262,10 @@ __global__ __launch_bounds__(kThreads) void lookup_kernel(const texgs_volume vol
     if (i >= n) return;
     const Lattice lattice = lattice_of(volume);
     const Samples<T> samples{static_cast<const T*>(volume.values), {volume.size[0], volume.size[1], volume.size[2]}};
-    const Spot spot(lattice, [&](int a) {
-        return fma(points[3 * i + a], static_cast<float>(lattice.per_unit[a]), static_cast<float>(lattice.middle[a]));
-    });
+    float at[3];
+    for (int a = 0; a < 3; ++a)
+        at[a] = fma(points[3 * i + a], static_cast<float>(lattice.per_unit[a]), static_cast<float>(lattice.middle[a]));
+    const Spot spot(lattice, at);
     const float value = spot.value(samples), low = transfer.points[0], high = transfer.points[5 * (transfer.n - 1)];
     if (to.values) to.values[i] = value;
     if (to.colors) {
