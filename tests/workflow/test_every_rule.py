@@ -126,7 +126,7 @@ def test_every_result_is_there_and_recorded(project):
     assert (results / "report.html").stat().st_size > 10_000
     shading = json.loads((results / "sphere" / "TF01" / "demo" / "shading" / "metrics.json").read_text())
     assert {"inputs", "versions", "machine", "code_sha"} <= set(shading)
-    assert set(shading["inputs"]) == {"model", "views"}
+    assert set(shading["inputs"]) == {"model", "views", "volume"}
     assert {"torch", "vtk", "opencv-python-headless"} <= set(shading["versions"])
     assert {"threads", "torch_blas", "texgs_cpu"} <= set(shading["machine"])
     assert not list(results.rglob(".*.work"))
