@@ -39,11 +39,9 @@ def empty(tmp_path, monkeypatch):
         ("palette fit=stylerf_quick device=cuda", CPU_ONLY.format("stylerf_quick", "palette")),
         ("surfels fit=paper fit.material_range=bounded", AMBIENT),
         ("surfels fit=quick fit.texture.texels=0", "fit.texture.texels: expected"),
-        ("cuts fit=plenoxels", ABLE.format("cuts", "surfels", "plenoxels", "voxels")),
         ("page fit=stylerf", ABLE.format("page", "surfels", "stylerf", "palette")),
         ("steps fit=gaussians", ABLE.format("steps", "surfels", "gaussians", "gaussians")),
         ("steps fit=demo", "dataset.series of sphere: expected the steps of a series in time, got none"),
-        ("cuts fit=demo", "metric.cut_planes: expected at least 1 plane, got 0; experiment=cuts has 20"),
     ],
 )
 def test_a_verb_wants_a_fit_that_it_can_work_on(capsys, words, message):

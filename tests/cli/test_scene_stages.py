@@ -29,7 +29,6 @@ def results(at, scene_of_two):
         scene_of_two.parent,
         ["pse", *ORBITAL],
         ["timing", *ORBITAL],
-        ["cuts", *ORBITAL, "metric.cut_planes=3"],
     )
     return scene_of_two / "orbital" / "scene" / "demo"
 
@@ -171,17 +170,6 @@ def test_the_report_needs_no_other_file_and_takes_titles_as_text(tmp_path, monke
     text = (tmp_path / "results" / "report.html").read_text()
     assert all(told in text for told in ("31.25", "a &lt;b&gt; edit", "not measured"))
     assert "http" not in text.replace("http-equiv", "")
-
-
-def test_cuts_are_compared_with_the_cut_volume(results):
-    metrics = numbers(results / "cuts")
-    assert {each["case"] for each in metrics["ways"]} == {"a plane", "three planes", "a plane, edited"}
-    ways = {each["way"]: each for each in metrics["ways"] if each["case"] == "a plane"}
-    assert list(ways) == ["uncut", "dropped", "clipped", "slab", "volume"]
-    assert all(each["ms"] > 0 for each in ways.values())
-    assert ways["slab"]["whole"] > ways["clipped"]["whole"] - 0.5
-    assert ways["volume"]["whole"] is None, "it is what the others are compared with"
-    assert (results / "cuts" / "cuts.png").stat().st_size > 5000
 
 
 def test_a_film_moves_the_last_plane(results, tmp_path, monkeypatch, capsys):

@@ -69,7 +69,7 @@ def test_sections_are_in_the_papers_order_and_every_link_leads_somewhere(tmp_pat
     document = page(tmp_path, paths)
     keys = [key for key in document.values("id") if key in SECTIONS]
     assert keys == [key for key in SECTIONS if key in keys]
-    assert set(keys) == set(SECTIONS) - {"scenes", "cuts", "time", "text", "ablations", "sizes"}, (
+    assert set(keys) == set(SECTIONS) - {"scenes", "time", "text", "ablations", "sizes"}, (
         "these have nothing to show"
     )
     ids, links = document.values("id"), document.values("href")

@@ -3,8 +3,6 @@ from dataclasses import replace
 from tests.report.written import lines, metrics, records, rows, sources
 from texgs.report.results import (
     Comparison,
-    CutResult,
-    CutWay,
     PseResult,
     SheetResult,
     StepsResult,
@@ -12,7 +10,7 @@ from texgs.report.results import (
     ViewsResult,
     VolumeResult,
 )
-from texgs.report.scene_tables import cuts, datasets, edits, rendering, steps
+from texgs.report.scene_tables import datasets, edits, rendering, steps
 from texgs.report.table import UNLIKE
 
 LATTICE = {"spacing": [1.0] * 3, "origin": [0.0] * 3, "minimum": 0.0, "maximum": 1.0, "voxels": 120}
@@ -44,16 +42,6 @@ def test_edits_with_and_without_a_volume(tmp_path):
     first, second = rows(edits(records(tmp_path)))
     assert (first["edit"], first["views"], first["PSNR"]) == ("a", 6, 30.0)
     assert (second["edit"], second["PSNR"]) == ("b", None)
-
-
-def test_ways_to_cut_have_times_beside_a_frame_that_is_not_cut(tmp_path):
-    scores = (38.0, 35.0, 31.0, 28.5, 29.0, 26.5)
-    ways = [CutWay("a plane", "uncut", 4.0), CutWay("a plane", "slab", 6.0, *scores)]
-    metrics(tmp_path, "cuts", CutResult(20, 400, 400, ways))
-    first, second = rows(cuts(records(tmp_path)))
-    assert (first["way"], first["face"], first["ms / not cut"]) == ("not cut", None, 1.0)
-    assert (second["whole"], second["face, tenth"], second["band, tenth"]) == (38.0, 28.5, 26.5)
-    assert second["ms / not cut"] == 1.5
 
 
 def test_steps_of_sweeps_are_not_among_those_of_data_sets(tmp_path):

@@ -48,7 +48,6 @@ class Metric:
     vtk_frames: int = key(
         0, "test views that VTK renders too, to compare times, where offscreen OpenGL works", least=0
     )
-    cut_planes: int = key(0, "planes that cut each scene beside its volume", least=0)
     views: int = key(4, "views of the test path that measure style, consistency and CLIP scores", least=1)
 
 

@@ -18,7 +18,6 @@ SECTIONS = {  # of the report, in the order of the paper
     "fitting": "Fitting",
     "pse": "Editing of colour, opacity and light",
     "relight": "Relighting",
-    "cuts": "Cuts",
     "time": "Through time",
     "image": "Image-driven editing",
     "text": "Text-driven editing",
@@ -228,31 +227,6 @@ class TimingResult(Result):
     threads: int
     volume_mean_ms: float | None = None
     volume_max_ms: float | None = None
-
-
-@dataclass(frozen=True)
-class CutWay:
-    """One way to show a cut scene: PSNR in dB against the cut volume, means and tenths over planes."""
-
-    case: str  # how many planes, and of which scene
-    way: str
-    ms: float  # median of a frame
-    whole: float | None = None  # all pixels
-    whole_tenth: float | None = None
-    face: float | None = None  # where the cut opens the volume
-    face_tenth: float | None = None
-    band: float | None = None  # along the edge of the face
-    band_tenth: float | None = None
-
-
-@dataclass(frozen=True)
-class CutResult(Result, section="cuts"):
-    """A scene that is cut by planes that face the camera."""
-
-    planes: int
-    width: int  # of frames, pixels
-    height: int
-    ways: list[CutWay] = field(default_factory=list)
 
 
 @dataclass(frozen=True)

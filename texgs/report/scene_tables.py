@@ -1,4 +1,4 @@
-"""Tables of data sets and whole scenes: `datasets`, `rendering`, `edits`, `steps` and `cuts`."""
+"""Tables of data sets and whole scenes: `datasets`, `rendering`, `edits` and `steps`."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -21,7 +21,6 @@ from texgs.report.published import (
     volumes,
 )
 from texgs.report.results import (
-    CutResult,
     PseResult,
     SheetResult,
     StepsResult,
@@ -30,14 +29,6 @@ from texgs.report.results import (
     VolumeResult,
 )
 from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Table, columns
-
-WAYS = {
-    "uncut": "not cut",
-    "dropped": "surfels dropped by their centres",
-    "clipped": "surfels clipped, no face",
-    "slab": "slab of the volume over clipped surfels",
-    "volume": "the volume, cut",
-}
 
 
 def datasets(records: Iterable[Record[Any]]) -> Table:
@@ -166,16 +157,3 @@ def steps(records: Iterable[Record[Any]]) -> Table:
         counts = {"steps": result.steps, "compared": len(result.compared), "views": result.views}
         rows.append(cells(record, **counts, **quality))
     return Table("", [*columns("steps").values()], rows)
-
-
-def cuts(records: Iterable[Record[Any]]) -> Table:
-    """Return ways to show a cut against the cut volume, with their times beside a frame that is not cut."""
-    rows = []
-    for record in in_order(of(CutResult, records)):
-        uncut = {each.case: each.ms for each in record.result.ways if each.way == "uncut"}
-        for each in record.result.ways if not record.is_swept else ():
-            tenths = {"face, tenth": each.face_tenth, "band, tenth": each.band_tenth}
-            scores = {"whole": each.whole, "face": each.face, "band": each.band, **tenths}
-            ms = {"ms": each.ms, "ms / not cut": each.ms / uncut[each.case]}
-            rows.append(cells(record, **{"cut by": each.case, "way": WAYS[each.way]}, **scores, **ms))
-    return Table("", [*columns("cuts").values()], rows)

@@ -9,7 +9,7 @@ from texgs.report.edit_tables import image_driven, looks, text_driven, text_driv
 from texgs.report.fit_tables import VARIANTS, ablation, fits, fitting, meshes, model_size
 from texgs.report.metrics_files import LeftOut, Record, note
 from texgs.report.results import EditResult, FitResult
-from texgs.report.scene_tables import cuts, datasets, edits, rendering, steps
+from texgs.report.scene_tables import datasets, edits, rendering, steps
 from texgs.report.sweep_table import sweep
 from texgs.report.table import PAPER, Table, tables_file
 
@@ -45,7 +45,7 @@ class TableSpec:
 
 MAKERS: dict[str, Callable[[Sequence[Record[Any]]], Table]] = {
     **{make.__name__: make for make in (datasets, image_driven, text_driven, text_driven_frozen, looks)},
-    **{make.__name__: make for make in (fitting, fits, model_size, meshes, rendering, edits, cuts, steps)},
+    **{make.__name__: make for make in (fitting, fits, model_size, meshes, rendering, edits, steps)},
     **{sweep: partial(ablation, sweep=sweep) for sweep in VARIANTS},
 }
 

@@ -19,7 +19,7 @@ from texgs.workflow.stage import Stage
 ABLE: dict[str, Callable[[Kind], bool]] = {  # kinds of field that a stage works on; others work on all
     "mesh": lambda kind: bool(kind.depth),
     "page": lambda kind: "html" in kind.exports,
-    **dict.fromkeys(("cuts", "steps"), lambda kind: kind.name == "surfels"),
+    "steps": lambda kind: kind.name == "surfels",
 }
 
 
