@@ -27,7 +27,7 @@ from texgs.models.vgg import Vgg
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.viewer.looks import OrbitTask
-from tools.style_pictures import picture_likeness
+from tools.style_likeness import picture_likeness
 
 CPU = torch.device("cpu")
 

@@ -12,7 +12,7 @@ from texgs.metrics.edits import retrieval
 from texgs.metrics.retrieval import LAYERS, LUMINANCE, Likeness, contrast, known, likeness
 from texgs.models.pictures import PICTURES, picture
 from texgs.models.vgg import Vgg
-from tools.style_pictures import picture_likeness
+from tools.style_likeness import picture_likeness
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,7 @@ HISTOGRAM = 0.5  # weight of the histograms against a layer
 AROUND = 1 / 16  # standard deviation of what is around a pixel, in image sides: its contrast becomes 1
 LEAST = 0.02  # contrast that is not made larger
 LUMINANCE = (0.299, 0.587, 0.114)
-KNOWN = files(__package__) / "likeness.safetensors"  # by `python -m tools.style_pictures`
+KNOWN = files(__package__) / "likeness.safetensors"  # by `python -m tools.style_likeness`
 
 
 @dataclass(frozen=True, eq=False)

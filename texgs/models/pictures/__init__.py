@@ -1,7 +1,7 @@
 """Style pictures of texgs, files beside this one: own work, in which nobody else has a right.
 
-Most are computed by `python -m tools.style_pictures`, which also describes all of them for the metric
-`retrieval`.
+`python -m tools.style_likeness` describes them for the metric `retrieval`. Most were computed: git has the
+program, `tools/style_pictures.py`, at e0f84421.
 """
 
 from __future__ import annotations
