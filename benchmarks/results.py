@@ -12,7 +12,8 @@ results of the code of a commit are of this source tree, too; the column `same` 
 
 `benchmarks/results/index.csv` has a row for each. Its column `code` names what was measured: stages, kinds of
 field and methods of editing by their names, other modules by their whole names; or the result that a picture
-is drawn from. A row without a digest was measured with code of another layout, or not of one commit.
+is drawn from. A row without a digest was measured with code of another layout, or not of one commit. A name
+of code that is no longer here leads nowhere: such a result is of older code.
 """
 
 from __future__ import annotations
