@@ -1,15 +1,24 @@
 """The viewer of a scene that Python holds: edits on pages reach Python, and the other way round."""
 
 import asyncio
+import threading
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import aiohttp
+import pytest
 
 import texgs
 from tests.scene.balls import write_balls
 from tests.viewer.pages import Browser
+from texgs.core.light import Light
 from texgs.scene.scene_file import read_scene
+from texgs.scene.session import Session
+from texgs.viewer.messages import Edit
+from texgs.viewer.shared_edits import SharedEdits, open_scene
+
+MEANWHILE = 0.5  # seconds that a step of one thread takes, in which the other one edits if nothing stops it
+DRAGGED, LIT = "TF01 opacity 0.25", "light (30, 40)"
 
 
 async def talk(address, scene):
@@ -52,3 +61,46 @@ def test_what_a_page_saves_outlives_the_process(tmp_path, monkeypatch):
     assert edits.save("mine.yaml") == Path("mine/scene.yaml").absolute()
     assert edits.would_replace("mine.yaml") is False
     assert {model.file.parent for model in read_scene("mine").models.values()} == {Path("mine")}
+
+
+@pytest.mark.parametrize(
+    ("step", "is_page_first", "past"),
+    [
+        ("_push", True, [DRAGGED, LIT]),
+        ("_push", False, ["TF01 opacity 0.5", LIT, DRAGGED]),
+        ("undo", True, [DRAGGED, LIT]),
+    ],
+)
+def test_neither_thread_loses_what_the_other_edits_meanwhile(
+    tmp_path, monkeypatch, step, is_page_first, past
+):
+    """A page drags a number, each time by an undo and a change, while Python sets the light."""
+    file = write_balls(tmp_path)
+    scene = texgs.open(file)
+    edits, made = SharedEdits(scene.session, open_scene(file)), getattr(Session, step)
+
+    def drag(value):
+        edits.change(Edit("TF01", "opacity", value, step=1), author=1)
+
+    def by_page():
+        drag(0.25)
+
+    def by_python():
+        scene.light = (30, 40)
+
+    drag(0.5)
+    first, second = (by_page, by_python) if is_page_first else (by_python, by_page)
+    other = threading.Thread(target=second)
+
+    def slow(session, *given):
+        monkeypatch.undo()
+        other.start()
+        other.join(MEANWHILE)
+        return made(session, *given)
+
+    monkeypatch.setattr(Session, step, slow)
+    first()
+    other.join()
+    assert scene["TF01"].opacity == 0.25
+    assert scene.light == Light("directional", 30, 40)
+    assert scene.session.past == past

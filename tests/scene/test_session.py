@@ -98,8 +98,8 @@ def test_each_change_is_undone_and_made_again(session, tmp_path):
 
 def test_the_oldest_of_many_steps_stay_made(session):
     for count in range(250):
-        session.set_light(Light("directional", count))
-        session.name_step(str(count))
+        with session.one_step(str(count)):
+            session.set_light(Light("directional", count))
     assert session.past == [str(count) for count in range(50, 250)]
     while session.undo():
         pass

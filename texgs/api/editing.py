@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -74,8 +75,8 @@ class Editing:
 
     @light.setter
     def light(self, value: Light | str | Sequence[float]) -> None:
-        self.session.set_light(light_of(as_python(value)))
-        self.changed(f"light {value}")
+        with self.one_step(f"light {value}"):
+            self.session.set_light(light_of(as_python(value)))
 
     @property
     def background(self) -> tuple[float, float, float]:
@@ -84,8 +85,8 @@ class Editing:
 
     @background.setter
     def background(self, value: str | Sequence[float]) -> None:
-        self.session.set_background(as_python(value))
-        self.changed(f"background {value}")
+        with self.one_step(f"background {value}"):
+            self.session.set_background(as_python(value))
 
     @property
     def time(self) -> int | None:
@@ -94,8 +95,8 @@ class Editing:
 
     @time.setter
     def time(self, step: int) -> None:
-        self.session.set_of_scene("time", as_python(step))
-        self.changed(f"time {step}")
+        with self.one_step(f"time {step}"):
+            self.session.set_of_scene("time", as_python(step))
 
     def edit(self, *words: str) -> Self:
         """Make the changes that words ask for, as `texgs edit` has them, such as "cut=x,0.1"; return self.
@@ -104,28 +105,33 @@ class Editing:
         """
         if not all(isinstance(word, str) for word in words):
             raise ArgumentError(f"words: expected text such as 'light=30,40', got {words!r:.100}")
-        apply_all(self.session, words)
-        return self.changed(" ".join(words))
+        with self.one_step(" ".join(words)):
+            apply_all(self.session, words)
+        return self
 
     def undo(self) -> bool:
         """Take the latest change back; return whether there was one."""
         done = self.session.undo()
-        self.changed()
+        self.tell()
         return done
 
     def redo(self) -> bool:
         """Make again what was undone last; return whether there was anything."""
         done = self.session.redo()
-        self.changed()
+        self.tell()
         return done
 
-    def changed(self, title: str = "") -> Self:
-        """Give the latest step a title, and tell pages of the viewer that show this scene; return self."""
-        if title:
-            self.session.name_step(title)
+    @contextmanager
+    def one_step(self, title: str) -> Iterator[None]:
+        """Let all changes within the block be one step with a title, and tell pages that show this scene."""
+        with self.session.one_step(title):
+            yield
+        self.tell()
+
+    def tell(self) -> None:
+        """Tell pages of the viewer that show this scene."""
         if self._viewer is not None:
             self._viewer.tell()
-        return self
 
     # ---- Looks and segments -------------------------------------------------
 
@@ -210,8 +216,8 @@ class Editing:
         new_segment(
             scene, part, clicks, around, mask_model(masks, device), file, facts, title=f"segment {name}"
         )
-        self.session.add_segment(part, file)
-        self.changed(f"{part} new")
+        with self.one_step(f"{part} new"):
+            self.session.add_segment(part, file)
         return self[part]
 
     @interrupts_between_items()
@@ -233,8 +239,9 @@ class Editing:
         task = replace(orbit_task(before, edit, self._new_folder(method), device), draws=False)
         after = edited_by(method_of(edit), task).scene
         names = parts_of(before, edit.parts)
-        self.session.set_looks(looks_of(after, names, before))
-        return self.changed(f"{', '.join(names)} {next(iter(values.values()))}")
+        with self.one_step(f"{', '.join(names)} {next(iter(values.values()))}"):
+            self.session.set_looks(looks_of(after, names, before))
+        return self
 
     def _picture(self, picture: Any) -> str:
         """Return the name or the file of a picture."""

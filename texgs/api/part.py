@@ -26,11 +26,11 @@ class Value(Generic[T]):
         return cast(T, getattr(entry_of(part.scene.session.scene, part.name).edit, self._key))
 
     def __set__(self, part: Part, value: Any) -> None:
-        if value is None:
-            part.scene.session.reset(part.name, self._key)
-        else:
-            part.scene.session.set(part.name, self._key, as_python(value))
-        part.scene.changed(f"{part.name} {self._key} {'as fitted' if value is None else value}")
+        with part.scene.one_step(f"{part.name} {self._key} {'as fitted' if value is None else value}"):
+            if value is None:
+                part.scene.session.reset(part.name, self._key)
+            else:
+                part.scene.session.set(part.name, self._key, as_python(value))
 
 
 class Part:

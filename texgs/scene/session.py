@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from threading import RLock
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -46,7 +47,7 @@ class Session:
 
     What is edited by numbers (colours, opacities, light) costs nothing but the next frame: files are read
     again only where a change brings others. A change that cannot be made is an ArgumentError or a ShapeError
-    that names the part, and leaves the scene as it is.
+    that names the part, and leaves the scene as it is. Threads that share a session change it by `one_step`.
 
     Args:
         scene: to begin with.
@@ -55,6 +56,7 @@ class Session:
 
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
         self._past, self._future = [(scene, "")], list[tuple[Scene, str]]()  # with titles of steps
+        self.lock = RLock()  # held from what a change reads to the step that it makes
         self._device = device
         self._opened = deque[tuple[object, Composed]](maxlen=KEPT)
         self._twins = deque[tuple[object, Twin]](maxlen=KEPT)
@@ -71,7 +73,7 @@ class Session:
 
     @property
     def past(self) -> list[str]:
-        """Return the titles of the steps that were made, the oldest first; see `name_step`."""
+        """Return the titles of the steps that were made, the oldest first; see `one_step`."""
         return [title for _, title in self._past[1:]]
 
     @property
@@ -199,34 +201,36 @@ class Session:
         self._push(replaced(self.scene, model, renamed))
 
     @contextmanager
-    def one_step(self) -> Iterator[None]:
-        """Let all changes within the block be one step; none where one of them fails."""
-        past, future = self._past, [*self._future]
-        try:
-            yield
-        except BaseException:
-            self._past, self._future = past, future
-            raise
-        if self.scene is not past[-1][0]:
-            self._past = [*past[-MOST_STEPS:], (self.scene, "")]
+    def one_step(self, title: str | Callable[[], str] = "") -> Iterator[None]:
+        """Let all changes within the block be one step with a title; none where one of them fails.
 
-    def name_step(self, title: str) -> None:
-        """Give the latest step a title."""
-        self._past[-1] = (self.scene, title)
+        Threads enter such blocks in turn. A function is asked for the title once all changes are made.
+        """
+        with self.lock:
+            past, future = self._past, [*self._future]
+            try:
+                yield
+            except BaseException:
+                self._past, self._future = past, future
+                raise
+            if self.scene is not past[-1][0]:
+                self._past = [*past[-MOST_STEPS:], (self.scene, title() if callable(title) else title)]
 
     def undo(self) -> bool:
         """Take the latest change back; return whether there was one."""
-        if len(self._past) == 1:
-            return False
-        self._future.append(self._past.pop())
-        return True
+        with self.lock:
+            if len(self._past) == 1:
+                return False
+            self._future.append(self._past.pop())
+            return True
 
     def redo(self) -> bool:
         """Make again what was undone last; return whether there was anything."""
-        if not self._future:
-            return False
-        self._past.append(self._future.pop())
-        return True
+        with self.lock:
+            if not self._future:
+                return False
+            self._past.append(self._future.pop())
+            return True
 
     # ---- Views ------------------------------------------------------------
 

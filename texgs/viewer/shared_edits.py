@@ -124,47 +124,47 @@ class SharedEdits:
 
     def change(self, asked: Change, author: int) -> None:
         """Make a change; edits with the same number by the same author are one step."""
-        session, step, title, before = self._session, None, "", self.scene
-        if isinstance(asked, Undo):
-            session.undo()
-            self._require_step(session.redo)
-        elif isinstance(asked, Redo):
-            session.redo()
-            self._require_step(session.undo)
-        elif isinstance(asked, Rename):
-            title = f"{asked.part} renamed to {asked.name}"
-            session.rename_segment(asked.part, asked.name)
-        elif isinstance(asked, Remove):
-            title = f"{asked.part} removed"
-            session.remove_segment(asked.part)
-        else:
-            step = (author, asked.step, asked.part, asked.key) if asked.step else None
-            is_latest = self._latest[0] == step and self._latest[1] is self.scene
-            goes_on = step is not None and is_latest and session.undo()
-            try:
-                self._edit(asked)
-            except Exception:
-                if goes_on:
-                    session.redo()
-                raise
-            title = asked.title
-        if title and self.scene is not before:
-            session.name_step(title)
-        self._latest = step, self.scene
+        session, step = self._session, None
+        with session.lock:
+            if isinstance(asked, Undo):
+                session.undo()
+                self._require_step(session.redo)
+            elif isinstance(asked, Redo):
+                session.redo()
+                self._require_step(session.undo)
+            elif isinstance(asked, Rename):
+                with session.one_step(f"{asked.part} renamed to {asked.name}"):
+                    session.rename_segment(asked.part, asked.name)
+            elif isinstance(asked, Remove):
+                with session.one_step(f"{asked.part} removed"):
+                    session.remove_segment(asked.part)
+            else:
+                step = (author, asked.step, asked.part, asked.key) if asked.step else None
+                is_latest = self._latest[0] == step and self._latest[1] is self.scene
+                goes_on = step is not None and is_latest and session.undo()
+                try:
+                    with session.one_step(lambda: asked.title):
+                        self._edit(asked)
+                except Exception:
+                    if goes_on:
+                        session.redo()
+                    raise
+            self._latest = step, self.scene
 
     def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:
         """Write the file of a new segment, and add it."""
         file = new_part_file("segment", self._folder, Path(self.name).stem, part)
-        self._session.make_segment(part, mask, file, facts)
-        self._session.name_step(f"{part} new")
+        with self._session.one_step(f"{part} new"):
+            self._session.make_segment(part, mask, file, facts)
 
     def give_looks(self, looks: Mapping[str, NewLook], name: str) -> list[str]:
         """Give parts new looks, and back the palettes these were made for; return parts that are gone."""
-        names = part_names(self.scene)
-        there = {part: look for part, look in looks.items() if part in names}
-        if there:
-            self._session.set_looks(there)
-            self._session.name_step(f"{', '.join(there)} {name}")
+        with self._session.lock:
+            names = part_names(self.scene)
+            there = {part: look for part, look in looks.items() if part in names}
+            with self._session.one_step(f"{', '.join(there)} {name}"):
+                if there:
+                    self._session.set_looks(there)
         return [part for part in looks if part not in names]
 
     def give_model(self, name: str, model: Surfels, tf: TransferFunction, before: Path | None) -> Path | None:
@@ -172,14 +172,14 @@ class SharedEdits:
 
         Return its file; None where that is not there any more.
         """
-        entry = self.scene.models.get(name)
-        is_there = self.scene.functions.get(name) == tf if before is None else entry and entry.file == before
-        if not is_there:
-            return None
-        file = write_model(new_part_file("model", self._folder, Path(self.name).stem, name), model)
-        self._session.set_scene(with_model(self.scene, name, file, tf))
-        self._session.name_step(f"{name} {'model' if before is None else 'finer model'}")
-        return file
+        with self._session.one_step(f"{name} {'model' if before is None else 'finer model'}"):
+            scene, entry = self.scene, self.scene.models.get(name)
+            is_there = scene.functions.get(name) == tf if before is None else entry and entry.file == before
+            if not is_there:
+                return None
+            file = write_model(new_part_file("model", self._folder, Path(self.name).stem, name), model)
+            self._session.set_scene(with_model(scene, name, file, tf))
+            return file
 
     def path_of(self, name: str) -> Path:
         """Return the scene file of a name in the folder for saving, or of a folder of that name there."""
