@@ -120,7 +120,7 @@ def test_slips_are_sentences(scene, tmp_path):
         scene.film("x.mp4", "test", frames=1)
     with pytest.raises(ArgumentError, match="what: expected one of view, test"):
         scene.film("x.mp4", "spin")
-    with pytest.raises(ArgumentError, match=r"nowhere.yaml: no such file"):
+    with pytest.raises(ArgumentError, match=r"nowhere.yaml: no such scene, folder or model"):
         texgs.open("nowhere.yaml")
     assert repr(scene) == "Scene\n  TF01: as fitted\n  TF02: as fitted"
     assert scene["TF01"].opacity == 1

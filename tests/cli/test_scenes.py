@@ -60,6 +60,17 @@ def test_a_model_that_does_not_go_with_the_others_is_refused_before_a_file_is_wr
     assert not scene.with_name("new.yaml").exists()
 
 
+def test_a_model_file_stands_for_a_scene_of_it_alone(scene, tmp_path):
+    model = read_scene(scene).models["TF02"].file
+    alone = write_scene(tmp_path / "alone.yaml", Scene({model.stem: SceneModel(model)}))
+    for source, name in ((model, "model.png"), (alone, "scene.png")):
+        assert main(["render", str(source), "--width", "40", "--output", str(tmp_path / name)]) == 0
+    pictures = [np.asarray(Image.open(tmp_path / name)) for name in ("model.png", "scene.png")]
+    assert np.array_equal(*pictures)
+    assert edit(model, f"{model.stem}.opacity=0.5") == 0
+    assert read_scene(scene.with_name("new.yaml")).models[model.stem].edit.opacity == 0.5
+
+
 def test_one_view_and_its_default_name(scene, tmp_path, monkeypatch):
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")

@@ -117,18 +117,23 @@ def test_a_mistake_is_named_with_its_place(folder, change, message):
 
 
 def test_files_that_are_no_scene(folder):
-    with pytest.raises(ArgumentError, match="no such file; check its name, or let texgs compose write one"):
+    with pytest.raises(ArgumentError, match="no such scene, folder or model; check its name, or"):
         read_scene(folder / "none.yaml")
     for text, message in (("a: [1", "YAML, got a mistake in line 1"), ("hello", "a table of keys .*'hello'")):
         (folder / "bad.yaml").write_text(text)
         with pytest.raises(ArgumentError, match=rf"bad\.yaml: .*expected {message}"):
             read_scene(folder / "bad.yaml")
+    (folder / "page.html").write_text("<!doctype html>")
+    with pytest.raises(ArgumentError, match=r"page.html: expected scene.yaml, a folder with one or a model "):
+        read_scene(folder / "page.html")
+    (folder / "empty").mkdir()
+    with pytest.raises(ArgumentError, match=r"expected one scene.yaml .* got none; texgs compose writes one"):
+        read_scene(folder / "empty")
+
+
+def test_a_model_is_a_scene_of_its_own(folder):
     model = folder / "a" / "model.safetensors"
-    with pytest.raises(ArgumentError, match="expected a scene, got a model; texgs compose makes"):
-        read_scene(model)
-    model.write_bytes(model.read_bytes()[:-100])
-    with pytest.raises(ArgumentError, match="expected a scene, got a model"):
-        read_scene(model)
+    assert read_scene(model) == Scene({"model": SceneModel(model)})
 
 
 def test_models_and_variants_that_do_not_belong(folder):

@@ -47,16 +47,6 @@ def test_a_folder_with_one_scene(scene_file, tmp_path):
         open_scene(tmp_path)
 
 
-def test_what_is_missing_is_told(tmp_path):
-    with pytest.raises(ArgumentError, match="no such scene, folder or model"):
-        open_scene(tmp_path / "none.safetensors")
-    (tmp_path / "page.html").write_text("<!doctype html>")
-    with pytest.raises(ArgumentError, match=r"page.html: expected scene.yaml, a folder with one or a model "):
-        open_scene(tmp_path / "page.html")
-    with pytest.raises(ArgumentError, match=r"expected one scene.yaml .* got none; texgs compose writes one"):
-        open_scene(tmp_path)
-
-
 def described(tmp_path, *models, **values):
     files = [write_model(tmp_path / f"{i}.safetensors", model) for i, model in enumerate(models)]
     entries = {f"TF{i}": SceneModel(file) for i, file in enumerate(files)}

@@ -225,8 +225,6 @@ def open_scene(path: str | Path, device: str = "cpu") -> Scene:
     Raises:
         ArgumentError: if there is no scene, or what it names is missing or damaged.
     """
-    from texgs.viewer.shared_edits import open_scene as opened
-
-    scene = Scene(Session(opened(Path(path)).scene, torch_device(device)))
+    scene = Scene(Session.open(path, torch_device(device)))
     _ = scene.session.composition  # what is wrong with its files is told now
     return scene

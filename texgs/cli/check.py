@@ -25,11 +25,10 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.errors import ArgumentError, located
     from texgs.core.io import require_place
     from texgs.report.check import check
-    from texgs.scene.scene_file import only_scene, read_scene
+    from texgs.scene.scene_file import read_scene, scene_path
     from texgs.scene.twin import Twin
 
-    if arguments.scene.is_dir():
-        arguments.scene = only_scene(arguments.scene)
+    arguments.scene = scene_path(arguments.scene)
     output = arguments.output or Path(f"{arguments.scene.stem}-check.json")
     if output.suffix != ".json":
         raise ArgumentError(f"--output: expected a file that ends in .json, got {output}")

@@ -21,7 +21,7 @@ KEPT = ("view", "point", "other", "box", "masks", "vote", "connected")  # argume
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the scene, the edits, and the new file."""
-    parser.add_argument("scene", type=Path, help="scene.yaml, or a folder with one")
+    parser.add_argument("scene", type=Path, help="scene.yaml, a folder with one, or a model file")
     parser.add_argument(
         "overrides",
         nargs="*",
@@ -125,7 +125,7 @@ def run_series(arguments: argparse.Namespace) -> int:
 
 def add_segment_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what is clicked on, and how masks are found and lifted."""
-    parser.add_argument("scene", type=Path, help="scene.yaml, or a folder with one")
+    parser.add_argument("scene", type=Path, help="scene.yaml, a folder with one, or a model file")
     parser.add_argument("--model", help="name of the model; may be left out where there is one")
     parser.add_argument("--name", help="of the new segment")
     add_clicks(parser)

@@ -66,26 +66,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
     from texgs.scene.export import OF_CLOUDS, Export, export_model, export_scene, remarks, require_other
-    from texgs.scene.scene_file import only_scene, read_scene
+    from texgs.scene.scene_file import read_scene, scene_path
 
-    if arguments.source.is_dir():
-        arguments.source = only_scene(arguments.source)
+    arguments.source = scene_path(arguments.source)
     kind = kind_of(arguments)
     require_taken(arguments, kind)
     require_own_place(arguments.to, "--to")
-    scene = read_scene(arguments.source) if arguments.source.suffix in SCENES else None
-    shown = as_scene(arguments, scene)
+    scene = read_scene(arguments.source)
+    shown = chosen(arguments, scene)
     if kind == "html":
         print(of_page(arguments, shown))
         return 0
     options = {name: getattr(arguments, name) for name in OPTIONS}
     export = Export(kind, known=shown.space, **options)
-    if kind in OF_CLOUDS or (scene is not None and arguments.model is None):
+    if kind in OF_CLOUDS or (arguments.source.suffix in SCENES and arguments.model is None):
         print(export_scene(arguments.to, shown, export))
         for note in [BAKED] * (kind in OF_CLOUDS) + remarks(shown, export):
             print(f"{arguments.to}: {note}", file=sys.stderr)
         return 0
-    require_other(arguments.to, scene or shown)
+    require_other(arguments.to, scene)
     (entry,) = shown.models.values()
     print(export_model(arguments.to, entry.open()[0], export))
     return 0
@@ -128,12 +127,8 @@ def require_taken(arguments: argparse.Namespace, kind: str) -> None:
             )
 
 
-def as_scene(arguments: argparse.Namespace, scene: Scene | None) -> Scene:
-    """Return the scene, with the chosen model alone; or one of a model file."""
-    from texgs.scene.scene import Scene, SceneModel
-
-    if scene is None:
-        return Scene({arguments.source.stem: SceneModel(arguments.source)})
+def chosen(arguments: argparse.Namespace, scene: Scene) -> Scene:
+    """Return the scene, with the chosen model alone where there is one."""
     if arguments.model is None:
         return scene
     if arguments.model not in scene.models:

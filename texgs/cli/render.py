@@ -27,7 +27,7 @@ MOST_GAIN = 16.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to show, from where, and where to."""
-    parser.add_argument("scene", type=Path, help="scene.yaml, or a folder with one")
+    parser.add_argument("scene", type=Path, help="scene.yaml, a folder with one, or a model file")
     parser.add_argument(
         "--output",
         type=Path,
@@ -65,14 +65,13 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.report.check import checked
     from texgs.scene.frame import Mode
     from texgs.scene.paths import shots_of
-    from texgs.scene.scene_file import only_scene, read_scene
+    from texgs.scene.scene_file import read_scene, scene_path
     from texgs.scene.session import Session
     from texgs.scene.twin import needs_twin
 
     if arguments.mode not in get_args(Mode):
         raise ArgumentError(f"--mode: expected one of {', '.join(get_args(Mode))}, got {arguments.mode}")
-    if arguments.scene.is_dir():
-        arguments.scene = only_scene(arguments.scene)
+    arguments.scene = scene_path(arguments.scene)
     scene = read_scene(arguments.scene)
     count = frames_of(arguments)
     output = output_of(arguments, count)

@@ -39,32 +39,42 @@ VOLUME_KEYS = ("file", *LOOK, "tfs")
 
 
 def read_scene(path: str | Path) -> Scene:
-    """Read a scene file, or the one in a folder or below. Files in it are relative to its folder.
+    """Read a scene: scene.yaml, a folder with one in it or below, or a model file, a scene of its own.
+
+    Files in scene.yaml are relative to its folder.
 
     Raises:
         ArgumentError: if the file is missing or a key of it is not as it should be; says which.
     """
-    path = Path(path)
-    if path.is_dir():
-        path = only_scene(path)
-    if not path.exists():
-        raise ArgumentError(f"{path}: no such file; check its name, or let texgs compose write one")
+    path = scene_path(path)
+    if path.suffix not in SCENES:
+        return Scene({label(str(path), path.stem): SceneModel(path)})
     with reading(path, "a scene in YAML", "correct it"), located(path):
-        if path.suffix not in SCENES and formats(path):
-            raise ArgumentError("expected a scene, got a model; texgs compose makes a scene of models")
         if path.stat().st_size > LARGEST:
             raise ArgumentError(f"expected a scene of at most {LARGEST} bytes; is it another file?")
         return _scene(parse_yaml(path.read_text(encoding="utf-8")), path.parent)
 
 
-def only_scene(folder: Path) -> Path:
-    """Return the scene file in a folder or below."""
-    files = sorted(folder.rglob(SCENE))
+def scene_path(path: str | Path) -> Path:
+    """Return the file of what `read_scene` takes: of a folder, the scene file in it or below."""
+    path = Path(path)
+    if not path.exists():
+        raise ArgumentError(
+            f"{path}: no such scene, folder or model; check its name, or let texgs compose write a scene"
+        )
+    if not path.is_dir():
+        if path.suffix not in SCENES and not formats(path):
+            raise ArgumentError(
+                f"{path}: expected scene.yaml, a folder with one or a model file (.safetensors, .texgs, "
+                ".ply), got a file of another kind, or a damaged one"
+            )
+        return path
+    files = sorted(path.rglob(SCENE))
     if len(files) != 1:
-        some = ", ".join(str(each.relative_to(folder)) for each in files[:MOST_LISTED])
+        some = ", ".join(str(each.relative_to(path)) for each in files[:MOST_LISTED])
         more = ", ..." if len(files) > MOST_LISTED else ""
         got = f"{len(files)} ({some}{more}); name one of them" if files else "none; texgs compose writes one"
-        raise ArgumentError(f"{folder}: expected one scene.yaml in this folder or below, got {got}")
+        raise ArgumentError(f"{path}: expected one scene.yaml in this folder or below, got {got}")
     return files[0]
 
 

@@ -9,16 +9,15 @@ from typing import Any
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.core.names import METRICS, SCENE, SCENES, file_name, label, new_part_file
+from texgs.core.names import METRICS, SCENE, SCENES, file_name, new_part_file
 from texgs.edit.function_model import with_model
-from texgs.fields.files import formats
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.check import checked
 from texgs.scene.copied import require_files, write_copy
 from texgs.scene.parts import NewLook, part_names, with_looks
-from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.scene_file import only_scene, read_scene, write_scene
+from texgs.scene.scene import Scene
+from texgs.scene.scene_file import read_scene, scene_path, write_scene
 from texgs.scene.session import SCENE_KEYS, Session, files_of, state_of
 from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
@@ -41,29 +40,18 @@ class Opened:
 
 
 def open_scene(path: Path, folder: Path | None = None) -> Opened:
-    """Return the scene of a path: scene.yaml, a folder with one of these in it or below, or a model file.
+    """Return the scene of a path, see `read_scene`, and where it is saved.
 
     A scene that a job wrote is saved under another name in the current folder: jobs do not replace a folder
     that holds files of others.
     """
-    if path.is_dir():
-        path = only_scene(path)
+    path = scene_path(path)
     of_job = (path.parent / METRICS).exists()
     folder = folder or (Path.cwd() if of_job else path.parent)
-    if path.suffix in SCENES:
-        name, file = ("edited.yaml", None) if of_job and path.name == SCENE else (path.name, path)
-        return Opened(read_scene(path), path, folder, name, file)
-    if not path.is_file():
-        raise ArgumentError(
-            f"{path}: no such scene, folder or model; check its name, or let texgs compose write a scene"
-        )
-    if not formats(path):
-        raise ArgumentError(
-            f"{path}: expected scene.yaml, a folder with one or a model file (.safetensors, .texgs, .ply), "
-            "got a file of another kind, or a damaged one"
-        )
-    scene = Scene({label(str(path), path.stem): SceneModel(path)})
-    return Opened(scene, path, folder, SCENE)
+    name, file = ("edited.yaml", None) if of_job and path.name == SCENE else (path.name, path)
+    if path.suffix not in SCENES:
+        name, file = SCENE, None
+    return Opened(read_scene(path), path, folder, name, file)
 
 
 def title_of(path: Path) -> str:
