@@ -6,8 +6,7 @@ from pathlib import Path
 from tests.fields.surfels.test_composition import ball
 from texgs.core.io import write_json
 from texgs.fields.surfels.model_file import write_model
-from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.twin import SceneVolume
+from texgs.scene.scene import Scene, SceneModel, SceneVolume
 from texgs.volume.generate import sphere
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource

@@ -21,8 +21,8 @@ from texgs.fitting.palette import PaletteFit
 from texgs.models.pictures import picture
 from texgs.raster.voxels import camera_rays
 
-WEIGHTS = StyleRfKeys(nnfm=0.0, patches=50.0, variation=0.1, distillation=60)
-RECIPE = WEIGHTS.recipe(6, 0, reduce=2, rate=0.01)
+STEPS, VARIATION = 60, 0.1  # of the distillation; weight of total variation
+RECIPE = StyleRfKeys(nnfm=0.0, patches=50.0).recipe(6, 0, reduce=2, rate=0.01)
 STYLE = StylePicture.of(picture("dots", 96))
 
 
@@ -104,7 +104,7 @@ def test_free_colours_learn_those_of_the_recoloured_palette(field, images):
 def test_only_colours_change(field, images, vgg, features):
     before = {name: x.clone() for name, x in field.parameters.items()}
     recipe = replace(RECIPE, features=features, iterations=2)
-    edited, losses, _ = stylize_palette(field, images, [STYLE, STYLE], recipe, WEIGHTS, vgg)
+    edited, losses, _ = stylize_palette(field, images, [STYLE, STYLE], recipe, STEPS, VARIATION, vgg)
     assert all(torch.equal(x, field.parameters[name]) for name, x in before.items()), "the field given"
     changed = {name for name, x in edited.parameters.items() if name not in before}
     assert changed == {"free.table", "free.0", "free.1", "free.2"}
@@ -119,8 +119,7 @@ def test_only_colours_change(field, images, vgg, features):
 
 def test_a_plain_style_becomes_the_colour_of_the_ball(field, images):
     field, style = one_colored(field), plain_style([0.2, 0.6, 0.3])
-    weights = replace(WEIGHTS, variation=0.0)
-    edited, *_ = stylize_palette(field, images, [style], replace(RECIPE, iterations=60), weights)
+    edited, *_ = stylize_palette(field, images, [style], replace(RECIPE, iterations=60), STEPS, 0.0)
     torch.testing.assert_close(edited.colors, style.mean[None])
     shown = edited.render(cameras(1, 48)[0])
     color = (shown.color - 1 + shown.alpha[..., None])[shown.alpha > 0.99]
@@ -129,7 +128,7 @@ def test_a_plain_style_becomes_the_colour_of_the_ball(field, images):
 
 def test_layers_of_palette_colours_are_apart_and_together_everything_and_each_has_a_style(field, images):
     with pytest.raises(ArgumentError, match="styles: expected one for each of 2 palette colours, got 1"):
-        stylize_palette(field, images, [STYLE], RECIPE, WEIGHTS)
+        stylize_palette(field, images, [STYLE], RECIPE, STEPS, VARIATION)
     camera = images.cameras[2]
     run = PalettePainting(field, [], [], [], 0.0, 0.0, torch.Generator())
     rays = camera_rays(camera).flatten(0, 1)

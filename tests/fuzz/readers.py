@@ -56,11 +56,11 @@ from texgs.fields.surfels.step_file import at_step, write_step
 from texgs.fields.surfels.variants import with_texture, write_texture
 from texgs.fitting.checkpoint import latest
 from texgs.models.networks import read_tensors
-from texgs.scene.scene import Scene, SceneModel, SceneSegment
+from texgs.scene.scene import Scene, SceneModel, SceneSegment, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.series_file import Series, read_series, write_series
-from texgs.scene.twin import SceneVolume, Twin
+from texgs.scene.twin import Twin
 from texgs.study.ballots import read_ballot
 from texgs.study.questions import read_key, write_key
 from texgs.volume.generate import sphere

@@ -14,9 +14,9 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
-from texgs.scene.twin import SceneVolume, Twin, range_of
+from texgs.scene.twin import Twin, range_of
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.origins import Origins
 from texgs.viewer.page_volume import page_volume

@@ -9,9 +9,8 @@ from tests.scene.balls import ball_models
 from texgs.core.errors import ArgumentError
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.copied import write_copy
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel, SceneVolume
 from texgs.scene.scene_file import read_scene
-from texgs.scene.twin import SceneVolume
 from texgs.volume.render import Appearance
 
 

@@ -277,7 +277,7 @@ def test_cuts_by_the_axes_of_the_file(placed_scene):
 
 def test_cuts_by_samples_towards_a_letter(placed_scene, tmp_path):
     file, world, _, grid = placed_scene
-    from texgs.scene.twin import SceneVolume
+    from texgs.scene.scene import SceneVolume
 
     scene = replace(read_scene(file), volume=SceneVolume(tmp_path / "volume.nrrd", {}))
     write_scene(file, scene)

@@ -16,10 +16,10 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.session import Session
-from texgs.scene.twin import SceneVolume, Twin, edited
+from texgs.scene.twin import Twin, edited
 from texgs.volume.caster import Caster
 from texgs.volume.generate import sphere
 from texgs.volume.nrrd_file import open_grid

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from texgs.core.progress import progress
-from texgs.viewer.work import Jobs, Stopped, Watch
+from texgs.viewer.jobs import Jobs, Stopped, Watch
 
 
 def run(work, watch=None):

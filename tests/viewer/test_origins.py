@@ -11,8 +11,7 @@ from tests.fields.surfels.test_composition import ball
 from tests.viewer.training_views import SIZE, TF, write_results
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
-from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.twin import SceneVolume
+from texgs.scene.scene import Scene, SceneModel, SceneVolume
 from texgs.viewer.origins import Origins, fitted, orbit_of
 from texgs.volume.transfer import TransferFunction
 

@@ -30,11 +30,10 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.step_file import write_step
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.frame import frame
-from texgs.scene.scene import Scene, SceneModel, SceneSegment
+from texgs.scene.scene import Scene, SceneModel, SceneSegment, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment
 from texgs.scene.series_file import Series, write_series
-from texgs.scene.twin import SceneVolume
 from texgs.viewer import standalone
 from texgs.viewer.description import describe
 from texgs.viewer.page_steps import UNITS, page_steps

@@ -30,9 +30,9 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.cut_view import beside
 from texgs.scene.frame import frame
-from texgs.scene.scene import Scene
+from texgs.scene.scene import Scene, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
-from texgs.scene.twin import SceneVolume, Twin, range_of
+from texgs.scene.twin import Twin, range_of
 from texgs.viewer.description import describe
 from texgs.viewer.downloads import Downloads, exports_of
 from texgs.viewer.frames import shown as shown_beside

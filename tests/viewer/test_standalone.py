@@ -24,9 +24,8 @@ from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.check import checksum_of
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
-from texgs.scene.twin import SceneVolume
 from texgs.viewer import standalone
 from texgs.viewer.messages import Edit
 

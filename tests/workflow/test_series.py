@@ -29,11 +29,10 @@ from texgs.fields.surfels.variants import write_texture
 from texgs.fitting import now, series
 from texgs.fitting.now import fit_now
 from texgs.scene.copied import write_copy
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment
 from texgs.scene.session import Session
-from texgs.scene.twin import SceneVolume
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.nrrd_file import open_grid

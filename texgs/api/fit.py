@@ -97,9 +97,8 @@ def fit_now_into(
     from texgs.fields.surfels.model_file import write_model
     from texgs.fitting.now import fit_now
     from texgs.scene.scene import Scene as Models
-    from texgs.scene.scene import SceneModel
+    from texgs.scene.scene import SceneModel, SceneVolume
     from texgs.scene.scene_file import write_scene
-    from texgs.scene.twin import SceneVolume
     from texgs.volume.caster import Caster
     from texgs.volume.framing import frame_of
     from texgs.volume.render import Appearance

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Any, Generic, TypeVar, cast
 
 from texgs.api.display import as_python
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.parts import entry_of
-
-if TYPE_CHECKING:
-    from texgs.api.editing import Editing
+from texgs.scene.session import Session
 
 T = TypeVar("T")
 
@@ -23,14 +23,14 @@ class Value(Generic[T]):
     def __get__(self, part: Part | None, owner: type) -> T:
         if part is None:
             return cast(T, self)
-        return cast(T, getattr(entry_of(part.scene.session.scene, part.name).edit, self._key))
+        return cast(T, getattr(entry_of(part.session.scene, part.name).edit, self._key))
 
     def __set__(self, part: Part, value: Any) -> None:
-        with part.scene.one_step(f"{part.name} {self._key} {'as fitted' if value is None else value}"):
+        with part.one_step(f"{part.name} {self._key} {'as fitted' if value is None else value}"):
             if value is None:
-                part.scene.session.reset(part.name, self._key)
+                part.session.reset(part.name, self._key)
             else:
-                part.scene.session.set(part.name, self._key, as_python(value))
+                part.session.set(part.name, self._key, as_python(value))
 
 
 class Part:
@@ -39,7 +39,7 @@ class Part:
     Setting a value raises an ArgumentError for one that is out of range or that the model cannot show.
     """
 
-    __slots__ = ("name", "scene")  # a slip in the name of a value is an AttributeError
+    __slots__ = ("name", "one_step", "session")  # a slip in the name of a value is an AttributeError
 
     visible = Value[bool]()
     palette = Value["tuple[float, float, float] | None"]()  # set red, green, blue from 0 to 1, or "#rrggbb"
@@ -50,13 +50,15 @@ class Part:
     shininess = Value[float]()
     tint = Value["tuple[float, float, float]"]()  # of highlights
 
-    def __init__(self, scene: Editing, name: str) -> None:
-        entry_of(scene.session.scene, name)  # which is there
-        self.scene, self.name = scene, name
+    def __init__(
+        self, session: Session, name: str, one_step: Callable[[str], AbstractContextManager[object]]
+    ) -> None:
+        entry_of(session.scene, name)  # which is there
+        self.session, self.name, self.one_step = session, name, one_step
 
     def __repr__(self) -> str:
         """Return the name, and what is edited."""
-        entry = entry_of(self.scene.session.scene, self.name)
+        entry = entry_of(self.session.scene, self.name)
         edits, fitted = vars(entry.edit), vars(PartEdit())
         changed = [f"{key}={value}" for key, value in edits.items() if value != fitted[key]]
         changed += ["a look"] if getattr(entry, "texture", None) else []

@@ -10,8 +10,7 @@ from texgs.core.errors import ArgumentError
 from texgs.fields.files import kind_of
 from texgs.fields.surfels.model import Surfels
 from texgs.fitting.now import fit_now
-from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.twin import volume_of
+from texgs.scene.scene import Scene, SceneModel, volume_of
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.nrrd_file import open_grid

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import cos, pi
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -27,9 +27,6 @@ from texgs.models.vgg import Vgg
 from texgs.raster.voxels import camera_rays
 from texgs.volume.images import Images
 
-if TYPE_CHECKING:
-    from texgs.edit.methods.stylerf import StyleRfKeys
-
 CLUSTERS = 4  # of the colours of a style, the largest of which is its dominant one
 DRAWN, RUN = 4096, 2  # rays a step of the distillation, and neighbours among them
 RATE, LAST_RATE = 1e-2, 7e-5  # of Adam in the distillation
@@ -42,14 +39,16 @@ def stylize_palette(
     images: Images,
     styles: Sequence[StylePicture],
     recipe: Recipe,
-    keys: StyleRfKeys,
+    distillation: int,
+    variation: float,
     vgg: Vgg | None = None,
     title: str = "style",
 ) -> tuple[PaletteField, Losses, float]:
     """Give each palette colour of a field the style of a picture; density and light stay.
 
-    Palette colours become the dominant ones of their styles, and free colours learn these. Then they follow
-    the distance to the styles: of what has most of a palette colour, alone over the grey of its style.
+    Palette colours become the dominant ones of their styles, and free colours learn these in the steps of
+    `distillation`. Then they follow the distance to the styles: of what has most of a palette colour, alone
+    over the grey of its style; and total variation with its weight.
 
     Returns:
         The field, the losses, and the RMS difference of free and palette colours in the last step before; 0
@@ -64,8 +63,8 @@ def stylize_palette(
     objectives = [Objective.of_views(recipe, style, images.size, vgg) for style in styles]
     greys = [float(style.mean @ torch.tensor(LUMINANCE)) for style in styles]
     generator = torch.Generator().manual_seed(recipe.seed)
-    run = PalettePainting(field, images.cameras, objectives, greys, keys.variation, recipe.rate, generator)
-    error = run.distil(images, keys.distillation, title)
+    run = PalettePainting(field, images.cameras, objectives, greys, variation, recipe.rate, generator)
+    error = run.distil(images, distillation, title)
     losses = learn_style(run, len(images), recipe, title)
     return run.field, losses, error
 

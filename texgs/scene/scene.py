@@ -24,12 +24,26 @@ from texgs.fields.surfels.variants import labels_of, with_texture, with_variants
 from texgs.scene.bounds import bounds_of, models_of
 from texgs.scene.segment_file import read_segment
 from texgs.scene.series_file import Series
-from texgs.scene.twin import SceneVolume
+from texgs.volume.render import Appearance
 from texgs.volume.space import Space
 from texgs.volume.transfer import TransferFunction
 
 WHITE = (1.0, 1.0, 1.0)
 MOST_FUNCTIONS = 32
+
+
+@dataclass(frozen=True)
+class SceneVolume:
+    """The volume that a scene was made from, as the views of its models show it."""
+
+    file: Path  # volume.nrrd, prepared
+    tfs: Mapping[str, TransferFunction]  # basic ones, by the names of models
+    appearance: Appearance = field(default_factory=Appearance)
+
+    @property
+    def has_channels(self) -> bool:
+        """Return whether functions show more than the first channel."""
+        return any(tf.channel for tf in self.tfs.values())
 
 
 @dataclass(frozen=True)
@@ -197,3 +211,13 @@ class Scene:
             raise ArgumentError(f"models: expected fields of one kind, got {' and '.join(made_of)}")
         composed: Composed = kinds()[made_of[0]].compose(models, segments)
         return composed
+
+
+def volume_of(scene: Scene) -> SceneVolume:
+    """Return the volume that a scene names; require that it names one."""
+    if scene.volume is None:
+        raise ArgumentError(
+            "volume: expected the volume that the scene was made from, got none; make the scene again by "
+            "texgs compose"
+        )
+    return scene.volume

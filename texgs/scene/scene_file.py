@@ -18,9 +18,8 @@ from texgs.core.names import SCENE, SCENES, close, is_number, label, named_file,
 from texgs.core.plain_yaml import parse_yaml
 from texgs.fields.files import formats
 from texgs.fields.part_edit import PartEdit, color
-from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment
+from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment, SceneVolume
 from texgs.scene.series_file import read_series
-from texgs.scene.twin import SceneVolume
 from texgs.volume.render import Appearance
 from texgs.volume.space import Space
 from texgs.volume.transfer import TransferFunction

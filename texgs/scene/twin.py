@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -20,28 +19,11 @@ from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
 from texgs.raster.cuts import CutRange, cut_range
 from texgs.raster.shading import MATERIAL
+from texgs.scene.scene import Scene, volume_of
 from texgs.volume.caster import Cast, Caster
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
-from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
-
-if TYPE_CHECKING:
-    from texgs.scene.scene import Scene
-
-
-@dataclass(frozen=True)
-class SceneVolume:
-    """The volume that a scene was made from, as the views of its models show it."""
-
-    file: Path  # volume.nrrd, prepared
-    tfs: Mapping[str, TransferFunction]  # basic ones, by the names of models
-    appearance: Appearance = field(default_factory=Appearance)
-
-    @property
-    def has_channels(self) -> bool:
-        """Return whether functions show more than the first channel."""
-        return any(tf.channel for tf in self.tfs.values())
 
 
 class Twin:
@@ -151,16 +133,6 @@ class Twin:
             known = ", ".join(self._volume.tfs) or "none"
             raise ArgumentError(f"volume.tfs: expected the basic TF of model {name}, got {known}; add it")
         return self._volume.tfs[name]
-
-
-def volume_of(scene: Scene) -> SceneVolume:
-    """Return the volume that a scene names; require that it names one."""
-    if scene.volume is None:
-        raise ArgumentError(
-            "volume: expected the volume that the scene was made from, got none; make the scene again by "
-            "texgs compose"
-        )
-    return scene.volume
 
 
 def twin_of(scene: Scene, device: torch.device | str = "cpu") -> Twin | None:

@@ -4,7 +4,7 @@ import asyncio
 import json
 import logging
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from aiohttp import web
@@ -13,9 +13,9 @@ from texgs.core.errors import TexgsError, first_line
 from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames, Pace
+from texgs.viewer.jobs import Stopped
 from texgs.viewer.messages import Look, Mask, Pick, View
 from texgs.viewer.shared_edits import SharedEdits
-from texgs.viewer.work import Stopped, Work
 
 log = logging.getLogger("texgs.viewer")
 MOST_NOTICES = 8  # that wait for a page which does not listen
@@ -26,10 +26,17 @@ class Page:
     """What waits to be sent to a page; of views and scenes only the newest. No two have the same number."""
 
     def __init__(
-        self, socket: web.WebSocketResponse, edits: SharedEdits, frames: Frames, work: Work, number: int
+        self,
+        socket: web.WebSocketResponse,
+        edits: SharedEdits,
+        frames: Frames,
+        number: int,
+        mask: Callable[[Mask], Awaitable[dict[str, Any]]],  # finds what clicks select
+        preview: Callable[[Look, int], Awaitable[dict[str, NewLook]]],  # for the page of a number
     ) -> None:
         self.number = number
-        self._socket, self._edits, self._frames, self._work = socket, edits, frames, work
+        self._socket, self._edits, self._frames = socket, edits, frames
+        self._mask, self._preview = mask, preview
         self._notices: deque[dict[str, Any]] = deque(maxlen=MOST_NOTICES)
         self._news: dict[str, dict[str, Any]] = {}  # by type, of each the newest
         self._view: View | None = None
@@ -140,9 +147,9 @@ class Page:
         """Find what was asked for: it may have to wait for another page, while frames go on."""
         try:
             if isinstance(asked, Mask):
-                self._tell_newest(await self._work.mask(asked))
+                self._tell_newest(await self._mask(asked))
                 return
-            looks = await self._work.preview(asked, self.number)
+            looks = await self._preview(asked, self.number)
             if asked is self._tried:
                 self._trial = {}  # of parts that are no longer chosen
                 self.try_on(looks)

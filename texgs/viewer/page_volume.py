@@ -10,8 +10,7 @@ import torch
 from torch.nn import functional as F
 
 from texgs.core.errors import ArgumentError, located
-from texgs.scene.scene import Scene
-from texgs.scene.twin import volume_of
+from texgs.scene.scene import Scene, volume_of
 from texgs.viewer import PAGE_VOLUME
 from texgs.volume.grid import Grid, Triple
 from texgs.volume.nrrd_file import MAKES, open_grid

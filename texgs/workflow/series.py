@@ -18,10 +18,9 @@ from texgs.core.plain_yaml import parse_yaml
 from texgs.core.progress import progress
 from texgs.fields.surfels.step_file import at_step, write_step
 from texgs.fitting.series import Follower
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel, SceneVolume, volume_of
 from texgs.scene.scene_file import write_scene
 from texgs.scene.series_file import MOST, Series, read_series, write_series
-from texgs.scene.twin import SceneVolume, volume_of
 from texgs.volume.framing import shown_corners, smallest_ball
 from texgs.volume.headers import NRRD
 from texgs.volume.nrrd_file import open_grid

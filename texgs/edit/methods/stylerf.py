@@ -72,8 +72,8 @@ class StyleRfKeys(FeatureKeys):
         pictures = [picture_of(each, STYLES) for each in self.styles]
         look.pictures.update({f"{name}-{index + 1}": each for index, each in enumerate(pictures)})
         pictures = pictures or [look.picture(name)] * len(model.colors)
-        images, title = load(views, task.reduce), task.title_of(name)
-        edited, losses, error = stylize_palette(model, images, pictures, recipe, self, look.vgg, title)
+        images, how = load(views, task.reduce), (self.distillation, self.variation, look.vgg)
+        edited, losses, error = stylize_palette(model, images, pictures, recipe, *how, task.title_of(name))
         look.notes.setdefault("distillation_rmse", {})[name] = error
         return edited, losses
 

@@ -14,7 +14,7 @@ from texgs.workflow.stage import Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import FitLabel, OfVolume, basic_tfs_of
 
 if TYPE_CHECKING:
-    from texgs.scene.twin import SceneVolume
+    from texgs.scene.scene import SceneVolume
 
 AZIMUTH, POLAR = -60.0, 20.0  # of the picture, degrees
 
@@ -65,7 +65,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 def volume_of(settings: Settings, volume: Path) -> SceneVolume:
     """Return the volume with its basic TFs as views show it."""
-    from texgs.scene.twin import SceneVolume
+    from texgs.scene.scene import SceneVolume
     from texgs.volume.render import Appearance
 
     tfs = basic_tfs_of(volume, settings.basic_tfs, settings.tf_values)
