@@ -12,12 +12,12 @@ from tests.fields.voxels.test_voxels import ball as voxels
 from tests.fitting.scenes import cameras
 from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.dataset_update import PhotometricLoss, azimuth, field_views, update_field, update_steps
-from texgs.edit.gaussians import GaussianLearner, radii
+from texgs.edit.gaussians import radii
 from texgs.edit.methods.dge import DgeKeys
 from texgs.edit.methods.igs2gs import Igs2gsKeys
 from texgs.edit.methods.in2n import In2nKeys
-from texgs.edit.methods.updates import UpdateSchedule
-from texgs.edit.voxels import VoxelLearner, corner
+from texgs.edit.update_schedule import UpdateSchedule
+from texgs.edit.voxels import corner
 from texgs.fields.optimizer import Rate
 from texgs.fitting.settings import CommonRates
 from texgs.raster.losses import ssim
@@ -33,14 +33,14 @@ def splats(**keys):
     model = gaussians(degree=1)
     images = images_of(model, count=5)
     keys = DgeKeys(rates=RATES, **{"prune": False, **keys})
-    return GaussianLearner(keys, model, images, PIXELS, 100), images
+    return keys.learner(model, images, PIXELS, 100), images
 
 
 def grid(frozen=False):
     field = voxels(degree=1)
     keys = In2nKeys(frozen=frozen, sh=0.05, patches=4, side=16)
     images = images_of(field, count=5)
-    return VoxelLearner(keys, field, images, PATCHES, 100), images
+    return keys.learner(field, images, PATCHES, 100), images
 
 
 LEARNERS = {"gaussians": splats, "voxels": grid}
@@ -153,7 +153,7 @@ def test_gaussians_that_are_faint_or_large_are_removed():
     parameters["opacities"][:10] = -9.0
     parameters["scales"][10:30, 0] = 0.5
     spoilt = replace(model, parameters=parameters)
-    learner = GaussianLearner(DgeKeys(rates=RATES), spoilt, images, PIXELS, 200)
+    learner = DgeKeys(rates=RATES).learner(spoilt, images, PIXELS, 200)
     learner.optimizer._rates = {name: Rate(0.0, 1.0) for name in learner.optimizer._rates}
     for _ in range(100):
         learner.step(images, [0], torch.Generator())

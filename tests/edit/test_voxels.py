@@ -17,8 +17,8 @@ from texgs.models.pictures import picture
 from texgs.raster.voxel_grid import drop_sh, unpack_rows
 from texgs.raster.voxels import render_view
 
-WEIGHTS = ArfKeys(nnfm=0.0, patches=50.0, content=0.0, variation=0.1)
-RECIPE = WEIGHTS.recipe(8, 0, reduce=2)
+WEIGHTS = {"content": 0.0, "variation": 0.1, "sh_variation": 5e-3}
+RECIPE = ArfKeys(nnfm=0.0, patches=50.0).recipe(8, 0, reduce=2)
 STYLE = StylePicture.of(picture("dots", 96))
 A = torch.tensor([[0.6, 0.2, 0.0], [0.1, 0.5, 0.1], [0.0, 0.1, 0.7]])
 B = torch.tensor([0.1, 0.05, 0.15])
@@ -59,9 +59,9 @@ def test_colours_count_by_their_alpha():
 def test_the_step_has_the_gradient_of_autograd(vgg, monkeypatch):
     field = ball(degree=0)
     images, recipe = images_of(field, count=1), replace(RECIPE, iterations=1, features=1.0)
-    weights = ArfKeys(content=0.3, variation=0.7)
+    weights = {**WEIGHTS, "content": 0.3, "variation": 0.7}
     objective = Objective.of_views(recipe, STYLE, images.size, vgg)
-    run = VoxelPainting(field.grid, field, images, objective, weights, torch.Generator())
+    run = VoxelPainting(field.grid, field, images, objective, torch.Generator(), **weights)
     gradients = []
     monkeypatch.setattr(run, "step", lambda step: gradients.append(run.optimizer.gradient.rows.clone()))
     losses = learn_style(run, 1, recipe, "test")
@@ -89,7 +89,9 @@ def test_only_colours_change(vgg, features):
     field = ball(degree=2)
     rows = field.grid.rows.clone()
     recipe = replace(RECIPE, features=features, iterations=3)
-    edited, losses = stylize_voxels(field, images_of(field), STYLE, recipe, ArfKeys(), vgg)
+    edited, losses = stylize_voxels(
+        field, images_of(field), STYLE, recipe, 1.0, True, {**WEIGHTS, "content": 5e-3}, vgg
+    )
     assert torch.equal(field.grid.rows, rows), "the field given is left alone"
     assert torch.equal(edited.grid.masks, field.grid.masks)
     assert torch.equal(edited.grid.rows[:, 3], field.grid.rows[:, 3]), "densities"
@@ -100,7 +102,7 @@ def test_only_colours_change(vgg, features):
 
 def test_a_plain_style_becomes_the_colour_of_the_ball():
     field, style = ball(degree=1), plain_style([0.2, 0.6, 0.3])
-    edited, _ = stylize_voxels(field, images_of(field), style, RECIPE, WEIGHTS)
+    edited, _ = stylize_voxels(field, images_of(field), style, RECIPE, 1.0, True, WEIGHTS)
     shown = render_view(edited.grid, cameras(1, 48)[0])
     color = (shown.color - 1 + shown.alpha[..., None])[shown.alpha > 0.99]
     torch.testing.assert_close(color, style.mean.expand_as(color), atol=0.01, rtol=0)
@@ -117,9 +119,9 @@ def test_in_the_end_colours_have_the_mean_and_covariance_of_the_style():
     wanted = torch.cat([style.mean, style.pixels.T.cov().flatten()])
     misses = {}
     for is_exact in (True, False):
-        weights = replace(WEIGHTS, exact=is_exact)
-        edited, _ = stylize_voxels(field, images, style, RECIPE, weights)
-        run = VoxelPainting(edited.grid, edited, images, None, weights, torch.Generator().manual_seed(3))
+        edited, _ = stylize_voxels(field, images, style, RECIPE, 1.0, is_exact, WEIGHTS)
+        generator = torch.Generator().manual_seed(3)
+        run = VoxelPainting(edited.grid, edited, images, None, generator, **WEIGHTS)
         colors = run.rendered_colors(images.cameras, True, 1)
         misses[is_exact] = float((torch.cat([colors.mean(0), colors.T.cov().flatten()]) - wanted).abs().max())
     assert misses[True] < 0.02

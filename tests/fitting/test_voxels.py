@@ -15,7 +15,7 @@ from texgs.fields.voxels.rays import AROUND, curve, training_rays, widened
 from texgs.fitting import checkpoint
 from texgs.fitting.checkpoint import run_to_end
 from texgs.fitting.hull import hull_box
-from texgs.fitting.kinds.voxels import Decay, GridStage, VoxelKeys
+from texgs.fitting.ray_settings import Decay, GridStage, VoxelKeys
 from texgs.fitting.voxels import VoxelFit, grown, hull_grid, refined, seen_voxels
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays

@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from texgs.core.progress import progress
-from texgs.viewer.jobs import Jobs, Stopped, Watch
+from texgs.viewer.page import Stopped
+from texgs.viewer.work import Jobs, Watch
 
 
 def run(work, watch=None):

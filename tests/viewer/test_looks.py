@@ -22,11 +22,11 @@ from texgs.edit.material import MATERIALS
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.parts import NewLook
 from texgs.scene.scene_file import read_scene
-from texgs.viewer.jobs import Jobs, Stopped, Watch
 from texgs.viewer.looks import THUMBNAILS, Looks, ScratchFolders, ThrottledPreview
 from texgs.viewer.messages import Look
-from texgs.viewer.page import Page
+from texgs.viewer.page import Page, Stopped
 from texgs.viewer.styles import Styles
+from texgs.viewer.work import Jobs, Watch
 
 SHOT = {**VIEW, "mode": "shaded", "camera": asdict(FRONT) | {"target": [0, 0, 0]}}
 

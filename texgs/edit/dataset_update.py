@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2, ceil, isfinite
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import torch
 from torch import Tensor
@@ -16,15 +16,13 @@ from texgs.core.errors import ArgumentError, FitError
 from texgs.core.progress import progress
 from texgs.edit.objective import LOSS_SCALE
 from texgs.edit.observations import edit_views
+from texgs.edit.update_schedule import UpdateSchedule
 from texgs.fields.field import Field
 from texgs.models.guidance import EditViews, Guidance, require_edited
 from texgs.models.instruction import require_instruction
 from texgs.models.lpips import Lpips
 from texgs.raster.losses import l1_dssim
 from texgs.volume.images import Images
-
-if TYPE_CHECKING:
-    from texgs.edit.methods.updates import UpdateSchedule
 
 
 class Learner(Protocol):

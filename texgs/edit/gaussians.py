@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
@@ -19,13 +18,9 @@ from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.optimizer import Optimizer
 from texgs.fields.splats import GEOMETRY, join, split
 from texgs.fitting.loop import extent, rates
-from texgs.fitting.settings import Rates
+from texgs.fitting.settings import CommonRates, Rates
 from texgs.models.vgg import Vgg
 from texgs.volume.images import Images
-
-if TYPE_CHECKING:
-    from texgs.edit.methods.dge import DgeKeys
-    from texgs.edit.methods.igs2gs import Igs2gsKeys
 
 HIGHER = 1 / 20  # rate of the higher harmonics in styles, against that of the zeroth
 PRUNE_EVERY = 100  # iterations
@@ -84,24 +79,26 @@ class GaussianPainting:
 class GaussianLearner:
     """Gaussians that learn from whole views by Adam, in so many iterations; the model given stays as it is.
 
-    Frozen, only harmonics learn. Else DGE can remove Gaussians now and then that are faint, or large in the
+    Frozen, only harmonics learn. Else `prune` removes Gaussians now and then that are faint, or large in the
     scene or on screen.
     """
 
     def __init__(
         self,
-        keys: Igs2gsKeys | DgeKeys,
         model: Gaussians,
         images: Images,
         loss: PhotometricLoss,
         iterations: int,
+        common: CommonRates,
+        frozen: bool,
+        prune: bool = False,
     ) -> None:
         self.original, self.loss, self.iterations = model, loss, iterations
-        self.prunes = bool(getattr(keys, "prune", False)) and not keys.frozen  # of DGE
+        self.prunes = prune and not frozen
         self.extent = extent(images.cameras, model.parameters["means"].cpu())
         raw = {**model.parameters, **split(model.parameters["sh"])}
-        chosen = rates(raw, Rates(**asdict(keys.rates)), self.extent)
-        learned = {name: rate for name, rate in chosen.items() if not (keys.frozen and name in GEOMETRY)}
+        chosen = rates(raw, Rates(**asdict(common)), self.extent)
+        learned = {name: rate for name, rate in chosen.items() if not (frozen and name in GEOMETRY)}
         self.optimizer = Optimizer({name: x.contiguous() for name, x in raw.items()}, learned)
         self.iteration = 0
         self.radii = torch.zeros(len(model), device=model.device)  # largest on screen since the last pruning

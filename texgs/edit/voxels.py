@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
@@ -26,10 +25,6 @@ from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variati
 from texgs.raster.voxels import Rays, Samples, camera_rays
 from texgs.volume.images import Box, Images
 
-if TYPE_CHECKING:
-    from texgs.edit.methods.arf import ArfKeys
-    from texgs.edit.methods.in2n import In2nKeys
-
 RAYS, RUN = 5000, 2  # a step of ARF's first phase, and neighbours among them
 RATE, LAST_RATE, RATE_STEPS = 0.1, 0.01, 250_000  # of ARF's coefficients, log-linear
 COUNTED = 1_000_000  # pixels that statistics of colours look at
@@ -42,14 +37,16 @@ def stylize_voxels(
     images: Images,
     style: StylePicture,
     recipe: Recipe,
-    keys: ArfKeys,
+    ray_epochs: float,
+    exact: bool,
+    weights: Mapping[str, float],
     vgg: Vgg | None = None,
     title: str = "style",
 ) -> tuple[Voxels, Losses]:
     """Give a grid the style of a picture; densities stay, and colours no longer depend on the direction.
 
     Colours are moved to those of the style, learned from the recoloured views, then from the distance of
-    rendered views to the style, and moved once more.
+    rendered views to the style, and moved once more. See `moved` for `exact`, `VoxelPainting` for weights.
     """
     generator = torch.Generator().manual_seed(recipe.seed)
     stride = max(1, round((images.planes[:, 0].numel() / COUNTED) ** 0.5))
@@ -57,14 +54,14 @@ def stylize_voxels(
     colors = object_colors(planes[:3].T, planes[3], generator, recipe.foreground)
     matrix, offset = (x.float() for x in color_map(colors, style.pixels))
     images = recolored_images(images, matrix, offset, recipe.foreground)
-    grid = moved(drop_sh(field.grid), matrix, offset, keys.exact)
+    grid = moved(drop_sh(field.grid), matrix, offset, exact)
     objective = Objective.of_views(recipe, style, images.size, vgg)
-    run = VoxelPainting(grid, field, images, objective, keys, generator)
-    run.learn_rays(title)
+    run = VoxelPainting(grid, field, images, objective, generator, **weights)
+    run.learn_rays(ray_epochs, title)
     losses = learn_style(run, len(images), recipe, title)
     colors = run.rendered_colors(images.cameras, recipe.foreground, stride)
     matrix, offset = (x.float() for x in color_map(colors, style.pixels))
-    return replace(field, grid=moved(run.grid, matrix, offset, keys.exact)), losses
+    return replace(field, grid=moved(run.grid, matrix, offset, exact)), losses
 
 
 def object_colors(color: Tensor, alpha: Tensor, generator: torch.Generator, foreground: bool) -> Tensor:
@@ -110,16 +107,19 @@ class VoxelPainting:
         field: Voxels,
         images: Images,
         objective: Objective,
-        keys: ArfKeys,
         generator: torch.Generator,
+        content: float,
+        variation: float,
+        sh_variation: float,
     ) -> None:
         self.grid, self.original, self.images, self.objective = grid, field, images, objective
-        self.keys, self.generator, self.optimizer = keys, generator, VoxelOptimizer(grid)
+        self.content, self.variation, self.sh_variation = content, variation, sh_variation
+        self.generator, self.optimizer = generator, VoxelOptimizer(grid)
 
-    def learn_rays(self, title: str) -> None:
+    def learn_rays(self, epochs: float, title: str) -> None:
         """Follow the colours of rays through the pixels of views."""
         rays = training_rays(self.images)
-        steps = range(round(self.keys.ray_epochs * len(rays) / RAYS))
+        steps = range(round(epochs * len(rays) / RAYS))
         for step in progress(steps, title=f"{title}, recoloured views", unit="step"):
             drawn, target = rays.draw(RAYS, RUN, self.generator)
             samples, out = sampled(self.grid, self.original, drawn)
@@ -140,10 +140,10 @@ class VoxelPainting:
 
         def added(image: Tensor) -> Terms:
             terms = {}
-            if self.keys.content and self.objective.recipe.needs_vgg:
+            if self.content and self.objective.recipe.needs_vgg:
                 content = self.objective.content(image, target.color.permute(2, 0, 1))
-                terms["content"] = self.keys.content * content
-            terms["variation"] = self.keys.variation * image_variation(image)
+                terms["content"] = self.content * content
+            terms["variation"] = self.variation * image_variation(image)
             return terms
 
         return [Painting(image, out.alpha.reshape(height, width), self.objective, backward, added)]
@@ -159,7 +159,7 @@ class VoxelPainting:
 
     def step(self, step: int) -> None:
         """Take a step of RMSProp on the colours, with total variation of some random blocks."""
-        variation = (0.0, self.keys.sh_variation, self.generator, self.optimizer.gradient)
+        variation = (0.0, self.sh_variation, self.generator, self.optimizer.gradient)
         add_variation_of_some(self.grid, *variation)
         rate = RATE * (LAST_RATE / RATE) ** (step / RATE_STEPS)
         self.optimizer.step(VoxelRates(0.0, rate, rate))
@@ -169,10 +169,9 @@ class VoxelLearner:
     """A grid that learns from patches of views by RMSProp; the field given stays as it is."""
 
     def __init__(
-        self, keys: In2nKeys, field: Voxels, images: Images, loss: PhotometricLoss, iterations: int
+        self, field: Voxels, loss: PhotometricLoss, rates: VoxelRates, patches: int, side: int
     ) -> None:
-        self.original, self.keys, self.loss = field, keys, loss
-        self.density = 0.0 if keys.frozen else keys.density
+        self.original, self.loss, self.rates, self.patches, self.side = field, loss, rates, patches, side
         self.grid = field.grid.with_rows(field.grid.rows.clone())
         self.optimizer = VoxelOptimizer(self.grid)
         self.iteration = 0
@@ -186,25 +185,23 @@ class VoxelLearner:
     @torch.no_grad()
     def step(self, images: Images, views: Sequence[int], generator: torch.Generator) -> float:
         """Learn from patches of these views, drawn at random around what is visible; return the loss."""
-        keys, size = self.keys, images.size
-        side = min(keys.side, *size)
+        side, size = min(self.side, *images.size), images.size
         rays, wanted = [], []
-        for place in torch.randint(len(views), (keys.patches,), generator=generator).tolist():
+        for place in torch.randint(len(views), (self.patches,), generator=generator).tolist():
             left, top = corner(images.boxes[views[place]], side, size, generator)
             camera = images.cameras[views[place]].crop(left, top, left + side, top + side)
             rays.append(camera_rays(camera).flatten(0, 1))
             wanted.append(images.planes[views[place], :3, top : top + side, left : left + side])
         samples, out = sampled(self.grid, self.original, torch.cat(rays))
-        shape = (keys.patches, side, side, 3)
         target = torch.stack(wanted).permute(0, 2, 3, 1).float() / 255
         with torch.enable_grad():
-            loss, gradient = self.loss.with_gradient(out.color.reshape(shape), target)
+            loss, gradient = self.loss.with_gradient(out.color.reshape(target.shape), target)
         samples.add_gradient(gradient.reshape(-1, 3), None, self.optimizer.gradient)
-        weight = TV_DENSITY if self.density else 0.0
+        weight = TV_DENSITY if self.rates.density else 0.0
         add_variation_of_some(self.grid, weight, TV_SH, generator, self.optimizer.gradient)
-        self.optimizer.step(VoxelRates(self.density, keys.sh, keys.sh))
+        self.optimizer.step(self.rates)
         self.iteration += 1
-        if self.density and self.iteration % OCCUPY_EVERY == 0:
+        if self.rates.density and self.iteration % OCCUPY_EVERY == 0:
             self.grid.refresh_occupancy()
         return loss
 

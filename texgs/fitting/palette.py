@@ -9,7 +9,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -20,13 +19,11 @@ from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import Parameters, base_color, density, light, new_networks, palette_color
 from texgs.fields.palette.rendering import Geometry, Shown, blending_weights, points_on, shown, view_harmonics
 from texgs.fitting.checkpoint import ResumableFit
+from texgs.fitting.ray_settings import PaletteKeys
 from texgs.fitting.voxels import VoxelFit
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, voxel_grid
 from texgs.volume.images import Images
-
-if TYPE_CHECKING:
-    from texgs.fitting.kinds.palette import PaletteKeys
 
 NEIGHBOURS = 2  # rays of a step that follow each other
 BETAS = (0.9, 0.99)  # of Adam

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from math import ceil, log10
-from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
@@ -14,13 +13,11 @@ from texgs.core.errors import FitError
 from texgs.fields.voxels.rays import TrainingRays, training_rays
 from texgs.fitting.checkpoint import ResumableFit
 from texgs.fitting.hull import hull_box, in_hull, lattice
+from texgs.fitting.ray_settings import GridStage, VoxelKeys
 from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, voxel_grid
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import March, Rays, Samples
 from texgs.volume.images import Images
-
-if TYPE_CHECKING:
-    from texgs.fitting.kinds.voxels import GridStage, VoxelKeys
 
 PIECE = 16_384  # rays at a time
 SIDE = 8  # voxels that the sides of the coarsest grid are multiples of

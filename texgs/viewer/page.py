@@ -13,30 +13,27 @@ from texgs.core.errors import TexgsError, first_line
 from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames, Pace
-from texgs.viewer.jobs import Stopped
 from texgs.viewer.messages import Look, Mask, Pick, View
 from texgs.viewer.shared_edits import SharedEdits
 
 log = logging.getLogger("texgs.viewer")
 MOST_NOTICES = 8  # that wait for a page which does not listen
 BEAT = 5.0  # seconds; a page that hears nothing for some of these takes its connection for broken
+Find = Callable[[Mask | Look, int], Awaitable[Any]]  # what clicks select, or looks for the page of a number
+
+
+class Stopped(TexgsError):
+    """Somebody has asked to stop."""
 
 
 class Page:
     """What waits to be sent to a page; of views and scenes only the newest. No two have the same number."""
 
     def __init__(
-        self,
-        socket: web.WebSocketResponse,
-        edits: SharedEdits,
-        frames: Frames,
-        number: int,
-        mask: Callable[[Mask], Awaitable[dict[str, Any]]],  # finds what clicks select
-        preview: Callable[[Look, int], Awaitable[dict[str, NewLook]]],  # for the page of a number
+        self, socket: web.WebSocketResponse, edits: SharedEdits, frames: Frames, found: Find, number: int
     ) -> None:
         self.number = number
-        self._socket, self._edits, self._frames = socket, edits, frames
-        self._mask, self._preview = mask, preview
+        self._socket, self._edits, self._frames, self._found = socket, edits, frames, found
         self._notices: deque[dict[str, Any]] = deque(maxlen=MOST_NOTICES)
         self._news: dict[str, dict[str, Any]] = {}  # by type, of each the newest
         self._view: View | None = None
@@ -146,13 +143,12 @@ class Page:
     async def _find(self, asked: Mask | Look) -> None:
         """Find what was asked for: it may have to wait for another page, while frames go on."""
         try:
+            found = await self._found(asked, self.number)
             if isinstance(asked, Mask):
-                self._tell_newest(await self._mask(asked))
-                return
-            looks = await self._preview(asked, self.number)
-            if asked is self._tried:
+                self._tell_newest(found)
+            elif asked is self._tried:
                 self._trial = {}  # of parts that are no longer chosen
-                self.try_on(looks)
+                self.try_on(found)
         except Exception as error:  # whatever it is, the server goes on
             self.tell_error(error, **({"mask": asked.id} if isinstance(asked, Mask) else {}))
         finally:

@@ -98,7 +98,7 @@ class Server:
             await socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=why.encode())
             return socket
         self._count += 1
-        page = Page(socket, self.edits, self.frames, self._count, self.work.mask, self.work.preview)
+        page = Page(socket, self.edits, self.frames, self.work.find, self._count)
         page.tell_scene({**self.greeting(), "page": page.number})
         self._pages[page] = socket
         sending = [asyncio.create_task(each) for each in (page.send(), page.beat())]

@@ -5,29 +5,76 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 
 from texgs.config.kept_function import keep
 from texgs.core.errors import ArgumentError, located
 from texgs.core.names import part_file, require_name
+from texgs.core.progress import watched
 from texgs.edit.function_model import models_of, overlap_of, tried
 from texgs.fields.surfels.model import Surfels
 from texgs.scene import export
 from texgs.scene.parts import NewLook, entry_of, require_new, split
 from texgs.viewer.downloads import FILMS, PAGES, Downloads, require_kind
 from texgs.viewer.frames import Frames
-from texgs.viewer.jobs import Jobs, Stopped, Watch
 from texgs.viewer.looks import Looks, looks_of, with_parts
 from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
-from texgs.viewer.page import Page
+from texgs.viewer.page import Page, Stopped
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import Styles
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Who is told about a job, and whether it has to stop."""
+
+    tell: Callable[[str, float], None] = lambda title, done: None  # what is done, and the part of it
+    stop: threading.Event = field(default_factory=threading.Event)
+
+
+class Jobs:
+    """A thread that works with half of the threads of the machine, as a rule: the others are for frames."""
+
+    def __init__(self) -> None:
+        self._all = torch.get_num_threads()
+        self._thread = ThreadPoolExecutor(1, "job")
+
+    async def run(self, work: Callable[[], T], watch: Watch, *, is_urgent: bool = False) -> T:
+        """Return what work returns; who watches it is told in this thread about the loops in the other.
+
+        Urgent work has all threads: somebody waits for it, and frames may be slower meanwhile.
+        """
+        loop, threads = asyncio.get_running_loop(), self._all if is_urgent else max(1, self._all // 2)
+
+        def step(title: str, done: int, total: int | None) -> None:
+            if watch.stop.is_set():
+                raise Stopped(f"{title}: it was cancelled; nothing has changed.")
+            if total:
+                loop.call_soon_threadsafe(watch.tell, title, done / total)
+
+        def watched_work() -> T:
+            torch.set_num_threads(threads)
+            with watched(step):
+                result = work()
+            if watch.stop.is_set():  # after the last step, or there was none
+                raise Stopped("It was cancelled; nothing has changed.")
+            return result
+
+        return await loop.run_in_executor(self._thread, watched_work)
+
+    def close(self) -> None:
+        """End the thread, once what it does has ended."""
+        self._thread.shutdown(wait=True, cancel_futures=True)
 
 
 class Work:
@@ -52,13 +99,12 @@ class Work:
         self._page: Page | None = None  # that it is for
         self._stop = threading.Event()
 
-    async def mask(self, asked: Mask) -> dict[str, Any]:
-        """Return what clicks select in a view, as a message; a job of another page may come before."""
-        return await self._jobs.run(partial(self._segmenter.mask, self._edits.scene, asked), Watch())
-
-    async def preview(self, asked: Look, page: int) -> dict[str, NewLook]:
-        """Return looks for a preview, of a picture or words, while a job may be at work."""
-        work = partial(self._looks.preview, self._edits.scene, asked, page)
+    async def find(self, asked: Mask | Look, page: int) -> Any:
+        """Return what clicks select, as a message, after a job of another page; or a preview, beside jobs."""
+        scene = self._edits.scene
+        if isinstance(asked, Mask):
+            return await self._jobs.run(partial(self._segmenter.mask, scene, asked), Watch())
+        work = partial(self._looks.preview, scene, asked, page)
         return await self._previews.run(work, Watch(), is_urgent=True)
 
     async def thumbnail(self, asked: Look) -> bytes:

@@ -34,7 +34,9 @@ class ArfKeys(FeatureKeys):
 
         recipe = self.recipe(round(self.epochs * len(views)), look.task.edit.seed, reduce=2)
         images, picture = load(views, look.task.reduce), look.picture(name)
-        return stylize_voxels(model, images, picture, recipe, self, look.vgg, look.task.title_of(name))
+        weights = {"content": self.content, "variation": self.variation, "sh_variation": self.sh_variation}
+        how = self.ray_epochs, self.exact, weights, look.vgg, look.task.title_of(name)
+        return stylize_voxels(model, images, picture, recipe, *how)
 
 
 METHOD = Method(

@@ -1,12 +1,14 @@
 """DGE (Chen et al. 2024), one of the paper's baselines, on 3D Gaussians: some views are edited together."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.method import Method
 from texgs.edit.methods.igs2gs import rates
-from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, run
+from texgs.edit.methods.updates import UpdateKeys, run
+from texgs.edit.update_schedule import UpdateSchedule
 from texgs.fitting.settings import CommonRates
 
 
@@ -34,6 +36,12 @@ class DgeKeys(UpdateKeys):
             raise ArgumentError(f"edit.dge.noise: expected one share from 0 to 1 at least, got {self.noise}")
         levels = tuple((level, level) for level in self.noise)
         return UpdateSchedule(self.rounds, self.every, self.views, self.views, "random", "round", levels)
+
+    def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Any:
+        """Return Gaussians that learn, and may be removed."""
+        from texgs.edit.gaussians import GaussianLearner
+
+        return GaussianLearner(model, images, loss, iterations, self.rates, self.frozen, self.prune)
 
 
 METHOD = Method(

@@ -1,10 +1,12 @@
 """Instruct-GS2GS (Vachha and Haque 2024), one of the paper's baselines, on 3D Gaussians."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, run
+from texgs.edit.methods.updates import UpdateKeys, run
+from texgs.edit.update_schedule import UpdateSchedule, noise_range
 from texgs.fitting.settings import CommonRates
 
 
@@ -26,6 +28,12 @@ class Igs2gsKeys(UpdateKeys):
         """Edit all views in passes, and learn from each when it is edited."""
         levels = noise_range("edit.igs2gs.noise", self.noise)
         return UpdateSchedule(self.passes, self.every, learned="newest", levels=levels)
+
+    def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Any:
+        """Return Gaussians that learn."""
+        from texgs.edit.gaussians import GaussianLearner
+
+        return GaussianLearner(model, images, loss, iterations, self.rates, self.frozen)
 
 
 METHOD = Method(

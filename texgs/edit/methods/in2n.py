@@ -1,10 +1,12 @@
 """Instruct-NeRF2NeRF (Haque et al. 2023), one of the paper's baselines, on voxel grids as in the paper."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, run
+from texgs.edit.methods.updates import UpdateKeys, run
+from texgs.edit.update_schedule import UpdateSchedule, noise_range
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,13 @@ class In2nKeys(UpdateKeys):
         """Edit one view after the other."""
         rounds = max(1, round(self.passes * views))
         return UpdateSchedule(rounds, self.every, views=1, levels=noise_range("edit.in2n.noise", self.noise))
+
+    def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Any:
+        """Return a grid that learns."""
+        from texgs.edit.voxels import VoxelLearner, VoxelRates
+
+        rates = VoxelRates(0.0 if self.frozen else self.density, self.sh, self.sh)
+        return VoxelLearner(model, loss, rates, self.patches, self.side)
 
 
 METHOD = Method(

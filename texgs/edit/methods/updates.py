@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
+from texgs.edit.update_schedule import UpdateSchedule
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from texgs.edit.dataset_update import PhotometricLoss
+    from texgs.edit.dataset_update import Learner
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.field import Field
     from texgs.volume.view_set import View
@@ -34,6 +35,10 @@ class UpdateKeys(InstructionKeys):
         """Return when which of so many views are edited."""
         raise NotImplementedError
 
+    def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Learner:
+        """Return a field that learns from views in so many iterations."""
+        raise NotImplementedError
+
     def check(self) -> None:
         """Require an instruction, a loss and a schedule that there can be."""
         super().check()
@@ -43,59 +48,21 @@ class UpdateKeys(InstructionKeys):
             )
         self.schedule(1)
 
-    def loss(self, device: Any) -> PhotometricLoss:
-        """Return the loss on views."""
-        from texgs.edit.dataset_update import PhotometricLoss
-        from texgs.models.lpips import Lpips
-
-        network = Lpips.load(device=device, dtype=None) if self.lpips else None
-        return PhotometricLoss(self.l1, self.dssim, self.lpips, network)
-
     def weights(self) -> dict[str, str]:
         """Return those of the guidance, and of LPIPS where it counts."""
         return super().weights() | (dict.fromkeys(("vgg16", "lpips_vgg"), "lpips=0") if self.lpips else {})
 
 
-@dataclass(frozen=True)
-class UpdateSchedule:
-    """Rounds of edits, and the iterations after each.
-
-    A round edits some views, `group` of them together before each of its first iterations, until all of
-    them are edited.
-    """
-
-    rounds: int
-    period: int  # iterations of a round
-    views: int | None = None  # edited in a round; None: all
-    group: int = 1  # edited together
-    order: Literal["next", "random"] = "next"  # going on where the last round ended, or drawn at random
-    learned: Literal["all", "newest", "round"] = "all"  # views: any, the one just edited, or the round's
-    levels: Sequence[tuple[float, float]] = ((1.0, 1.0),)  # from and to, by round; the last holds on
-
-    @property
-    def iterations(self) -> int:
-        """Return how many all rounds have."""
-        return self.rounds * self.period
-
-
-def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float], ...]:
-    """Return one range of noise for all rounds."""
-    if len(noise) != 2 or not 0 <= noise[0] <= noise[1] <= 1:
-        raise ArgumentError(f"{where}: expected two shares from 0 to 1, the smaller one first, got {noise}")
-    return ((noise[0], noise[1]),)
-
-
 def run(task: Task[UpdateKeys]) -> EditedScene:
     """Give the models the look; write views.png."""
-    from texgs.edit.dataset_update import update_field
-    from texgs.edit.gaussians import GaussianLearner
+    from texgs.edit.dataset_update import PhotometricLoss, update_field
     from texgs.edit.task import EditedScene
-    from texgs.edit.voxels import VoxelLearner
+    from texgs.models.lpips import Lpips
     from texgs.volume.images import load
 
-    learners: Any = {"gaussians": GaussianLearner, "voxels": VoxelLearner}
     keys, guidance = task.settings, task.settings.opened(task.device)
-    loss = keys.loss(task.device)
+    lpips = Lpips.load(device=task.device, dtype=None) if keys.lpips else None
+    loss = PhotometricLoss(keys.l1, keys.dssim, keys.lpips, lpips)
     rows: dict[str, list[np.ndarray]] = {}
     losses: dict[str, dict[str, list[float]]] = {}
     notes: dict[str, Any] = {}
@@ -103,7 +70,7 @@ def run(task: Task[UpdateKeys]) -> EditedScene:
     def one(name: str, model: Field, views: Sequence[View]) -> Field:
         images, plan = load(views, task.reduce), keys.schedule(len(views))
         updated = update_field(
-            learners[model.kind](keys, model, images, loss, plan.iterations),
+            keys.learner(model, images, loss, plan.iterations),
             *(images, guidance),
             task.settings_for(name).instruction,
             plan,
