@@ -58,7 +58,7 @@ class Editing:
 
     def __getitem__(self, name: str) -> Part:
         """Return a part; another name is an ArgumentError that lists those that there are."""
-        return Part(self.session, str(name), self.changed)
+        return Part(self.session, str(name), self.one_step)
 
     def __iter__(self) -> Iterator[str]:
         """Yield the names of all parts."""
