@@ -7,7 +7,6 @@ from torch.nn.functional import normalize
 
 from tests.volume.scenes import SHELLS, ball
 from texgs.core.geometry import quats_to_matrices
-from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
 from texgs.fitting.attributes import HOLD, Attributes, coherence
 from texgs.volume.caster import Caster
@@ -71,16 +70,20 @@ def test_coherence_is_the_mean_cosine_to_the_nearest_three_by_brute_force():
     assert coherence(lookup, means[:3]) == 0
 
 
-def test_held_surfels_start_as_the_volume_and_learn_differences():
-    held = held_to(ball(), hold=0.1)
-    fit = new_fit(parameters=seeds(), held=held, iterations=60)
-    assert_same(held.at(fit.parameters["means"]), {name: fit.fitted[name] for name in ("colors", "normals")})
-    run(fit)
-    own = held.at(fit.parameters["means"])
+def test_held_surfels_start_as_they_are_given_and_learn_differences():
+    held, start = held_to(ball(), hold=0.1), seeds()
+    fit = new_fit(parameters=start, held=held, iterations=60)
     for name in ("colors", "normals"):
-        torch.testing.assert_close(fit.fitted[name] - own[name], fit.parameters[name], atol=1e-6, rtol=0)
-        assert fit.parameters[name].any()
-    Surfels({name: x.detach() for name, x in fit.fitted.items()})
+        torch.testing.assert_close(fit.fitted[name], start[name], atol=1e-6, rtol=0)
+    own = held.at(start["means"])
+    as_the_volume = new_fit(parameters={**start, **own}, held=held, iterations=60)
+    assert not any(as_the_volume.parameters[name].any() for name in own)
+    run(as_the_volume)
+    own = held.at(as_the_volume.parameters["means"])
+    for name in own:
+        learned = as_the_volume.fitted[name] - own[name]
+        torch.testing.assert_close(learned, as_the_volume.parameters[name], atol=1e-6, rtol=0)
+        assert learned.any()
 
 
 def test_the_more_they_are_held_the_nearer_they_stay():

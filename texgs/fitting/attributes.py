@@ -72,6 +72,11 @@ class Attributes:
         seen = self.lookup.at(means, ("colors", "quats"))
         return {"colors": seen["colors"], "normals": seen["quats"]}
 
+    def differences(self, parameters: Mapping[str, Tensor]) -> dict[str, Tensor]:
+        """Return parameters of surfels with the differences from the volume for colours and normals."""
+        own = self.at(parameters["means"])
+        return {name: x - own[name] if name in own else x for name, x in parameters.items()}
+
     def added_to(self, differences: Mapping[str, Tensor]) -> dict[str, Tensor]:
         """Return parameters of surfels whose colours and normals are given as differences from the volume."""
         own = self.at(differences["means"])

@@ -25,8 +25,7 @@ SMALLEST = 1e-3  # distance, world units
 class Fit(ResumableFit):
     """One phase of surfels or 3D Gaussians, from raw parameters, on training views.
 
-    Surfels that are held start with the attributes of their volume, not with those among the parameters, and
-    learn the differences.
+    Surfels that are held learn how their colours and normals differ from those of their volume.
 
     With the same seed of the order of views and of splits, machine and versions results are equal.
     """
@@ -45,8 +44,7 @@ class Fit(ResumableFit):
         super().__init__(phase.iterations)
         self.held = held
         if held is not None:
-            zeros = {name: torch.zeros_like(x) for name, x in parameters.items() if name in HELD}
-            parameters = {**parameters, **zeros}
+            parameters = held.differences(parameters)
         self.shading, self.images, self.phase, self.seed = shading, images, phase, seed
         self.order: tuple[int, list[int]] = (-1, [])  # an epoch and its views
         size = extent(images.cameras, parameters["means"])

@@ -38,7 +38,7 @@ class FitTask(Generic[Settings]):
     seed: int
     title: str  # of progress bars
     metadata: Mapping[str, str]  # of the field: where it is from
-    volume: Grid | None = None  # that the views show, where seeds may come from it
+    volume: Grid | None = None  # that the views show, where the fit starts from it
 
 
 @dataclass(frozen=True, eq=False)
