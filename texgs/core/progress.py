@@ -39,6 +39,12 @@ def watched(watch: Watch) -> AbstractContextManager[None]:
     return _within(_watch, watch)
 
 
+def let_stop(title: str) -> None:
+    """Let who watches the loops of this thread end the work here, before it changes what others see."""
+    if watch := _watch.get():
+        watch(title, 0, None)
+
+
 def curve_logger(log: LogPoint | None) -> AbstractContextManager[None]:
     """Call a function with the points of all curves of this thread within the block; None: nobody is told.
 

@@ -5,9 +5,10 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 from threading import RLock
-from typing import Any, Self, TypeVar
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import numpy as np
 import torch
@@ -31,6 +32,7 @@ from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.twin import Twin, needs_twin
 
 T = TypeVar("T")
+P = ParamSpec("P")
 SCENE_KEYS: dict[str, Any] = {
     "light": "headlight",
     "background": WHITE,
@@ -42,12 +44,26 @@ MOST_STEPS = 200  # of the history: of more, the oldest cannot be undone
 KEPT = 3  # compositions and twins: pages may show others in turn, as before an edit and after it
 
 
+def locked(
+    change: Callable[Concatenate["Session", P], T],
+) -> Callable[Concatenate["Session", P], T]:
+    """Let a method hold the lock of its session from what it reads to the step that it makes."""
+
+    @wraps(change)
+    def run(session: "Session", /, *given: P.args, **named: P.kwargs) -> T:
+        with session.lock:
+            return change(session, *given, **named)
+
+    return run
+
+
 class Session:
     """A scene and its history. Parts have the names MODEL and MODEL/SEGMENT.
 
     What is edited by numbers (colours, opacities, light) costs nothing but the next frame: files are read
     again only where a change brings others. A change that cannot be made is an ArgumentError or a ShapeError
-    that names the part, and leaves the scene as it is. Threads that share a session change it by `one_step`.
+    that names the part, and leaves the scene as it is. Threads that share a session make their changes in
+    turn; several changes that belong together are made in `one_step`.
 
     Args:
         scene: to begin with.
@@ -56,7 +72,7 @@ class Session:
 
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
         self._past, self._future = [(scene, "")], list[tuple[Scene, str]]()  # with titles of steps
-        self.lock = RLock()  # held from what a change reads to the step that it makes
+        self.lock = RLock()
         self._device = device
         self._opened = deque[tuple[object, Composed]](maxlen=KEPT)
         self._twins = deque[tuple[object, Twin]](maxlen=KEPT)
@@ -83,6 +99,7 @@ class Session:
 
     # ---- Changes ------------------------------------------------------------
 
+    @locked
     def set(self, part: str, key: str, value: Any) -> None:
         """Set a value of a part's edit: `visible`, `palette`, `opacity`, or a factor of the material."""
         entry = entry_of(self.scene, part)
@@ -97,34 +114,41 @@ class Session:
         """Take a value of a part's edit back."""
         self.set(part, key, getattr(PartEdit(), key, None))
 
+    @locked
     def set_file(self, part: str, key: str, file: Path | None) -> None:
         """Give a part another `file` or `texture`; None: the texels that it was fitted with."""
         changed: dict[str, Any] = {key: file}
         scene = replaced(self.scene, part, replace(entry_of(self.scene, part), **changed))
         self._push_read(scene, {split(self.scene, part)[0]})
 
+    @locked
     def set_looks(self, looks: Mapping[str, NewLook]) -> None:
         """Give several parts new looks in one step; see `with_looks` for palettes."""
         models = {split(self.scene, part)[0] for part in looks}
         self._push_read(with_looks(self.scene, looks), models)
 
+    @locked
     def set_light(self, light: Light = HEADLIGHT) -> None:
         """Let another light shine on the scene."""
         self._push(replace(self.scene, light=light))
 
+    @locked
     def set_background(self, value: object = WHITE) -> None:
         """Put another colour behind the scene."""
         self._push(replace(self.scene, background=color("background", value)))
 
+    @locked
     def set_cuts(self, cuts: Cuts) -> None:
         """Cut the scene; cuts of before are gone."""
         self._push(replace(self.scene, cuts=cuts))
 
+    @locked
     def set_scene(self, scene: Scene) -> None:
         """Go on with another scene, whose models are read first."""
         changed = [name for name, entry in scene.models.items() if self.scene.models.get(name) != entry]
         self._push_read(scene, changed)
 
+    @locked
     def set_of_scene(self, key: str, value: Any) -> None:
         """Set what is edited of a whole scene, as a scene file has it; see `SCENE_KEYS`."""
         known({key: value}, SCENE_KEYS, "the scene")
@@ -140,6 +164,7 @@ class Session:
             case _:
                 self.set_background(value)
 
+    @locked
     def add_segment(self, part: str, file: Path) -> None:
         """Make surfels of a model, those of a file of `write_segment`, a part of their own.
 
@@ -151,6 +176,7 @@ class Session:
         before = entry.segments.get(str(name), SceneSegment(file, entry.edit, entry.texture))
         self._push_read(replaced(self.scene, part, replace(before, file=file)), {model})
 
+    @locked
     def make_segment(self, part: str, mask: Tensor, file: Path, facts: Mapping[str, Any]) -> None:
         """Write the file of a new segment, and add it.
 
@@ -181,10 +207,12 @@ class Session:
         write_segment(file, fitted, mask, facts)
         self.add_segment(part, file)
 
+    @locked
     def remove_segment(self, part: str) -> None:
         """Give the surfels of a segment back to their model."""
         self._push(replaced(self.scene, part, None))
 
+    @locked
     def rename_segment(self, part: str, name: str) -> None:
         """Give a segment another name; it keeps its place among those of its model."""
         model, segment = split(self.scene, part)
@@ -216,21 +244,21 @@ class Session:
             if self.scene is not past[-1][0]:
                 self._past = [*past[-MOST_STEPS:], (self.scene, title() if callable(title) else title)]
 
+    @locked
     def undo(self) -> bool:
         """Take the latest change back; return whether there was one."""
-        with self.lock:
-            if len(self._past) == 1:
-                return False
-            self._future.append(self._past.pop())
-            return True
+        if len(self._past) == 1:
+            return False
+        self._future.append(self._past.pop())
+        return True
 
+    @locked
     def redo(self) -> bool:
         """Make again what was undone last; return whether there was anything."""
-        with self.lock:
-            if not self._future:
-                return False
-            self._past.append(self._future.pop())
-            return True
+        if not self._future:
+            return False
+        self._past.append(self._future.pop())
+        return True
 
     # ---- Views ------------------------------------------------------------
 
