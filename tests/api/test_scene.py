@@ -28,8 +28,8 @@ from texgs.viewer.standalone import scene_page
 @pytest.fixture(autouse=True)
 def quick(monkeypatch, tmp_path_factory):
     """Few and small views and no weights, wherever the tests run."""
-    monkeypatch.setattr("texgs.edit.task.VIEWS", 12)
-    monkeypatch.setattr("texgs.edit.task.SIZE", 96)
+    monkeypatch.setattr("texgs.edit.new_look.VIEWS", 12)
+    monkeypatch.setattr("texgs.edit.new_look.SIDE", 96)
     monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path_factory.mktemp("none")))
     monkeypatch.setenv("TEXGS_CACHE", str(tmp_path_factory.mktemp("cache")))
 

@@ -12,14 +12,14 @@ from tests.scene.test_twin import HIGH, LOW, peak, sphere_volume
 from tests.viewer.pages import on_page
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
-from texgs.edit import function_model
-from texgs.edit.function_model import overlap_of, tried, with_model
+from texgs.edit.function_model import fit_function, overlap_of, tried, with_model
 from texgs.fields.gaussians.files import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.series_file import Series
+from texgs.scene.session import Session
 from texgs.scene.twin import Twin
 
 
@@ -69,14 +69,14 @@ def test_a_scene_without_a_volume_has_no_function_to_fit(scene_file):
     with pytest.raises(
         ArgumentError, match="volume: expected the volume that the scene was made from, got none"
     ):
-        next(function_model.models_of(bare, "new"))
+        next(fit_function(Session(bare), "new", scene_file.with_name))
 
 
 def test_surfels_join_no_scene_of_other_fields(scene_file, tmp_path):
     scene, file = read_scene(scene_file), write_gaussians(tmp_path / "g.safetensors", gaussians(20))
     other = replace(scene, models={**scene.models, "high": SceneModel(file)})
     with pytest.raises(ArgumentError, match=r"models\.high: expected surfels, which .* join, got gaussians"):
-        next(function_model.models_of(other, "new"))
+        next(fit_function(Session(other), "new", scene_file.with_name))
 
 
 def test_the_command_line_writes_the_scene_and_one_model(scene_file, capsys):
@@ -112,12 +112,12 @@ async def test_the_viewer_adds_a_first_model_and_then_a_finer_one(browser, clien
 def held(monkeypatch, *before_each):
     """Let the viewer wait for an event before each model that it makes."""
 
-    def models(scene, name, device):
+    def models(*_):
         for event in before_each:
             event.wait(30)
             yield ball(1)
 
-    monkeypatch.setattr("texgs.viewer.work.models_of", models)
+    monkeypatch.setattr("texgs.edit.function_model.models_of", models)
 
 
 async def notice(browser, text):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Self
@@ -16,9 +16,8 @@ from texgs.api.display import as_python, camera_of, picture_of
 from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
-from texgs.core.keys import ValueMismatch, typed
 from texgs.core.light import Light
-from texgs.core.names import part_file
+from texgs.core.names import new_part_file
 from texgs.scene.changes import apply_all
 from texgs.scene.parts import part_names
 from texgs.scene.scene_file import light_of
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
     from texgs.api.live import Viewer
 
-VOTING = 512  # pixels of views that vote on the surfels of a segment
 PNG_MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I", "I;16")  # of pictures that PNG holds
 
 
@@ -197,50 +195,37 @@ class Editing:
             ArgumentError: if the name is taken, no surfel is there, or weights are missing.
         """
         from texgs.edit.clicks import Clicks
+        from texgs.edit.mask_keys import MaskKeys
         from texgs.edit.new_segment import model_name, new_segment
-        from texgs.models.sam import mask_model
-        from texgs.volume.cameras import icosphere_of
 
         scene, device = self.session.scene, self.session.composition.device
-        part = f"{model_name(scene, model, 'model')}/{name}"
-        framed = scene.framed(self.session.composition)
+        part, framed = f"{model_name(scene, model, 'model')}/{name}", scene.framed(self.session.composition)
         try:
             pixels = torch.tensor(point, dtype=torch.float32, device=device).reshape(-1, 2) + 0.5
         except (TypeError, ValueError, RuntimeError) as error:
             raise ArgumentError(f"point: expected pixel x, y, or several, got {point!r:.100}") from error
-        every = torch.ones(len(pixels), dtype=torch.bool, device=device)
-        clicks = Clicks(camera_of(framed, azimuth, polar, size).to(device), pixels, every)
-        around = [each.to(device) for each in icosphere_of(views, framed.lens().square(VOTING))]
-        file = self._new_folder("segment") / part_file("name", part)
-        facts = {"view": [azimuth, polar], "point": pixels.tolist(), "masks": masks}
-        new_segment(
-            scene, part, clicks, around, mask_model(masks, device), file, facts, title=f"segment {name}"
+        camera = camera_of(framed, azimuth, polar, size).to(device)
+        clicks = Clicks(camera, pixels, torch.ones(len(pixels), dtype=torch.bool, device=device))
+        file, facts = (
+            partial(self._new_file, "segment", part),
+            {"view": [azimuth, polar], "point": pixels.tolist()},
         )
-        with self.one_step(f"{part} new"):
-            self.session.add_segment(part, file)
+        keys = MaskKeys(masks, views=views)
+        new_segment(self.session, part, clicks, keys, framed.lens(), file, facts, title=f"segment {name}")
+        self.tell()
         return self[part]
 
     @interrupts_between_items()
     def _look(self, method: str, values: dict[str, Any], parts: Sequence[str]) -> Self:
         """Give parts a new look by a method of editing with values of its settings."""
-        from texgs.config.recipes import Edit
-        from texgs.edit.method import method_of
-        from texgs.edit.task import edited_by, orbit_task, parts_of
-        from texgs.viewer.looks import looks_of
+        from texgs.edit.new_look import give_look, look_task, settings_of
 
-        before, device = self.session.scene, self.session.composition.device
         if isinstance(parts, str) or not isinstance(parts, Iterable):
-            parts = [parts]
-        try:
-            edit = typed(Edit, {"name": method, "method": method, "parts": [*parts], method: values})
-        except ValueMismatch as error:
-            raise ArgumentError(str(error)) from error
-        method_of(edit).of(edit).check()
-        task = replace(orbit_task(before, edit, self._new_folder(method), device), draws=False)
-        after = edited_by(method_of(edit), task).scene
-        names = parts_of(before, edit.parts)
-        with self.one_step(f"{', '.join(names)} {next(iter(values.values()))}"):
-            self.session.set_looks(looks_of(after, names, before))
+            parts = [str(parts)]
+        scene, device = self.session.scene, self.session.composition.device
+        task = look_task(scene, settings_of(method, values), parts, self._new_folder(method), device)
+        give_look(self.session, task, str(next(iter(values.values()))))
+        self.tell()
         return self
 
     def _picture(self, picture: Any) -> str:
@@ -249,6 +234,7 @@ class Editing:
             return str(picture)
         image = picture if hasattr(picture, "save") else self._painted(picture)
         file = self._new_folder("picture") / "style.png"
+        file.parent.mkdir()
         (image if image.mode in PNG_MODES else image.convert("RGB")).save(file)
         return str(file)
 
@@ -262,8 +248,10 @@ class Editing:
         return picture_of(values)
 
     def _new_folder(self, kind: str) -> Path:
-        """Return a new folder for files of the scene."""
+        """Return a folder for files of the scene that is not there yet."""
         self._count += 1
-        folder = Path(self._scratch.name, f"{self._count}-{kind}")
-        folder.mkdir()
-        return folder
+        return Path(self._scratch.name, f"{self._count}-{kind}")
+
+    def _new_file(self, kind: str, part: str) -> Path:
+        """Return the file of a new part that is not there yet."""
+        return new_part_file("name", Path(self._scratch.name), kind, part)

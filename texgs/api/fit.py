@@ -94,24 +94,20 @@ def fit_now_into(
     volume: Volume, functions: Mapping[str, TransferFunction], size: int, seed: int, device: str, folder: Path
 ) -> Path:
     """Fit models in memory, and write them and a scene into a folder; return the scene's file."""
+    from texgs.edit.function_model import models_of
     from texgs.fields.surfels.model_file import write_model
-    from texgs.fitting.now import fit_now
     from texgs.scene.scene import Scene as Models
     from texgs.scene.scene import SceneModel, SceneVolume
     from texgs.scene.scene_file import write_scene
-    from texgs.volume.caster import Caster
     from texgs.volume.framing import frame_of
-    from texgs.volume.render import Appearance
 
-    look, frame, models = Appearance(), frame_of(volume.grid, functions.values()), {}
     files = {name: folder / file_name("functions", f"{name}.safetensors") for name in functions}
     if (folder / SCENE).exists():
         warnings.warn(f"{folder} holds a scene, which this replaces; another folder keeps both", stacklevel=3)
-    made_of = SceneVolume(copied(volume, folder), functions, look)
-    caster = Caster(volume.grid, look, device)
+    made_of, frame = SceneVolume(copied(volume, folder), functions), frame_of(volume.grid, functions.values())
+    models = {}
     for name, tf in functions.items():
-        lens = frame.lens(width=size, height=size)
-        (model,) = fit_now(caster, look, tf, lens, name, seed, soon=False)
+        (model,) = models_of(made_of, tf, frame, name, device, size, seed=seed, soon=False)
         models[name] = SceneModel(write_model(files[name], model))
     return write_scene(folder / SCENE, Models(models, volume=made_of, frame=frame, space=volume.grid.world))
 

@@ -28,9 +28,7 @@ NUMBERS = re.compile(rf"(?!{NUMBER.pattern})-[\d.][-\d.,eE]*")  # such as -90,20
 # Verbs in the module of another have `add_VERB_arguments` and `run_VERB` there; those of stages share one.
 SHARED = {
     "init": "new",
-    "segment": "edit",
-    "model": "edit",
-    "series": "edit",
+    "series": "model",
     "report": "tables",
     "votes": "study",
     "download": "weights",

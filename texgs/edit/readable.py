@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from texgs.fields.surfels.composition import Composition
     from texgs.scene.scene import Scene
 
+AnyTask = TypeVar("AnyTask", bound="Task[Any]")
 READABLE = 0.9  # mean alpha of a part from which its pattern is plain
 LARGEST = 16.0  # of a factor: beyond, next to nothing changes
 KEPT = 0.5  # share of its pixels that every part keeps
@@ -68,7 +69,7 @@ class OpacityKeys(MethodKeys):
         return factor
 
 
-def raised(task: Task[Any]) -> Task[Any]:
+def raised(task: AnyTask) -> AnyTask:
     """Return the task with the opacities in its scene that the look of its parts asks for."""
     from texgs.edit.task import parts_of
     from texgs.scene.parts import entry_of, replaced

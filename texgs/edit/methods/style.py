@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
+from texgs.edit.mask_keys import MASKS, mask_weights
 from texgs.edit.method import MethodKeys
-from texgs.edit.methods.segment import MASKS, mask_weights, normalized_clicks
+from texgs.edit.methods.segment import normalized_clicks
 
 if TYPE_CHECKING:
     from torch import Tensor
