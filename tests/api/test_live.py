@@ -69,6 +69,7 @@ def test_what_a_page_saves_outlives_the_process(tmp_path, monkeypatch):
         ("_push", True, [DRAGGED, LIT]),
         ("_push", False, ["TF01 opacity 0.5", LIT, DRAGGED]),
         ("undo", True, [DRAGGED, LIT]),
+        ("set", True, [DRAGGED, LIT]),
     ],
 )
 def test_neither_thread_loses_what_the_other_edits_meanwhile(
@@ -80,7 +81,7 @@ def test_neither_thread_loses_what_the_other_edits_meanwhile(
     edits, made = SharedEdits(scene.session, open_scene(file)), getattr(Session, step)
 
     def drag(value):
-        edits.change(Edit("TF01", "opacity", value, step=1), author=1)
+        edits.change(Edit("TF01", "opacity", value, step=1, title=f"TF01 opacity {value}"), author=1)
 
     def by_page():
         drag(0.25)

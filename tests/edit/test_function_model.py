@@ -131,7 +131,7 @@ async def test_a_model_of_a_function_that_was_changed_is_not_added(browser, clie
     await browser.send(type="fit", function="new")
     await browser.next("job")  # it has begun
     await browser.send(type="edit", part="", key="functions", value={})
-    await browser.past("functions")
+    await browser.past("functions {}")
     changed.set()
     await notice(browser, "new: its function was changed meanwhile; make the model again")
     assert "new" not in client.server_side.edits.scene.models

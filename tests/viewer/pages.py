@@ -27,6 +27,8 @@ class Browser:
         self.socket = socket
 
     async def send(self, **message):
+        if message["type"] == "edit":
+            message["title"] = "{part} {key} {value}".format(**message).strip()
         await self.socket.send_str(json.dumps(message))
 
     async def next(self, kind):

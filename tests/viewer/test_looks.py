@@ -345,7 +345,7 @@ async def test_thumbnails_and_the_preview_of_a_picture_are_learned_once(browser,
     shown = await picture(browser)
     assert (first != turned, len(learned)) == (True, 1)
     await browser.send(type="edit", part="TF01", key="visible", value=False)
-    await browser.past("TF01 visible off")
+    await browser.past("TF01 visible False")
     assert (await thumbnail(client))[1] != first
     assert len(learned) == 2
     await browser.send(type="undo")

@@ -12,7 +12,7 @@ from pathlib import Path
 from texgs.viewer.looks import Looks
 from texgs.viewer.styles import Styles
 looks = Looks(Styles())
-looks._scratch.new("preview", 1).mkdir(parents=True)
+looks._new_folder().mkdir()
 os.kill(os.getpid(), signal.SIGKILL)
 """
 

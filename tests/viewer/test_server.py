@@ -203,7 +203,7 @@ async def test_pages_share_edits_and_their_history(browser, client):
         await browser.send(type="edit", part="", key="light", value={"azimuth": 30, "polar": 40})
         await other.send(type="redo")
         await other.send(type="edit", part="", key="background", value=None)
-        news = await browser.past("light azimuth 30°, polar 40°", "background reset")
+        news = await browser.past("light {'azimuth': 30, 'polar': 40}", "background None")
         assert news["scene"]["light"] == {"azimuth": 30, "polar": 40}
 
 
@@ -211,8 +211,10 @@ async def test_pages_share_edits_and_their_history(browser, client):
 async def test_pages_cut_the_scene(browser, client):
     up = {"normal": [0, 2, 0], "offset": 0.5}
     await browser.send(type="edit", part="", key="cuts", value={"planes": [up]}, step=1)
-    await browser.send(type="edit", part="", key="cuts", value={"planes": [up, up], "faces": "unlit"}, step=1)
-    cuts = (await browser.past("cuts 2 planes, unlit"))["scene"]["cuts"]
+    await browser.send(
+        type="edit", part="", key="cuts", value=(two := {"planes": [up, up], "faces": "unlit"}), step=1
+    )
+    cuts = (await browser.past(f"cuts {two}"[:100]))["scene"]["cuts"]
     assert cuts == {"planes": 2 * [{"normal": [0, 1, 0], "offset": 0.25}], "box": None, "faces": "unlit"}
     assert isolated(client.server_side.edits.scene, "TF01").cuts == NO_CUTS, "clicks select what is whole"
     await browser.send(type="undo")
@@ -236,10 +238,10 @@ async def test_a_movement_goes_on_from_its_own_step_only(browser, client):
     """Others edit the same session, as Python beside a viewer in a notebook."""
     move = {"type": "edit", "part": "", "key": "background", "step": 7}
     await browser.send(**move, value=[1, 0, 0])
-    await browser.past("background #ff0000")
-    client.server_side.edits._session.set("TF01", "opacity", 0.5)
+    await browser.past("background [1, 0, 0]")
+    client.server_side.edits.session.set("TF01", "opacity", 0.5)
     await browser.send(**move, value=[0, 0, 1])
-    news = await browser.past("background #ff0000", "", "background #0000ff")
+    news = await browser.past("background [1, 0, 0]", "", "background [0, 0, 1]")
     assert news["scene"]["models"][0]["edit"]["opacity"] == 0.5
 
 
@@ -360,7 +362,7 @@ async def test_a_step_to_a_model_that_is_gone_is_refused_and_taken_back(browser,
     edits, models = client.server_side.edits, scene_file.parent
     copy(models / "TF02.safetensors", finer := models / "finer.safetensors")
     entry = replace(edits.scene.models["TF01"], file=finer)
-    edits._session.set_scene(replaced(edits.scene, "TF01", entry))
+    edits.session.set_scene(replaced(edits.scene, "TF01", entry))
     (models / "TF01.safetensors").unlink()
     await browser.send(type="undo")
     assert "TF01.safetensors: no such file, which the scene needs" in (await browser.next("notice"))["text"]

@@ -229,10 +229,10 @@ class Session:
         self._push(replaced(self.scene, model, renamed))
 
     @contextmanager
-    def one_step(self, title: str | Callable[[], str] = "") -> Iterator[None]:
+    def one_step(self, title: str = "") -> Iterator[None]:
         """Let all changes within the block be one step with a title; none where one of them fails.
 
-        Threads enter such blocks in turn. A function is asked for the title once all changes are made.
+        Threads enter such blocks in turn.
         """
         with self.lock:
             past, future = self._past, [*self._future]
@@ -242,7 +242,7 @@ class Session:
                 self._past, self._future = past, future
                 raise
             if self.scene is not past[-1][0]:
-                self._past = [*past[-MOST_STEPS:], (self.scene, title() if callable(title) else title)]
+                self._past = [*past[-MOST_STEPS:], (self.scene, title)]
 
     @locked
     def undo(self) -> bool:

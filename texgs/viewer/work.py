@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -17,7 +17,7 @@ import torch
 from texgs.config.kept_function import keep
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import let_stop, watched
-from texgs.edit.function_model import FINER, fit_function, overlap_of
+from texgs.edit.function_model import FIRST, fit_function, overlap_of
 from texgs.scene import export
 from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene
@@ -140,7 +140,8 @@ class Work:
         failed = False
         try:
             work = partial(self._do, asked, page, loop.call_soon_threadsafe)
-            await self._jobs.run(work, watch, is_urgent=isinstance(asked, Fit))
+            notice = await self._jobs.run(work, watch, is_urgent=isinstance(asked, Fit))
+            page.tell(**notice)
         except Exception as error:  # whatever it is, the server goes on
             page.tell_error(error)
             failed = True
@@ -148,26 +149,29 @@ class Work:
         self._changed()
         page.tell_job("", None, failed)
 
+    def _tell_changed(self, page: Page, text: str) -> None:
+        """Tell all pages of the scene while a job goes on, and the page that it is for what it has done."""
+        self._changed()
+        page.tell(text)
+
     # ---- Jobs, in their thread: `call` calls functions of the page in its own -----------------
 
-    def _do(self, asked: Job, page: Page, call: Call) -> None:
-        """Do a job, and tell its page what came out."""
+    def _do(self, asked: Job, page: Page, call: Call) -> dict[str, str]:
+        """Do a job, and return what there is to tell its page in the end."""
         match asked:
             case Segment():
                 file = partial(self._edits.new_file, "segment", asked.part)
                 lifted = self._segmenter.segment(self._edits.session, asked, file)
-                call(page.tell, f"{asked.part}: {lifted.basis}")
+                return {"text": f"{asked.part}: {lifted.basis}"}
             case Look():
                 output = self._edits.new_folder("image" if asked.style else "text")
-                call(page.tell, self._look(asked, output, partial(call, page.try_on)))
+                return {"text": self._look(asked, output, partial(call, page.try_on))}
             case Fit():
-                for made in self._fit(asked.function):
-                    call(self._changed)
-                    call(page.tell, made)
+                return {"text": self._fit(asked.function, partial(call, self._tell_changed, page))}
             case Keep():
-                call(page.tell, keep(self._edits.scene, asked.function))
+                return {"text": keep(self._edits.scene, asked.function)}
             case Export():
-                call(partial(page.tell, level="file", **self._export(asked, page.shown(asked.view))))
+                return {"level": "file", **self._export(asked, page.shown(asked.view))}
 
     def _look(
         self, asked: Look, output: Path, try_on: Callable[[Mapping[str, NewLook] | None], object]
@@ -182,19 +186,21 @@ class Work:
         done = f"{asked.style or asked.instruction}: {given.how}, {monotonic() - start:.0f} s."
         return f"{done}{left} Textures are in {output}; the scene is not saved yet."
 
-    def _fit(self, name: str) -> Iterator[str]:
-        """Put models in the place of a function; yield what was done once each is there."""
-        edits, start, made = self._edits, monotonic(), ""
+    def _fit(self, name: str, tell: Callable[[str], object]) -> str:
+        """Put a first model in the place of a function, and tell it; return the same of the finer model."""
+        edits, start, done = self._edits, monotonic(), ""
+        models = fit_function(edits.session, name, partial(edits.new_file, "model", name), self._device)
         try:
-            for made in fit_function(
-                edits.session, name, partial(edits.new_file, "model", name), self._device
-            ):
-                more = "" if made == FINER else overlap_of(edits.scene, name)
-                yield f"{name}: {made}, {monotonic() - start:.0f} s; the scene is not saved yet.{more}"
+            for made in models:
+                more = overlap_of(edits.scene, name) if made == FIRST else ""
+                done = f"{name}: {made}, {monotonic() - start:.0f} s; the scene is not saved yet.{more}"
+                if made == FIRST:
+                    tell(done)
         except Stopped as stopped:
-            if made:
+            if done:
                 raise Stopped(f"{name}: the finer model was cancelled; the first one stays.") from stopped
             raise
+        return done
 
     def _export(self, asked: Export, scene: Scene) -> dict[str, str]:
         """Write a file of a scene; return its name, and what there is to say of it."""

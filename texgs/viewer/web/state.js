@@ -51,7 +51,7 @@ function partsOf(scene) {
   ]));
 }
 
-/** What the list of steps calls an edit, as the server does. */
+/** What the list of steps calls an edit. */
 export function titleOf({ part, key, value }) {
   const ofScene = { cuts: titleOfCuts, functions: (functions) => Object.keys(functions).join(", ") };
   const title = value && ofScene[key] ? ofScene[key](value) : titleOfValue(value);
