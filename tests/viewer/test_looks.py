@@ -8,7 +8,6 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
-import torch
 from PIL import Image
 
 from tests.viewer.pages import TOKEN, on_page, origin, page
@@ -216,27 +215,6 @@ async def test_a_look_is_cancelled_and_leaves_nothing(browser, scene_file, monke
     assert "it was cancelled" in (await browser.next("notice"))["text"]
     await ended(browser)
     assert not [path for path in scene_file.parent.iterdir() if path.is_dir()]
-
-
-@on_page
-async def test_a_look_of_a_part_that_is_gone_stays_with_the_others(browser, client, scene_file, monkeypatch):
-    reached, go_on = threading.Event(), threading.Event()
-    monkeypatch.setattr("texgs.viewer.looks.Throttled.__call__", lambda *_: reached.set() or go_on.wait(30))
-    edits = client.server_side.edits
-    mask = torch.arange(len(edits.scene.models["TF01"].surfels()[0])) % 2 == 0
-    with edits.session.one_step("TF01/half new"):
-        edits.session.make_segment("TF01/half", mask, scene_file.with_name("half"), {})
-    await browser.send(**look(parts=["TF01/half", "TF02"], style="dots"))
-    await asyncio.to_thread(reached.wait, 30)
-    await browser.send(type="rename", part="TF01/half", name="core")
-    await browser.past("TF01/half new", "TF01/half renamed to core")
-    go_on.set()
-    told = ""
-    while "Textures are in" not in told:
-        told = (await browser.next("notice"))["text"]
-    assert "Not in the scene any more: TF01/half." in told
-    assert edits.scene.models["TF02"].texture is not None
-    assert len(list((scene_file.parent / "scene-image-1").glob("*.safetensors"))) == 2
 
 
 @pytest.fixture
