@@ -113,9 +113,9 @@ async def test_words_are_tried_from_one_side_and_change_nothing(browser, client)
     assert np.abs(tried - made).mean() < 0.5 * np.abs(made - before).mean(), "from this side it is alike"
 
 
-def test_previews_of_words_are_made_by_filters_all_else_by_a_network_that_is_there(monkeypatch):
+def test_previews_of_words_are_made_by_filters_all_else_by_a_network_that_is_there(monkeypatch, tmp_path):
     monkeypatch.setattr("texgs.viewer.looks.unusable", lambda name: None)
-    looks = Looks(Styles())
+    looks = Looks(Styles(tmp_path), tmp_path)
     full, tried, side = (
         looks.recipe_of(Look(instruction="gold", preview=preview, camera=camera))
         for preview, camera in ((False, FRONT), (True, None), (True, FRONT))
@@ -123,7 +123,6 @@ def test_previews_of_words_are_made_by_filters_all_else_by_a_network_that_is_the
     assert (full.guidance, full.recipe, full.size) == ("instruct_pix2pix", "default", 512)
     assert (tried.guidance, tried.recipe, tried.recipe_of().views) == ("filters", "quick", "axes")
     assert (side.guidance, side.recipe_of().views) == ("filters", "all")
-    looks.close()
 
 
 @on_page
@@ -348,14 +347,14 @@ async def test_a_thumbnail_that_cannot_be_is_a_sentence(client, browser):
 
 def test_pictures_of_a_folder(tmp_path):
     with pytest.raises(ArgumentError, match="--styles: expected a folder"):
-        Styles(tmp_path / "none")
+        Styles(tmp_path, tmp_path / "none")
     with pytest.raises(ArgumentError, match="got 0"):
-        Styles(tmp_path)
+        Styles(tmp_path, tmp_path)
     Image.new("RGB", (64, 48), "red").save(tmp_path / "red.png")
     (tmp_path / "broken.JPG").write_bytes(b"no picture")
     (tmp_path / "notes.txt").write_text("not offered")
     Image.new("1", (13_000, 13_000)).save(tmp_path / "large.png")
-    styles = Styles(tmp_path)
+    styles = Styles(tmp_path, tmp_path)
     assert styles.names[-3:] == ["broken.JPG", "large.png", "red.png"]
     assert styles.source("red.png") == str(tmp_path / "red.png")
     with pytest.raises(ArgumentError, match=r"large\.png: expected a picture of at most 50 million pixels"):
@@ -363,5 +362,4 @@ def test_pictures_of_a_folder(tmp_path):
     for number in range(51):
         (tmp_path / f"{number}.png").touch()
     with pytest.raises(ArgumentError, match="got 54"):
-        Styles(tmp_path)
-    styles.close()
+        Styles(tmp_path, tmp_path)

@@ -35,7 +35,7 @@ from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import Twin, range_of
 from texgs.viewer.description import describe
 from texgs.viewer.downloads import Downloads, exports_of
-from texgs.viewer.frames import shown as shown_beside
+from texgs.viewer.frames import comparison
 from texgs.viewer.messages import Export, parse
 from texgs.viewer.page_volume import LEVELS, PageVolume, page_volume, within
 from texgs.viewer.standalone import pack
@@ -187,7 +187,7 @@ def test_cuts_with_looks_have_faces_of_the_volume_over_the_models(page, scene, t
 @pytest.mark.parametrize("mode", ["difference", "wipe"])
 def test_scene_and_volume_beside_each_other(page, scene, mode):
     image, truth = beside(scene.open(), CAMERA, scene, Twin(scene))
-    expected = shown_beside(replace(VIEW, mode=mode, gain=4.0, wipe=0.4), image.color, truth.color)
+    expected = comparison(replace(VIEW, mode=mode, gain=4.0, wipe=0.4), image.color, truth.color)
     got = drawn(page, CAMERA, described(page, scene), mode, gain=4, wipe=0.4)
     assert closeness(got, expected) > LEAST - 12 * (mode == "difference"), "differences are enlarged"
 
@@ -340,15 +340,14 @@ def settled(page):
     return np.asarray(picture).astype(int)
 
 
-def test_the_viewer_exports_it_too(source):
+def test_the_viewer_exports_it_too(source, tmp_path):
     scene = read_scene(source)
     assert "volume" in exports_of(scene)
     assert "volume" not in exports_of(replace(scene, volume=None))
-    downloads = Downloads(None, SimpleNamespace(checked=lambda scene: ""))
+    downloads = Downloads(None, SimpleNamespace(checked=lambda scene: ""), tmp_path / "files")
     written = downloads.write(scene, Export("volume", VIEW), "scene").read_text()
     assert 'id="volume"' in written
     assert 'id="volume"' not in downloads.write(scene, Export("html", VIEW), "scene").read_text()
-    downloads.close()
 
 
 def test_the_same_scene_gives_the_same_bytes(source, tmp_path):

@@ -36,7 +36,7 @@ RED, BESIDE = (-0.3, 0.0, 0.0), (0.0, -0.7, 0.0)
 def small(monkeypatch):
     """Few views and no weights, wherever the tests run."""
     monkeypatch.setattr("texgs.viewer.segments.CHOICES", ("grabcut",))
-    monkeypatch.setattr("texgs.viewer.segments.KEYS", KEYS)
+    monkeypatch.setattr("texgs.viewer.segments.VOTING", KEYS)
 
 
 @pytest.fixture

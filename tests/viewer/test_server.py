@@ -163,7 +163,7 @@ async def test_the_newest_camera_wins(browser, client):
 async def test_frames_of_a_moving_camera_are_smaller_where_they_are_slow(browser, client, monkeypatch):
     sizes = []
     for slow, moving in ((1e-9, False), (1e-9, True), (1e-9, False), (1e9, True), (1e9, True)):
-        monkeypatch.setattr("texgs.viewer.frames.SLOW", slow)
+        monkeypatch.setattr("texgs.viewer.frames.SLOW_FRAME", slow)
         await browser.send(**{**VIEW, "moving": moving})
         sizes.append((await browser.next("frame"))[1].shape[:2])
     assert sizes == [(48, 64), (16, 21), (48, 64), (16, 21), (48, 64)]

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 NOW = "now"
 TEST_VIEWS = 12  # for the numbers of a fit; `Scene.psnr` measures more
-LEAST = 16  # pixels
+LEAST_SIZE = 16  # pixels
 
 
 @interrupts_between_items()
@@ -64,8 +64,8 @@ def fit(
 
     if not isinstance(volume, Volume):
         raise ArgumentError(f"volume: expected a texgs.Volume, got {type(volume).__name__}")
-    if not isinstance(size, Integral) or size < LEAST:
-        raise ArgumentError(f"size: expected a whole number of pixels, at least {LEAST}, got {size!r}")
+    if not isinstance(size, Integral) or size < LEAST_SIZE:
+        raise ArgumentError(f"size: expected a whole number of pixels, at least {LEAST_SIZE}, got {size!r}")
     if not isinstance(seed, Integral) or not 0 <= seed < 2**63:
         raise ArgumentError(f"seed: expected a whole number from 0 on, got {seed!r}")
     recipes = [NOW, *members("fit")]

@@ -22,7 +22,7 @@ from texgs.scene.scene import Scene
 from texgs.volume.view_set import View, read_views
 
 Settings = TypeVar("Settings")
-STEPS = 6  # of a series at most, that a look is learned from beside that of the scene
+SERIES_STEPS = 6  # of a series at most, that a look is learned from beside that of the scene
 
 
 def parts_of(scene: Scene, names: Sequence[str]) -> list[str]:
@@ -115,7 +115,7 @@ class Task(Generic[Settings]):
         if self.scene.series is None or name not in self.scene.series.models:
             return []
         last = len(self.scene.series.steps) - 1
-        spread = {round(last * i / (STEPS - 1)) for i in range(STEPS)} - {self.scene.time}
+        spread = {round(last * i / (SERIES_STEPS - 1)) for i in range(SERIES_STEPS)} - {self.scene.time}
         return [self.scene.at(step).models[name].surfels()[0].to(self.device) for step in sorted(spread)]
 
     def each_part(

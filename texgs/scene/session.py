@@ -41,7 +41,7 @@ SCENE_KEYS: dict[str, Any] = {
     "time": 0,
 }  # what is edited of a whole scene, and without edits
 MOST_STEPS = 200  # of the history: of more, the oldest cannot be undone
-KEPT = 3  # compositions and twins: pages may show others in turn, as before an edit and after it
+MOST_KEPT = 3  # compositions and twins: pages may show others in turn, as before an edit and after it
 
 
 def locked(
@@ -74,8 +74,8 @@ class Session:
         self._past, self._future = [(scene, "")], list[tuple[Scene, str]]()  # with titles of steps
         self.lock = RLock()
         self._device = device
-        self._opened = deque[tuple[object, Composed]](maxlen=KEPT)
-        self._twins = deque[tuple[object, Twin]](maxlen=KEPT)
+        self._opened = deque[tuple[object, Composed]](maxlen=MOST_KEPT)
+        self._twins = deque[tuple[object, Twin]](maxlen=MOST_KEPT)
 
     @classmethod
     def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Self:

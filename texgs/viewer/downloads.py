@@ -17,7 +17,6 @@ from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames
 from texgs.viewer.messages import Export, Orbit
 from texgs.viewer.page_volume import page_volume
-from texgs.viewer.scratch import scratch_folder
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.standalone import write_page
 
@@ -26,18 +25,18 @@ PAGES = ("html", "volume")  # the second has the volume of its scene
 
 
 class Downloads:
-    """Writes files into a folder of its own, which is removed in the end."""
+    """Writes files into a folder of its own."""
 
-    def __init__(self, frames: Frames, edits: SharedEdits) -> None:
-        self._frames, self._edits = frames, edits
-        self._folder = scratch_folder()
+    def __init__(self, frames: Frames, edits: SharedEdits, folder: Path) -> None:
+        self._frames, self._edits, self._folder = frames, edits, folder
+        folder.mkdir()
 
     def write(self, scene: Scene, asked: Export, name: str) -> Path:
         """Return the file of a scene as it is shown; the name is without its ending."""
         require_kind(scene, asked.kind)
         ending = ".html" if asked.kind in PAGES else EXPORTS.get(asked.kind, [f".{asked.kind}"])[0]
         stem = f"{name}-{asked.kind}" if ending == ".ply" else name  # there are several kinds of these
-        path = Path(self._folder.name, f"{stem}{ending}")
+        path = self._folder / f"{stem}{ending}"
         if asked.kind in FILMS:
             words = self._edits.checked(scene)
             return write_frames(path, self._film(scene, asked), asked.fps, comment=words)
@@ -49,11 +48,7 @@ class Downloads:
 
     def file(self, name: str) -> Path | None:
         """Return a file that was written, if there is one of this name."""
-        return next((path for path in Path(self._folder.name).iterdir() if path.name == name), None)
-
-    def close(self) -> None:
-        """Remove all files."""
-        self._folder.cleanup()
+        return next((path for path in self._folder.iterdir() if path.name == name), None)
 
     def _film(self, scene: Scene, asked: Export) -> Iterator[np.ndarray]:
         """Yield frames of a film."""

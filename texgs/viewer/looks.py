@@ -29,12 +29,11 @@ from texgs.scene.parts import NewLook, with_looks
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer.messages import Look
-from texgs.viewer.scratch import scratch_folder
-from texgs.viewer.styles import MOST, Styles
+from texgs.viewer.styles import MOST_PICTURES, Styles
 
 QUICK_SIZE = 352  # pixels of the views along the axes, which the scene fills
 SECONDS_BETWEEN = 2.0  # from one texture on its way that is shown to the next
-MOST_TRIED = len(PICTURES) + 2 * MOST  # looks that are kept: those of all pictures that there may be
+MOST_TRIED = len(PICTURES) + 2 * MOST_PICTURES  # looks that are kept: those of all pictures that there may be
 THUMBNAIL = 112  # rows of pixels
 TryOn = Callable[[str, NewLook], object]  # a part, and its look on its way
 FULL = ("default", "patches")  # recipes for pictures: the first is taken whose weights are here
@@ -55,9 +54,9 @@ class Looks:
     takes 2 s for two models on a core, of which opacities, which depend on the scene alone, take half.
     """
 
-    def __init__(self, styles: Styles, device: torch.device | str = "cpu") -> None:
+    def __init__(self, styles: Styles, scratch: Path, device: torch.device | str = "cpu") -> None:
         self._styles, self._device = styles, torch.device(device)
-        self._folder, self._numbers = scratch_folder(), count()  # of folders in it
+        self._scratch, self._numbers = scratch, count()  # of folders in it
         self._tried = OrderedDict[str, TriedLook]()  # by what was asked for
         self._latest: tuple[Any, LookTask] | None = None  # what opacities depend on, and a task with them
 
@@ -94,13 +93,9 @@ class Looks:
         Image.fromarray(frame(shown.open(self._device), camera, shown)).save(file, "JPEG", quality=90)
         return file.getvalue()
 
-    def close(self) -> None:
-        """Remove the files of what was tried."""
-        self._folder.cleanup()
-
     def _new_folder(self) -> Path:
         """Return a place for files."""
-        return Path(self._folder.name, str(next(self._numbers)))
+        return self._scratch / str(next(self._numbers))
 
     def _task(self, scene: Scene, asked: Look, output: Path) -> LookTask:
         """Return the task of the look that is asked for, by a recipe whose weights are on this machine."""

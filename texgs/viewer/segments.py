@@ -29,8 +29,8 @@ from texgs.scene.scene import Scene
 from texgs.scene.session import Session, state_of
 from texgs.viewer.messages import Clicked, Mask, Segment
 
-KEYS = MaskKeys()  # views that vote, and how, as for `texgs segment`
-COLOR = (170, 0, 255, 150)  # over what is masked
+VOTING = MaskKeys()  # views that vote, and how, as for `texgs segment`
+MASK_COLOR = (170, 0, 255, 150)  # over what is masked
 CHOICES = ("mobile_sam", "grabcut")  # the first whose weights are here
 
 
@@ -56,7 +56,7 @@ class Segmenter:
         on, off = ([[x, y] for x, y, is_on in asked.points if is_on == sign] for sign in (True, False))
         facts = {"camera": asdict(asked.camera), "point": on, "other": off, "outline": asked.outline}
         made = new_segment(
-            *(session, asked.part, self._clicks(asked), KEYS, session.scene.framed().lens(), file),
+            *(session, asked.part, self._clicks(asked), VOTING, session.scene.framed().lens(), file),
             {**facts, "masks": self._masks.name},
             masks=self._masks,
             title=f"segment {asked.part}",
@@ -94,7 +94,7 @@ def isolated(scene: Scene, name: str) -> Scene:
 def picture_of(mask: Tensor) -> str:
     """Return a mask [H, W] bool as the address of a PNG picture."""
     pixels = np.zeros((*mask.shape, 4), dtype=np.uint8)
-    pixels[mask.cpu().numpy()] = COLOR
+    pixels[mask.cpu().numpy()] = MASK_COLOR
     file = io.BytesIO()
     Image.fromarray(pixels).save(file, format="PNG")
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"

@@ -23,7 +23,7 @@ from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Pick
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
-from texgs.viewer.styles import LARGEST
+from texgs.viewer.styles import LARGEST_PICTURE
 from texgs.viewer.work import Work
 
 WEB = Path(__file__).parent / "web"
@@ -71,7 +71,7 @@ class Server:
 
         Other pages, such as notebooks, may show pages that are framed.
         """
-        app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST)
+        app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST_PICTURE)
         handlers = {
             "": self.index,
             "socket": self.socket,

@@ -26,6 +26,7 @@ from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks
 from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
 from texgs.viewer.page import Page, Stopped
+from texgs.viewer.scratch import scratch_folder
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import Styles
@@ -88,9 +89,11 @@ class Work:
     ) -> None:
         self._edits, self._changed, self._device = edits, changed, device
         self._jobs, self._previews, self._thumbnails = Jobs(), Jobs(), Jobs()  # side by side
-        self.styles = Styles(styles)
-        self._segmenter, self._looks = Segmenter(device), Looks(self.styles, device)
-        self.downloads = Downloads(frames, edits)
+        self._scratch = scratch_folder()
+        folder = Path(self._scratch.name)
+        self.styles = Styles(folder / "styles", styles)
+        self._segmenter, self._looks = Segmenter(device), Looks(self.styles, folder / "looks", device)
+        self.downloads = Downloads(frames, edits, folder / "downloads")
         self._task: asyncio.Task[None] | None = None
         self._page: Page | None = None  # that it is for
         self._stop = threading.Event()
@@ -125,13 +128,11 @@ class Work:
             self._stop.set()
 
     def close(self) -> None:
-        """Stop, and end the thread."""
+        """Stop, end the threads, and remove files that nobody has saved."""
         self.stop()
         for jobs in (self._jobs, self._previews, self._thumbnails):
             jobs.close()
-        self._looks.close()
-        self.downloads.close()
-        self.styles.close()
+        self._scratch.cleanup()
 
     async def _work(self, asked: Job, page: Page, watch: Watch) -> None:
         """Do a job, and tell its page when it begins, fails and ends."""
