@@ -131,8 +131,7 @@ def configuration(
 ) -> Config:
     """Return the configuration of a data set that is a volume with basic transfer functions."""
     from texgs.config.compose import recompose
-    from texgs.config.dataset import BasicTF, Dataset
-    from texgs.config.dataset import Volume as VolumeKeys
+    from texgs.config.dataset import BasicTF, dataset_of
     from texgs.config.project import check_name
     from texgs.volume.transfer import check_disjoint
 
@@ -147,8 +146,7 @@ def configuration(
     few = (f"views.test.count={TEST_VIEWS}", f"views.relit={TEST_VIEWS}", "views.turntable=1")
     config = recompose(("tracking=none", "edit=none", *few, "metric.vtk_frames=0", *words))
     basic = {name: BasicTF(**tf.to_dict()) for name, tf in functions.items()}
-    keys = VolumeKeys(generator=None, file=str(copied(volume, folder).resolve()))
-    dataset = Dataset(name=volume.name, title=volume.name, volume=keys, basic_tfs=basic)
+    dataset = dataset_of(volume.name, copied(volume, folder).resolve(), basic)
     return replace(config, dataset=dataset, results=str(folder))
 
 

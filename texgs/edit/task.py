@@ -88,8 +88,8 @@ class Task(Generic[Settings]):
 
     def settings_for(self, part: str) -> Settings:
         """Return the settings with the picture or the instruction that the model of a part follows."""
-        look = self.followed.get(split(self.scene, part)[0])
-        changes: dict[str, Any] = {} if look is None else {method_of(self.edit).follows: look}
+        followed = self.followed.get(split(self.scene, part)[0])
+        changes: dict[str, Any] = {} if followed is None else {method_of(self.edit).follows: followed}
         return replace(self.settings, **changes)  # type: ignore[type-var]
 
     def opacity_of(self, part: str) -> float:
