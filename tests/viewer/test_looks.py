@@ -267,16 +267,6 @@ async def test_of_previews_that_wait_the_newest_is_shown(browser, client, held):
 
 
 @on_page
-async def test_a_picture_of_a_sphere_goes_by_normals(browser):
-    shown = []
-    for sphere in (False, True):
-        await browser.send(**look(style="glass", sphere=sphere, preview=True))
-        await browser.next("trial")
-        shown.append(await picture(browser))
-    assert np.abs(shown[0] - shown[1]).mean() > 1
-
-
-@on_page
 async def test_a_preview_is_on_the_parts_that_are_chosen_and_on_no_others(browser, client):
     (own,) = client.server_side._pages
     for parts in ([], ["TF02"], ["TF01"]):

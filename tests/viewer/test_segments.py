@@ -102,21 +102,6 @@ async def test_an_outline_shows_the_mask_of_what_it_holds_and_makes_a_segment(br
     assert (mask == (red == 0)).float().mean() > 0.97
 
 
-@pytest.mark.parametrize(
-    ("places", "message"),
-    [
-        ([BESIDE, (0.5, -0.7, 0.0), (0.5, -0.6, 0.0)], "outline: expected an object, got none"),
-        ([BESIDE, BESIDE, BESIDE], "outline: expected pixels inside of it, got none"),
-        ([BESIDE, RED, (0.0, 2.0, 0.0)], "outline: expected corners in 120 x 120 pixels, got"),
-        ([BESIDE, RED], "outline: expected 3 to 500 values"),
-    ],
-)
-@on_page
-async def test_outlines_that_select_nothing_are_told(browser, places, message):
-    await browser.send(type="mask", model="balls", **outlined(*places))
-    assert message in (await browser.next("notice"))["text"]
-
-
 @on_page
 async def test_clicks_see_a_model_that_was_written_again(browser, scene_file):
     before = await masked(browser)

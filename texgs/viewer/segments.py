@@ -2,6 +2,7 @@
 
 import base64
 import io
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -26,7 +27,7 @@ from texgs.models.masks import MaskModel
 from texgs.models.sam import mask_model
 from texgs.scene.parts import entry_of, split
 from texgs.scene.scene import Scene
-from texgs.scene.session import Session, state_of
+from texgs.scene.session import Session, last_of, state_of
 from texgs.viewer.messages import Clicked, Mask, Segment
 
 VOTING = MaskKeys()  # views that vote, and how, as for `texgs segment`
@@ -39,16 +40,15 @@ class Segmenter:
 
     def __init__(self, device: torch.device | str = "cpu") -> None:
         self._device = torch.device(device)
-        self._opened: tuple[list[object], Surfels] | None = None  # states of its files
+        self._opened = deque[tuple[object, Surfels]](maxlen=1)  # for the next click on the same model
 
     def mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
         """Return the mask of a view as a message with a PNG picture, which is transparent elsewhere."""
         entry_of(scene, asked.model)
         name, masks = split(scene, asked.model)[0], self._masks
-        states: list[object] = [state_of(file) for file in scene.models[name].files]
-        if self._opened is None or self._opened[0] != states:  # else it is the next click on the same model
-            self._opened = (states, clicked_model(scene, name, self._device))
-        mask = clicked_mask(self._opened[1], self._clicks(asked), masks, scene.light)
+        states = [state_of(file) for file in scene.models[name].files]
+        model = last_of(self._opened, states, lambda: clicked_model(scene, name, self._device))
+        mask = clicked_mask(model, self._clicks(asked), masks, scene.light)
         return {"type": "mask", "id": asked.id, "picture": picture_of(mask), "by": masks.name}
 
     def segment(self, session: Session, asked: Segment, file: Callable[[], Path]) -> Lifted:
