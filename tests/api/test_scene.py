@@ -18,7 +18,6 @@ from texgs.core.image import read_rgba
 from texgs.core.light import Light
 from texgs.edit.new_segment import new_segment
 from texgs.fields.surfels.step_file import write_step
-from texgs.scene.parts import HIGHLIGHTS
 from texgs.scene.scene import Scene as Seen
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.series_file import Series, write_series
@@ -172,17 +171,6 @@ def test_an_instruction_by_filters(scene):
     scene.instruct("make it gold", guidance="filters", recipe="quick", size=64)
     assert np.abs(pixels(scene) - before).max() > 30
     assert scene.session.past == ["TF01, TF02 make it gold"]
-
-
-@pytest.mark.parametrize("second", ["gold", "silver"])
-def test_one_material_after_another_is_as_if_it_were_the_first(scene, tmp_path, second):
-    once = texgs.open(write_balls(tmp_path))
-    once.instruct(f"make it {second}", guidance="filters", size=64, parts="TF01")
-    for each in ("gold", second):
-        scene.instruct(f"make it {each}", guidance="filters", size=64, parts="TF01")
-    assert scene["TF01"].specular != 1
-    for key in HIGHLIGHTS:
-        assert getattr(scene["TF01"], key) == getattr(once["TF01"], key)
 
 
 def test_pictures_of_any_mode_are_styles(scene):

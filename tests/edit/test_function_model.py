@@ -64,19 +64,17 @@ def test_what_cannot_be_fitted(scene_file, capsys, words, message):
     assert not output.exists()
 
 
-def test_a_scene_without_a_volume_has_no_function_to_fit(scene_file):
-    bare = replace(read_scene(scene_file), volume=None)
-    with pytest.raises(
-        ArgumentError, match="volume: expected the volume that the scene was made from, got none"
-    ):
-        next(fit_function(Session(bare), "new", scene_file.with_name))
-
-
-def test_surfels_join_no_scene_of_other_fields(scene_file, tmp_path):
+def test_scenes_that_no_model_can_join_are_refused(scene_file, tmp_path):
     scene, file = read_scene(scene_file), write_gaussians(tmp_path / "g.safetensors", gaussians(20))
-    other = replace(scene, models={**scene.models, "high": SceneModel(file)})
-    with pytest.raises(ArgumentError, match=r"models\.high: expected surfels, which .* join, got gaussians"):
-        next(fit_function(Session(other), "new", scene_file.with_name))
+    series = Series(scene_file.with_name("series.json"), ["a", "b"], ["new"])
+    others = {
+        "volume: expected": replace(scene, volume=None),
+        r"models\.high: expected surfels": replace(scene, models={**scene.models, "high": SceneModel(file)}),
+        "new has a model for each step": replace(scene, series=series),
+    }
+    for words, other in others.items():
+        with pytest.raises(ArgumentError, match=words):
+            next(fit_function(Session(other), "new", scene_file.with_name))
 
 
 def test_the_command_line_writes_the_scene_and_one_model(scene_file, capsys):
@@ -147,13 +145,6 @@ async def test_a_first_model_stays_where_the_finer_one_is_cancelled(browser, cli
     await browser.next("trial")
     cancelled.set()
     await notice(browser, "new: the finer model was cancelled; the first one stays.")
-
-
-def test_a_series_has_models_of_all_steps(scene_file):
-    scene = read_scene(scene_file)
-    series = Series(scene_file.with_name("series.json"), ["a", "b"], ["low"])
-    with pytest.raises(ArgumentError, match="low has a model for each step of the series"):
-        tried(replace(scene, series=series), "low")
 
 
 @on_page

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -56,7 +55,7 @@ class Editing:
 
     def __getitem__(self, name: str) -> Part:
         """Return a part; another name is an ArgumentError that lists those that there are."""
-        return Part(self.session, str(name), self.one_step)
+        return Part(self.session, str(name))
 
     def __iter__(self) -> Iterator[str]:
         """Yield the names of all parts."""
@@ -73,7 +72,7 @@ class Editing:
 
     @light.setter
     def light(self, value: Light | str | Sequence[float]) -> None:
-        with self.one_step(f"light {value}"):
+        with self.session.one_step(f"light {value}"):
             self.session.set_light(light_of(as_python(value)))
 
     @property
@@ -83,7 +82,7 @@ class Editing:
 
     @background.setter
     def background(self, value: str | Sequence[float]) -> None:
-        with self.one_step(f"background {value}"):
+        with self.session.one_step(f"background {value}"):
             self.session.set_background(as_python(value))
 
     @property
@@ -93,7 +92,7 @@ class Editing:
 
     @time.setter
     def time(self, step: int) -> None:
-        with self.one_step(f"time {step}"):
+        with self.session.one_step(f"time {step}"):
             self.session.set_of_scene("time", as_python(step))
 
     def edit(self, *words: str) -> Self:
@@ -103,33 +102,17 @@ class Editing:
         """
         if not all(isinstance(word, str) for word in words):
             raise ArgumentError(f"words: expected text such as 'light=30,40', got {words!r:.100}")
-        with self.one_step(" ".join(words)):
+        with self.session.one_step(" ".join(words)):
             apply_all(self.session, words)
         return self
 
     def undo(self) -> bool:
         """Take the latest change back; return whether there was one."""
-        done = self.session.undo()
-        self.tell()
-        return done
+        return self.session.undo()
 
     def redo(self) -> bool:
         """Make again what was undone last; return whether there was anything."""
-        done = self.session.redo()
-        self.tell()
-        return done
-
-    @contextmanager
-    def one_step(self, title: str) -> Iterator[None]:
-        """Let all changes within the block be one step with a title, and tell pages that show this scene."""
-        with self.session.one_step(title):
-            yield
-        self.tell()
-
-    def tell(self) -> None:
-        """Tell pages of the viewer that show this scene."""
-        if self._viewer is not None:
-            self._viewer.tell()
+        return self.session.redo()
 
     # ---- Looks and segments -------------------------------------------------
 
@@ -212,7 +195,6 @@ class Editing:
         )
         keys = MaskKeys(masks, views=views)
         new_segment(self.session, part, clicks, keys, framed.lens(), file, facts, title=f"segment {name}")
-        self.tell()
         return self[part]
 
     @interrupts_between_items()
@@ -225,7 +207,6 @@ class Editing:
         scene, device = self.session.scene, self.session.composition.device
         task = look_task(scene, settings_of(method, values), parts, self._new_folder(method), device)
         give_look(self.session, task, str(next(iter(values.values()))))
-        self.tell()
         return self
 
     def _picture(self, picture: Any) -> str:

@@ -73,6 +73,9 @@ class Session:
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
         self._past, self._future = [(scene, "")], list[tuple[Scene, str]]()  # with titles of steps
         self.lock = RLock()
+        self.changed: Callable[[], object] = lambda: (
+            None
+        )  # is called after each step, and when one is taken back
         self._device = device
         self._opened = deque[tuple[object, Composed]](maxlen=MOST_KEPT)
         self._twins = deque[tuple[object, Twin]](maxlen=MOST_KEPT)
@@ -243,6 +246,7 @@ class Session:
                 raise
             if self.scene is not past[-1][0]:
                 self._past = [*past[-MOST_STEPS:], (self.scene, title)]
+        self.changed()
 
     @locked
     def undo(self) -> bool:
@@ -250,6 +254,7 @@ class Session:
         if len(self._past) == 1:
             return False
         self._future.append(self._past.pop())
+        self.changed()
         return True
 
     @locked
@@ -258,6 +263,7 @@ class Session:
         if not self._future:
             return False
         self._past.append(self._future.pop())
+        self.changed()
         return True
 
     # ---- Views ------------------------------------------------------------
