@@ -168,10 +168,8 @@ def test_edits_show_and_are_data(scene, tmp_path):
     ("of", "word", "message"),
     [
         ("scene", "TF03.opacity=1", "expected a model of the scene (TF01, TF02), got TF03"),
-        ("scene", "TF01.opacity=-1", "models.TF01.opacity: expected a factor from 0 to 1000, got -1"),
         ("scene", "TF01.texture=none.safetensors", "expected a file that is there, got none.safetensors"),
         ("scene", "TF01.opacity=[", "expected a number, true, false, r,g,b or #rrggbb"),
-        ("scene", "cut=x,9", "expected a cut through the models, which lie from -"),
         (
             "scene",
             "TF01.style=x.jpg",
@@ -180,7 +178,6 @@ def test_edits_show_and_are_data(scene, tmp_path):
         ("scene", "visible", "expected KEY=VALUE, such as TF01.opacity=0.5"),
         ("dotted", "v1.2/shell.opacity=1", "expected a segment of v1.2 (it has none), got shell"),
         ("dotted", "TF01/shell.opacity=1", "expected a model of the scene (v1.2), got TF01"),
-        ("dotted", "v1.2/shell=none.safetensors", "expected a file that is there, got none.safetensors"),
         ("dotted", "v1.2/=scene.yaml", "expected a file that is there"),
     ],
 )
@@ -230,20 +227,11 @@ def test_a_file_of_another_kind_is_refused(scene, tmp_path, capsys, monkeypatch,
     assert message in refused(capsys, verb, scene, *words)
 
 
-def test_a_picture_is_not_replaced_by_a_scene(scene, tmp_path, capsys):
-    picture = tmp_path / "new.png"
-    assert render(scene, picture) == 0
-    before = picture.read_bytes()
-    assert edit(scene, "light=30,40", output=picture) == 2
-    assert f"--output: expected a file that ends in .yaml, got {picture}" in capsys.readouterr().err
-    assert picture.read_bytes() == before
-
-
 def test_only_a_scene_is_replaced_by_an_edited_one(scene, tmp_path, capsys):
-    (tmp_path / "data.yaml").write_text("name: engine\n")
-    message = refused(capsys, "edit", scene, "light=30,40", "--output", tmp_path / "data.yaml")
-    assert message.endswith("data.yaml is a file of another kind, which stays; choose another")
-    assert (tmp_path / "data.yaml").read_text() == "name: engine\n"
+    for name in ("data.yaml", "picture.png"):
+        (file := tmp_path / name).write_text("name: engine\n")
+        assert str(file) in refused(capsys, "edit", scene, "light=30,40", "--output", file)
+        assert file.read_text() == "name: engine\n"
     assert [edit(scene, f"light=30,{polar}") for polar in (40, 50)] == [0, 0]
     assert read_scene(tmp_path / "new.yaml").light.polar == 50
 

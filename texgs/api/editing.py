@@ -189,12 +189,9 @@ class Editing:
             raise ArgumentError(f"point: expected pixel x, y, or several, got {point!r:.100}") from error
         camera = camera_of(framed, azimuth, polar, size).to(device)
         clicks = Clicks(camera, pixels, torch.ones(len(pixels), dtype=torch.bool, device=device))
-        file, facts = (
-            partial(self._new_file, "segment", part),
-            {"view": [azimuth, polar], "point": pixels.tolist()},
-        )
-        keys = MaskKeys(masks, views=views)
-        new_segment(self.session, part, clicks, keys, framed.lens(), file, facts, title=f"segment {name}")
+        keys, facts = MaskKeys(masks, views=views), {"view": [azimuth, polar], "point": pixels.tolist()}
+        file, title = partial(self._new_file, "segment", part), f"segment {name}"
+        new_segment(self.session, part, clicks, keys, framed.lens(), file, facts, title=title)
         return self[part]
 
     @interrupts_between_items()

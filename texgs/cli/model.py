@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise ArgumentError(f"--size: expected at least {LEAST_SIZE}, got {arguments.size}")
     file = partial(new_part_file, "model", output.parent, output.stem, name)
     with located(arguments.scene):
-        [*fit_function(session, name, file, torch_device(arguments.device), arguments.size, soon=False)]
+        list(fit_function(session, name, file, torch_device(arguments.device), arguments.size, soon=False))
     print(f"{session.save(output)}{overlap_of(session.scene, name)}")
     return 0
 
