@@ -107,7 +107,7 @@ async def test_an_outline_shows_the_mask_of_what_it_holds_and_makes_a_segment(br
         ([BESIDE, (0.5, -0.7, 0.0), (0.5, -0.6, 0.0)], "outline: expected an object, got none"),
         ([BESIDE, BESIDE, BESIDE], "outline: expected pixels inside of it, got none"),
         ([BESIDE, RED, (0.0, 2.0, 0.0)], "outline: expected corners in 120 x 120 pixels, got"),
-        ([BESIDE, RED], "outline: Tuple should have at least 3 items"),
+        ([BESIDE, RED], "outline: expected 3 to 500 values"),
     ],
 )
 @on_page

@@ -13,7 +13,7 @@ from aiohttp import WSCloseCode, WSMsgType, WSServerHandshakeError
 from PIL import Image
 
 from tests.viewer.pages import TOKEN, WAIT, on_page, origin, page, served
-from tests.viewer.test_messages import CAMERA, VIEW
+from tests.viewer.test_messages import CAMERA, SHOWN, VIEW
 from texgs.cli.main import main
 from texgs.core.cuts import NO_CUTS
 from texgs.core.io import write_json
@@ -140,11 +140,11 @@ async def test_a_still_without_a_view_says_so(browser, client):
 
 @on_page
 async def test_a_pixel_of_a_view_is_a_point_or_nothing(browser):
-    await browser.send(type="pick", view=VIEW, pixel=[32, 24])
+    await browser.send(type="pick", view=SHOWN, pixel=[32, 24])
     point = torch.tensor((await browser.next("point"))["point"])
     place, _ = parse(json.dumps(VIEW)).camera.camera().project(point)
     torch.testing.assert_close(place, torch.tensor([32.5, 24.5]), atol=1e-3, rtol=0)
-    await browser.send(type="pick", view=VIEW, pixel=[0, 0])
+    await browser.send(type="pick", view=SHOWN, pixel=[0, 0])
     assert (await browser.next("point"))["point"] is None
 
 

@@ -37,8 +37,8 @@ class Page:
         self._notices: deque[dict[str, Any]] = deque(maxlen=MOST_NOTICES)
         self._news: dict[str, dict[str, Any]] = {}  # by type, of each the newest
         self._view: View | None = None
-        self._asked: dict[str, Mask | Look] = {}  # by type, of each the newest that waits
-        self._finding: dict[str, asyncio.Task[None]] = {}
+        self._asked: dict[type[Mask | Look], Mask | Look] = {}  # by type, of each the newest that waits
+        self._finding: dict[type[Mask | Look], asyncio.Task[None]] = {}
         self._tried: Look | None = None  # the newest preview, until it is taken off
         self._trial: dict[str, NewLook] = {}
         self._pace = Pace()
@@ -57,7 +57,7 @@ class Page:
 
     def find(self, asked: Mask | Look) -> None:
         """Send what clicks select, or show a preview of a look, in place of what was asked for before."""
-        self._asked[asked.type] = asked
+        self._asked[type(asked)] = asked
         if isinstance(asked, Look):
             self._tried = asked
         self._wake.set()

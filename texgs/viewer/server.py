@@ -126,7 +126,7 @@ class Server:
 
     async def still(self, request: web.Request) -> web.StreamResponse:
         """Return a PNG file of the view in the query on its page, as `texgs render` writes it."""
-        view = parse(request.query.get("view", ""), messages.VIEWS)
+        view = parse(request.query.get("view", ""), View)
         scene = self._shown(view, request.query.get("page", ""))
         words = await asyncio.to_thread(self.edits.checked, scene)
         png = await self.frames.still(view, scene, words)
@@ -135,7 +135,7 @@ class Server:
 
     async def thumbnail(self, request: web.Request) -> web.StreamResponse:
         """Return a small view of the scene with a picture laid on."""
-        asked = parse(request.query.get("look", ""), messages.LOOKS)
+        asked = parse(request.query.get("look", ""), Look)
         picture = await self.work.thumbnail(replace(asked, preview=True))  # never by a full recipe
         return web.Response(body=picture, content_type="image/jpeg")
 
