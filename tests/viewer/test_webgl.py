@@ -15,9 +15,9 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
-from texgs.scene.frame import Mode
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.segment_file import write_segment
+from texgs.scene.shot import Mode
 from texgs.viewer.description import describe
 from texgs.viewer.standalone import pack
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import torch
 
-from texgs.api.display import as_python, camera_of, picture_of
+from texgs.api.display import as_python, picture_of
 from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
@@ -23,6 +23,7 @@ from texgs.scene.changes import apply_all
 from texgs.scene.parts import part_names
 from texgs.scene.scene_file import light_of
 from texgs.scene.session import Session
+from texgs.scene.shot import Shot
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -209,7 +210,7 @@ class Editing:
         except (TypeError, ValueError, RuntimeError) as error:
             raise ArgumentError(f"point: expected pixel x, y, or several, got {point!r:.100}") from error
         every = torch.ones(len(pixels), dtype=torch.bool, device=device)
-        clicks = Clicks(camera_of(framed, azimuth, polar, size).to(device), pixels, every)
+        clicks = Clicks(Shot(size, azimuth=azimuth, polar=polar).camera(framed).to(device), pixels, every)
         around = [each.to(device) for each in icosphere_of(views, framed.lens().square(VOTING))]
         file = self._new_folder("segment") / part_file("name", part)
         facts = {"view": [azimuth, polar], "point": pixels.tolist(), "masks": masks}

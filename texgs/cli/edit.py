@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.cli.options import add_device, add_lens, lens_of, option, require_only_files, require_own_place
+from texgs.cli.options import add_device, add_keys, keys_of, option, require_only_files, require_own_place
 from texgs.core.errors import ArgumentError, located
-from texgs.core.lens import Lens
+from texgs.core.lens import Lens, LensKeys
 from texgs.core.names import SCENES, new_part_file, require_name
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def add_segment_arguments(parser: argparse.ArgumentParser) -> None:
     )
     option(parser, "--views", 42, "number of views that vote, 10 f^2 + 2: 12, 42, 92, 162, ...")
     option(parser, "--size", 512, "of these views, pixels")
-    add_lens(parser, "of the view clicked on", "default the width")
+    add_keys(parser, LensKeys)  # of the view clicked on
     add_device(parser)
 
 
@@ -178,7 +178,7 @@ def run_segment(arguments: argparse.Namespace) -> int:
     scene, device = read_scene(arguments.scene), torch_device(arguments.device)
     name = model_name(scene, arguments.model, "--model")
     require_output(arguments)
-    lens = lens_of(arguments, scene.framed())
+    lens = keys_of(arguments, LensKeys).lens(scene.framed())
     clicks, masks = clicks_of(arguments, lens, device), mask_model(arguments.masks, device)
     if arguments.preview:
         model = clicked_model(scene, name, device)

@@ -1,6 +1,5 @@
 """Files of a scene that a page saves: films, and what `texgs export` writes."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from math import exp, log
 from pathlib import Path
@@ -8,11 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.core.movie import write_frames
 from texgs.core.names import EXPORTS
-from texgs.core.progress import progress
 from texgs.fields.files import kind_of
 from texgs.scene import export
+from texgs.scene.film import Film
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames
 from texgs.viewer.messages import Export, Orbit
@@ -40,7 +38,9 @@ class Downloads:
         path = Path(self._folder.name, f"{stem}{ending}")
         if asked.kind in FILMS:
             words = self._edits.checked(scene)
-            return write_frames(path, self._film(scene, asked), asked.fps, comment=words)
+            view, film = replace(asked.view, transparent=False), film_of(asked)
+            frames = (self._frames.pixels(replace(view, camera=each), scene) for each in way_of(asked))
+            return film.write(path, frames, words, title="film")
         if asked.kind in PAGES:
             volume = page_volume(scene) if asked.kind == "volume" else None
             write_page(path, scene, name, self._edits.checked(scene), volume, asked.steps)
@@ -55,18 +55,17 @@ class Downloads:
         """Remove all files."""
         self._folder.cleanup()
 
-    def _film(self, scene: Scene, asked: Export) -> Iterator[np.ndarray]:
-        """Yield frames of a film."""
-        view = replace(asked.view, transparent=False)
-        for camera in progress(way_of(asked), title="film", unit="frame"):
-            yield self._frames.pixels(replace(view, camera=camera), scene)
+
+def film_of(asked: Export) -> Film:
+    """Return how long a film is."""
+    return Film(seconds=asked.seconds, fps=asked.fps)
 
 
 def way_of(asked: Export) -> list[Orbit]:
     """Return the cameras of a film: one turn from its view on, or a smooth way through its stops."""
     from scipy.interpolate import PchipInterpolator
 
-    start, count = asked.view.camera, max(1, round(asked.seconds * asked.fps))
+    start, count = asked.view.camera, film_of(asked).count
     if len(asked.stops) < 2:
         return [replace(start, azimuth=start.azimuth + 360 * index / count) for index in range(count)]
     stops = np.array([[s.azimuth, s.polar, log(s.distance), s.fov_y, *s.target] for s in asked.stops])

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import REQUIRED, ValueMismatch, key, mismatch, typed
-from texgs.scene.frame import Mode
+from texgs.scene.shot import Mode
 
 Shown = Literal[Mode, "truth", "difference", "wipe"]  # the volume, the scene's difference from it, or both
 LARGEST = 1 << 22  # bytes of a message; most have a few hundred, 32 functions of ParaView 400,000

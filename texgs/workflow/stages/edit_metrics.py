@@ -35,13 +35,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     from texgs.core.check import torch_device
     from texgs.metrics.metric import MeasuredScene, values_of
-    from texgs.scene.paths import PATHS
+    from texgs.scene.film import COUNTS
     from texgs.scene.scene_file import read_scene
     from texgs.volume.cameras import spiral
 
     edit, views, device = settings.edit, settings.views, torch_device(settings.fit.device)
     before, after = read_scene(inputs["before"]), read_scene(inputs["scene"])
-    path = spiral(PATHS["test"], views.lens(before.frame))  # near and far along it are angles
+    path = spiral(COUNTS["test"], views.lens(before.frame))  # near and far along it are angles
     cameras = [camera.to(device) for camera in path]
     measured = MeasuredScene(
         title=f"{settings.dataset}: {edit.name}",

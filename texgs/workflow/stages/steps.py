@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -91,16 +90,12 @@ def measured(
 
 def write_film(path: Path, scene: Scene, settings: Settings, device: torch.device) -> None:
     """Write a film of all steps, around which the camera turns."""
-    from texgs.core.movie import write_frames
-    from texgs.scene.paths import shots_of
-    from texgs.scene.session import Session
+    from texgs.scene.film import Film, frames_of
 
-    session, size = Session(scene, device), kinds()[settings.fit.field].film_size
     count = max(FRAMES, len(scene.timeline.steps))
-    lens = settings.views.lens(scene.frame).square(size)
-    shots = shots_of(scene, session.composition, "orbit-time", count, lens, polar=POLAR)
-    frames: Iterator[np.ndarray] = (session.frame(camera, scene=shown) for camera, shown in shots)
-    write_frames(path, progress(frames, count, title=f"{settings.dataset}: film", unit="frame"))
+    film, lens = Film(what="orbit-time", frames=count, polar=POLAR), settings.views.lens(scene.frame)
+    shots = film.shots(scene, lens=lens.square(kinds()[settings.fit.field].film_size))
+    film.write(path, frames_of(scene, shots, device), title=f"{settings.dataset}: film")
 
 
 def inputs(config: Config) -> dict[str, Path]:
