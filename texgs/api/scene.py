@@ -15,10 +15,10 @@ from texgs.core.check import torch_device
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
-from texgs.core.names import EXPORTS, check_count
+from texgs.core.names import check_count
 from texgs.scene.copied import write_copy
+from texgs.scene.export_keys import Export
 from texgs.scene.film import Film
-from texgs.scene.scene_file import known
 from texgs.scene.session import Session
 from texgs.scene.shot import Shot
 
@@ -79,40 +79,18 @@ class Scene(Editing):
         """
         return write_copy(folder, self.session.scene)
 
-    def export(self, path: str | Path, kind: str | None = None, **options: Any) -> Path:
-        """Write a file for other programs, and return its path; see `texgs export --help`.
-
-        Args:
-            path: its ending says what: .html, .ply, .usdc, .usda, .glb, .spz, .vtp.
-            kind: what, where an ending has several; default 3dgs for .ply.
-            **options: of `texgs.scene.export.Export`; of .html, `steps`, see `show`, and `volume`, MB of the
-                page for the volume.
+    @takes(Export, "kind")
+    def export(self, path: str | Path, keys: Export) -> Path:
+        """Write a file for other programs, and return its path; its ending says what it is.
 
         Raises:
-            ArgumentError: if the ending is unknown or another kind's, an option is, or the scene cannot be
-                written so.
+            ArgumentError: if the ending is unknown or another kind's, an option does not count for the kind,
+                or the scene cannot be written so.
         """
-        from texgs.scene.export import OF_MODELS, Export, export_scene, taken
-        from texgs.viewer.page_volume import page_volume
-        from texgs.viewer.standalone import write_page
+        from texgs.viewer.export import export
 
-        path, scene = Path(path), self.session.scene
-        able = {key: endings for key, endings in EXPORTS.items() if key not in OF_MODELS}
-        if kind and kind not in able:
-            raise ArgumentError(f"kind: expected one of {', '.join(able)}, got {kind}")
-        chosen = kind or next((key for key, endings in able.items() if path.suffix in endings), "")
-        if path.suffix not in able.get(chosen, ()):
-            endings = dict.fromkeys(ending for each in able.values() for ending in each)
-            expected = " or ".join(able.get(chosen, endings))
-            raise ArgumentError(f"path: expected a file that ends in {expected}, got {path}")
-        takes = ["steps", "volume"] if chosen == "html" else taken(chosen)
-        known(options, takes, f"options of {chosen}")
-        if chosen == "html":
-            size = options.pop("volume", None)
-            volume = None if size is None else page_volume(scene, size)
-            write_page(path, scene, path.stem, volume=volume, **options)
-            return path
-        return export_scene(path, scene, Export(chosen, **options))
+        export(Path(path), self.session.scene, keys)
+        return Path(path)
 
     # ---- Notebooks ------------------------------------------------------------
 

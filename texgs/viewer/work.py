@@ -20,9 +20,8 @@ from texgs.core.names import part_file, require_name
 from texgs.core.progress import watched
 from texgs.edit.function_model import models_of, overlap_of, tried
 from texgs.fields.surfels.model import Surfels
-from texgs.scene import export
 from texgs.scene.parts import NewLook, entry_of, require_new, split
-from texgs.viewer.downloads import FILMS, PAGES, Downloads, require_kind
+from texgs.viewer.downloads import Downloads, require_kind
 from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks, looks_of, with_parts
 from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
@@ -250,7 +249,6 @@ class Work:
     async def _export(self, asked: Export, page: Page, watch: Watch) -> None:
         """Write a file, and tell its page where it is."""
         scene, name = page.shown(asked.view), Path(self._edits.name).stem
-        path = await self._jobs.run(partial(self.downloads.write, scene, asked, name), watch)
-        told = [f"{path.stat().st_size / 2**20:.1f} MiB"]
-        told += [] if asked.kind in (*PAGES, *FILMS) else export.remarks(scene, export.Export(asked.kind))
-        page.tell(f"{path.name}: {', '.join(told)}", level="file", name=path.name)
+        path, notes = await self._jobs.run(partial(self.downloads.write, scene, asked, name), watch)
+        told = ", ".join([f"{path.stat().st_size / 2**20:.1f} MiB", *notes])
+        page.tell(f"{path.name}: {told}", level="file", name=path.name)
