@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from texgs.api.display import MB, LivePage, Page, picture_of
@@ -61,14 +60,14 @@ class Scene(Editing):
         Both have the scene's light and edits, without cuts. Looks and segments are not of the volume: they
         count as differences.
         """
-        from texgs.metrics.quality import compare
+        from texgs.report.compared import mean_scores
         from texgs.volume.cameras import spiral
 
         check_count("views", views, least=2)
         scene = replace(self.session.scene, cuts=NO_CUTS)
         lens = scene.framed(self.session.composition).lens(width=width, height=width)
         pairs = (self.session.beside(camera, scene) for camera in spiral(views, lens, "views"))
-        return fmean(compare(*pair)["psnr"] for pair in pairs)
+        return mean_scores(pairs)["psnr"]
 
     # ---- Files --------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from texgs.report.results import EditMeasures
 from texgs.workflow.edits import edited_scene
 from texgs.workflow.inputs import fitted_scene, view_settings, with_recipe
 from texgs.workflow.stage import EVERY, Config, Outcome, Rule, Stage, made, read
-from texgs.workflow.stages.edit import Settings as EditSettings
+from texgs.workflow.stages.settings import OfEdit
 
 if TYPE_CHECKING:
     from texgs.metrics.metric import Style
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class Settings(EditSettings):
+class Settings(OfEdit):
     """What the stage reads of the configuration."""
 
     compared: int = read("metric.views")
