@@ -30,7 +30,7 @@ from texgs.viewer import standalone
 from texgs.viewer.messages import Edit
 
 HOSTILE = "</script><b>&'\""
-LEVELS = 3  # of 255, see test_webgl.py
+LEVELS = 3  # of 255, see test_agreement.py
 BOX, UNLIT = {"box": Box([-1.0] * 3, [1.0] * 3)}, {"faces": "unlit"}
 SIZE = {"width": 900, "height": 400}  # of the window; a part of it is the picture
 
