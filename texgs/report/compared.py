@@ -8,18 +8,21 @@ from typing import Any
 import numpy as np
 
 from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.field import Composed
+from texgs.fields.files import kind_of
 from texgs.metrics.quality import compare, mean
 from texgs.raster import Render
-from texgs.report.beside_volume import pictures
+from texgs.report.beside_volume import changed, in_words, pictures, side_by_side, what_changed
 from texgs.report.results import COMPARED, Comparison
-from texgs.scene.cut_view import beside
+from texgs.scene.cut_view import beside, beside_fitted
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
 
+LARGEST_GAIN = 16.0
 POLAR = 20.0  # of the views that are compared, degrees
 LEFT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
 SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in the paper's figure, degrees
@@ -49,6 +52,54 @@ def compare_views(
             yield pair
 
     return Comparison(title, **mean_scores(pairs())), shown
+
+
+class SideBySide:
+    """Frames of a scene, its volume or what it was as fitted, and their difference; and what differs in all.
+
+    Args:
+        session: of the scene.
+        other: "volume" or "fitted".
+        gain: factor on differences, 1 to 16.
+    """
+
+    def __init__(self, session: Session, other: str, gain: float) -> None:
+        if not 1 <= gain <= LARGEST_GAIN:
+            raise ArgumentError(f"gain: expected 1 to {LARGEST_GAIN:g}, got {gain:g}")
+        if session.scene.shows_volume and other == "volume":
+            raise ArgumentError(
+                "compare: expected a scene of models, got a cut one that shows its volume; take cuts back by "
+                "texgs edit, or compare it with what was fitted"
+            )
+        if other == "volume":
+            session.twin_of(session.scene)  # what is wrong with its volume is told now
+        self._session, self._gain, self._is_fitted = session, gain, other == "fitted"
+        self._scores, self._changes = defaultdict[str, list[float]](list), list[dict[str, float]]()
+
+    def frames(self, shots: Iterable[tuple[Camera, Scene]]) -> Iterator[np.ndarray]:
+        """Yield a picture [H, W, 3], uint8, of each shot."""
+        titles = ("scene", "as fitted" if self._is_fitted else "volume")
+        for camera, scene in shots:
+            image, truth = self._pair(camera, scene)
+            picture, scores = side_by_side(image, truth, self._gain, titles)
+            for name, value in scores.items():
+                self._scores[name].append(value)
+            self._changes.append(changed(image, truth))
+            yield picture
+
+    @property
+    def sentences(self) -> list[str]:
+        """Return the means of PSNR and SSIM so far, and what edits have changed."""
+        return [", ".join(in_words(mean(self._scores))), *([what_changed(self._changes)] * self._is_fitted)]
+
+    def _pair(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
+        """Return a view of a scene, and what it is compared with."""
+        if not self._is_fitted:
+            return self._session.beside(camera, scene)
+        can = kind_of(next(iter(scene.models.values())).file).can
+        outputs = ("depth", "normal") if "normals" in can else ("depth",)
+        now, before = (self._session.composition_of(each) for each in (scene, scene.as_fitted))
+        return beside_fitted(now, before, camera, scene, outputs)
 
 
 def caption(entry: Comparison) -> str:
