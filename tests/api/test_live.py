@@ -80,7 +80,7 @@ def test_neither_thread_loses_what_the_other_edits_meanwhile(
     edits, made = SharedEdits(scene.session, open_scene(file)), getattr(Session, step)
 
     def drag(value):
-        edits.change(Edit("TF01", "opacity", value, step=1), author=1)
+        edits.change(Edit("TF01", "opacity", value, 1, f"TF01 opacity {value}"), author=1)
 
     def by_page():
         drag(0.25)

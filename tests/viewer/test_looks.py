@@ -291,7 +291,7 @@ async def test_a_look_has_its_own_colours(browser, client):
     await browser.send(**look(parts=["TF01"], instruction="turn it into gold"))
     await ended(browser)
     assert edits.scene.models["TF01"].edit.palette is None
-    assert edits.state()["past"] == ["TF01 palette #1ae61a", "TF01 turn it into gold"]
+    assert edits.state()["past"] == ["TF01 palette [0.1, 0.9, 0.1]", "TF01 turn it into gold"]
     await browser.send(type="undo")
     assert (await picture(browser) == tinted).all()
     assert edits.scene.models["TF01"].edit.palette == (0.1, 0.9, 0.1)

@@ -63,29 +63,6 @@ def test_messages_are_read():
     assert parse(json.dumps(drawn)) == Mask(view.camera, (), corners, "TF01", 4)
 
 
-@pytest.mark.parametrize(
-    ("part", "key", "value", "title"),
-    [
-        ("TF01", "opacity", 0.123456, "TF01 opacity 0.1235"),
-        ("TF01", "opacity", 1000, "TF01 opacity 1000"),
-        ("", "time", 12345, "time 12345"),
-        ("TF01", "palette", [1, 0.5, 0], "TF01 palette #ff8000"),
-        ("TF01", "palette", "#00ff00", "TF01 palette #00ff00"),
-        ("TF01/a", "visible", False, "TF01/a visible off"),
-        ("TF01", "palette", None, "TF01 palette reset"),
-        ("", "light", "headlight", "light headlight"),
-        ("", "light", {"polar": 12.4}, "light polar 12°"),
-        ("", "cuts", {"planes": [{}], "box": None, "faces": "unlit"}, "cuts 1 plane, unlit"),
-        ("", "cuts", {"planes": [{}, {}], "box": {}, "faces": "shaded"}, "cuts 2 planes"),
-        ("", "cuts", {"box": {"low": [0, 0, 0]}}, "cuts box"),
-        ("", "cuts", {"planes": [], "faces": "unlit"}, "cuts none"),
-        ("", "cuts", None, "cuts reset"),
-    ],
-)
-def test_edits_have_titles(part, key, value, title):
-    assert Edit(part, key, value, 0).title == title
-
-
 def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
     half, whole = (parse(json.dumps(VIEW)).camera.camera(scale) for scale in (0.5, 1))
     expected = orbit(30, 20, 3, 40, 64, 48)

@@ -203,7 +203,7 @@ async def test_pages_share_edits_and_their_history(browser, client):
         await browser.send(type="edit", part="", key="light", value={"azimuth": 30, "polar": 40})
         await other.send(type="redo")
         await other.send(type="edit", part="", key="background", value=None)
-        news = await browser.past("light azimuth 30°, polar 40°", "background reset")
+        news = await browser.past("light {'azimuth': 30, 'polar': 40}", "background None")
         assert news["scene"]["light"] == {"azimuth": 30, "polar": 40}
 
 
@@ -211,8 +211,15 @@ async def test_pages_share_edits_and_their_history(browser, client):
 async def test_pages_cut_the_scene(browser, client):
     up = {"normal": [0, 2, 0], "offset": 0.5}
     await browser.send(type="edit", part="", key="cuts", value={"planes": [up]}, step=1)
-    await browser.send(type="edit", part="", key="cuts", value={"planes": [up, up], "faces": "unlit"}, step=1)
-    cuts = (await browser.past("cuts 2 planes, unlit"))["scene"]["cuts"]
+    await browser.send(
+        type="edit",
+        part="",
+        key="cuts",
+        value={"planes": [up, up], "faces": "unlit"},
+        step=1,
+        title="two planes",
+    )
+    cuts = (await browser.past("two planes"))["scene"]["cuts"]
     assert cuts == {"planes": 2 * [{"normal": [0, 1, 0], "offset": 0.25}], "box": None, "faces": "unlit"}
     assert isolated(client.server_side.edits.scene, "TF01").cuts == NO_CUTS, "clicks select what is whole"
     await browser.send(type="undo")
@@ -236,10 +243,10 @@ async def test_a_movement_goes_on_from_its_own_step_only(browser, client):
     """Others edit the same session, as Python beside a viewer in a notebook."""
     move = {"type": "edit", "part": "", "key": "background", "step": 7}
     await browser.send(**move, value=[1, 0, 0])
-    await browser.past("background #ff0000")
+    await browser.past("background [1, 0, 0]")
     client.server_side.edits._session.set("TF01", "opacity", 0.5)
     await browser.send(**move, value=[0, 0, 1])
-    news = await browser.past("background #ff0000", "", "background #0000ff")
+    news = await browser.past("background [1, 0, 0]", "", "background [0, 0, 1]")
     assert news["scene"]["models"][0]["edit"]["opacity"] == 0.5
 
 

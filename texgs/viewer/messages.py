@@ -1,7 +1,6 @@
 """What a page says to its server: messages in JSON, checked before anything uses them."""
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -65,15 +64,7 @@ class Edit:
     key: str  # of a `PartEdit`; of `SCENE_KEYS` for the scene
     value: Any = None  # as in a scene file; None takes the edit back
     step: int = 0  # edits of one number in a row are one step of the history, such as those of a slider
-
-    @property
-    def title(self) -> str:
-        """Return what the list of steps calls it, once it has been made."""
-        if self.value is not None and self.key in ("cuts", "functions"):
-            value = title_of_cuts(self.value) if self.key == "cuts" else ", ".join(self.value)
-        else:
-            value = title_of_value(self.value)
-        return f"{self.part} {self.key} {value}".strip()
+    title: str = ""  # of the step in the history
 
 
 @dataclass(frozen=True)
@@ -206,27 +197,3 @@ def parse(text: str | bytes, kind: type[Any] | None = None) -> Any:
         raise ArgumentError(str(error)) from error
     except (ValueError, RecursionError) as error:
         raise ArgumentError(f"message: expected keys with values in JSON, got {text[:100]!r}") from error
-
-
-def title_of_value(value: Any) -> str:
-    """Return a value of an edit in few letters: #rrggbb, angles, a number."""
-    if value is None:
-        return "reset"
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    if isinstance(value, Mapping):
-        return ", ".join(f"{key} {angle:.0f}°" for key, angle in value.items())
-    if isinstance(value, list):
-        return "#" + "".join(f"{round(255 * x):02x}" for x in value)
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def title_of_cuts(cuts: Mapping[str, Any]) -> str:
-    """Return cuts as a scene file has them in few words."""
-    count = len(cuts.get("planes", ()))
-    words = [f"{count} planes" if count > 1 else "1 plane"] if count else []
-    if cuts.get("box"):
-        words.append("box")
-    if words and cuts.get("faces") == "unlit":
-        words.append("unlit")
-    return ", ".join(words) or "none"

@@ -23,6 +23,7 @@ from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
 from texgs.volume.transfer import TransferFunction
 
+LONGEST_TITLE = 300  # letters
 Change = Edit | Undo | Redo | Rename | Remove
 
 
@@ -131,7 +132,7 @@ class SharedEdits:
                 is_latest = self._latest[0] == step and self._latest[1] is self.scene
                 goes_on = step is not None and is_latest and session.undo()
                 try:
-                    with session.one_step(lambda: asked.title):
+                    with session.one_step(asked.title[:LONGEST_TITLE]):
                         self._edit(asked)
                 except Exception:
                     if goes_on:
