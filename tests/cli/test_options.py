@@ -67,7 +67,7 @@ def test_the_help_has_units_and_defaults(capsys):
     with pytest.raises(SystemExit):
         parser().parse_args(["--help"])
     told = " ".join(capsys.readouterr().out.split())
-    assert "--width LINE_WIDTH of lines, pixels (1.5)" in told
+    assert "--width WIDTH of lines, pixels (1.5)" in told
     assert "--paper {a4,letter} what it is drawn on (a4)" in told
     assert "default 100 % of them" in told
     assert "--number" not in told

@@ -209,7 +209,7 @@ def test_what_knows_no_space_stays_in_the_world_and_says_so(placed_scene, tmp_pa
     )
     assert main(["export", str(file), "--to", str(target), "--space", "file"]) == 2
     assert (
-        "--space: expected --kind points or mesh or vtp or usd or gltf or spz, got 3dgs"
+        "space: expected kind points or mesh or vtp or usd or gltf or spz, got 3dgs"
         in capsys.readouterr().err
     )
     model = scene.models["A"].file

@@ -17,7 +17,7 @@ from tests.viewer.drawing import rendered
 from tests.viewer.in_browser import HIDE
 from texgs.cli.main import main
 from texgs.core.camera import orbit
-from texgs.core.cuts import NO_CUTS, Box, Cuts, Plane
+from texgs.core.cuts import NO_CUTS, Cuts, Plane
 from texgs.core.io import write_json
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
@@ -29,8 +29,7 @@ from texgs.scene.scene_file import read_scene, write_scene
 from texgs.viewer import standalone
 
 HOSTILE = "</script><b>&'\""
-LEVELS = 3  # of 255, see test_webgl.py
-BOX, UNLIT = {"box": Box([-1.0] * 3, [1.0] * 3)}, {"faces": "unlit"}
+LEVELS = 3  # of 255, see test_agreement.py
 SIZE = {"width": 900, "height": 400}  # of the window; a part of it is the picture
 
 
@@ -70,6 +69,11 @@ def page(chromium, file):
     assert wrong == []
     assert [url for url in asked if not url.startswith("data:")] == [file.as_uri()]
     page.close()
+
+
+@pytest.fixture(scope="module")
+def blank(chromium):
+    return chromium.new_page()
 
 
 def settle(page):
@@ -216,6 +220,31 @@ def test_a_plane_cuts_the_page_and_words_make_the_same_cut(page, file, scene, fo
     settle(page)
     assert differ(page, file, cuts=cuts) <= LEVELS
     assert differ(page, file) > 50, "it takes something away"
+
+
+@pytest.mark.parametrize(
+    ("part", "key", "value", "title"),
+    [
+        ("TF01", "opacity", 0.123456, "TF01 opacity 0.1235"),
+        ("TF01", "opacity", 1000, "TF01 opacity 1000"),
+        ("", "time", 12345, "time 12345"),
+        ("TF01", "palette", [1, 0.5, 0], "TF01 palette #ff8000"),
+        ("TF01", "palette", "#00ff00", "TF01 palette #00ff00"),
+        ("TF01/a", "visible", False, "TF01/a visible off"),
+        ("TF01", "palette", None, "TF01 palette reset"),
+        ("", "light", {"polar": 12.4}, "light polar 12°"),
+        ("", "cuts", {"planes": [{}], "box": None, "faces": "unlit"}, "cuts 1 plane, unlit"),
+        ("", "cuts", {"planes": [{}, {}], "box": None, "faces": "shaded"}, "cuts 2 planes"),
+        ("", "cuts", {"planes": [], "box": {"low": [0, 0, 0]}}, "cuts box"),
+        ("", "cuts", {"planes": [], "faces": "unlit"}, "cuts none"),
+        ("", "cuts", None, "cuts reset"),
+    ],
+)
+def test_steps_have_titles(blank, part, key, value, title):
+    blank.evaluate(
+        f"() => {{ {standalone.joined_modules('state.js')} globalThis.state = modules['state.js']; }}"
+    )
+    assert blank.evaluate("edit => state.titleOf(edit)", {"part": part, "key": key, "value": value}) == title
 
 
 def test_the_words_at_an_input_are_in_its_name(page):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import torch
 
-from texgs.api.display import as_python, camera_of, picture_of
+from texgs.api.display import as_python, picture_of
 from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
 from texgs.core.interrupts import interrupts_between_items
@@ -21,6 +21,7 @@ from texgs.scene.changes import apply_all
 from texgs.scene.parts import part_names
 from texgs.scene.scene_file import light_of
 from texgs.scene.session import Session
+from texgs.scene.shot import Shot
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -187,7 +188,7 @@ class Editing:
             pixels = torch.tensor(point, dtype=torch.float32, device=device).reshape(-1, 2) + 0.5
         except (TypeError, ValueError, RuntimeError) as error:
             raise ArgumentError(f"point: expected pixel x, y, or several, got {point!r:.100}") from error
-        camera = camera_of(framed, azimuth, polar, size).to(device)
+        camera = Shot(size, azimuth=azimuth, polar=polar).camera(framed).to(device)
         clicks = Clicks(camera, pixels, torch.ones(len(pixels), dtype=torch.bool, device=device))
         keys, facts = MaskKeys(masks, views=views), {"view": [azimuth, polar], "point": pixels.tolist()}
         file, title = partial(self._new_file, "segment", part), f"segment {name}"

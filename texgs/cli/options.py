@@ -4,14 +4,12 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import MISSING, Field, is_dataclass
 from pathlib import Path
-from typing import Any, Literal, NoReturn, TypeVar, cast, get_args, get_origin
+from typing import Any, NoReturn, TypeVar, cast, get_args, get_origin
 
 from texgs.core.errors import ArgumentError
-from texgs.core.keys import REQUIRED, ValueMismatch, fields_of, typed, without_none
-from texgs.core.lens import Frame, Lens
+from texgs.core.keys import REQUIRED, ValueMismatch, choices_of, fields_of, typed, without_none
 from texgs.core.names import METRICS, close
 
-LENS = Lens()
 T = TypeVar("T")
 
 
@@ -46,14 +44,18 @@ def add_keys(parser: argparse._ActionsContainer, schema: Any, without: Sequence[
             continue
         default = each.default if each.default_factory is MISSING else each.default_factory()
         more: dict[str, Any] = {"default": default, "required": default == REQUIRED}
-        choices = get_args(kind) if get_origin(kind) is Literal else each.metadata["choices"]
         if kind is bool:
             more["action"] = argparse.BooleanOptionalAction if default else "store_true"
         elif get_origin(kind) in (list, tuple):
             parts = get_args(kind)
             more["nargs"] = "*" if get_origin(kind) is list or parts[-1] is ... else len(parts)
-        elif choices:
+            more["metavar"] = (
+                tuple("XYZ"[: len(parts)]) if more["nargs"] in (2, 3) else option_of(each)[2:].upper()
+            )
+        elif choices := choices_of(hint, each):
             more["metavar"] = f"{{{','.join(choices)}}}"
+        else:
+            more["metavar"] = option_of(each)[2:].upper()
         parser.add_argument(option_of(each), dest=name, help=help_of(each, default), **more)
 
 
@@ -105,24 +107,3 @@ def require_only_files(files: Sequence[str]) -> None:
 def add_device(parser: argparse.ArgumentParser) -> None:
     """Add where to compute."""
     option(parser, "--device", "cpu", "", choices=("cpu", "cuda"))
-
-
-def add_lens(parser: argparse.ArgumentParser, width: str, height: str) -> None:
-    """Add the size of pictures, in these words, and where the camera looks, from how far and how wide."""
-    option(parser, "--width", LENS.width, width)
-    parser.add_argument("--height", type=int, help=height)
-    frames = "what is centred on 90 %% of the picture; paper: cameras 4.0311 from the origin"
-    option(parser, "--frame", "scene", frames, choices=("scene", "paper"))
-    target = "what the camera looks at, world units; default the middle of the frame"
-    parser.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=target)
-    parser.add_argument("--radius", type=float, help="distance from it, world units; default by the frame")
-    option(parser, "--fov", LENS.fov_y, "vertical field of view, degrees")
-
-
-def lens_of(arguments: argparse.Namespace, framed: Frame) -> Lens:
-    """Return what `add_lens` has added; pictures are square and show all that is framed by default."""
-    size = arguments.width, arguments.width if arguments.height is None else arguments.height
-    radius, target = arguments.radius, arguments.target
-    if arguments.frame != "paper":
-        return framed.lens(arguments.fov, *size, radius, target)
-    return Lens(LENS.radius if radius is None else radius, arguments.fov, *size, target or LENS.target)

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.cli.edit import require_scene
-from texgs.cli.options import add_device, add_keys, add_lens, keys_of, lens_of, require_own_place
+from texgs.cli.options import add_device, add_keys, keys_of, require_own_place
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import LensKeys
 from texgs.core.names import new_part_file, require_name
 from texgs.edit.mask_keys import MaskKeys
 
@@ -32,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preview", type=Path, metavar="PNG", help="write the view with the mask, no scene")
     add_keys(parser, MaskKeys)
     parser.add_argument("--threshold", type=float, help="of votes; default 0.5, of vote centre 0.7")
-    add_lens(parser, "of the view clicked on", "default the width")
+    add_keys(parser, LensKeys)  # of the view clicked on
     add_device(parser)
 
 
@@ -69,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     session, keys = Session.open(arguments.scene), keys_of(arguments, MaskKeys)
     name = model_name(session.scene, arguments.model, "--model")
     require_output(arguments)
-    lens = lens_of(arguments, session.scene.framed())
+    lens = keys_of(arguments, LensKeys).lens(session.scene.framed())
     device = torch_device(arguments.device)
     clicks, masks = clicks_of(arguments, lens, device), mask_model(keys.masks, device)
     if arguments.preview:

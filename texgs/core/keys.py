@@ -188,6 +188,12 @@ def _value(hint: Any, value: Any, key: str) -> Any:
     raise mismatch(key, "text, a number, a list or keys with values", value)
 
 
+def choices_of(hint: Any, field: Field[Any]) -> tuple[str, ...]:
+    """Return what a key is one of; nothing where any value will do."""
+    is_literal = typing.get_origin(without_none(hint)) is Literal
+    return typing.get_args(without_none(hint)) if is_literal else field.metadata.get("choices", ())
+
+
 def without_none(hint: Any) -> Any:
     """Return the type of what may also be None; any other type as it is."""
     if isinstance(hint, UnionType) or typing.get_origin(hint) is typing.Union:

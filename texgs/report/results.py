@@ -166,6 +166,10 @@ class SceneResult(Result, section="pse"):
     primitives: int
 
 
+COMPARED = 3  # views around the object, one of which is shown
+BELOW = "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
+
+
 @dataclass(frozen=True)
 class Comparison:
     """An edit by numbers, against the volume with the same edit."""

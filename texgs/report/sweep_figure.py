@@ -132,12 +132,12 @@ def scene_pictures(runs: DataFrame) -> dict[str, dict[str, np.ndarray]]:
 
 def picture(path: Path) -> np.ndarray:
     """Render a scene from the front."""
-    import torch
-
-    from texgs.report.before_after import POLAR, pictures
+    from texgs.report.before_after import POLAR
+    from texgs.scene.film import frames_of
     from texgs.scene.scene_file import read_scene
-    from texgs.volume.cameras import orbit_path
+    from texgs.scene.shot import Shot
+    from texgs.volume.cameras import FRONT
 
     scene = read_scene(path)
-    cameras = orbit_path(1, POLAR, scene.framed().lens().square(PIXELS))
-    return next(pictures(scene, cameras, [scene.light], torch.device("cpu")))
+    camera = Shot(azimuth=FRONT, polar=POLAR, width=PIXELS).camera(scene.framed())
+    return next(frames_of(scene, [(camera, scene)], "cpu"))

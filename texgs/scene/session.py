@@ -24,11 +24,12 @@ from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.raster import Render
 from texgs.scene.cut_view import beside
-from texgs.scene.frame import Mode, frame, point_at
+from texgs.scene.frame import frame, point_at
 from texgs.scene.parts import NewLook, entry_of, key_path, replaced, require_new, split, with_looks
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, cuts_of, functions_of, known, light_of, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
+from texgs.scene.shot import Mode
 from texgs.scene.twin import Twin, needs_twin
 
 T = TypeVar("T")

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import REQUIRED, ValueMismatch, key, mismatch, typed
-from texgs.scene.frame import Mode
+from texgs.scene.shot import Mode
 
 Shown = Literal[Mode, "truth", "difference", "wipe"]  # the volume, the scene's difference from it, or both
 LARGEST = 1 << 22  # bytes of a message; most have a few hundred, 32 functions of ParaView 400,000
@@ -64,7 +64,7 @@ class Edit:
     key: str  # of a `PartEdit`; of `SCENE_KEYS` for the scene
     value: Any = None  # as in a scene file; None takes the edit back
     step: int = 0  # edits of one number in a row are one step of the history, such as those of a slider
-    title: str = ""  # of this step, in the list of all
+    title: str = ""  # of the step in the history
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from torch.nn import functional as F
 
 from texgs.core.errors import ArgumentError, located
 from texgs.scene.scene import Scene, volume_of
-from texgs.viewer import PAGE_VOLUME
 from texgs.volume.grid import Grid, Triple
 from texgs.volume.nrrd_file import MAKES, open_grid
 
@@ -51,15 +50,12 @@ class PageVolume:
         return {**facts, "appearance": asdict(volume_of(scene).appearance)}
 
 
-def page_volume(scene: Scene, budget: float = PAGE_VOLUME) -> PageVolume:
+def page_volume(scene: Scene, budget: float) -> PageVolume:
     """Return the volume that a scene names, with as many samples as a budget in MB holds.
 
     Raises:
-        ArgumentError: if the scene names no volume, it cannot be read or has several channels, or the budget
-            is none.
+        ArgumentError: if the scene names no volume, or it cannot be read or has several channels.
     """
-    if not isinstance(budget, int | float) or not 0 < budget < np.inf:
-        raise ArgumentError(f"volume: expected a size in MB above 0, got {budget!r}")
     source = volume_of(scene)
     if source.has_channels:
         raise ArgumentError(

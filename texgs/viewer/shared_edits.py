@@ -17,7 +17,7 @@ from texgs.scene.session import SCENE_KEYS, Session, files_of, state_of
 from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
 
-LONGEST_TITLE = 100  # letters
+LONGEST_TITLE = 300  # letters
 Change = Edit | Undo | Redo | Rename | Remove
 
 
@@ -126,7 +126,7 @@ class SharedEdits:
                 is_latest = self._latest[0] == step and self._latest[1] is self.scene
                 goes_on = step is not None and is_latest and session.undo()
                 try:
-                    with session.one_step(asked.title[:LONGEST_TITLE] or f"{asked.part} {asked.key}"):
+                    with session.one_step(asked.title[:LONGEST_TITLE]):
                         self._edit(asked)
                 except Exception:
                     if goes_on:

@@ -18,10 +18,9 @@ from texgs.config.kept_function import keep
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import let_stop, watched
 from texgs.edit.function_model import FIRST, fit_function, overlap_of
-from texgs.scene import export
 from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene
-from texgs.viewer.downloads import FILMS, PAGES, Downloads
+from texgs.viewer.downloads import Downloads
 from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks
 from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
@@ -205,9 +204,7 @@ class Work:
 
     def _export(self, asked: Export, scene: Scene) -> dict[str, str]:
         """Write a file of a scene; return its name, and what there is to say of it."""
-        path = self.downloads.write(scene, asked, Path(self._edits.name).stem)
+        path, notes = self.downloads.write(scene, asked, Path(self._edits.name).stem)
         let_stop(path.name)
-        remarks = [f"{path.stat().st_size / 2**20:.1f} MiB"]
-        if asked.kind not in (*PAGES, *FILMS):
-            remarks += export.remarks(scene, export.Export(asked.kind))
-        return {"text": f"{path.name}: {', '.join(remarks)}", "name": path.name}
+        words = ", ".join([f"{path.stat().st_size / 2**20:.1f} MiB", *notes])
+        return {"text": f"{path.name}: {words}", "name": path.name}

@@ -69,6 +69,7 @@ function titleOfValue(value) {
   if (value === null) return "reset";
   if (typeof value === "boolean") return value ? "on" : "off";
   if (Array.isArray(value)) return toHex(value);
+  if (Number.isInteger(value) || typeof value === "string") return `${value}`;
   if (typeof value === "number") return `${Number(value.toPrecision(4))}`;
   return Object.entries(value).map(([key, angle]) => `${key} ${Math.round(angle)}°`).join(", ");
 }

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.recipes import Edit
 from texgs.core.names import SCENE
 from texgs.edit.method import Method, method_of, methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import EditResult
-from texgs.workflow.edits import VIEWS, edit_keys, edited_scene, looks_of
-from texgs.workflow.stage import Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import FitLabel, OfDataset
+from texgs.workflow.edits import VIEWS, edited_scene
+from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.stages.settings import OfEdit
 
 if TYPE_CHECKING:
     from texgs.edit.task import Task
@@ -25,27 +23,7 @@ CURVE_POINTS = 100  # of a curve of losses at most
 CAPTION = "Before and after the edit; what can be relit, under another light too."
 
 
-@dataclass(kw_only=True)
-class EditedFit(FitLabel):
-    """The same, with the variant of the edit."""
-
-    sweep: str = read("sweep.name")
-    variant: str = read("variant")
-
-
-@dataclass(kw_only=True)
-class Settings(OfDataset):
-    """What the stage reads of the configuration; `weights` comes from the job."""
-
-    edit: Edit = read(edit_keys)
-    fit: EditedFit
-    reduce: int = read("fit.reduce")
-    fov_y: float = read("views.fov_y")  # degrees
-    weights: dict[str, str | None]
-    followed: dict[str, str] = read(looks_of)  # by model, where not as the edit says
-
-
-def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+def work(settings: OfEdit, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write scene.yaml, edit.png, what the method writes, and turntable.mp4 where the scene looks different.
 
     It reads `scene`, and for each model `views.MODEL`, the transforms_train.json of its views.
