@@ -46,16 +46,15 @@ def add_keys(parser: argparse._ActionsContainer, schema: Any, without: Sequence[
         more: dict[str, Any] = {"default": default, "required": default == REQUIRED}
         if kind is bool:
             more["action"] = argparse.BooleanOptionalAction if default else "store_true"
-        elif get_origin(kind) in (list, tuple):
-            parts = get_args(kind)
-            more["nargs"] = "*" if get_origin(kind) is list or parts[-1] is ... else len(parts)
-            more["metavar"] = (
-                tuple("XYZ"[: len(parts)]) if more["nargs"] in (2, 3) else option_of(each)[2:].upper()
-            )
-        elif choices := choices_of(hint, each):
-            more["metavar"] = f"{{{','.join(choices)}}}"
         else:
-            more["metavar"] = option_of(each)[2:].upper()
+            choices = ",".join(choices_of(hint, each))
+            more["metavar"] = f"{{{choices}}}" if choices else option_of(each)[2:].upper()
+        if get_origin(kind) in (list, tuple):
+            parts = get_args(kind)
+            is_any = get_origin(kind) is list or parts[-1] is ...
+            more |= (
+                {"nargs": "*"} if is_any else {"nargs": len(parts), "metavar": tuple("XYZW"[: len(parts)])}
+            )
         parser.add_argument(option_of(each), dest=name, help=help_of(each, default), **more)
 
 

@@ -78,20 +78,16 @@ class Film(Shot):
         lens, count = lens or self.lens(scene.framed(composition)), self.count
         if self.what == "test":
             return ((camera, scene) for camera in spiral(count, lens, "frames"))
-        camera, turn = (
-            orbit(self.azimuth, self.polar, *lens),
-            iter(orbit_path(count, self.polar, lens, self.azimuth)),
-        )
+        turn = orbit_path(count, self.polar, lens, self.azimuth)
         if self.what == "orbit":
             return ((place, scene) for place in turn)
+        camera = orbit(self.azimuth, self.polar, *lens)
         if self.what == "view":
             return repeat((camera, scene), count)
         shares = (i / max(count - 1, 1) for i in range(count))
         if self.what in ("time", "orbit-time"):
-            last, places = (
-                len(scene.timeline.steps) - 1,
-                turn if self.what == "orbit-time" else repeat(camera),
-            )
+            last = len(scene.timeline.steps) - 1
+            places = turn if self.what == "orbit-time" else repeat(camera)
             return ((at, scene.at(round(share * last))) for at, share in zip(places, shares, strict=False))
         if self.what == "cut":
             low, high = swept(scene, composition or scene.open())
