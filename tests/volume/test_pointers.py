@@ -7,13 +7,13 @@ import pytest
 
 from tests.volume.volume_files import WRITERS, assert_holds, sample_values
 from texgs.core.errors import ArgumentError
-from texgs.volume.sources import OPENERS, open_source
+from texgs.volume.sources import FORMATS, open_source
 
 POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 52428800\n"
 LOGIN = "\n<!DOCTYPE html>\n<html><head><title>Sign in</title></head></html>"
 
 
-@pytest.mark.parametrize("suffix", OPENERS)
+@pytest.mark.parametrize("suffix", FORMATS)
 @pytest.mark.parametrize(("text", "what"), [(POINTER, "a pointer of Git LFS"), (LOGIN, "a page of HTML")])
 def test_pointers_and_pages_are_told(tmp_path, suffix, text, what):
     (tmp_path / f"v{suffix}").write_text(text)

@@ -13,7 +13,7 @@ from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.fitting import series
 from texgs.report.tables import tables_of
 from texgs.scene.scene_file import read_scene
-from texgs.volume.generate_series import flame
+from texgs.volume.generate import flame
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.coding import attributes_of
 from texgs.volume.grid import ONES, ZEROS, Triple
 
 if TYPE_CHECKING:
@@ -25,6 +24,12 @@ METRES |= {f"{prefix[:1]}m": 10.0**n for prefix, n in POWERS.items() if prefix !
 METRES |= dict.fromkeys(("um", "µm", "μm", "micron", "microns"), 1e-6) | {"angstrom": 1e-10}
 # What CF and cf_xarray call axes, and the letters that they have here.
 LETTERS = {"X": "x", "longitude": "x", "Y": "y", "latitude": "y", "Z": "z", "vertical": "z", "T": "t"}
+# Attributes of CF: what stands for missing samples; how packed ones are scaled; which are valid; and others.
+CODES, PACKED = ("_FillValue", "missing_value"), {"scale_factor": 1.0, "add_offset": 0.0}
+NUMBERS = (*CODES, *PACKED, "valid_min", "valid_max", "valid_range")
+UNSIGNED = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
+CF = (*NUMBERS, UNSIGNED, "axis", "standard_name", "long_name", "units", "positive")
+CF += ("cartesian_axis", "grads_dim", "_CoordinateAxisType")  # of others, known to cf_xarray
 PRESSURES = ("Pa", "hPa", "kPa", "mbar", "millibar", "dbar", "decibar", "bar")
 
 
@@ -56,6 +61,14 @@ class Axis:
         if self.letter == "t" or self.name.lower() in ("t", "time") or " since " in self.unit:
             return "time"
         return "channel" if self.name.lower() in ("c", "ch", "channel") else "space"
+
+
+def attributes_of(array: Any) -> dict[str, Any]:
+    """Return the attributes of CF that an array of h5py, Zarr or xarray has, with bytes as text."""
+    said = {key: np.ravel(array.attrs[key]) for key in CF if key in array.attrs}
+    is_text = {key for key, values in said.items() if values.dtype.kind in "SUO" and values.size == 1}
+    words = {key: said[key][0] for key in is_text}
+    return said | {k: v.decode(errors="replace") if isinstance(v, bytes) else v for k, v in words.items()}
 
 
 def nameless(shape: Sequence[int]) -> list[str]:

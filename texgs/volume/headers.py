@@ -1,4 +1,4 @@
-"""Text headers of NRRD and MetaImage files: their fields, and the file with the samples."""
+"""Text headers of NRRD and MetaImage files, the file with the samples, and what stands in place of a file."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ UPRIGHT = "uprightspacing"  # a pair of ours: +y is up, whatever the directions 
 UNIT = re.compile(r'"([^"]*)"')
 ANALYZE = (".hdr", ".img")  # of ANALYZE and NIfTI in two files, each of which may be given for both
 LONGEST_HEADER = 1 << 20  # bytes; a foreign file may hold no line break for gigabytes
+
+LFS, PAGES = b"version https://git-lfs", (b"<!doctype html", b"<html")  # how a file begins that is another
 
 
 def read_fields(path: Path) -> tuple[dict[str, str], int]:
@@ -86,3 +88,14 @@ def samples_file(header: Path, fields: dict[str, str]) -> Path:
     path = named_file(key, header.parent, name.replace("\\", "/"))
     beside = path.parent.iterdir() if path.parent.is_dir() else ()
     return next((each for each in beside if each.name.lower() == path.name.lower()), path)
+
+
+def require_itself(path: Path) -> bytes:
+    """Refuse what is known to stand in place of a file, and return how the file begins."""
+    with path.open("rb") as file:
+        start = file.read(64)
+    if start.startswith(LFS):
+        raise ArgumentError("expected a file, got a pointer of Git LFS in its place; run git lfs pull")
+    if start.lstrip().lower().startswith(PAGES):
+        raise ArgumentError("expected a file, got a page of HTML in its place; download it again, logged in")
+    return start

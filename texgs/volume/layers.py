@@ -6,6 +6,7 @@ link to nowhere or a type that NetCDF lacks, and on one of Zarr in which a singl
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from math import ceil, prod
 from pathlib import Path
@@ -16,8 +17,18 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
-from texgs.volume.axes import METRES, Axis, axes_of, lattice, picked, upright
-from texgs.volume.coding import coding_of, decoded
+from texgs.volume.axes import (
+    CODES,
+    METRES,
+    NUMBERS,
+    PACKED,
+    UNSIGNED,
+    Axis,
+    axes_of,
+    lattice,
+    picked,
+    upright,
+)
 from texgs.volume.grid import Triple, require_room
 from texgs.volume.slabs import SLAB_BYTES, Source
 from texgs.volume.space import Space
@@ -27,6 +38,7 @@ if TYPE_CHECKING:
 
 SHARE = 4  # one layer takes this part of the free memory at most
 LISTED = 8  # arrays in a message
+EVERYTHING = (-np.inf, np.inf)
 
 
 class LayerSource(Source):
@@ -97,6 +109,50 @@ class LayerSource(Source):
                 samples = np.asarray(self._array[tuple(index)]).transpose(self._turn)
                 self._first, self._kept = first, decoded(samples, *self._coding)
         return self._kept
+
+
+def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> tuple[dict[str, Any], tuple[float, float]]:
+    """Return how samples of a type are coded, by attributes of CF, and the range of those that are valid.
+
+    Numbers may be written as text. Codes are as samples have them, which may have fewer digits. The range is
+    that after decoding; one of whole numbers is of packed samples.
+    """
+    said: dict[str, np.ndarray] = {}
+    for key in (each for each in NUMBERS if np.size(attributes.get(each, ())) > 0):
+        values = np.ravel(attributes[key])
+        try:
+            values = values if values.dtype.kind in "iuf" else values.astype(np.float64)
+        except ValueError:
+            raise ArgumentError(f"{key}: expected a number, got {values[0]}; correct the file") from None
+        with np.errstate(over="ignore"):
+            said[key] = values.astype(dtype) if key in CODES and dtype.kind == "f" else values
+    coding: dict[str, Any] = {key: said[key] for key in CODES if key in said}
+    coding |= {key: float(said[key][0]) for key in PACKED if key in said}
+    if str(attributes.get(UNSIGNED, "")).lower() == "true" and dtype.kind == "i":
+        coding[UNSIGNED] = "true"
+    low, high = said.get("valid_range", EVERYTHING)
+    low, high = said.get("valid_min", [low])[0], said.get("valid_max", [high])[0]
+    if coding.keys() & PACKED and any(np.asarray(end).dtype.kind in "iu" for end in (low, high)):
+        scale, offset = (coding.get(key, default) for key, default in PACKED.items())
+        low, high = sorted(((low - 0.5) * scale + offset, (high + 0.5) * scale + offset))
+    return coding, (float(low), float(high))
+
+
+def decoded(values: np.ndarray, coding: Mapping[str, Any], valid: tuple[float, float]) -> np.ndarray:
+    """Return samples as `coding_of` says they are: packed ones are scaled, NaN stands for those that miss.
+
+    Integers become float32 where any of this is said.
+    """
+    import xarray
+
+    stored = xarray.Variable([*map(str, range(values.ndim))], values, coding)
+    with warnings.catch_warnings(), np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
+        warnings.simplefilter("ignore", xarray.SerializationWarning)  # of several codes
+        samples = xarray.conventions.decode_cf_variable("field", stored, decode_times=False).values
+        if valid != EVERYTHING:
+            samples = np.where((samples < valid[0]) | (samples > valid[1]), np.nan, samples)
+        is_new = samples.dtype.kind == "f" != values.dtype.kind
+        return samples.astype(np.float32) if is_new else samples
 
 
 def one_of(arrays: Mapping[str, Any], variable: str | None) -> str:

@@ -10,8 +10,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
-from texgs.volume.axes import Axis, axes_of, nameless
-from texgs.volume.coding import attributes_of
+from texgs.volume.axes import Axis, attributes_of, axes_of, nameless
 from texgs.volume.grid import Triple
 from texgs.volume.layers import LayerSource, gaps_in, labelled, one_of
 

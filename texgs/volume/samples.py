@@ -15,8 +15,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Dims, byte_count, require_room
-from texgs.volume.headers import METAIMAGE, read_fields, samples_file
-from texgs.volume.pointers import require_itself
+from texgs.volume.headers import METAIMAGE, read_fields, require_itself, samples_file
 
 NUMBERS = ("elementspacing", "elementsize", "offset", "position", "origin", "transformmatrix", "rotation")
 ENCODINGS = {"raw": "raw", "gzip": "gzip", "gz": "gzip", "bzip2": "bzip2", "bz2": "bzip2"} | dict.fromkeys(

@@ -15,8 +15,17 @@ from texgs.core.io import reading_as
 from texgs.volume.axes import Axis, picked
 from texgs.volume.grid import ONES, ZEROS, Grid, Triple, require_room
 from texgs.volume.slabs import ArraySource, RawSource, Source
-from texgs.volume.slice_names import arranged, tiffs_in
-from texgs.volume.tiff_images import axes_of, chosen, file_of, images_in, is_set, require_pages, told_of
+from texgs.volume.tiff_images import (
+    arranged,
+    axes_of,
+    chosen,
+    file_of,
+    images_in,
+    is_set,
+    require_pages,
+    tiffs_in,
+    told_of,
+)
 
 READABLE = (1, 8, 32773, 32946, 34925)  # none, deflate, packbits and LZMA: others need imagecodecs
 PAGES = 2  # in memory at a time: one as it is decoded, and its place in the slab

@@ -78,8 +78,7 @@ def prepared(volume: Volume, fields: Sequence[Source], target: Path, shown: Any 
 
 def generated(volume: Volume) -> Source:
     """Return the field of a generator, at its time where it changes."""
-    from texgs.volume.generate import GENERATORS, RANDOM
-    from texgs.volume.generate_series import SERIES
+    from texgs.volume.generate import GENERATORS, RANDOM, SERIES
     from texgs.volume.slabs import ArraySource
 
     name, last = str(volume.generator), volume.steps - 1
