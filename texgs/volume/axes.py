@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from texgs.volume.grid import ONES, ZEROS, Triple
 if TYPE_CHECKING:
     import xarray
 
+NUMBER = re.compile("0|[1-9][0-9]{0,17}")  # of a channel or step
 UNEVEN = 0.01  # of the mean distance: coordinates are often rounded to float32
 COMPONENTS = (2, 3, 4)  # sizes of a last axis without a name that is none of space
 POWERS = {"nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3}
@@ -144,20 +146,21 @@ def picked(axes: Sequence[Axis], channel: str | None = None, time: int | None = 
     if unfit := said.keys() - {axis.kind for axis in axes}:
         raise ArgumentError(f"dataset.volume.{min(unfit)}: there is no such axis in {sizes}; leave it out")
     pairs = zip(axes, is_space, strict=True)
-    return [slice(None) if is_kept else _place(axis, said.get(axis.kind, "")) for axis, is_kept in pairs]
+    return [slice(None) if is_kept else place_on(axis, said.get(axis.kind)) for axis, is_kept in pairs]
 
 
-def _place(axis: Axis, wanted: str) -> int:
+def place_on(axis: Axis, wanted: str | int | None) -> int:
     """Return the index of a channel by its label or number, or of a step of time, by default the first."""
-    numbers = [str(k) for k in range(axis.size)]
-    wanted = wanted or ("0" if axis.size == 1 or axis.kind == "time" else "")
+    first = "0" if axis.size == 1 or axis.kind == "time" else ""
+    name = first if wanted is None else str(wanted)
     labels = [channel.label for channel in axis.channels] if axis.kind == "channel" else []
-    for names in (labels, numbers):
-        if wanted in names:
-            return names.index(wanted)
-    known = ", ".join(map("{} ({})".format, numbers, labels)) or f"0 to {axis.size - 1}"
+    if name in labels:
+        return labels.index(name)
+    if NUMBER.fullmatch(name) and int(name) < axis.size:
+        return int(name)
+    known = ", ".join(f"{k} ({label})" for k, label in enumerate(labels)) or f"0 to {axis.size - 1}"
     key = f"dataset.volume.{axis.kind}" + ", or a basic TF's channel" * (axis.kind == "channel")
-    raise ArgumentError(f"{key}: expected one of {known}, got {wanted or 'none'}")
+    raise ArgumentError(f"{key}: expected one of {known}, got {name or 'none'}")
 
 
 def lattice(

@@ -15,11 +15,11 @@ import SimpleITK as sitk
 from pydicom.uid import MultiFrameGrayscaleWordSecondaryCaptureImageStorage as CAPTURE
 
 from texgs.core.errors import ArgumentError
+from texgs.volume.axes import Axis, place_on
 from texgs.volume.dicom_series import ALL, FileSeries, chosen, phases_of, series_in
 from texgs.volume.dicom_slice import CONVERT, TIMES, Slice, slices_in
 from texgs.volume.grid import dims_of, require_room
 from texgs.volume.itk_image import sentence
-from texgs.volume.slabs import require_step
 from texgs.volume.space import LPS
 
 UNEVEN = 0.05  # of the distance of slices: how much one may differ, as places are rounded in files
@@ -56,11 +56,9 @@ def step_at(path: Path, series: str | None, time: int) -> tuple[list[Slice], int
     every = series_in(path) if path.is_dir() else [FileSeries([str(path)])]
     if series == ALL and len(every) > 1:
         phases, note = phases_of(every)
-        require_step(time, len(phases))
-        return slices_of(phases[time]), len(phases), note
+        return slices_of(phases[place_on(Axis("time", len(phases)), time)]), len(phases), note
     steps = steps_of(slices_of(chosen(every, series)))
-    require_step(time, len(steps))
-    return steps[time], len(steps), ""
+    return steps[place_on(Axis("time", len(steps)), time)], len(steps), ""
 
 
 def slices_of(series: FileSeries) -> list[Slice]:

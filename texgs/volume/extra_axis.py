@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from texgs.core.errors import ArgumentError
+from texgs.volume.axes import Axis, place_on
 from texgs.volume.headers import METAIMAGE, NRRD, read_fields
-from texgs.volume.slabs import require_step
 
 OF_SPACE = ("domain", "space")  # kinds of axes of NRRD
 SEQUENCE = ".seq.nrrd"  # of 3D Slicer, whose list is one of steps in time
@@ -34,18 +34,15 @@ class ExtraAxis(NamedTuple):
         return np.moveaxis(values.reshape(shape), 3 - self.place, 0)[index]
 
 
-def extra_axis(path: Path, time: int, channel: str | None) -> tuple[ExtraAxis | None, int]:
+def extra_axis(path: Path, time: int | None, channel: str | None) -> tuple[ExtraAxis | None, int]:
     """Return the axis that is none of space, and which of it is chosen: by default the first step."""
     axis = axis_of(path)
-    for key, is_said in (("time", time > 0), ("channel", channel is not None)):
-        if is_said and (axis is None or axis.key != key):
+    for key, wanted in (("time", time), ("channel", channel)):
+        if wanted is not None and (axis is None or axis.key != key):
             raise ArgumentError(f"dataset.volume.{key}: there is no such axis; leave it out")
-    if axis is not None and axis.key == "time":
-        require_step(time, axis.size)
-    elif axis is not None and channel not in [str(k) for k in range(axis.size)]:
-        known = f"0 to {axis.size - 1}, as there are {axis.size} components per sample"
-        raise ArgumentError(f"dataset.volume.channel: expected one of {known}, got {channel or 'none'}")
-    return axis, int(channel or time)
+    if axis is None:
+        return None, 0
+    return axis, place_on(Axis(axis.key, axis.size), channel if axis.key == "channel" else time)
 
 
 def axis_of(path: Path) -> ExtraAxis | None:

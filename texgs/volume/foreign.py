@@ -50,7 +50,7 @@ def open_foreign(path: Path, spacing: Triple | None, origin: Triple | None, **ke
     those of the file; `series` is the number or UID of one of several in a folder of DICOM slices, `time` the
     step of one that has several volumes, and `variable` the name of a point array of VTK's image data.
     """
-    suffix, time = path.suffix.lower(), keys.get("time", 0)
+    suffix, time = path.suffix.lower(), keys.get("time")
     with reading_as(_kind(path)):
         stored = stored_samples(path) if suffix in (*NRRD, *METAIMAGE) else None
         extra, index = extra_axis(path, time, keys.get("channel")) if stored is not None else (None, 0)
@@ -70,7 +70,7 @@ def open_foreign(path: Path, spacing: Triple | None, origin: Triple | None, **ke
                 reply["n_steps"] = extra.size if extra.key == "time" else 1
         source = ArraySource(Grid(permuted_values(values, axes), steps, first, space=space), path.name)
         source.n_steps = reply.get("n_steps", 1)
-        source.note = "; ".join(filter(None, (step_note(time, source.n_steps), reply.get("note"))))
+        source.note = "; ".join(filter(None, (step_note(time or 0, source.n_steps), reply.get("note"))))
         return source
 
 

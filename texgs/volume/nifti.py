@@ -7,8 +7,9 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
+from texgs.volume.axes import Axis, place_on
 from texgs.volume.grid import Grid, Triple, check_lattice, dims_of, require_room
-from texgs.volume.slabs import ArraySource, Source, require_step, step_note
+from texgs.volume.slabs import ArraySource, Source, step_note
 from texgs.volume.space import RAS, RIGHT_HANDED, Space
 
 BY_NIBABEL = (".nii", ".nii.gz", ".hdr", ".img", ".mgh", ".mgz")
@@ -32,7 +33,7 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: 
         if stored.fields:
             raise ArgumentError(f"expected a scalar volume, got {len(stored.fields)} components per sample")
         n_steps, *rest = image.shape[3:] or (1,)
-        require_step(time, n_steps)
+        place_on(Axis("time", n_steps), time)
         shape = image.shape[:3] + tuple(size for size in rest if size != 1)
         x, y, z = dims_of(shape)[::-1]
         check_lattice((x, y, z), stored)
