@@ -79,19 +79,3 @@ def test_steps_and_components_of_metaimage(tmp_path, name, is_compressed):
     np.testing.assert_array_equal(whole(tmp_path / name, channel="1"), VALUES[1])
     with pytest.raises(ArgumentError, match="as there are 3 components per sample, got none"):
         open_source(tmp_path / name)
-
-
-def test_a_step_that_is_not_there_any_more(tmp_path):
-    write_nrrd(tmp_path / "v.nrrd", 3, "time", "raw")
-    content = (tmp_path / "v.nrrd").read_bytes()
-    (tmp_path / "v.nrrd").write_bytes(content[:-1])
-    with pytest.raises(ArgumentError, match="the file is cut off"):
-        open_source(tmp_path / "v.nrrd")
-
-
-def test_two_axes_more_are_refused(tmp_path):
-    nrrd.write(str(tmp_path / "v.nrrd"), np.zeros((2, 2, 3, 3, 3), np.uint8), index_order="C")
-    sitk.WriteImage(sitk.GetImageFromArray(np.zeros((2, 3, 3, 3, 2)), isVector=True), tmp_path / "v.mha")
-    for name in ("v.nrrd", "v.mha"):
-        with pytest.raises(ArgumentError, match=r"expected (3 axes|a scalar volume)"):
-            open_source(tmp_path / name)
