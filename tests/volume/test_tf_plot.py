@@ -7,7 +7,7 @@ from PIL import Image
 from texgs.core.figures import write_figure
 from texgs.volume.grid import Grid
 from texgs.volume.summaries import histogram
-from texgs.volume.tf_plot import CAST, casts_of, plot
+from texgs.volume.tf_plot import CAST_PIXELS, casts_of, plot
 from texgs.volume.transfer import TransferFunction
 
 pytest.importorskip("matplotlib")
@@ -93,7 +93,10 @@ def test_casts_show_what_each_function_does_and_all_of_them(tmp_path):
     blue = TransferFunction(((60, 0.9), (100, 0.9)), ((60, 0, 0, 1),))
     casts = casts_of(balls(), {"a$": red, "b": blue})
     assert list(casts) == ["a$", "b", "all"]
-    assert all(cast.shape == (CAST, CAST, 3) and 0 <= cast.min() < cast.max() <= 1 for cast in casts.values())
+    assert all(
+        cast.shape == (CAST_PIXELS, CAST_PIXELS, 3) and 0 <= cast.min() < cast.max() <= 1
+        for cast in casts.values()
+    )
     for channel, name, other in ((0, "a$", "b"), (2, "b", "a$")):
         seen = {
             key: int((cast[..., channel] > 1.5 * cast[..., 2 - channel]).sum()) for key, cast in casts.items()

@@ -24,7 +24,7 @@ from texgs.fitting.settings import Densify, Losses, Phase, Rates, Seeds
 from texgs.raster.shading import MATERIAL
 from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
-from texgs.volume.images import Images, shrunk
+from texgs.volume.images import Images, shrink
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
@@ -214,7 +214,7 @@ def most_seen(
     surfels: Mapping[str, Tensor], colors: Tensor, images: Images, count: int, seed: int
 ) -> tuple[dict[str, Tensor], Tensor]:
     """Fit surfels for a moment and keep the `count` that contribute most to all views, as they are then."""
-    small = shrunk(images, max(images.planes.shape[2:]) // PIXELS)
+    small = shrink(images, max(images.planes.shape[2:]) // PIXELS)
     start = {**surfels, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20.0, "bounded")}
     fit = Fit(start, ShadingModel(), small, PHASE, seed)
     for _ in fit.run():

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray
 
 NUMBER = re.compile("0|[1-9][0-9]{0,17}")  # of a channel or step
-UNEVEN = 0.01  # of the mean distance: coordinates are often rounded to float32
+SPACING_TOLERANCE = 0.01  # of the mean distance: coordinates are often rounded to float32
 COMPONENTS = (2, 3, 4)  # sizes of a last axis without a name that is none of space
 POWERS = {"nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3}
 WORDS = ("meter", "metre", "meters", "metres")
@@ -117,7 +117,7 @@ def along(name: str, size: int, places: xarray.DataArray | None = None, letter: 
     if positive.lower() == "down" or (unit in PRESSURES and not positive):
         numbers = -numbers
     step = float(numbers[-1] - numbers[0]) / (size - 1)
-    is_even = bool(np.abs(np.diff(numbers) - step).max() <= UNEVEN * abs(step))
+    is_even = bool(np.abs(np.diff(numbers) - step).max() <= SPACING_TOLERANCE * abs(step))
     return Axis(name, size, unit, float(numbers[0]), step, is_even, letter=letter)
 
 
@@ -136,7 +136,9 @@ def upright(axes: Sequence[Axis]) -> tuple[list[int], str]:
     return [0, 1, 2], f"axes {names} are taken for z, y, x, as they are stored" if is_guess else ""
 
 
-def picked(axes: Sequence[Axis], channel: str | None = None, time: int | None = None) -> list[int | slice]:
+def choose_places(
+    axes: Sequence[Axis], channel: str | None = None, time: int | None = None
+) -> list[int | slice]:
     """Return one index for each axis that is none of space or of size 1, all of the three others."""
     said = {kind: str(value) for kind, value in (("time", time), ("channel", channel)) if value is not None}
     is_space = [axis.kind == "space" and axis.size > 1 for axis in axes]

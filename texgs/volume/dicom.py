@@ -16,14 +16,14 @@ from pydicom.uid import MultiFrameGrayscaleWordSecondaryCaptureImageStorage as C
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Axis, place_on
-from texgs.volume.dicom_series import ALL, FileSeries, chosen, phases_of, series_in
+from texgs.volume.dicom_series import ALL, FileSeries, choose_series, phases_of, series_in
 from texgs.volume.dicom_slice import CONVERT, TIMES, Slice, slices_in
 from texgs.volume.grid import dims_of, require_room
 from texgs.volume.itk_image import sentence
 from texgs.volume.space import LPS
 
-UNEVEN = 0.05  # of the distance of slices: how much one may differ, as places are rounded in files
-TILT = 0.01  # of the distance of the outer slices: how far one may be shifted across it
+GAP_TOLERANCE = 0.05  # of the distance of slices: how much one may differ, as places are rounded in files
+TILT_TOLERANCE = 0.01  # of the distance of the outer slices: how far one may be shifted across it
 ROUNDING = 0.01  # mm; and of the widest gap: slices that are closer are at one place
 
 
@@ -46,7 +46,7 @@ def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any
         "space": LPS,
         "unit": "mm",
         "n_steps": n_steps,
-        "note": "; ".join(filter(None, (note, first.note, without_padding(values, slices)))),
+        "note": "; ".join(filter(None, (note, first.note, replace_padding(values, slices)))),
     }
     return lattice, values
 
@@ -57,7 +57,7 @@ def step_at(path: Path, series: str | None, time: int) -> tuple[list[Slice], int
     if series == ALL and len(every) > 1:
         phases, note = phases_of(every)
         return slices_of(phases[place_on(Axis("time", len(phases)), time)]), len(phases), note
-    steps = steps_of(slices_of(chosen(every, series)))
+    steps = steps_of(slices_of(choose_series(every, series)))
     return steps[place_on(Axis("time", len(steps)), time)], len(steps), ""
 
 
@@ -113,7 +113,7 @@ def slice_distance(slices: list[Slice]) -> float:
                 f"{each.name}: expected size, spacing and orientation of {first.name}; {CONVERT}"
             )
         shift = np.abs(first.directions[:2] @ (each.place - first.place)).max()
-        if shift > TILT * (each.height - first.height) + ROUNDING:
+        if shift > TILT_TOLERANCE * (each.height - first.height) + ROUNDING:
             raise ArgumentError(
                 f"{each.name}: expected slices behind each other, got one {shift:.3g} mm "
                 f"beside {first.name}; correct the tilt of the gantry first"
@@ -121,7 +121,7 @@ def slice_distance(slices: list[Slice]) -> float:
     gaps = np.diff([each.height for each in slices])
     step = float(np.sort(gaps)[(len(gaps) - 1) // 2])
     worst = int(np.abs(gaps - step).argmax())
-    if abs(gaps[worst] - step) > UNEVEN * step:
+    if abs(gaps[worst] - step) > GAP_TOLERANCE * step:
         raise ArgumentError(
             f"{slices[worst].name} and {slices[worst + 1].name}: expected slices {step:.6g} mm apart, got "
             f"{gaps[worst]:.6g} mm; complete the series, or {CONVERT}"
@@ -165,7 +165,7 @@ def stored_frames(path: Path) -> np.ndarray:
         return sitk.GetArrayFromImage(sitk.ReadImage(file))
 
 
-def without_padding(values: np.ndarray, slices: Sequence[Slice]) -> str:
+def replace_padding(values: np.ndarray, slices: Sequence[Slice]) -> str:
     """Let samples that stand for none take the smallest value of the others, and return what to say of it."""
     masks = np.zeros(values.shape, bool)
     for mask, plane, each in zip(masks, values, slices, strict=True):

@@ -10,7 +10,7 @@ import pydicom
 import SimpleITK as sitk
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.dicom_slice import said_in, slices_in
+from texgs.volume.dicom_slice import slices_in, values_in
 
 ALL = "all"  # in place of the number of a series
 OF_SERIES = ["SeriesNumber", "SeriesDescription", "TemporalPositionIdentifier", "Modality"]
@@ -43,7 +43,7 @@ def series_in(folder: Path) -> list[FileSeries]:
     for uid in reader.GetGDCMSeriesIDs(str(folder)):
         files = reader.GetGDCMSeriesFileNames(str(folder), uid)
         header = pydicom.dcmread(files[0], stop_before_pixels=True, force=True, specific_tags=OF_SERIES)
-        first = said_in([header])
+        first = values_in([header])
         number, description, position, kind = (str(first.get(each, "")) for each in OF_SERIES)
         lattice = lattice_of(Path(files[0]), len(files))
         every.append(FileSeries(files, uid, number, description or kind, position, lattice))
@@ -72,7 +72,7 @@ def lattice_of(file: Path, count: int) -> tuple[float, ...]:
     return tuple(round(float(each), 3) for each in numbers)
 
 
-def chosen(every: Sequence[FileSeries], series: str | None) -> FileSeries:
+def choose_series(every: Sequence[FileSeries], series: str | None) -> FileSeries:
     """Return the only series, or the one whose number or UID is asked for."""
     matching = [each for each in every if series in (None, ALL, each.uid, each.number)]
     if len(matching) != 1:

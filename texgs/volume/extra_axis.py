@@ -73,12 +73,12 @@ def one_volume(path: Path, axis: ExtraAxis | None) -> Iterator[Path]:
         head = file.read(read_fields(path)[1]).decode("latin-1")
     with TemporaryDirectory() as folder:
         header = Path(folder) / path.name
-        lines = [bare(line, axis.place, path.suffix.lower() in NRRD) for line in head.splitlines()]
+        lines = [without_axis(line, axis.place, path.suffix.lower() in NRRD) for line in head.splitlines()]
         header.write_text("\n".join([*lines, "", ""]), encoding="latin-1")
         yield header
 
 
-def bare(line: str, place: int, is_nrrd: bool) -> str:
+def without_axis(line: str, place: int, is_nrrd: bool) -> str:
     """Return a line of a header without what it says of an axis: one of four words, or of a matrix."""
     name, mark, value = line.partition(":" if is_nrrd else "=")
     key, words = name.replace(" ", "").strip().lower(), WORD.findall(value)

@@ -32,14 +32,15 @@ from texgs.volume.grid import (
     require_room,
 )
 from texgs.volume.headers import METAIMAGE, NRRD
-from texgs.volume.samples import StoredSamples, stored_samples, unpacked
+from texgs.volume.samples import StoredSamples, stored_samples, unpack
 from texgs.volume.slabs import ArraySource, RawSource, Source, step_note
 from texgs.volume.space import LEFT_HANDED, RIGHT_HANDED, Space
 
 BY_VTK = (".vti", ".vtr", ".vts", ".pvti", ".pvtr", ".vtk", ".slc")
 DICOM = (".dcm", ".ima")  # suffixes of files; slices without are read in their folder
-SECONDS, RATE = 60.0, 1e6  # how long reading may take: at least, and bytes per second of a large file
-LONGEST_LINE = 1 << 20  # bytes of what the process says before the samples
+MIN_SECONDS = 60.0  # that reading may take, of a file of any size
+BYTES_PER_SECOND = 1e6  # that reading has to keep up with, of a large file
+MAX_LINE_BYTES = 1 << 20  # bytes of what the process says before the samples
 COMPLAINT = re.compile(r"error|fail|cannot|corrupt|unexpected", re.IGNORECASE)
 
 
@@ -64,7 +65,7 @@ def open_foreign(path: Path, spacing: Triple | None, origin: Triple | None, **ke
                 return _raw(stored, dims, dtype, steps, first, space)
             every = (nx, ny, nz * extra.size) if extra else dims
             is_raw = stored.encoding == "raw"
-            values = _raw(stored, every, dtype).mapped() if is_raw else unpacked(stored, every, dtype)
+            values = _raw(stored, every, dtype).mapped() if is_raw else unpack(stored, every, dtype)
             if extra is not None:
                 values = extra.picked(values, index)
                 reply["n_steps"] = extra.size if extra.key == "time" else 1
@@ -107,10 +108,10 @@ def _ask(path: Path, keys: dict[str, Any], is_header_only: bool) -> tuple[dict[s
     size = sum(each.stat().st_size for each in (path.iterdir() if path.is_dir() else [path]))
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(command, **pipes) as child:  # type: ignore[call-overload]
-        watchdog = Timer(SECONDS + size / RATE, child.kill)
+        watchdog = Timer(MIN_SECONDS + size / BYTES_PER_SECOND, child.kill)
         watchdog.start()
         try:
-            reply, values = _received(child.stdout, is_header_only)
+            reply, values = _receive(child.stdout, is_header_only)
         finally:
             watchdog.cancel()
             child.kill()
@@ -123,9 +124,9 @@ def _ask(path: Path, keys: dict[str, Any], is_header_only: bool) -> tuple[dict[s
     return reply, values
 
 
-def _received(stream: IO[bytes], is_header_only: bool) -> tuple[dict[str, Any] | None, np.ndarray]:
+def _receive(stream: IO[bytes], is_header_only: bool) -> tuple[dict[str, Any] | None, np.ndarray]:
     """Return what the process says about a volume, None if it died, and the samples where it sends some."""
-    reply = json.loads(stream.readline(LONGEST_LINE) or "null")
+    reply = json.loads(stream.readline(MAX_LINE_BYTES) or "null")
     if reply is None or "error" in reply or is_header_only:
         return reply, np.empty(0)
     dims, dtype = reply["dims"], np.dtype(reply["dtype"])

@@ -27,7 +27,7 @@ from texgs.volume.navier_stokes import (
 
 Array = np.ndarray
 ORBITAL = (4, 3, 0)  # quantum numbers n, l and m: 4f z^3
-FADED = 0.05  # of the largest amplitude along the radius of an orbital: what is farther out is cut off
+AMPLITUDE_CUTOFF = 0.05  # of the largest along the radius of an orbital: what is farther out is cut off
 STEPS = 4096  # along the radius and the polar angle, where the largest amplitude is looked for
 TURBULENCE_RESOLUTION, JETS_RESOLUTION = 64, 48  # cells of the simulation along each side; even
 DURATION = 1.5  # of turbulence; an eddy turns over in about 1. Tubes have formed by 1, then they decay
@@ -184,7 +184,7 @@ def orbital_cube(size: int, n: int, degree: int, order: int) -> Array:
     """
     r = np.linspace(0, 4 * n * (n + 2), STEPS)
     along_radius = np.abs(radial(n, degree, r))
-    reach = r[np.flatnonzero(along_radius > FADED * along_radius.max())[-1] + 1]
+    reach = r[np.flatnonzero(along_radius > AMPLITUDE_CUTOFF * along_radius.max())[-1] + 1]
     around = np.abs(angular(degree, abs(order), np.linspace(-1, 1, STEPS), np.zeros(1)))
     axis = np.linspace(-reach, reach, size)
     values = wave_function(n, degree, order, axis[:, None, None], axis, axis[:, None])

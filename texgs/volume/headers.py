@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from texgs.volume.space import Triple
 
 NRRD, METAIMAGE = (".nrrd", ".nhdr"), (".mhd", ".mha")  # suffixes
-UPRIGHT = "uprightspacing"  # a pair of ours: +y is up, whatever the directions are
+UPRIGHT_SPACING = "uprightspacing"  # a pair of ours: +y is up, whatever the directions are
 UNIT = re.compile(r'"([^"]*)"')
 ANALYZE = (".hdr", ".img")  # of ANALYZE and NIfTI in two files, each of which may be given for both
-LONGEST_HEADER = 1 << 20  # bytes; a foreign file may hold no line break for gigabytes
+MAX_HEADER_BYTES = 1 << 20  # bytes; a foreign file may hold no line break for gigabytes
 
 LFS, PAGES = b"version https://git-lfs", (b"<!doctype html", b"<html")  # how a file begins that is another
 
@@ -27,7 +27,7 @@ def read_fields(path: Path) -> tuple[dict[str, str], int]:
     """Read the fields of a header, and its length in bytes; names are in lower case and without spaces."""
     is_nrrd = path.suffix.lower() in NRRD
     with path.open("rb") as file:
-        head = BytesIO(file.read(LONGEST_HEADER))
+        head = BytesIO(file.read(MAX_HEADER_BYTES))
     if is_nrrd and not head.getvalue().startswith(b"NRRD"):
         raise ArgumentError("expected an NRRD file, but it does not start with NRRD")
     fields: dict[str, str] = {}
@@ -40,8 +40,8 @@ def read_fields(path: Path) -> tuple[dict[str, str], int]:
             fields[name.replace(" ", "").strip().lower() + sign] = value.removeprefix(sign).strip()
         if "elementdatafile" in fields:  # the last one
             break
-    if head.tell() == LONGEST_HEADER:
-        raise ArgumentError(f"expected a header of less than {LONGEST_HEADER} bytes, got a longer one")
+    if head.tell() == MAX_HEADER_BYTES:
+        raise ArgumentError(f"expected a header of less than {MAX_HEADER_BYTES} bytes, got a longer one")
     if not is_nrrd and "elementdatafile" not in fields:
         raise ArgumentError("expected a MetaImage file, found no ElementDataFile in its header")
     return fields, head.tell()
@@ -55,7 +55,7 @@ def unit_in(fields: Mapping[str, str]) -> str:
 
 def spacing_in(fields: Mapping[str, str]) -> Triple | None:
     """Return the spacing of a volume that is prepared, with axes of its file; None of others."""
-    said = fields.get(f"{UPRIGHT}=", "").split()
+    said = fields.get(f"{UPRIGHT_SPACING}=", "").split()
     return (float(said[0]), float(said[1]), float(said[2])) if said else None
 
 

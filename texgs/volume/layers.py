@@ -25,8 +25,8 @@ from texgs.volume.axes import (
     UNSIGNED,
     Axis,
     axes_of,
+    choose_places,
     lattice,
-    picked,
     upright,
 )
 from texgs.volume.grid import Triple, require_room
@@ -36,8 +36,8 @@ from texgs.volume.space import Space
 if TYPE_CHECKING:
     import xarray
 
-SHARE = 4  # one layer takes this part of the free memory at most
-LISTED = 8  # arrays in a message
+MEMORY_PARTS = 4  # one layer takes this part of the free memory at most
+MAX_LISTED = 8  # arrays in a message
 EVERYTHING = (-np.inf, np.inf)
 
 
@@ -71,7 +71,7 @@ class LayerSource(Source):
         **keys: Any,
     ) -> None:
         self._name, self._array = name, array
-        self._index = picked(axes, **keys)
+        self._index = choose_places(axes, **keys)
         space = [k for k, index in enumerate(self._index) if isinstance(index, slice)]
         self._turn, guess = upright([axes[k] for k in space])
         z, y, x = (axes[space[k]] for k in self._turn)
@@ -79,13 +79,13 @@ class LayerSource(Source):
         self._signs = [-1 if axis.step < 0 else 1 for axis in (z, y, x)]
         spacing, origin, remark = lattice((x, y, z), *given)
         self._coding = coding_of(attributes, array.dtype)
-        dtype = decoded(np.empty(0, array.dtype), *self._coding).dtype
+        dtype = decode(np.empty(0, array.dtype), *self._coding).dtype
         super().__init__(Path(name).name, (x.size, y.size, z.size), dtype, spacing, origin)
         self.space = Space(unit=x.unit if x.unit in METRES and not remark else "")
         self.take(axes, self._index)
         self.note = "; ".join(filter(None, (note, self.note, guess, remark)))
         plane, chunk = x.size * y.size * self.dtype.itemsize, chunks[self._z] if chunks else 1
-        most = max(1, free_memory() // (SHARE * plane))
+        most = max(1, free_memory() // (MEMORY_PARTS * plane))
         self._depth = min(chunk * max(1, SLAB_BYTES // (chunk * plane)), most)  # slices in a layer
         require_room((x.size, y.size, self._depth), self.dtype)
         self._first, self._kept = -1, np.empty(0)  # index of its first slice, and the layer in memory
@@ -107,7 +107,7 @@ class LayerSource(Source):
             index[self._z] = slice(first, min(first + self._depth, self.dims[2]))
             with reading_as("an array that is whole", where=f"{self._name}: "):
                 samples = np.asarray(self._array[tuple(index)]).transpose(self._turn)
-                self._first, self._kept = first, decoded(samples, *self._coding)
+                self._first, self._kept = first, decode(samples, *self._coding)
         return self._kept
 
 
@@ -138,7 +138,7 @@ def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> tuple[dict[str,
     return coding, (float(low), float(high))
 
 
-def decoded(values: np.ndarray, coding: Mapping[str, Any], valid: tuple[float, float]) -> np.ndarray:
+def decode(values: np.ndarray, coding: Mapping[str, Any], valid: tuple[float, float]) -> np.ndarray:
     """Return samples as `coding_of` says they are: packed ones are scaled, NaN stands for those that miss.
 
     Integers become float32 where any of this is said.
@@ -165,16 +165,18 @@ def one_of(arrays: Mapping[str, Any], variable: str | None) -> str:
     name = fields[0] if len(fields) == 1 and not variable else (variable or "").strip("/")
     if name in fields:
         return name
-    got, more = variable or "none", f" and {len(fields) - LISTED} more" if len(fields) > LISTED else ""
+    got, n_more = variable or "none", len(fields) - MAX_LISTED
     if name in arrays:
         got = f"{name or '/'} of {' x '.join(map(str, arrays[name].shape))} {arrays[name].dtype}"
+    known = ", ".join(each or "/" for each in fields[:MAX_LISTED]) or "another file"
+    known += f" and {n_more} more" if n_more > 0 else ""
     raise ArgumentError(
         "dataset.volume.variable: expected an array of real numbers with three axes or more, got "
-        f"{got}; choose one of {', '.join(each or '/' for each in fields[:LISTED]) or 'another file'}{more}"
+        f"{got}; choose one of {known}"
     )
 
 
-def labelled(
+def labelled_source(
     name: str | Path, field: xarray.DataArray, given: tuple[Triple | None, Triple | None], **keys: Any
 ) -> LayerSource:
     """Return an array of xarray, whose labels say where its axes run; keys are those of `LayerSource`."""

@@ -12,7 +12,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.volume.axes import Axis, attributes_of, axes_of, nameless
 from texgs.volume.grid import Triple
-from texgs.volume.layers import LayerSource, gaps_in, labelled, one_of
+from texgs.volume.layers import LayerSource, gaps_in, labelled_source, one_of
 
 CLASSIC = (b"CDF\x01", b"CDF\x02")  # the latter with offsets of 64 bits
 NO_COORDINATES = b"This is a netCDF dimension but not a netCDF variable"  # begins the NAME of such a scale
@@ -45,7 +45,7 @@ def _classic(path: Path, variable: str | None, given: Any, **keys: Any) -> Layer
     file = xarray.open_dataset(path, engine="scipy", decode_cf=False, cache=False)
     field = file[one_of({str(name): file[name] for name in file.variables}, variable)]
     code = NEVER_WRITTEN.get(field.dtype.str[1:], {})
-    return labelled(path, field.assign_attrs(code | field.attrs), given, **keys)
+    return labelled_source(path, field.assign_attrs(code | field.attrs), given, **keys)
 
 
 def _hdf5(path: Path, variable: str | None, given: Any, **keys: Any) -> LayerSource:

@@ -69,7 +69,7 @@ def _is_true(fields: dict[str, str], name: str) -> bool:
     return fields.get(name, "").lower() in ("true", "1")
 
 
-def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
+def unpack(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
     """Unpack samples [Z, Y, X] of a type with byte order, as far as the header says and no further."""
     n_bytes = byte_count(dims, dtype)
     if stored.encoding == "text":
@@ -92,7 +92,7 @@ def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
     most = 2 * n_bytes if stored.skip == -1 else n_bytes + stored.skip + 1
     with stored.path.open("rb") as file:
         file.seek(stored.offset)
-        samples = _unpack(file, stored.encoding, most)
+        samples = _read_stream(file, stored.encoding, most)
     start = len(samples) - n_bytes if stored.skip == -1 else stored.skip
     if start < 0 or len(samples) != start + n_bytes:
         more = "at least " if len(samples) == most else ""
@@ -103,7 +103,7 @@ def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
     return np.frombuffer(samples, dtype, prod(dims), start).reshape(dims[::-1])
 
 
-def _unpack(file: BinaryIO, encoding: str, most: int) -> bytes:
+def _read_stream(file: BinaryIO, encoding: str, most: int) -> bytes:
     """Read a stream, or several behind each other, as programs write them that use several cores."""
     if encoding == "zlib":
         return zlib.decompressobj().decompress(file.read(), most)

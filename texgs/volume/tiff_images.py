@@ -49,7 +49,7 @@ def is_set(images: Sequence[Any], files: Sequence[Path]) -> bool:
     return len(names) > 1
 
 
-def chosen(images: Sequence[Any], wanted: str | None, tiff: Any) -> tuple[Any, str]:
+def choose_image(images: Sequence[Any], wanted: str | None, tiff: Any) -> tuple[Any, str]:
     """Return the image of a name or number, and a note of what was taken without one.
 
     That is the only volume, or the only one with pages in an open file, which may be None.
@@ -90,7 +90,7 @@ def axes_of(image: Any, labels: Sequence[str]) -> tuple[list[Axis], str]:
     return axes, "its steps of time are taken for slices, as there are no others"
 
 
-def told_of(image: Any, tiff: Any, images: Sequence[Any]) -> tuple[Triple | None, list[str]]:
+def spacing_and_labels(image: Any, tiff: Any, images: Sequence[Any]) -> tuple[Triple | None, list[str]]:
     """Return the spacing x, y, z, in the unit of x, as OME or ImageJ tells, and OME's labels of channels."""
     if not tiff.is_ome:
         depth = (tiff.imagej_metadata or {}).get("spacing")
@@ -140,7 +140,7 @@ def tiffs_in(folder: Path) -> list[Path]:
     return sorted((file for file in files if file.suffix.lower() in SLICES), key=natural_order)
 
 
-def arranged(files: Sequence[Path]) -> tuple[list[Axis], list[Path]]:
+def arrange(files: Sequence[Path]) -> tuple[list[Axis], list[Path]]:
     """Return the axes that numbers in the names count, and the files in their order, the last axis fastest.
 
     One number counts slices, by even steps. Others may count steps of time and channels, if the word before
