@@ -128,13 +128,6 @@ def test_volumes_of_one_series_are_steps_in_time(tmp_path, tags):
         open_source(tmp_path, time=3)
 
 
-def test_one_volume_has_one_step(tmp_path):
-    write_series(tmp_path, sample_values(), AcquisitionNumber=1)
-    assert (open_source(tmp_path).n_steps, open_source(tmp_path).note) == (1, "")
-    with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 0, got 1$"):
-        open_source(tmp_path, time=1)
-
-
 def test_compressed_slices_are_read(tmp_path):
     write_series(tmp_path, sample_values())
     for path in tmp_path.iterdir():

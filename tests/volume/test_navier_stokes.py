@@ -13,7 +13,6 @@ from texgs.volume.navier_stokes import (
     sample,
     to_field,
     to_spectrum,
-    wavevectors,
 )
 
 N = 16
@@ -30,10 +29,6 @@ def lattice(n=N):
 
 def flow(n=32, seed=0):
     return random_flow(n, 1.5, 2.5, seed).to(torch.complex128)
-
-
-def divergence(velocity):
-    return (1j * wavevectors(velocity) * velocity).sum(0)
 
 
 def largest(tensor):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.io import netcdf_file
 
-from texgs.core.errors import ArgumentError
 from texgs.volume.sources import open_source
 
 SIZES = {"lat": 4, "r": 5, "lon": 6}
@@ -13,25 +12,19 @@ FIELD = np.random.default_rng(0).normal(size=(4, 5, 6)).astype(np.float32)
 UPRIGHT = FIELD.transpose(1, 0, 2)  # [Z, Y, X]: latitude and longitude are y and x by their units
 
 
-def write_netcdf(path, fields, *, version=2, axes=tuple(SIZES), **more):
+def write_netcdf(path, fields, *, version=2, **more):
     """Write fields over latitude, radius and longitude, with more attributes."""
     with netcdf_file(path, "w", version=version) as file:
-        for name, size in {"time": 2, "step": 1, **SIZES}.items():
-            file.createDimension(name, size)
         for name, size in SIZES.items():
+            file.createDimension(name, size)
             axis = file.createVariable(name, "f8", (name,))
             axis[:], axis.units = np.arange(size), UNITS[name]
         for name, values in fields.items():
-            variable = file.createVariable(name, values.dtype, axes)
+            variable = file.createVariable(name, values.dtype, tuple(SIZES))
             variable[:] = values
             for key, value in more.items():
                 setattr(variable, key, value)
     return path
-
-
-def whole(path, **keys):
-    source = open_source(path, **keys)
-    return source.slices(0, source.dims[2])
 
 
 @pytest.mark.parametrize("version", [1, 2])
@@ -56,31 +49,6 @@ def test_types(tmp_path, dtype):
     np.testing.assert_array_equal(source.slices(0, 5), values.transpose(1, 0, 2))
 
 
-@pytest.mark.parametrize("name", ["_FillValue", "missing_value"])
-def test_packed_numbers_are_decoded_and_missing_ones_are_nan(tmp_path, name):
-    stored = np.arange(120, dtype=np.int16).reshape(4, 5, 6)
-    coded = {name: np.int16(7), "scale_factor": 0.5, "add_offset": 100.0}
-    values = whole(write_netcdf(tmp_path / "v.nc", {"t": stored}, **coded)).transpose(1, 0, 2)
-    np.testing.assert_array_equal(values, np.where(stored == 7, np.nan, 100 + 0.5 * stored))
-    expected = FIELD.copy()
-    expected[1, 2, 3] = np.nan
-    path = write_netcdf(tmp_path / "w.nc", {"t": FIELD}, **{name: FIELD[1, 2, 3]})
-    np.testing.assert_array_equal(whole(path), expected.transpose(1, 0, 2))
-
-
-def test_a_step_of_time_is_chosen_and_the_first_one_is_taken_with_a_note(tmp_path):
-    path = write_netcdf(tmp_path / "one.nc", {"t": FIELD[None]}, axes=("step", *SIZES))
-    np.testing.assert_array_equal(whole(path), UPRIGHT)
-    path = write_netcdf(tmp_path / "two.nc", {"t": np.stack([FIELD, -FIELD])}, axes=("time", *SIZES))
-    source = open_source(path)
-    np.testing.assert_array_equal(source.slices(0, 5), UPRIGHT)
-    assert source.note.startswith("step 0 of 2; dataset.volume.time chooses another; units along x, y, z are")
-    assert source.n_steps == 2
-    np.testing.assert_array_equal(whole(path, time=1), -UPRIGHT)
-    with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 1, got 2"):
-        open_source(path, time=2)
-
-
 def write_axes(path, places, units, axes=("z", "y", "x"), field=FIELD):
     """Write a field with coordinates [n] of its dimensions, and their units."""
     with netcdf_file(path, "w") as file:
@@ -98,14 +66,6 @@ def test_spacing_and_origin_are_those_of_coordinates_in_the_unit_of_x(tmp_path):
     assert (source.spacing, source.origin, source.note) == ((300, 100, 500), (-7, 0, 2000), "")
     assert source.space.unit == "meter"
     np.testing.assert_array_equal(source.slices(0, 4), FIELD)
-
-
-def test_axes_whose_coordinates_fall_are_turned(tmp_path):
-    places = (9 - 2 * np.arange(4), 8 - np.arange(5), np.arange(6))
-    source = open_source(write_axes(tmp_path / "v.nc", places, 3 * ["m"]))
-    assert (source.spacing, source.origin) == ((1, 1, 2), (0, 4, 3))
-    np.testing.assert_array_equal(source.slices(0, 4), FIELD[::-1, ::-1])
-    np.testing.assert_array_equal(source.slices(1, 3), FIELD[::-1, ::-1][1:3])
 
 
 def test_units_that_cannot_be_compared_are_told(tmp_path):
