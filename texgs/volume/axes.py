@@ -1,4 +1,4 @@
-"""Axes of arrays with labels: which are those of space, how samples lie along them, one index of others."""
+"""Axes of labelled arrays: which are x, y and z, where samples lie along them, and places on all others."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 NUMBER = re.compile("0|[1-9][0-9]{0,17}")  # of a channel or step
 SPACING_TOLERANCE = 0.01  # of the mean distance: coordinates are often rounded to float32
-COMPONENTS = (2, 3, 4)  # sizes of a last axis without a name that is none of space
+COMPONENTS = (2, 3, 4)  # sizes of a nameless last axis that holds components
 POWERS = {"nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3}
 WORDS = ("meter", "metre", "meters", "metres")
 METRES = {prefix + word: 10.0**n for prefix, n in POWERS.items() for word in WORDS}
@@ -26,7 +26,7 @@ METRES |= {f"{prefix[:1]}m": 10.0**n for prefix, n in POWERS.items() if prefix !
 METRES |= dict.fromkeys(("um", "µm", "μm", "micron", "microns"), 1e-6) | {"angstrom": 1e-10}
 # What CF and cf_xarray call axes, and the letters that they have here.
 LETTERS = {"X": "x", "longitude": "x", "Y": "y", "latitude": "y", "Z": "z", "vertical": "z", "T": "t"}
-# Attributes of CF: what stands for missing samples; how packed ones are scaled; which are valid; and others.
+# Attributes of CF: codes of missing samples, scaling of packed ones, bounds of valid ones, and labels.
 CODES, PACKED = ("_FillValue", "missing_value"), {"scale_factor": 1.0, "add_offset": 0.0}
 NUMBERS = (*CODES, *PACKED, "valid_min", "valid_max", "valid_range")
 UNSIGNED = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
@@ -37,11 +37,11 @@ PRESSURES = ("Pa", "hPa", "kPa", "mbar", "millibar", "dbar", "decibar", "bar")
 
 @dataclass(frozen=True)
 class Channel:
-    """What a file says of a channel: its name, and how it is shown, if it says that at all."""
+    """The name of a channel and the way it is shown, as far as the file says."""
 
     label: str = ""
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)  # red, green, blue
-    window: tuple[float, float] | None = None  # the values that are black and of the full colour
+    window: tuple[float, float] | None = None  # values shown black, and in the full colour
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ def upright(axes: Sequence[Axis]) -> tuple[list[int], str]:
 def choose_places(
     axes: Sequence[Axis], channel: str | None = None, time: int | None = None
 ) -> list[int | slice]:
-    """Return one index for each axis that is none of space or of size 1, all of the three others."""
+    """Return a slice for each of the three axes of space, and the place on each other axis."""
     said = {kind: str(value) for kind, value in (("time", time), ("channel", channel)) if value is not None}
     is_space = [axis.kind == "space" and axis.size > 1 for axis in axes]
     sizes = " x ".join(f"{axis.name} {axis.size}" for axis in axes)

@@ -84,7 +84,7 @@ class Caster:
         # With the number of the GPU, whichever is the current one later.
         self.device = torch.empty(0, device=device).device
         self._channels = dict[int, tuple[native.Struct, Tensor]]()  # that were shown, of all copies
-        self._prepared = list[Prepared]()  # the last PREPARED, of all copies
+        self._prepared = list[Prepared]()  # the last CACHE_SIZE, of all copies
         if not grid.others:
             self.channel(0)
 

@@ -22,8 +22,8 @@ from texgs.volume.grid import dims_of, require_room
 from texgs.volume.itk_image import sentence
 from texgs.volume.space import LPS
 
-GAP_TOLERANCE = 0.05  # of the distance of slices: how much one may differ, as places are rounded in files
-TILT_TOLERANCE = 0.01  # of the distance of the outer slices: how far one may be shifted across it
+GAP_TOLERANCE = 0.05  # of the distance of slices: places are rounded in files
+TILT_TOLERANCE = 0.01  # of the distance to the first slice: how far one may lie beside it
 ROUNDING = 0.01  # mm; and of the widest gap: slices that are closer are at one place
 
 
@@ -166,7 +166,7 @@ def stored_frames(path: Path) -> np.ndarray:
 
 
 def replace_padding(values: np.ndarray, slices: Sequence[Slice]) -> str:
-    """Let samples that stand for none take the smallest value of the others, and return what to say of it."""
+    """Set padding to the smallest value of all other samples, in place; return a note for the user."""
     masks = np.zeros(values.shape, bool)
     for mask, plane, each in zip(masks, values, slices, strict=True):
         if each.padding:

@@ -66,7 +66,7 @@ def lattice_of(file: Path, count: int) -> tuple[float, ...]:
     """Return that of a series as `FileSeries` has it, rounded to 0.001 mm."""
     try:
         first, *others = slices_in(file)
-    except (ArgumentError, KeyError):  # a report, say, that has no place
+    except (ArgumentError, KeyError):  # no image, such as a report
         return ()
     numbers = count * (1 + len(others)), *first.sizes, *first.spacing, *first.place, *first.directions.flat
     return tuple(round(float(each), 3) for each in numbers)

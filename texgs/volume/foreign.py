@@ -1,6 +1,6 @@
-"""Formats that SimpleITK or PyVista reads, as sources; they do it in a process of their own: this module.
+"""Sources of the formats that SimpleITK and PyVista read, in a process of its own that runs this module.
 
-Damaged files crash libraries that are written in C++, and make them print instead of raising.
+Damaged files crash these libraries, or make them print instead of raising.
 """
 
 import json
@@ -37,10 +37,10 @@ from texgs.volume.slabs import ArraySource, RawSource, Source, step_note
 from texgs.volume.space import LEFT_HANDED, RIGHT_HANDED, Space
 
 BY_VTK = (".vti", ".vtr", ".vts", ".pvti", ".pvtr", ".vtk", ".slc")
-DICOM = (".dcm", ".ima")  # suffixes of files; slices without are read in their folder
+DICOM = (".dcm", ".ima")  # suffixes; slices may have none, and are read by their folder
 MIN_SECONDS = 60.0  # that reading may take, of a file of any size
 BYTES_PER_SECOND = 1e6  # that reading has to keep up with, of a large file
-MAX_LINE_BYTES = 1 << 20  # bytes of what the process says before the samples
+MAX_LINE_BYTES = 1 << 20  # bytes of the line that comes before the samples
 COMPLAINT = re.compile(r"error|fail|cannot|corrupt|unexpected", re.IGNORECASE)
 
 
@@ -102,7 +102,7 @@ def _kind(path: Path) -> str:
 
 
 def _ask(path: Path, keys: dict[str, Any], is_header_only: bool) -> tuple[dict[str, Any], np.ndarray]:
-    """Let a process of its own read a file: what it says, and the samples [Z, Y, X]."""
+    """Read a file in a process of its own; return its lattice and its samples [Z, Y, X]."""
     request = json.dumps({"path": str(path.absolute()), "keys": keys, "is_header_only": is_header_only})
     command = [sys.executable, "-P", "-m", "texgs.volume.foreign", request]
     size = sum(each.stat().st_size for each in (path.iterdir() if path.is_dir() else [path]))
@@ -137,7 +137,7 @@ def _receive(stream: IO[bytes], is_header_only: bool) -> tuple[dict[str, Any] | 
 
 
 def answer(path: Path, keys: dict[str, Any], is_header_only: bool) -> None:
-    """Print a line of JSON about a file, or what is wrong with it, and then the samples: all in the child."""
+    """Print a line of JSON with the lattice or the error, and then the samples; runs in the child."""
     with os.fdopen(os.dup(1), "wb") as output, tempfile.TemporaryFile("w+", errors="replace") as printed:
         os.dup2(printed.fileno(), 1)
         os.dup2(printed.fileno(), 2)
@@ -146,7 +146,7 @@ def answer(path: Path, keys: dict[str, Any], is_header_only: bool) -> None:
         try:
             with reading_as(_kind(path)):
                 reply, values = image_of(path, keys, is_header_only)
-            printed.seek(0)  # what a library has printed instead of raising it
+            printed.seek(0)  # errors that a library printed instead of raising
             for line in printed:
                 if COMPLAINT.search(line) and "warning" not in line.lower():
                     raise ArgumentError(f"the file is damaged or cut off, its reader says: {line.strip()}")
@@ -158,7 +158,7 @@ def answer(path: Path, keys: dict[str, Any], is_header_only: bool) -> None:
 
 
 def limit_memory() -> None:
-    """Let this process have no more memory than there is; it would take the rest of the machine with it."""
+    """Limit the memory of this process to what is free, so that a damaged file cannot stall the machine."""
     if sys.platform == "linux":
         import resource
 

@@ -15,12 +15,15 @@ if TYPE_CHECKING:
     from texgs.volume.space import Triple
 
 NRRD, METAIMAGE = (".nrrd", ".nhdr"), (".mhd", ".mha")  # suffixes
-UPRIGHT_SPACING = "uprightspacing"  # a pair of ours: +y is up, whatever the directions are
+UPRIGHT_SPACING = "uprightspacing"  # our own key: spacing of axes already turned so that +y is up
 UNIT = re.compile(r'"([^"]*)"')
-ANALYZE = (".hdr", ".img")  # of ANALYZE and NIfTI in two files, each of which may be given for both
+ANALYZE = (".hdr", ".img")  # two files of ANALYZE or NIfTI; either may be given
 MAX_HEADER_BYTES = 1 << 20  # bytes; a foreign file may hold no line break for gigabytes
 
-LFS, PAGES = b"version https://git-lfs", (b"<!doctype html", b"<html")  # how a file begins that is another
+LFS, PAGES = (
+    b"version https://git-lfs",
+    (b"<!doctype html", b"<html"),
+)  # first bytes of files that replace the real one
 
 
 def read_fields(path: Path) -> tuple[dict[str, str], int]:
@@ -33,7 +36,7 @@ def read_fields(path: Path) -> tuple[dict[str, str], int]:
     fields: dict[str, str] = {}
     while line := head.readline():
         name, separator, value = line.decode("utf-8", "surrogateescape").partition(":" if is_nrrd else "=")
-        if is_nrrd and not line.strip():  # ends a header that samples follow
+        if is_nrrd and not line.strip():  # an empty line ends the header
             break
         if separator:  # NRRD's pairs of key and value, :=, keep a sign: they are no fields of its own
             sign = "=" if value.startswith("=") else ""
@@ -60,7 +63,7 @@ def spacing_in(fields: Mapping[str, str]) -> Triple | None:
 
 
 def samples_of(header: Path) -> Path | None:
-    """Return the file with the samples of a header; None where it is no such header, or there is none."""
+    """Return the separate file with the samples of a header; None if there is none."""
     if (suffix := header.suffix.lower()) in ANALYZE:
         path = header.with_suffix(next(each for each in ANALYZE if each != suffix))
         return path if path.is_file() else None
@@ -69,7 +72,7 @@ def samples_of(header: Path) -> Path | None:
     try:
         path = samples_file(header, read_fields(header)[0])
         return path if path != header and path.is_file() else None
-    except (OSError, ArgumentError):  # not there yet, or not for us: whoever reads it tells
+    except (OSError, ArgumentError):  # whoever reads the file will say so
         return None
 
 
@@ -91,7 +94,7 @@ def samples_file(header: Path, fields: dict[str, str]) -> Path:
 
 
 def require_itself(path: Path) -> bytes:
-    """Refuse what is known to stand in place of a file, and return how the file begins."""
+    """Refuse a pointer or a page in place of a file; return the first bytes of the file."""
     with path.open("rb") as file:
         start = file.read(64)
     if start.startswith(LFS):

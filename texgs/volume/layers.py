@@ -36,7 +36,7 @@ from texgs.volume.space import Space
 if TYPE_CHECKING:
     import xarray
 
-MEMORY_PARTS = 4  # one layer takes this part of the free memory at most
+MEMORY_PARTS = 4  # a layer takes at most one part of so many of the free memory
 MAX_LISTED = 8  # arrays in a message
 EVERYTHING = (-np.inf, np.inf)
 
@@ -88,7 +88,7 @@ class LayerSource(Source):
         most = max(1, free_memory() // (MEMORY_PARTS * plane))
         self._depth = min(chunk * max(1, SLAB_BYTES // (chunk * plane)), most)  # slices in a layer
         require_room((x.size, y.size, self._depth), self.dtype)
-        self._first, self._kept = -1, np.empty(0)  # index of its first slice, and the layer in memory
+        self._first, self._kept = -1, np.empty(0)  # first slice of the layer in memory, and its samples
 
     def slices(self, start: int, stop: int) -> np.ndarray:
         """Return samples [stop - start, Y, X], NaN where they are missing."""
@@ -100,9 +100,9 @@ class LayerSource(Source):
         return values.astype(self.dtype, copy=False)
 
     def _layer(self, first: int) -> np.ndarray:
-        """Return the layer that begins with a slice, as it is stored."""
+        """Return the layer that begins with a slice, in the order of the file."""
         if self._first != first:
-            self._first, self._kept = -1, np.empty(0)  # gives its memory back before the next one is read
+            self._first, self._kept = -1, np.empty(0)  # frees the memory before the next layer is read
             index = list(self._index)
             index[self._z] = slice(first, min(first + self._depth, self.dims[2]))
             with reading_as("an array that is whole", where=f"{self._name}: "):

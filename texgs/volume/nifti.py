@@ -13,8 +13,8 @@ from texgs.volume.slabs import ArraySource, Source, step_note
 from texgs.volume.space import RAS, RIGHT_HANDED, Space
 
 BY_NIBABEL = (".nii", ".nii.gz", ".hdr", ".img", ".mgh", ".mgz")
-ORIENTED = ("sform_code", "qform_code", "goodRASFlag")  # of headers of NIfTI and MGH: 0 for none
-UNITS = {"meter": "m", "micron": "um"}  # mm where a file tells none
+ORIENTED = ("sform_code", "qform_code", "goodRASFlag")  # fields of headers; 0: no orientation
+UNITS = {"meter": "m", "micron": "um"}  # mm if the file tells none
 
 
 def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: int = 0) -> Source:
@@ -27,7 +27,7 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: 
 
     with reading_as("a NIfTI file"), LoggingOutputSuppressor():
         image = nibabel.load(path)
-        if not isinstance(image, nibabel.AnalyzeImage | nibabel.MGHImage):  # the former has NIfTI below it
+        if not isinstance(image, nibabel.AnalyzeImage | nibabel.MGHImage):  # NIfTI is a subclass of ANALYZE
             raise ArgumentError(f"expected a NIfTI image, got {type(image).__name__}")
         stored = image.get_data_dtype()
         if stored.fields:
@@ -43,7 +43,7 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: 
             raise ArgumentError("expected three independent axes, got a singular affine matrix")
         proxy: Any = image.dataobj
         is_scaled = (proxy.slope, proxy.inter) != (1, 0)
-        proxy = proxy[..., time, *[0] * len(rest)] if n_steps > 1 else proxy  # reads no other step
+        proxy = proxy[..., time, *[0] * len(rest)] if n_steps > 1 else proxy  # reads this step only
         require_room((x, y, z), np.dtype(np.float32) if is_scaled else stored)
         samples = np.asarray(proxy, np.float32) if is_scaled else np.asanyarray(proxy)
         values = nibabel.apply_orientation(samples.reshape(shape, order="F"), turn)  # [X, Y, Z]

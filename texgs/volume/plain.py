@@ -97,7 +97,7 @@ def open_text(
             )
         table = pandas.read_csv(path, usecols=[column - 1], dtype=dtype, nrows=count + 1, **options)
     values = table.to_numpy().ravel()
-    is_longer = not np.isnan(values[count:]).all()  # an empty line at the end is none
+    is_longer = not np.isnan(values[count:]).all()  # an empty last line is no sample
     if len(values) < count or is_longer:
         raise ArgumentError(
             f"expected {' x '.join(map(str, dims))} = {count} lines, found "

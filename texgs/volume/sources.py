@@ -21,24 +21,24 @@ from texgs.volume.slabs import Source
 from texgs.volume.tiff import open_tiff
 from texgs.volume.tiff_images import tiffs_in
 
-DEFAULTS = {"endian": "little", "skip": 0, "time": 0}  # of keys, which every format may be given
+DEFAULTS = {"endian": "little", "skip": 0, "time": 0}  # values that every format accepts
 HDF5 = (".nc", ".nc4", ".h5", ".hdf5", ".hdf", ".nxs")
 IMARIS = (
     "Imaris pads arrays with zeros, and tells size and extent by text that is not read: dataset.volume.crop "
     "and spacing set them"
 )
-IN_FILES = ("variable", "channel", "time")  # keys of an array among others
-IN_PAGES = ("image", "channel", "time")  # keys of an image of TIFF
-GZIP = b"\x1f\x8b"  # how a file of gzip begins
+IN_FILES = ("variable", "channel", "time")  # keys that choose an array and a part of it
+IN_PAGES = ("image", "channel", "time")  # keys that choose an image of TIFF and a part of it
+GZIP = b"\x1f\x8b"  # the first bytes of a gzip file
 OF_ZARR = (".zarray", ".zgroup", ".zattrs", "zarr.json")  # names in a zip of Zarr
 
 
 class Format(NamedTuple):
     """How a format is opened."""
 
-    open: Callable[..., Source]  # with a path, spacing and origin where they replace the file's, and keys
-    keys: tuple[str, ...] = ()  # that it takes
-    is_superior: bool = False  # whether its z points to the head
+    open: Callable[..., Source]  # takes the path, spacing and origin that replace the file's, and keys
+    keys: tuple[str, ...] = ()  # the keys that `open` takes
+    is_superior: bool = False  # z points to the head
 
 
 def open_source(
@@ -88,7 +88,7 @@ def open_source(
 
 
 def _try_to_read(path: Path) -> None:
-    """Raise where that is not possible; the readers of the formats say it each in other words."""
+    """Refuse what cannot be read at all, before readers refuse it in words of their own."""
     if path.is_dir():
         files = (each for each in path.iterdir() if not each.name.startswith(".") and not each.is_dir())
         if first := min(files, default=None):
@@ -101,7 +101,7 @@ def _try_to_read(path: Path) -> None:
 
 
 def _suffix(path: Path) -> str:
-    """Return the suffix in lower case; both where a file is compressed as a whole."""
+    """Return the suffix in lower case, with the one before it if the whole file is gzipped."""
     suffixes = [suffix.lower() for suffix in path.suffixes]
     return "".join(suffixes[-2:] if suffixes[-1:] == [".gz"] else suffixes[-1:])
 
@@ -113,7 +113,7 @@ def holds_arrays(path: Path) -> bool:
 
 
 def tells_superior(path: Path) -> bool:
-    """Return whether z points to the head by a volume's format: of NIfTI, and of DICOM."""
+    """Return whether the format has z point to the head, as NIfTI and DICOM have."""
     kind = _format(path)
     return kind is not None and kind.is_superior
 
@@ -130,7 +130,7 @@ def _format(path: Path) -> Format | None:
 
 
 def _require_packing(path: Path) -> None:
-    """Require gzip where the suffix says so, and only there, of formats that have suffixes for both."""
+    """Require gzip if and only if the suffix says so, where a format has suffixes for both."""
     start, suffix = require_itself(path), path.suffix.lower()
     is_packed = start.startswith(GZIP)
     if suffix == ".gz" and start and not is_packed and Path(path.stem).suffix.lower() + suffix in FORMATS:
@@ -145,7 +145,7 @@ def _require_packing(path: Path) -> None:
 
 
 def _open(path: Path, spacing: Triple | None, origin: Triple | None, said: dict[str, Any]) -> Source:
-    """Open a file by its suffix, or a folder of slices; `said` are keys that only some formats take."""
+    """Open a file or a folder by its format; `said` are keys that not every format takes."""
     kind = _format(path)
     if path.name.upper() == "DICOMDIR":
         raise ArgumentError(
@@ -161,7 +161,7 @@ def _open(path: Path, spacing: Triple | None, origin: Triple | None, said: dict[
 
 
 def _open_imaris(path: Path, spacing: Triple | None, origin: Triple | None, **keys: Any) -> Source:
-    """Open an array of Imaris as one of HDF5."""
+    """Open an Imaris file, which is HDF5."""
     source = open_netcdf(path, spacing, origin, **keys)
     source.note = "; ".join(filter(None, (source.note, "" if spacing else IMARIS)))
     return source

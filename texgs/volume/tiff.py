@@ -29,8 +29,8 @@ from texgs.volume.tiff_images import (
 
 # None, deflate, packbits and LZMA: others need imagecodecs.
 READABLE_COMPRESSIONS = (1, 8, 32773, 32946, 34925)
-PAGES_IN_MEMORY = 2  # in memory at a time: one as it is decoded, and its place in the slab
-LOSS_WORDS = ("subset", "incompletely")  # words of tifffile's warnings about samples that are not there
+PAGES_IN_MEMORY = 2  # one as it is decoded, and its place in the slab
+LOSS_WORDS = ("subset", "incompletely")  # words of warnings about lost samples
 NO_SPACING = "TIFF tells no spacing, so that samples are 1 apart; dataset.volume.spacing sets it"
 
 
@@ -160,7 +160,7 @@ def complaints_raised() -> Iterator[None]:
 
     def collect(record: logging.LogRecord) -> bool:
         records.append(record)
-        return False  # nobody else hears of it
+        return False  # keeps it from all other handlers
 
     logger.addFilter(collect)
     try:
