@@ -23,7 +23,7 @@ from tests.volume.test_netcdf import FIELD, write_axes, write_netcdf
 from tests.volume.test_text_columns import DIMS as LINE_DIMS
 from tests.volume.test_text_columns import LINES, write_lines
 from tests.volume.test_tiff import A, folder_of, ome, split
-from tests.volume.volume_files import WRITERS, sample_values, whole
+from tests.volume.volume_files import BY_A_PROCESS, WRITERS, sample_values, whole
 from tests.volume.zarr_files import all_axes, axes_of, write_image
 from texgs.core.errors import TexgsError
 from texgs.volume.sources import FORMATS
@@ -286,6 +286,8 @@ REFUSED = {
         (of_slices("z1_t1 z2_t2 z3_t3"), f"z1_t1.tif and z3_t3.tif{NAMES}"),
         (of_slices("s1 s01 s2"), f"s.*1.tif and s2.tif{NAMES}"),
         (of_slices("left right"), f"left.tif and right.tif{NAMES}"),
+    ],
+    "slices": [
         (at(0, 2, 4, 8, 10), "slices 2 mm apart, got 4 mm; complete the series"),
         (at(0, 2, 4, 7, 9), "slices 2 mm apart, got 3 mm; complete the series"),
         (at(0, 2, 2, 4, 6), "slices at different places, got two at one"),
@@ -437,7 +439,15 @@ ROWS += [(f"v{suffix}", data(POINTER), "a pointer of Git LFS in its place") for 
 ROWS += [(f"v{suffix}", data(LOGIN), "a page of HTML in its place") for suffix in FORMATS]
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row[0]}: {row[2]}"[:60])
+# A process of its own reads these, in half a second or more.
+PROCESS = (*BY_A_PROCESS, ".vts", ".dcm", ".ima", "slices")
+MARKS = {True: pytest.mark.subprocess, False: ()}
+
+
+@pytest.mark.parametrize(
+    "row",
+    [pytest.param(row, id=f"{row[0]}: {row[2]}"[:60], marks=MARKS[row[0].endswith(PROCESS)]) for row in ROWS],
+)
 def test_refused(tmp_path, capfd, row):
     name, write, words, keys = (*row, {})[:4]
     write(tmp_path / name)
