@@ -36,7 +36,7 @@ from texgs.volume.space import Space
 if TYPE_CHECKING:
     import xarray
 
-MEMORY_PARTS = 4  # a layer takes at most one part of so many of the free memory
+MEMORY_PARTS = 4  # a layer takes at most a quarter of the free memory
 MAX_LISTED = 8  # arrays in a message
 EVERYTHING = (-np.inf, np.inf)
 
