@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+import SimpleITK
 
 from tests.real_data import real_data
 from tests.volume.test_netcdf import FIELD, write_netcdf
@@ -20,7 +21,9 @@ from texgs.volume.sources import open_source
 OTHERS = {
     "v.nc": lambda path, values: write_netcdf(path, {"t": FIELD}),
     "v.txt.gz": lambda path, values: write_lines(path, LINES),
+    "v.gipl": lambda path, values: SimpleITK.WriteImage(SimpleITK.GetImageFromArray(values), path),
 }
+CUT = [*NAMES, "v.nc", "v.txt.gz", pytest.param("v.gipl", marks=pytest.mark.subprocess)]
 KEYS = {"v.txt.gz": {"dims": DIMS, "column": 2}}
 HEAD = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: {sizes}\nencoding: {encoding}\n{more}\n"
 
@@ -34,7 +37,7 @@ def refused(path, **keys) -> str:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.3, 0.6, 0.97])
-@pytest.mark.parametrize("name", [*NAMES, *OTHERS])
+@pytest.mark.parametrize("name", CUT)
 def test_a_file_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path, capfd, name, share):
     path = tmp_path / name
     {**WRITERS, **OTHERS}[name](path, sample_values())

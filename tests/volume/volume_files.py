@@ -9,7 +9,6 @@ import nrrd
 import numpy as np
 import pytest
 import pyvista
-import SimpleITK
 import tifffile
 from vtkmodules.vtkIOImage import vtkMetaImageWriter
 from vtkmodules.vtkIOLegacy import vtkStructuredPointsWriter
@@ -73,12 +72,6 @@ def by_nibabel(kind=nibabel.Nifti1Image) -> Writer:
     return lambda path, values: nibabel.save(kind(values.T, np.diag([*SPACING, 1.0])), path)
 
 
-def by_itk(path: Path, values: np.ndarray) -> None:
-    image = SimpleITK.GetImageFromArray(values)
-    image.SetSpacing(SPACING)
-    SimpleITK.WriteImage(image, path)
-
-
 def by_h5py(path: Path, values: np.ndarray) -> None:
     with h5py.File(path, "w") as file:
         file["density"] = values
@@ -111,11 +104,10 @@ WRITERS: dict[str, Writer] = {
     "pages.tif": page_by_page,
     "rows.npy": np.save,
     "array.h5": by_h5py,
-    "v.gipl": by_itk,
     "columns.npy": lambda path, values: np.save(path, np.asfortranarray(values)),
 }
 # Endings of files that a process of its own reads, in half a second or more; `make test` leaves these out.
-BY_A_PROCESS = (".vti", ".vtk", ".mha", ".mhd", ".nrrd", ".nhdr", ".gipl")
+BY_A_PROCESS = (".vti", ".vtk", ".mha", ".mhd", ".nrrd", ".nhdr")
 NAMES = [
     pytest.param(name, marks=pytest.mark.subprocess) if name.endswith(BY_A_PROCESS) else name
     for name in WRITERS
