@@ -20,19 +20,7 @@ pytestmark = pytest.mark.subprocess
 
 CASES = int(os.environ.get("TEXGS_FUZZ_CASES", "20"))
 # A file of these takes a second.
-IN_A_PROCESS_EACH = (
-    ".vti",
-    ".pvti",
-    ".vtr",
-    ".vtk",
-    ".slc",
-    ".mha",
-    ".mhd",
-    ".nrrd",
-    ".nhdr",
-    ".gipl",
-    "samples",
-)
+IN_A_PROCESS_EACH = (".vti", ".pvti", ".vtr", ".vtk", ".slc", ".mha", ".mhd", ".nrrd", ".nhdr", "samples")
 SECONDS = 300.0  # for all files of a reader
 ROOT = Path(__file__).parents[2]
 
