@@ -38,7 +38,7 @@ ROOT = Path(__file__).parents[1]
 RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"
 INDEX = RESULTS / "index.csv"
 # Of short names.
-PLACES = ("workflow.stages", "fitting.kinds", "fields.kinds", "edit.methods", "metrics.edits")
+PLACES = ("workflow.stages", "fitting", "fields", "edit.methods", "metrics.edits")
 ABOUT = "accuracy.md"  # explains the mark
 LINK = re.compile(r"(\]\((?:[^)\s]*/)?([\w.-]+)\))(?:†|\[†\]\([^)]*\))?")
 

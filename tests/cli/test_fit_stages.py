@@ -13,7 +13,7 @@ from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import z_order_of
 from texgs.fields.files import open_field
-from texgs.fields.gaussians.model import JoinedGaussians
+from texgs.fields.gaussians import JoinedGaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import read_model
 from texgs.fitting import checkpoint

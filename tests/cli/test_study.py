@@ -14,7 +14,7 @@ from PIL import Image
 from tests.fields.voxels.test_voxels import ball
 from tests.study.studies import WORDS, edit, fit
 from texgs.cli.main import main
-from texgs.fields.voxels.file import write_voxels
+from texgs.fields.voxels import write_voxels
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 

@@ -12,7 +12,7 @@ from texgs.edit.keys import EditKeys
 from texgs.edit.methods.image import ImageKeys, run
 from texgs.edit.methods.text import TextKeys
 from texgs.edit.readable import KEPT, LARGEST, READABLE, SHOWS, SIZE, VIEWS, raised, readable_factors
-from texgs.fields.gaussians.files import write_gaussians
+from texgs.fields.gaussians import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels

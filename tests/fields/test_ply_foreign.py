@@ -15,7 +15,7 @@ from tests.fields.surfels.samples import sample as surfels
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.ply_file import read_vertices
-from texgs.fields.gaussians import files
+from texgs.fields import gaussians as files
 from texgs.fields.surfels import ply
 
 KINDS = {"surfels": (lambda: surfels("surfels"), ply), "gaussians": (gaussians, files)}

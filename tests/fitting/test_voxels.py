@@ -10,12 +10,12 @@ from tests.real_data import real_data
 from texgs.config.compose import compose
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
-from texgs.fields.voxels.model import Voxels
-from texgs.fields.voxels.rays import AROUND, curve, training_rays, widened
+from texgs.fields.voxels import Voxels
 from texgs.fitting import checkpoint
 from texgs.fitting.checkpoint import run_to_end
 from texgs.fitting.hull import hull_box
 from texgs.fitting.ray_settings import Decay, GridStage, VoxelKeys
+from texgs.fitting.rays import AROUND, curve, training_rays, widened
 from texgs.fitting.voxels import VoxelFit, grown, hull_grid, refined, seen_voxels
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays

@@ -13,7 +13,7 @@ from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import Light
 from texgs.fields.surfels.composition import Composition
-from texgs.fields.voxels.model import VoxelScene
+from texgs.fields.voxels import VoxelScene
 from texgs.metrics.consistency import OPAQUE, TOLERANCE, SeenFrame, difference, mean_differences, warp
 
 SIZE = 64

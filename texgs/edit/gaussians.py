@@ -14,7 +14,7 @@ from texgs.edit.objective import Objective
 from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import Losses, Painting, learn_style
 from texgs.edit.style_picture import StylePicture
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians import Gaussians
 from texgs.fields.optimizer import Optimizer
 from texgs.fields.splats import GEOMETRY, join, split
 from texgs.fitting.loop import extent, rates

@@ -20,8 +20,8 @@ from texgs.edit.style_picture import StylePicture
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import free_color, light, new_networks, palette_color
 from texgs.fields.palette.rendering import RAYS, Shown, points_on, shown, view_harmonics
-from texgs.fields.voxels.rays import training_rays
 from texgs.fitting.palette import cluster_colors
+from texgs.fitting.rays import training_rays
 from texgs.metrics.retrieval import LUMINANCE
 from texgs.models.vgg import Vgg
 from texgs.raster.voxels import camera_rays

@@ -16,8 +16,8 @@ from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import Losses, Painting, Terms, image_variation, learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_start import color_map
-from texgs.fields.voxels.model import Voxels
-from texgs.fields.voxels.rays import training_rays
+from texgs.fields.voxels import Voxels
+from texgs.fitting.rays import training_rays
 from texgs.models.vgg import Vgg
 from texgs.raster.shading import Y00
 from texgs.raster.voxel_grid import GREY, VoxelGrid, drop_sh, recolored

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.fields.voxels.rays import widened
+from texgs.fitting.rays import widened
 from texgs.volume.images import Images
 
 TRIED = 200_000  # points at a time

@@ -63,6 +63,11 @@ class Fit(ResumableFit):
         """Raw parameters of the surfels or Gaussians of now; differentiable in `parameters`."""
         return self.parameters if self.held is None else self.held.added_to(self.parameters)
 
+    @property
+    def result(self) -> dict[str, Tensor]:
+        """The same without a graph."""
+        return {name: x.detach() for name, x in self.fitted.items()}
+
     def run(self) -> Iterator[int]:
         """Iterate to the end of the phase."""
         while self.iteration < self.iterations:

@@ -18,8 +18,9 @@ from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import Parameters, base_color, density, light, new_networks, palette_color
 from texgs.fields.palette.rendering import Geometry, Shown, blending_weights, points_on, shown, view_harmonics
-from texgs.fitting.checkpoint import ResumableFit
+from texgs.fitting.checkpoint import FOLDER, ResumableFit, run_to_end
 from texgs.fitting.ray_settings import PaletteKeys
+from texgs.fitting.task import FitTask, Fitted
 from texgs.fitting.voxels import VoxelFit
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, voxel_grid
@@ -100,8 +101,7 @@ class PaletteFit(ResumableFit):
     def begin(self, part: Part) -> None:
         """Make the networks of a part, and an optimiser of those that learn in it."""
         known = {name.split(".")[0] for name in self.parameters if name != "palette.colors"}
-        missing = set(part.networks) - known
-        new = new_networks(missing, self.levels, len(self.colors), self.generator)
+        new = new_networks({*part.networks} - known, self.levels, len(self.colors), self.generator)
         parameters = {"palette.colors": self.colors, **self.parameters, **new}
         learned = [name for name in parameters if name.split(".")[0] in part.networks]
         rate = Rate(self.settings.rate, part.last_rate)
@@ -147,6 +147,14 @@ class PaletteFit(ResumableFit):
         if self.own:
             self.optimizer.restore(_under("networks.", state))
         self.generator.set_state(state["random"])
+
+
+def fit_palette(task: FitTask[PaletteKeys]) -> Fitted:
+    """Fit networks to random rays, from the last checkpoint if there is one."""
+    run = PaletteFit(task.images, task.settings, task.seed)
+    seconds = run_to_end(run, task.output / FOLDER, task.title)
+    field = run.field(task.metadata)
+    return Fitted(field, seconds, run.iterations, run.losses, {"palette": field.colors.tolist()})
 
 
 def places(fit: VoxelFit, levels: HashLevels, step: float) -> Geometry:

@@ -14,7 +14,6 @@ from texgs.core.geometry import facing
 from texgs.core.names import POINTS
 from texgs.core.ply_file import read_vertices
 from texgs.fields.ply_columns import take
-from texgs.fields.splats import split, zeroth
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fitting.ends import Points, ends_of_rays
@@ -92,26 +91,6 @@ def seed_surfels(
     if kind != "visible":
         return surfels, colors
     return most_seen(surfels, colors, images, count, seed)
-
-
-def seed_gaussians(
-    images: Images,
-    views: ViewSet,
-    seeds: Seeds,
-    degree: int,
-    seed: int,
-    volume: Grid | None = None,
-    most: int | None = None,
-) -> dict[str, Tensor]:
-    """Return raw parameters of the first Gaussians: as surfels start, as thick as they are wide.
-
-    `sh` is apart from `sh_rest`, as they learn at different rates; all but the zeroth harmonic are zero.
-    """
-    surfels, colors = seed_surfels(images, views, seeds, seed, volume, most)
-    thickness = surfels["scales"].amin(dim=1, keepdim=True)  # seeds of surfels are round, or nearly so
-    zeros = torch.zeros(len(colors), (degree + 1) ** 2 - 1, 3)
-    sh = torch.cat([zeroth(colors), zeros], dim=1)
-    return {**surfels, "scales": torch.cat([surfels["scales"], thickness], dim=1), **split(sh)}
 
 
 def points_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed: int) -> Points:

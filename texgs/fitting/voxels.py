@@ -10,10 +10,12 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import FitError
-from texgs.fields.voxels.rays import TrainingRays, training_rays
-from texgs.fitting.checkpoint import ResumableFit
+from texgs.fields.voxels import Voxels
+from texgs.fitting.checkpoint import FOLDER, ResumableFit, run_to_end
 from texgs.fitting.hull import hull_box, in_hull, lattice
 from texgs.fitting.ray_settings import GridStage, VoxelKeys
+from texgs.fitting.rays import TrainingRays, training_rays
+from texgs.fitting.task import FitTask, Fitted
 from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, voxel_grid
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import March, Rays, Samples
@@ -119,6 +121,14 @@ class VoxelFit(ResumableFit):
         s = self.settings
         sh = s.sh.at(self.iteration, s.steps)
         return VoxelRates(s.density.at(self.iteration, s.steps), sh, sh)
+
+
+def fit_voxels(task: FitTask[VoxelKeys]) -> Fitted:
+    """Fit a grid to random rays, coarse to fine, from the last checkpoint if there is one."""
+    run = VoxelFit(task.images, task.settings, task.seed)
+    seconds = run_to_end(run, task.output / FOLDER, task.title)
+    field = Voxels(run.grid, run.march, task.metadata)
+    return Fitted(field, seconds, run.iterations, run.losses, {"lattice": list(run.grid.size)})
 
 
 def hull_grid(images: Images, side: int, half_size: float, degree: int, density: float) -> VoxelGrid:

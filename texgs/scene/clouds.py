@@ -14,7 +14,7 @@ from texgs.core.errors import ArgumentError, located
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.fields.field import Field
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians import Gaussians
 from texgs.fields.part_edit import PartEdit, opacity_factors
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.composition import Part

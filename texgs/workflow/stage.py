@@ -106,7 +106,7 @@ class Stage:
         """
         modules = [self.module, self.fits] if self.fits else [self.module]
         if self.place != "phase" and "fit" in settings:
-            modules.append(kinds()[settings["fit"]["field"]].module)
+            modules += kinds()[settings["fit"]["field"]].modules
         if "edit" in settings:
             modules.append(methods()[settings["edit"]["method"]].module)
         if self.name == "edit_metrics":

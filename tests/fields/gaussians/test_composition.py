@@ -5,7 +5,7 @@ from torch.testing import assert_close
 from tests.fields.gaussians.samples import sample
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
-from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
+from texgs.fields.gaussians import Gaussians, JoinedGaussians
 from texgs.fields.part_edit import PartEdit
 
 CAMERA = orbit(30, 20, 3, 40, 48, 40)

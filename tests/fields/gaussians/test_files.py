@@ -12,8 +12,7 @@ from tests.fields.surfels.samples import same
 from tests.fields.surfels.samples import sample as surfels
 from texgs.core.errors import ArgumentError
 from texgs.fields.files import open_field
-from texgs.fields.gaussians.files import read_ply, write_gaussians, write_ply
-from texgs.fields.gaussians.model import Baked, Gaussians
+from texgs.fields.gaussians import Baked, Gaussians, read_ply, write_gaussians, write_ply
 from texgs.fields.surfels.ply import write_ply as write_surfels
 
 NAMES = [

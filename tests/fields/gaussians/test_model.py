@@ -7,7 +7,7 @@ from torch.testing import assert_close
 from tests.fields.gaussians.samples import sample
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians import Gaussians
 from texgs.raster import Options
 from texgs.raster.reference.render import rasterize
 

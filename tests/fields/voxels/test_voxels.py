@@ -7,7 +7,7 @@ import torch
 
 from texgs.core.camera import orbit
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.voxels.model import Voxels, VoxelScene, merged
+from texgs.fields.voxels import Voxels, VoxelScene, merged
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, unpack_rows, voxel_grid
 
 CAMERA = orbit(30, 20, 4.0, 30.0, 48, 40)

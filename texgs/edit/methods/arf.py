@@ -12,7 +12,7 @@ from texgs.edit.methods.style import FeatureKeys, Look, run
 
 if TYPE_CHECKING:
     from texgs.edit.style_loop import Losses
-    from texgs.fields.voxels.model import Voxels
+    from texgs.fields.voxels import Voxels
     from texgs.volume.view_set import View
 
 

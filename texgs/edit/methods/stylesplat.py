@@ -12,7 +12,7 @@ from texgs.edit.methods.style import FeatureKeys, Look, run
 
 if TYPE_CHECKING:
     from texgs.edit.style_loop import Losses
-    from texgs.fields.gaussians.model import Gaussians
+    from texgs.fields.gaussians import Gaussians
     from texgs.volume.view_set import View
 
 
