@@ -31,7 +31,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from texgs.core.checksum import digest
+from texgs.core.cache import digest
 from texgs.workflow.code import code_of, source
 
 ROOT = Path(__file__).parents[1]

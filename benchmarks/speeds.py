@@ -19,7 +19,7 @@ from statistics import median
 from typing import NamedTuple
 
 from benchmarks.command import call
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.io import read_json
 from texgs.core.names import METRICS
 from texgs.workflow.forecast import PROBE, Speed, probe, speeds, work_of

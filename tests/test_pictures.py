@@ -9,7 +9,7 @@ from PIL import Image
 
 from benchmarks.results import DOCS, RESULTS, parts
 from tests.scene.balls import write_balls
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.io import write_json
 from texgs.workflow.graph import drawn
 from texgs.workflow.sweep import as_sweep

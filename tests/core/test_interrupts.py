@@ -6,8 +6,7 @@ from threading import Thread
 
 import pytest
 
-from texgs.core.interrupts import interrupts_between_items
-from texgs.core.progress import progress
+from texgs.core.progress import interrupts_between_items, progress
 
 
 def ctrl_c():

@@ -11,8 +11,8 @@ from tests.fields.surfels.test_composition import ball
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT
 from texgs.edit.keys import EditKeys
-from texgs.edit.material import MATERIALS, highlights_of
 from texgs.edit.methods.text import METHOD, TextKeys
+from texgs.edit.readable import MATERIALS, highlights_of
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Part
 from texgs.fields.surfels.model import Surfels

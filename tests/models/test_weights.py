@@ -6,7 +6,7 @@ from importlib.util import find_spec
 import pytest
 
 from tests.real_data import real_data
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import ArgumentError, MissingDataError
 from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
 from texgs.models.networks import read_tensors

@@ -7,7 +7,7 @@ from tests.raster.operations import LEVELS, points
 from tests.raster.requirements import refuses
 from texgs.core.errors import ArgumentError
 from texgs.raster.hash_encoding import HashLevels, encode
-from texgs.raster.reference import hash_encoding as definition
+from texgs.raster.reference import voxels as definition
 
 
 def looped(point, table, levels):

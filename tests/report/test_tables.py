@@ -5,7 +5,7 @@ import pytest
 from tests.report.written import lines, metrics, records
 from tests.study.studies import study
 from texgs.cli.main import main
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_json
 from texgs.core.names import METRICS

@@ -7,7 +7,7 @@ import pytest
 
 from tests.workflow.project import TINY
 from texgs.cli.main import main
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.workflow import forecast
 from texgs.workflow.experiments import selected
 from texgs.workflow.graph import graph

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from texgs.config.compose import compose
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.report.results import Comparison, EditResult, FitResult, GalleryResult, PseResult, Shown, plain
 from texgs.workflow.job import Job
 from texgs.workflow.provenance import device, seed

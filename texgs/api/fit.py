@@ -16,9 +16,9 @@ from texgs.api.scene import Scene
 from texgs.api.volume import Volume
 from texgs.core.check import torch_device
 from texgs.core.errors import ArgumentError
-from texgs.core.interrupts import interrupts_between_items
 from texgs.core.io import copy_atomic
 from texgs.core.names import SCENE, close, file_name
+from texgs.core.progress import interrupts_between_items
 from texgs.scene.session import Session
 from texgs.volume.summaries import summary_file, write_summaries
 from texgs.volume.transfer import TransferFunction

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from texgs.cli.main import main as texgs
-from texgs.core.process import collect_rarely
+from texgs.core.memory import collect_rarely
 
 ADDRESS = "TEXGS_FORK_SERVER"  # environment variable: the server's name among the abstract sockets
 LIBRARIES = (

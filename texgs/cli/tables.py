@@ -94,7 +94,7 @@ def study_of(arguments: argparse.Namespace) -> Path:
 
 def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[LeftOut]]:
     """Read the metrics files that are given, or those of a folder; tell of those that are left out."""
-    from texgs.core.checksum import Checksums
+    from texgs.core.cache import Checksums
     from texgs.report.metrics_files import LeftOut, read_known, require_apart
     from texgs.workflow.graph import Graph, earlier
 

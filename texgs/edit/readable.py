@@ -1,4 +1,4 @@
-"""How opaque parts are while and after they get a new look, so that a person can read it.
+"""What a new look changes of a scene beside textures: opacity, so that a person can read it, and highlights.
 
 Where a part is translucent, a pixel shows several of its layers, whose colours average to grey. More opacity
 brings the front layer out. It also hides what is inside, of which enough has to stay visible.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from texgs.core.camera import Camera
     from texgs.edit.task import Task
     from texgs.fields.surfels.composition import Composition
+    from texgs.fields.surfels.model import Surfels
     from texgs.scene.scene import Scene
 
 READABLE = 0.9  # mean alpha of a part from which its pattern is plain
@@ -193,3 +194,55 @@ def two_digits(factor: float) -> float:
     """Return a factor of at least 1 rounded down to two digits, as a person would write it."""
     unit = 10.0 ** (floor(log10(factor)) - 1)
     return round(floor(factor / unit + 1e-9) * unit, 1)
+
+
+# -- highlights ---
+
+
+class Highlights(NamedTuple):
+    """Highlights that a material has."""
+
+    specular: float  # k_s
+    shininess: float  # beta
+    tint: tuple[float, float, float] = PartEdit.tint
+
+
+# By the names of the vocabulary. Tints of metals are what these reflect straight on, linear and at most 1
+# (Akenine-Moeller et al. 2018, Real-Time Rendering, table 9.2).
+MATERIALS = {
+    "gold": Highlights(0.9, 20, (1.0, 0.782, 0.344)),
+    "silver": Highlights(0.9, 25, (0.972, 0.960, 0.915)),
+    "copper": Highlights(0.8, 18, (0.955, 0.638, 0.538)),
+    "wood": Highlights(0.1, 8),
+    "marble": Highlights(0.3, 30),
+    "glass": Highlights(0.9, 60),
+}
+
+
+def highlights_of(instruction: str, model: Surfels, surfels: Tensor | None = None) -> dict[str, Any]:
+    """Return the values of a `PartEdit` that give a part the highlights of the material that is named.
+
+    The factors bring the medians of the part's own k_s and beta, as fitted, to those of the material.
+
+    Args:
+        instruction: such as "make it gold"; one that says anything else, too, changes nothing: {}.
+        model: relightable.
+        surfels: [N] bool, those of the part; all by default.
+    """
+    from texgs.fields.surfels.shading import material
+    from texgs.models.instruction import understand
+
+    try:
+        named = MATERIALS.get(understand(instruction)[0])
+    except ArgumentError:  # what a diffusion model may understand
+        named = None
+    if named is None:
+        return {}
+    own = material(model.parameters, model.shading.material)  # [N] or [1]
+    edit: dict[str, Any] = {"tint": named.tint}
+    for name in ("specular", "shininess"):
+        values = own[name] if surfels is None or len(own[name]) == 1 else own[name][surfels]
+        wanted, fitted = getattr(named, name), float(values.median())
+        if fitted:  # else no factor reaches it
+            edit[name] = min(wanted / fitted, MOST)
+    return edit

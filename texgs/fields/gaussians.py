@@ -16,11 +16,10 @@ from texgs.core.io import reading_as
 from texgs.core.light import Light
 from texgs.core.ply_file import is_ply, read_vertices
 from texgs.core.tensor_file import read_tensor_file, write_tensor_file
-from texgs.fields.field import sizes_in_mib
+from texgs.fields.field import Asked, UnlitScene, sizes_in_mib
 from texgs.fields.part_edit import MOST_OPAQUE, PartEdit, opacity_factors
 from texgs.fields.ply_columns import Told, splat_columns, take_geometry, take_harmonics, write_columns
 from texgs.fields.splats import Splats
-from texgs.fields.unlit import Asked, UnlitScene
 from texgs.raster import Options, Render
 from texgs.raster.shading import DEGREES, spherical_harmonics
 

@@ -14,8 +14,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ShapeError, located
 from texgs.core.io import reading_as
 from texgs.core.tensor_file import read_tensor_file, write_tensor_file
-from texgs.fields.field import Role, sizes_in_mib
-from texgs.fields.unlit import Asked, UnlitField, UnlitScene, require_depth
+from texgs.fields.field import Asked, Role, UnlitField, UnlitScene, require_depth, sizes_in_mib
 from texgs.raster import Render
 from texgs.raster.voxel_grid import (
     VoxelGrid,

@@ -79,7 +79,7 @@ def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
 
     Trilinear between the lattice points of each level; points outside of the cube have the features of its
     faces. The table has all levels, one after the other. For a definition see
-    `texgs.raster.reference.hash_encoding`.
+    `texgs.raster.reference.voxels`.
     """
     given = {"points": (points, "n 3"), "table": (table, f"{levels.rows} {FEATURES}")}
     require(given, constant=("points",), cpu="hash encoding runs on the CPU")

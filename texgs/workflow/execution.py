@@ -8,7 +8,7 @@ from typing import Any
 
 from texgs.config.compose import compose
 from texgs.config.schema import Config
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.io import write_json
 from texgs.core.keys import ValueMismatch, typed

@@ -48,7 +48,7 @@ class Speed:
 
 def forecast(words: tuple[str, ...]) -> Forecast:
     """Return what a run with these words would do; nothing is written."""
-    from texgs.core.checksum import Checksums
+    from texgs.core.cache import Checksums
     from texgs.workflow.graph import drawn
 
     selection, planned = drawn(as_sweep(words), Checksums.load())

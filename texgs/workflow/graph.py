@@ -9,7 +9,7 @@ from typing import Any
 
 from texgs.config.project import Words
 from texgs.config.schema import Config
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.io import read_json
 from texgs.core.names import METRICS

@@ -8,7 +8,7 @@ from typing import Any, Self
 import yaml
 
 from texgs.config.schema import Config
-from texgs.core.checksum import Checksums, digest
+from texgs.core.cache import Checksums, digest
 from texgs.core.io import write_bytes
 from texgs.core.names import METRICS
 from texgs.workflow import result

@@ -16,8 +16,7 @@ from typing import Any
 from texgs.config.compose import compose
 from texgs.config.project import ROOT, folders
 from texgs.config.schema import Config
-from texgs.core.cache import keep, recall
-from texgs.core.checksum import Checksums, digest, of_folders
+from texgs.core.cache import Checksums, checksum_of_folders, digest, keep, recall
 from texgs.core.errors import ConfigError
 from texgs.core.io import write_bytes
 from texgs.workflow.experiments import LeftOut, apart
@@ -112,7 +111,7 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
     """
     path = Path(".snakemake", "texgs", f"plan-{digest(repr(words))}.json")
     data = os.environ.get("TEXGS_DATA", "")
-    key = digest("\n".join([*words, data, of_folders(ROOT / "texgs", *folders())]))
+    key = digest("\n".join([*words, data, checksum_of_folders(ROOT / "texgs", *folders())]))
     if is_job and (kept := recall(path, key)):
         with suppress(TypeError):  # of a damaged file, it is made again
             return Plan(**kept), []

@@ -19,7 +19,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from texgs.core.checksum import Checksums, combined, sha256
+from texgs.core.cache import Checksums, combined_checksum, sha256
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, remove_scratch, write_json
 from texgs.core.names import METRICS, POINTS, SLICES
@@ -195,7 +195,7 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
     is_foreign = path.exists() and path.name not in made_files
     if (folder / FILES).exists() and not is_foreign:
         made = [(name, sha) for name, sha in made_files.items() if name not in (METRICS, TIMES)]
-        return combined([*made, (STAMP, json.dumps(stamped(folder), sort_keys=True))])
+        return combined_checksum([*made, (STAMP, json.dumps(stamped(folder), sort_keys=True))])
     if path.name.startswith("transforms_"):
         members = [each for each in folder.rglob("*") if each.suffix in (".json", ".png")]
         members += [points for points in [folder / POINTS] if points.is_file()]
@@ -204,10 +204,10 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
         files = [each for each in path.rglob("*") if each.is_file()]  # chunks and DICOM have any suffix
         members = [each for each in files if each.suffix.lower() in SLICES] or files
     elif parts := parts_of(path):
-        return combined((each.name, checksums.of(each)) for each in (path, *parts))
+        return combined_checksum((each.name, checksums.of(each)) for each in (path, *parts))
     else:
         return checksums.of(path)
-    return combined(
+    return combined_checksum(
         (str(each.relative_to(folder) if each.is_relative_to(folder) else each), checksums.of(each))
         for each in members
     )

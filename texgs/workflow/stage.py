@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, cast, get_type_hints
 
 from texgs.config.schema import Config
-from texgs.core.checksum import digest
+from texgs.core.cache import digest
 from texgs.core.errors import ConfigError
 from texgs.edit.method import methods
 from texgs.fields.kinds import kinds

@@ -12,7 +12,7 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.schema import NO_SWEEP
-from texgs.core.checksum import digest
+from texgs.core.cache import digest
 from texgs.core.io import write_json
 from texgs.report.metrics_files import label
 from texgs.workflow import result

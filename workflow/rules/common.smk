@@ -10,7 +10,7 @@ from texgs.cli import fork_client
 from texgs.cli.run import tell_last_words
 from texgs.core.errors import TexgsError
 from texgs.core.cache import cache_folder
-from texgs.core.process import collect_rarely, waiting
+from texgs.core.memory import collect_rarely, waiting
 from texgs.report.table import DOCUMENT, FORMATS
 from texgs.report.tables import specs
 from texgs.workflow import tracked

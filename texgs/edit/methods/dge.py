@@ -8,7 +8,7 @@ from texgs.core.keys import key
 from texgs.edit.method import Method
 from texgs.edit.methods.igs2gs import rates
 from texgs.edit.methods.updates import UpdateKeys, run
-from texgs.edit.update_schedule import UpdateSchedule
+from texgs.edit.recipe import UpdateSchedule
 from texgs.fitting.settings import CommonRates
 
 

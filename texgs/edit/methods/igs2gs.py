@@ -5,8 +5,8 @@ from typing import Any
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods.updates import UpdateKeys, run
-from texgs.edit.update_schedule import UpdateSchedule, noise_range
+from texgs.edit.methods.updates import UpdateKeys, noise_range, run
+from texgs.edit.recipe import UpdateSchedule
 from texgs.fitting.settings import CommonRates
 
 

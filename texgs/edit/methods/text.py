@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.keys import key
 from texgs.edit.method import Method
 from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
-from texgs.edit.readable import OpacityKeys, raised
+from texgs.edit.readable import OpacityKeys, highlights_of, raised
 
 if TYPE_CHECKING:
     import numpy as np
@@ -59,7 +59,6 @@ class TextKeys(OpacityKeys, InstructionKeys):
 
 def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
-    from texgs.edit.material import highlights_of
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
     from texgs.volume.images import smaller

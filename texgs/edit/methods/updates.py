@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
-from texgs.edit.update_schedule import UpdateSchedule
+from texgs.edit.recipe import UpdateSchedule
 
 if TYPE_CHECKING:
     import numpy as np
@@ -89,3 +89,10 @@ def run(task: Task[UpdateKeys]) -> EditedScene:
     notes["instruction"] = task.followed or keys.instruction
     how = f"{guidance.name}, geometry {'frozen' if keys.frozen else 'learns'}"
     return EditedScene(scene, how, write_views(task.output, rows), notes=notes, losses=losses)
+
+
+def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float], ...]:
+    """Return one range of noise for all rounds."""
+    if len(noise) != 2 or not 0 <= noise[0] <= noise[1] <= 1:
+        raise ArgumentError(f"{where}: expected two shares from 0 to 1, the smaller one first, got {noise}")
+    return ((noise[0], noise[1]),)

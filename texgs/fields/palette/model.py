@@ -18,10 +18,9 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, located
 from texgs.core.io import reading_as
 from texgs.core.tensor_file import read_tensor_file, write_tensor_file
-from texgs.fields.field import Role, sizes_in_mib
+from texgs.fields.field import Asked, Role, UnlitField, UnlitScene, require_depth, sizes_in_mib
 from texgs.fields.palette.networks import Parameters, free_color, light, network_shapes, palette_color
 from texgs.fields.palette.rendering import RAYS, Geometry, Points, merged, points_on, shown, view_harmonics
-from texgs.fields.unlit import Asked, UnlitField, UnlitScene, require_depth
 from texgs.fields.voxels import grid_of, lattice, march_of
 from texgs.raster import Render
 from texgs.raster.hash_encoding import HashLevels
