@@ -14,7 +14,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT
 from texgs.fitting import now
-from texgs.fitting.ends import ends_of_rays, thickened
+from texgs.fitting.casting import ends_of_rays, thickened
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.generate import sphere
@@ -85,9 +85,11 @@ def test_thicker_matter_lets_a_power_of_the_light_through(alpha, factor):
 def test_one_of_two_views_has_a_headlight_and_the_others_lights_of_their_own(small, grid, monkeypatch):
     """42 cameras, of which 14 have a headlight; of the others one of two is cast."""
     seen = []
-    refine = now.refined
+    refine = now.fit_further
     monkeypatch.setattr(
-        now, "refined", lambda model, images, *rest: (seen.append(images), refine(model, images, *rest))[1]
+        now,
+        "fit_further",
+        lambda model, images, *rest: (seen.append(images), refine(model, images, *rest))[1],
     )
     tf = of_range(HIGH, grid)
     assert len(list(now.fit_now(Caster(grid, LOOK), LOOK, tf, LENS, "sphere", soon=False))) == 1

@@ -13,8 +13,8 @@ from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.light import HEADLIGHT
-from texgs.fitting import now, series
-from texgs.fitting.ends import Points
+from texgs.fitting import casting, series
+from texgs.fitting.casting import Points
 from texgs.fitting.now import fit_now
 from texgs.fitting.series import Follower
 from texgs.volume.caster import Caster
@@ -39,7 +39,7 @@ def key():
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """Steps of a second."""
-    monkeypatch.setattr(now, "FREQUENCY", 2)
+    monkeypatch.setattr(casting, "FREQUENCY", 2)
     for name, value in {"SIZE": 48, "ROUNDS": 2}.items():
         monkeypatch.setattr(series, name, value)
 

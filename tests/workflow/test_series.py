@@ -26,7 +26,7 @@ from texgs.core.io import write_json
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
-from texgs.fitting import now, series
+from texgs.fitting import casting, series
 from texgs.fitting.now import fit_now
 from texgs.scene.copied import write_copy
 from texgs.scene.scene import Scene, SceneModel, SceneVolume
@@ -70,7 +70,7 @@ def fitted():
 @pytest.fixture
 def folder(tmp_path, monkeypatch, fitted):
     """A folder of three steps, and a scene of the middle one; fits are short."""
-    monkeypatch.setattr(now, "FREQUENCY", 2)
+    monkeypatch.setattr(casting, "FREQUENCY", 2)
     for name, value in {"SIZE": 32, "ROUNDS": 1}.items():
         monkeypatch.setattr(series, name, value)
     files = write_steps(tmp_path)

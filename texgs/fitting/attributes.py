@@ -31,7 +31,7 @@ class Attributes:
     """What a volume says of surfels, and how strongly they are held to it."""
 
     lookup: Lookup
-    look: Appearance
+    appearance: Appearance
     coherence: float  # how alike its normals are from one surfel to the next, 0 to 1
     hold: float  # share of a difference that an iteration takes away; 0: the volume is no more than the start
 
@@ -39,7 +39,7 @@ class Attributes:
     def of(
         cls,
         caster: Caster,
-        look: Appearance,
+        appearance: Appearance,
         tf: TransferFunction,
         means: Tensor,
         hold: float | None = None,
@@ -51,7 +51,7 @@ class Attributes:
         lookup = Lookup(caster, tf)
         alike = coherence(lookup, means)
         share = min(max((alike - ROUGH) / (SMOOTH - ROUGH), 0.0), 1.0)
-        return cls(lookup, look, alike, HOLD * share if hold is None else hold)
+        return cls(lookup, appearance, alike, HOLD * share if hold is None else hold)
 
     @property
     def held(self) -> Attributes | None:
@@ -63,7 +63,7 @@ class Attributes:
 
         The material is that of the views, or the nearest that materials of a kind can express.
         """
-        factors = {name: getattr(self.look, name) for name in MATERIAL}
+        factors = {name: getattr(self.appearance, name) for name in MATERIAL}
         material = raw_material(**nearest_material(factors, kind), kind=kind)
         return {**self.at(means), **{name: x.to(means) for name, x in material.items()}}
 

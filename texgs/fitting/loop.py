@@ -2,14 +2,17 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import FitError
+from texgs.core.progress import progress
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.splats import Shading, Splats, join, visible_part
+from texgs.fields.surfels.model import Surfels
 from texgs.fitting.attributes import HELD, Attributes
 from texgs.fitting.checkpoint import ResumableFit
 from texgs.fitting.densify import DensityControl
@@ -131,6 +134,16 @@ class Fit(ResumableFit):
         device = self.parameters["means"].device
         self.control.gradients = state["control.gradients"].to(device, copy=True)
         self.control.counts = state["control.counts"].to(device, copy=True)
+
+
+def fit_further(
+    model: Surfels, images: Images, phase: Phase, seed: int, title: str, held: Attributes | None = None
+) -> Surfels:
+    """Return a model of a phase that starts with another one, without checkpoints."""
+    fit = Fit(model.parameters, model.shading, images, phase, seed, held)
+    for _ in progress(fit.run(), phase.iterations, title=title, unit=fit.unit):
+        pass
+    return replace(model, parameters=fit.result)
 
 
 def extent(cameras: Sequence[Camera], means: Tensor) -> float:

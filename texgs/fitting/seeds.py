@@ -16,7 +16,7 @@ from texgs.core.ply_file import read_vertices
 from texgs.fields.ply_columns import take
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
-from texgs.fitting.ends import Points, ends_of_rays
+from texgs.fitting.casting import Points, ends_of_rays
 from texgs.fitting.hull import Box, hull_points, mean_colors, random_points
 from texgs.fitting.loop import Fit
 from texgs.fitting.settings import Densify, Losses, Phase, Rates, Seeds
@@ -100,8 +100,8 @@ def points_in(volume: Grid | None, views: ViewSet, images: Images, most: int, se
             f"{views.folder}: seeds.kind=volume needs a volume and views that name their transfer function; "
             "seeds.kind=visible needs neither"
         )
-    caster, look, tf = shown_volume(volume, views)
-    return ends_of_rays(caster, look, tf, images.cameras, most, seed)
+    caster, appearance, tf = shown_volume(volume, views)
+    return ends_of_rays(caster, appearance, tf, images.cameras, most, seed)
 
 
 def shown_volume(
@@ -110,9 +110,9 @@ def shown_volume(
     """Return what casts rays through a volume as its views show it, how it looks there, and the function."""
     told, named = views.metadata, views.metadata["tf"]
     shading = {name: told["shading"][name] for name in MATERIAL if name in (told.get("shading") or {})}
-    look = Appearance(**shading, opacity_unit=told.get("opacity_unit", Appearance.opacity_unit))
+    appearance = Appearance(**shading, opacity_unit=told.get("opacity_unit", Appearance.opacity_unit))
     points = {key: named[key] for key in named if key != "name"} if isinstance(named, Mapping) else named
-    return Caster(volume, look, device), look, TransferFunction.from_dict(points)
+    return Caster(volume, appearance, device), appearance, TransferFunction.from_dict(points)
 
 
 def tell_fewer(views: ViewSet, found: int, count: int) -> None:

@@ -14,8 +14,9 @@ from texgs.core.lens import Lens
 from texgs.fields.surfels.model import TEXTURE, Surfels
 from texgs.fields.surfels.step_file import UNITS
 from texgs.fields.surfels.texels import untextured
-from texgs.fitting.ends import Points, ends_of_rays
-from texgs.fitting.now import HEADLIGHTS, OPACITY, PHASE, SURFELS, cast_views, lit_cameras, refined
+from texgs.fitting.casting import HEADLIGHTS, Points, cast_views, ends_of_rays, lit_cameras
+from texgs.fitting.loop import fit_further
+from texgs.fitting.now import OPACITY, PHASE, SURFELS
 from texgs.fitting.seeds import shown, surfels_on
 from texgs.fitting.settings import Rates
 from texgs.volume.caster import Caster
@@ -47,14 +48,14 @@ class Follower:
 
     Args:
         key: the model of any step, of stage shading or texture.
-        look: how volumes look.
+        appearance: how volumes look.
         tf: what the model shows, in data values.
     """
 
-    def __init__(self, key: Surfels, look: Appearance, tf: TransferFunction) -> None:
+    def __init__(self, key: Surfels, appearance: Appearance, tf: TransferFunction) -> None:
         if "ambient" not in key.parameters:
             raise ArgumentError(f"model: expected stage shading or texture, got {key.stage}; fit it further")
-        self._shading, self._look, self._tf = key.shading, look, tf
+        self._shading, self._appearance, self._tf = key.shading, appearance, tf
         self._texture = plain_texture(key.to("cpu"))
 
     def step(self, model: Surfels, before: Grid, after: Grid, title: str, seed: int = 0) -> Surfels:
@@ -77,7 +78,7 @@ class Follower:
         plain["colors"] = plain["colors"] + self._texture
         if lens_of(before, self._tf):
             plain = carried(plain, motion(before, after, self._tf))
-        caster = Caster(after, replace(self._look, step=STEP), device)
+        caster = Caster(after, replace(self._appearance, step=STEP), device)
         fitted = self._fitted(plain, caster, lens, title, seed)
         fitted["colors"] = fitted["colors"] - self._texture.to(device)
         return replace(model, parameters={**model.parameters, **fitted})
@@ -88,11 +89,11 @@ class Follower:
         """Plant surfels without texels, and fit all to views of a volume."""
         images = cast_views(caster, self._tf, lit_cameras(lens, seed), f"{title}, views")
         headlit = images[::HEADLIGHTS]
-        points = ends_of_rays(caster, self._look, self._tf, headlit.cameras, SURFELS, seed)
+        points = ends_of_rays(caster, self._appearance, self._tf, headlit.cameras, SURFELS, seed)
         weights = shown(Surfels(plain, self._shading).to(caster.device), headlit).cpu()
         model = Surfels(planted(plain, points, weights, seed), self._shading).to(caster.device)
         phase = replace(PHASE, iterations=ROUNDS * len(images), rates=RATES)
-        return dict(refined(model, images, phase, seed, title).parameters)
+        return dict(fit_further(model, images, phase, seed, title).parameters)
 
 
 def lens_of(grid: Grid, tf: TransferFunction) -> Lens | None:

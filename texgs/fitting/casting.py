@@ -1,6 +1,7 @@
-"""Where rays through a volume end: the places that its views show, as many on each as they show of it."""
+"""What a volume shows of a function, for fits: views that are cast, and the places where their rays end."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -9,16 +10,22 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.geometry import z_order_of
-from texgs.core.light import HEADLIGHT
+from texgs.core.lens import Lens
+from texgs.core.light import HEADLIGHT, Light, random_lights
+from texgs.core.progress import progress
+from texgs.volume.cameras import icosphere
 from texgs.volume.caster import Caster
-from texgs.volume.images import smaller
+from texgs.volume.images import Images, smaller
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
+FREQUENCY = 4  # of the icosphere of cameras, of which it has 162
+HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of their own
 GLANCE = 64  # pixels of the longer side of views whose rays are followed, about
 PIXELS = 4000  # of each view
 FAINT = 0.02  # alpha below which a pixel shows nothing to speak of
 DENSEST = 1 - 1e-6  # opacity of a point
+LitCamera = tuple[Camera, Light]
 
 
 class Points(NamedTuple):
@@ -30,14 +37,14 @@ class Points(NamedTuple):
 
 
 def ends_of_rays(
-    caster: Caster, look: Appearance, tf: TransferFunction, cameras: list[Camera], most: int, seed: int
+    caster: Caster, appearance: Appearance, tf: TransferFunction, cameras: list[Camera], most: int, seed: int
 ) -> Points:
     """Return where rays of random pixels lose some part of their light, another one in each view.
 
     So there are as many ends on a layer as it shows, also behind others. They are on the CPU, `most` of them
     or fewer: small views are enough where they show so many.
     """
-    unlit = caster.with_appearance(replace(look, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
+    unlit = caster.with_appearance(replace(appearance, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
     glance = max(cameras[0].width, cameras[0].height) // GLANCE
     for reduction in sorted({max(glance, 1), 1}, reverse=True):
         points = ends_in(unlit, tf, [smaller(camera, reduction) for camera in cameras], most, seed)
@@ -77,3 +84,22 @@ def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: tor
     at = rows[ends], columns[ends]
     rgba = rgba[at]
     return Points(camera.unproject(z)[at], normals[at], (rgba[:, :3] / rgba[:, 3:]).clamp(0, 1))
+
+
+def lit_cameras(lens: Lens, seed: int) -> list[LitCamera]:
+    """Return the cameras of training views: every third has a headlight, the others a random light."""
+    cameras = icosphere(FREQUENCY, lens)
+    random = random_lights(len(cameras), seed, 0)
+    lights = [light if index % HEADLIGHTS else HEADLIGHT for index, light in enumerate(random)]
+    return list(zip(cameras, lights, strict=True))
+
+
+def cast_views(caster: Caster, tf: TransferFunction, lit: Sequence[LitCamera], title: str) -> Images:
+    """Cast what a function shows, from cameras of one size."""
+    cameras, lights = map(list, zip(*lit, strict=True))
+    planes = torch.empty(len(cameras), 4, cameras[0].height, cameras[0].width, dtype=torch.uint8)
+    for index, camera in enumerate(progress(cameras, title=title, unit="view")):
+        seen = caster.cast(tf, camera, lights[index]).rgba.permute(2, 0, 1)
+        over_white = torch.cat([seen[:3] + 1 - seen[3], seen[3:]])
+        planes[index] = (255 * over_white).round_().clamp_(0, 255).to(torch.uint8)
+    return Images(planes, cameras, lights)
