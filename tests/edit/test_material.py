@@ -39,7 +39,7 @@ def test_the_middle_of_a_part_gets_the_highlights_of_the_material(name):
     model = Surfels({**model.parameters, "specular": raw}, model.shading)
     outer = torch.arange(151) < 75
     edit = PartEdit(**highlights_of(f"make it {name}", model, outer))
-    _, _, specular, shininess = Part(model).edited([edit]).material
+    _, _, specular, shininess = Part(model).apply([edit]).material
     assert float(specular[outer].median()) == pytest.approx(MATERIALS[name].specular)
     assert float(shininess[outer].median()) == pytest.approx(MATERIALS[name].shininess)
     assert edit.tint == MATERIALS[name].tint

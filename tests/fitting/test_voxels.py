@@ -16,7 +16,7 @@ from texgs.fitting.checkpoint import run_to_end
 from texgs.fitting.hull import hull_box
 from texgs.fitting.ray_settings import Decay, GridStage, VoxelKeys
 from texgs.fitting.rays import AROUND, curve, training_rays, widened
-from texgs.fitting.voxels import VoxelFit, grown, hull_grid, refined, seen_voxels
+from texgs.fitting.voxels import VoxelFit, dilate, hull_grid, refine_grid, seen_voxels
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays
 from texgs.volume.images import load
@@ -152,7 +152,7 @@ def test_the_hull_holds_the_ball(images):
 
 
 def test_refining_keeps_the_field(fit):
-    finer = refined(fit.grid, torch.ones(fit.grid.size, dtype=torch.bool))
+    finer = refine_grid(fit.grid, torch.ones(fit.grid.size, dtype=torch.bool))
     assert finer.spacing == fit.grid.spacing / 2
     coarse, fine = (grid.rows[grid.links().long()] for grid in (fit.grid, finer))
     # float32 places, times densities of hundreds
@@ -164,7 +164,7 @@ def test_refining_keeps_the_field(fit):
 def test_a_grown_mask():
     mask = torch.rand(9, 10, 11, generator=torch.Generator().manual_seed(0)) < 0.02
     expected = torch.nn.functional.max_pool3d(mask[None].float(), 3, 1, 1)[0] > 0
-    assert torch.equal(grown(mask), expected)
+    assert torch.equal(dilate(mask), expected)
 
 
 def test_seen_voxels_are_near_the_surface(fit, images):

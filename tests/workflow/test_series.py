@@ -71,7 +71,7 @@ def fitted():
 def folder(tmp_path, monkeypatch, fitted):
     """A folder of three steps, and a scene of the middle one; fits are short."""
     monkeypatch.setattr(casting, "FREQUENCY", 2)
-    for name, value in {"SIZE": 32, "ROUNDS": 1}.items():
+    for name, value in {"VIEW_SIZE": 32, "ROUNDS": 1}.items():
         monkeypatch.setattr(series, name, value)
     files = write_steps(tmp_path)
     (tmp_path / "volume.nrrd").write_bytes(files[1].read_bytes())

@@ -19,7 +19,7 @@ CONTAINERS = (  # for versions 2 and 1 of cgroups: the line that names a group, 
     (r"^\d+:(?:.*,)?memory(?:,.*)?:/(.*)$", "memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
 )
 MIB, GIB = 1 << 20, 1 << 30
-SMALL = 64 << 20  # bytes that are there without asking
+SMALL_BYTES = 64 << 20  # bytes that are there without asking
 # How threads wait. A fit has thousands of loops a second of less than a millisecond. To wake a thread
 # that sleeps takes as long as many of them, above all on virtual machines; one that spins on takes a core
 # from others. So they spin for some tens of microseconds and then sleep. docs/accuracy.md has the gain.
@@ -94,7 +94,7 @@ def require_memory(n_bytes: int, what: str, advice: str) -> None:
 
     Linux hands out more memory than there is, and ends a process that uses it.
     """
-    if n_bytes <= SMALL:
+    if n_bytes <= SMALL_BYTES:
         return
     free = free_memory()
     if n_bytes > free:

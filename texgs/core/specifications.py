@@ -26,7 +26,7 @@ def specifications(package: str, attribute: str) -> dict[str, Any]:
     defined, modules = dict[str, Any](), dict[str, str]()
     for entry in pkgutil.iter_modules(import_module(package).__path__):
         module = f"{package}.{entry.name}"
-        found = getattr(imported(module), attribute, ())
+        found = getattr(import_specification(module), attribute, ())
         for specification in found if isinstance(found, tuple) else (found,):
             name = getattr(specification, "name", None)
             if not isinstance(name, str):
@@ -44,10 +44,10 @@ def specifications(package: str, attribute: str) -> dict[str, Any]:
 def named(name: str) -> Any:
     """Return what a module defines, by a name such as "texgs.fields.voxels:read_voxels"."""
     module, _, attribute = name.partition(":")
-    return getattr(imported(module), attribute)
+    return getattr(import_specification(module), attribute)
 
 
-def imported(name: str) -> ModuleType:
+def import_specification(name: str) -> ModuleType:
     """Import a module; what is wrong with it becomes one sentence."""
     try:
         return import_module(name)

@@ -89,12 +89,12 @@ class JoinedGaussians(UnlitScene[Gaussians]):
         super().__init__(models, segments)
         if len({model.shading for model in models}) > 1:
             raise ArgumentError("models: expected all antialiased or none, got both; fit them by one recipe")
-        self.whole = joined(models)
+        self.whole = join_models(models)
 
     def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
         return self.whole.render(camera, opacity=self._per_gaussian(factors), **asked._asdict())
 
-    def edited(self, edits: Sequence[PartEdit]) -> Gaussians:
+    def with_edits(self, edits: Sequence[PartEdit]) -> Gaussians:
         """Return what is visible as one model, opacities as edited."""
         factors = self._per_gaussian(opacity_factors(edits, len(self.counts), self.kind))
         shown = factors > 0
@@ -112,7 +112,7 @@ class JoinedGaussians(UnlitScene[Gaussians]):
         return torch.cat([torch.full((n,), factor, device=self.device) for factor, n in pairs])
 
 
-def joined(models: Sequence[Gaussians]) -> Gaussians:
+def join_models(models: Sequence[Gaussians]) -> Gaussians:
     """Join models to one; harmonics that a model has not are zero."""
     most = max(model.parameters["sh"].shape[1] for model in models)
     several = [

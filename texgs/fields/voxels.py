@@ -114,10 +114,10 @@ class VoxelScene(UnlitScene[Voxels]):
                 continue  # its voxels need no place
             density, sh = unpack_rows(each.grid.rows)
             grids.append(each.grid.with_rows(pack_rows(density * factor, sh)))
-        return replace(first, grid=grids[0] if len(grids) == 1 else merged(grids))
+        return replace(first, grid=grids[0] if len(grids) == 1 else merge_grids(grids))
 
 
-def merged(grids: Sequence[VoxelGrid]) -> VoxelGrid:
+def merge_grids(grids: Sequence[VoxelGrid]) -> VoxelGrid:
     """Merge grids to one in which densities add up, and colours are means weighted by them.
 
     It has the finest of their spacings, or that of LARGEST voxels along its longest side where this is wider.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from texgs.core.geometry import nearest
 from texgs.fields.surfels.material import nearest_material
 from texgs.fields.surfels.shading import raw_material
 from texgs.raster.shading import MATERIAL
@@ -89,12 +89,9 @@ def coherence(lookup: Lookup, means: Tensor) -> float:
     Light sees no difference between a normal and its opposite, so that cosines count without their sign. It
     is 0 for fewer points than have neighbours.
     """
-    from scipy.spatial import cKDTree
-
     if len(means) <= NEIGHBOURS:
         return 0.0
     normals = normalize(lookup.at(means, ("gradients",))["gradients"].cpu(), dim=1)
-    places = means.detach().cpu().numpy()
-    _, near = cKDTree(places).query(places, k=1 + NEIGHBOURS)
-    cosines = (normals[:, None] * normals[torch.from_numpy(near[:, 1:])]).sum(dim=2)
+    _, near = nearest(means, means, 1 + NEIGHBOURS)
+    cosines = (normals[:, None] * normals[near[:, 1:]]).sum(dim=2)
     return float(cosines.abs().mean())

@@ -21,14 +21,14 @@ from texgs.volume.transfer import TransferFunction
 
 FREQUENCY = 4  # of the icosphere of cameras, of which it has 162
 HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of their own
-GLANCE = 64  # pixels of the longer side of views whose rays are followed, about
+GLANCE_SIZE = 64  # pixels of the longer side of views whose rays are followed, about
 PIXELS = 4000  # of each view
-FAINT = 0.02  # alpha below which a pixel shows nothing to speak of
-DENSEST = 1 - 1e-6  # opacity of a point
+FAINT_ALPHA = 0.02  # alpha below which a pixel shows nothing to speak of
+DENSEST_OPACITY = 1 - 1e-6  # opacity of a point
 LitCamera = tuple[Camera, Light]
 
 
-class Points(NamedTuple):
+class RayEnds(NamedTuple):
     """Where rays end: places, normals and colours [N, 3]."""
 
     places: Tensor
@@ -38,14 +38,14 @@ class Points(NamedTuple):
 
 def ends_of_rays(
     caster: Caster, appearance: Appearance, tf: TransferFunction, cameras: list[Camera], most: int, seed: int
-) -> Points:
+) -> RayEnds:
     """Return where rays of random pixels lose some part of their light, another one in each view.
 
     So there are as many ends on a layer as it shows, also behind others. They are on the CPU, `most` of them
     or fewer: small views are enough where they show so many.
     """
     unlit = caster.with_appearance(replace(appearance, step=1.0, ambient=1.0, diffuse=0.0, specular=0.0))
-    glance = max(cameras[0].width, cameras[0].height) // GLANCE
+    glance = max(cameras[0].width, cameras[0].height) // GLANCE_SIZE
     for reduction in sorted({max(glance, 1), 1}, reverse=True):
         points = ends_in(unlit, tf, [smaller(camera, reduction) for camera in cameras], most, seed)
         if len(points.places) == most:
@@ -53,37 +53,37 @@ def ends_of_rays(
     return points
 
 
-def ends_in(caster: Caster, tf: TransferFunction, cameras: list[Camera], most: int, seed: int) -> Points:
+def ends_in(caster: Caster, tf: TransferFunction, cameras: list[Camera], most: int, seed: int) -> RayEnds:
     """Return where rays of views end, `most` of them or fewer, along a Z curve."""
     generator = torch.Generator().manual_seed(seed)
     count, parts = len(cameras), []
     shares = (torch.randperm(count, generator=generator) + 0.5) / count  # spread evenly, in random order
     for camera, left in zip(cameras, shares.tolist(), strict=True):
-        thick = thickened(tf, math.log(0.5) / math.log(left))  # half of its light is left where `left` was
+        thick = thicken(tf, math.log(0.5) / math.log(left))  # half of its light is left where `left` was
         parts.append(ends_of(caster, thick, camera, generator))
-    points = Points(*map(torch.cat, zip(*parts, strict=True)))
+    points = RayEnds(*map(torch.cat, zip(*parts, strict=True)))
     chosen = torch.randperm(len(points.places), generator=generator)[:most]
     ordered = chosen[z_order_of(points.places[chosen])]
-    return Points(*(x[ordered] for x in points))
+    return RayEnds(*(x[ordered] for x in points))
 
 
-def thickened(tf: TransferFunction, factor: float) -> TransferFunction:
+def thicken(tf: TransferFunction, factor: float) -> TransferFunction:
     """Return a function of a factor's extinction."""
-    through = [(value, math.log1p(-min(alpha, DENSEST))) for value, alpha in tf.opacity]
+    through = [(value, math.log1p(-min(alpha, DENSEST_OPACITY))) for value, alpha in tf.opacity]
     return tf.with_points([(value, -math.expm1(factor * x)) for value, x in through], tf.color)
 
 
-def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: torch.Generator) -> Points:
+def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: torch.Generator) -> RayEnds:
     """Return where rays of random pixels of one view lose half of their light, as far as they do."""
     seen = caster.cast(tf, camera, HEADLIGHT, ("median", "normal"))
     z, normals, rgba = seen.median.cpu(), seen.normal.cpu(), seen.rgba.cpu()  # type: ignore[union-attr]
-    rows, columns = (rgba[..., 3] > FAINT).nonzero(as_tuple=True)
+    rows, columns = (rgba[..., 3] > FAINT_ALPHA).nonzero(as_tuple=True)
     some = torch.randperm(len(rows), generator=generator)[:PIXELS]
     rows, columns = rows[some], columns[some]
     ends = z[rows, columns] > 0
     at = rows[ends], columns[ends]
     rgba = rgba[at]
-    return Points(camera.unproject(z)[at], normals[at], (rgba[:, :3] / rgba[:, 3:]).clamp(0, 1))
+    return RayEnds(camera.unproject(z)[at], normals[at], (rgba[:, :3] / rgba[:, 3:]).clamp(0, 1))
 
 
 def lit_cameras(lens: Lens, seed: int) -> list[LitCamera]:

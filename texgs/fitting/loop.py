@@ -22,7 +22,7 @@ from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 
 USUAL_DISTANCE = 4.0  # of cameras, in radii of the object
-SMALLEST = 1e-3  # distance, world units
+SMALLEST_EXTENT = 1e-3  # distance, world units
 
 
 class Fit(ResumableFit):
@@ -154,7 +154,7 @@ def extent(cameras: Sequence[Camera], means: Tensor) -> float:
     """
     around = spread(torch.stack([camera.position for camera in cameras]))
     radius = spread(means)
-    return 1.1 * max(around if around > radius else USUAL_DISTANCE * radius, SMALLEST)
+    return 1.1 * max(around if around > radius else USUAL_DISTANCE * radius, SMALLEST_EXTENT)
 
 
 def spread(points: Tensor) -> float:

@@ -22,7 +22,7 @@ from texgs.volume.transfer import TransferFunction
 SURFELS, OPACITY = 40_000, 0.05
 FEWEST_POINTS = 100
 CAST_EVERY = 2  # of the views that have no headlight, one of so many is cast
-STEP = 1.0  # voxels between the samples of views
+SAMPLE_DISTANCE = 1.0  # voxels between the samples of views
 PHASE = Phase(
     rates=Rates(quats=0.016, scales=0.05, opacities=0.1),
     losses=Losses(alpha=0.0),
@@ -65,7 +65,7 @@ def fit_now(
         raise ArgumentError("function: expected to see enough of the volume, got little; raise its opacity")
     others = [each for index, each in enumerate(lit) if index % HEADLIGHTS][::CAST_EVERY]
     chosen = [*lit[::HEADLIGHTS], *others]
-    caster = caster.with_appearance(replace(appearance, step=STEP))
+    caster = caster.with_appearance(replace(appearance, step=SAMPLE_DISTANCE))
     images = cast_views(caster, tf, chosen, f"{title}, views")
     headlit = images[: len(chosen) - len(others)]
     shading = ShadingModel(local_viewer=caster.local_viewer)

@@ -10,13 +10,13 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from texgs.core.errors import ArgumentError, located
-from texgs.core.geometry import facing
+from texgs.core.geometry import facing, nearest
 from texgs.core.names import POINTS
 from texgs.core.ply_file import read_vertices
 from texgs.fields.ply_columns import take
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
-from texgs.fitting.casting import Points, ends_of_rays
+from texgs.fitting.casting import RayEnds, ends_of_rays
 from texgs.fitting.hull import Box, hull_points, mean_colors, random_points
 from texgs.fitting.loop import Fit
 from texgs.fitting.settings import Densify, Losses, Phase, Rates, Seeds
@@ -30,11 +30,11 @@ from texgs.volume.view_set import ViewSet
 
 MARGIN = 0.02  # of the box around the data, relative to its longest side
 HALF_SIZE = 1.1  # of the cube around the origin where nothing else is known, in halves of the longest side
-SIDE = 1.0  # the longest side of data where views do not say, world units
+USUAL_SIDE = 1.0  # the longest side of data where views do not say, world units
 GREY = 0.5  # the colour of random seeds
-USUAL = 10_000  # seeds, where nothing says how many
+USUAL_COUNT = 10_000  # seeds, where nothing says how many
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
-SMALLEST = 1e-4  # scale, world units
+LEAST_SCALE = 1e-4  # scale, world units
 # A quick fit finds what is seen of more surfels than are kept.
 CANDIDATES = 2  # for each surfel that is kept
 PIXELS = 200  # of the longer side of its small images, about
@@ -68,7 +68,7 @@ def seed_surfels(
         raise ArgumentError(f"seeds.opacity: expected a value between 0 and 1, got {seeds.opacity}")
     if kind == "auto":
         kind = "volume" if volume is not None and "tf" in views.metadata else "visible"
-    count = seeds.count or (most if kind in ("volume", "visible") else None) or USUAL
+    count = seeds.count or (most if kind in ("volume", "visible") else None) or USUAL_COUNT
     generator = torch.Generator().manual_seed(seed)
     if kind == "volume":
         ends = points_in(volume, views, images, count, seed)
@@ -93,7 +93,7 @@ def seed_surfels(
     return most_seen(surfels, colors, images, count, seed)
 
 
-def points_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed: int) -> Points:
+def points_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed: int) -> RayEnds:
     """Return where rays of all views end in what they show of a volume."""
     if volume is None or "tf" not in views.metadata:
         raise ArgumentError(
@@ -130,7 +130,7 @@ def box_of(views: ViewSet, half_size: float | None) -> Box:
     """
     aabb = views.metadata.get("aabb")
     if aabb is None:
-        corner = torch.full((3,), (half_size or HALF_SIZE) * SIDE / 2)
+        corner = torch.full((3,), (half_size or HALF_SIZE) * USUAL_SIDE / 2)
         return -corner, corner
     try:
         low, high = torch.tensor(aabb, dtype=torch.float32).reshape(2, 3)
@@ -169,13 +169,10 @@ def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
 
 def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
     """Return raw geometry of round surfels at points [N, 3], as far apart as large, turned at random."""
-    from scipy.spatial import cKDTree
-
     if len(points) <= NEIGHBOURS:
         raise ArgumentError(f"seeds: expected at least {NEIGHBOURS + 1} points, got {len(points)}")
-    places = points.double().numpy()
-    distances, _ = cKDTree(places).query(places, k=NEIGHBOURS + 1)
-    scale = torch.from_numpy(np.sqrt(np.mean(distances[:, 1:] ** 2, axis=1))).float().clamp_min(SMALLEST)
+    distances = nearest(points, points, NEIGHBOURS + 1)[0].numpy()
+    scale = torch.from_numpy(np.sqrt(np.mean(distances[:, 1:] ** 2, axis=1))).float().clamp_min(LEAST_SCALE)
     return {
         "means": points.float(),
         "quats": normalize(torch.randn(len(points), 4, generator=generator), dim=1),
@@ -184,7 +181,7 @@ def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> di
     }
 
 
-def surfels_on(points: Points, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
+def surfels_on(points: RayEnds, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
     """Return raw geometry of round surfels at points, which face along their normals."""
     return {**surfels_at(points.places, opacity, generator), "quats": facing(points.normals)}
 
@@ -199,12 +196,12 @@ def most_seen(
     for _ in fit.run():
         pass
     fitted = {name: x.detach() for name, x in fit.parameters.items()}
-    best = shown(Surfels(fitted), small).topk(min(count, len(colors))).indices
+    best = visible_weights(Surfels(fitted), small).topk(min(count, len(colors))).indices
     return {name: fitted[name][best] for name in surfels}, fitted["colors"][best].clamp(0, 1)
 
 
 @torch.no_grad()
-def shown(model: Surfels, images: Images) -> Tensor:
+def visible_weights(model: Surfels, images: Images) -> Tensor:
     """Sum the blending weights [N] of each surfel over all pixels of all views."""
     total = torch.zeros(len(model), device=model.device)
     for camera, light in zip(images.cameras, images.lights, strict=True):

@@ -60,7 +60,7 @@ class VoxelFit(ResumableFit):
     def refine(self) -> None:
         """Remove what no ray sees, and halve the spacing."""
         self.grid.refresh_occupancy()
-        self._begin(refined(self.grid, self.seen()))
+        self._begin(refine_grid(self.grid, self.seen()))
 
     def seen(self) -> Tensor:
         """Return the voxels [X, Y, Z] that show in the training views."""
@@ -156,7 +156,7 @@ def seen_voxels(grid: VoxelGrid, rays: TrainingRays, march: March, weight: float
     return (weights > weight)[grid.links().long()]
 
 
-def refined(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
+def refine_grid(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
     """Make a grid with half the spacing, of the voxels around those to keep, [X, Y, Z] bool.
 
     Its rows are interpolated; every other one is a row as it was.
@@ -164,14 +164,14 @@ def refined(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
     mask = kept
     for axis in range(3):
         mask = mask.repeat_interleave(2, axis)
-    finer = voxel_grid(grown(mask), grid.lower, grid.spacing / 2, grid.degree)
+    finer = voxel_grid(dilate(mask), grid.lower, grid.spacing / 2, grid.degree)
     finer.rows[0] = grid.rows[0]
     interpolate_rows(grid, finer.points(), out=finer.rows[1:])
     finer.refresh()
     return finer
 
 
-def grown(mask: Tensor) -> Tensor:
+def dilate(mask: Tensor) -> Tensor:
     """Add all 26 neighbours of what is in a mask [X, Y, Z]."""
     for axis, side in enumerate(mask.shape):
         before, mask = mask, mask.clone()

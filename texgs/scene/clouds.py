@@ -115,13 +115,13 @@ def lit(
     model = untextured(model) if model.stage == "texture" else model
     texels = model.parameters.get("texels", torch.zeros_like(model.parameters["colors"]))
     part = Part(model, masks)
-    edited = part.edited(edits)
+    edited = part.apply(edits)
     cameras = icosphere_of(DIRECTIONS, Lens(radius=FAR))
     views = normalize(torch.stack([-camera.position for camera in cameras]).double(), dim=1)  # [M, 3]
     count = COEFFICIENTS[light.kind]
     solver = torch.linalg.pinv(harmonics(views)[:, :count]).float()  # [K, M]
     sh = texels.new_zeros(len(model), count, 3)
     for camera, weights in zip(cameras, solver.T, strict=True):
-        base, gain = part.look(edited, camera, light, "shaded")
+        base, gain = part.shade(edited, camera, light, "shaded")
         sh += weights[:, None] * (base + gain[:, None] * texels - 0.5)[:, None]
     return edited.opacities, sh

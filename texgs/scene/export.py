@@ -150,7 +150,7 @@ def export_scene(path: Path, scene: Scene, export: Export) -> Path:
         render = partial(composed.render, edits=edits, look=look)
         return _write_fused(path, export, export.cameras(scene.framed(composed)), render, field.depth)
     if isinstance(composed, JoinedGaussians):
-        return write_gaussians(path, composed.edited(edits), told)
+        return write_gaussians(path, composed.with_edits(edits), told)
     return _write(path, export, joined(cast(Composition, composed).parts, edits))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods.style import FeatureKeys, Look, run
+from texgs.edit.methods.style import FeatureKeys, StyleWork, run
 
 if TYPE_CHECKING:
     from texgs.edit.style_loop import Losses
@@ -27,15 +27,17 @@ class ArfKeys(FeatureKeys):
     sh_variation: float = key(5e-3, "weight of total variation of the coefficients", least=0)
     exact: bool = key(True, "colours are moved, not their coefficients as if they were colours (ARF's code)")
 
-    def stylize(self, look: Look, name: str, model: Voxels, views: Sequence[View]) -> tuple[Voxels, Losses]:
+    def stylize(
+        self, work: StyleWork, name: str, model: Voxels, views: Sequence[View]
+    ) -> tuple[Voxels, Losses]:
         """Give a grid the style of its picture; features see half of the resolution, and the style too."""
         from texgs.edit.voxels import stylize_voxels
         from texgs.volume.images import load
 
-        recipe = self.recipe(round(self.epochs * len(views)), look.task.edit.seed, reduce=2)
-        images, picture = load(views, look.task.reduce), look.picture(name)
+        recipe = self.recipe(round(self.epochs * len(views)), work.task.edit.seed, reduce=2)
+        images, picture = load(views, work.task.reduce), work.picture(name)
         weights = {"content": self.content, "variation": self.variation, "sh_variation": self.sh_variation}
-        how = self.ray_epochs, self.exact, weights, look.vgg, look.task.title_of(name)
+        how = self.ray_epochs, self.exact, weights, work.vgg, work.task.title_of(name)
         return stylize_voxels(model, images, picture, recipe, *how)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods.style import FeatureKeys, Look, picture_of, require_picture, run
+from texgs.edit.methods.style import FeatureKeys, StyleWork, picture_of, require_picture, run
 
 if TYPE_CHECKING:
     from texgs.edit.style_loop import Losses
@@ -61,20 +61,20 @@ class StyleRfKeys(FeatureKeys):
         return ", ".join(Path(name).name for name in self.styles or [self.style])
 
     def stylize(
-        self, look: Look, name: str, model: PaletteField, views: Sequence[View]
+        self, work: StyleWork, name: str, model: PaletteField, views: Sequence[View]
     ) -> tuple[PaletteField, Losses]:
         """Give palette colours the styles of their pictures; features see half of the resolution."""
         from texgs.edit.palette_style import stylize_palette
         from texgs.volume.images import load
 
-        task = look.task
+        task = work.task
         recipe = self.recipe(round(self.epochs * len(views)), task.edit.seed, reduce=2, rate=self.rate)
         pictures = [picture_of(each, STYLES) for each in self.styles]
-        look.pictures.update({f"{name}-{index + 1}": each for index, each in enumerate(pictures)})
-        pictures = pictures or [look.picture(name)] * len(model.colors)
-        images, how = load(views, task.reduce), (self.distillation, self.variation, look.vgg)
+        work.pictures.update({f"{name}-{index + 1}": each for index, each in enumerate(pictures)})
+        pictures = pictures or [work.picture(name)] * len(model.colors)
+        images, how = load(views, task.reduce), (self.distillation, self.variation, work.vgg)
         edited, losses, error = stylize_palette(model, images, pictures, recipe, *how, task.title_of(name))
-        look.notes.setdefault("distillation_rmse", {})[name] = error
+        work.notes.setdefault("distillation_rmse", {})[name] = error
         return edited, losses
 
 

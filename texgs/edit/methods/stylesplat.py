@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods.style import FeatureKeys, Look, run
+from texgs.edit.methods.style import FeatureKeys, StyleWork, run
 
 if TYPE_CHECKING:
     from texgs.edit.style_loop import Losses
@@ -24,16 +24,16 @@ class StyleSplatKeys(FeatureKeys):
     rate: float = key(0.005, "learning rate of zeroth harmonics; the others have a twentieth", above=0)
 
     def stylize(
-        self, look: Look, name: str, model: Gaussians, views: Sequence[View]
+        self, work: StyleWork, name: str, model: Gaussians, views: Sequence[View]
     ) -> tuple[Gaussians, Losses]:
         """Give Gaussians the style of their picture; features see every pixel."""
         from texgs.edit.gaussians import stylize_gaussians
         from texgs.volume.images import smaller
 
-        task = look.task
+        task = work.task
         recipe = self.recipe(self.iterations, task.edit.seed, reduce=1, rate=self.rate)
         cameras = [smaller(view.camera, task.reduce) for view in views]
-        return stylize_gaussians(model, cameras, look.picture(name), recipe, look.vgg, task.title_of(name))
+        return stylize_gaussians(model, cameras, work.picture(name), recipe, work.vgg, task.title_of(name))
 
 
 METHOD = Method(

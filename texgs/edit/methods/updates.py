@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
+from texgs.edit.methods.instruction import SHOWN_VIEWS, InstructionKeys, write_views
 from texgs.edit.recipe import UpdateSchedule
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def run(task: Task[UpdateKeys]) -> EditedScene:
             seed=task.edit.seed,
             title=task.title_of(name),
         )
-        before, after = zip(*updated.some(SHOWN), strict=True)
+        before, after = zip(*updated.some(SHOWN_VIEWS), strict=True)
         rows[f"{name} before"] = [old.numpy() for old in before]
         rows[f"{name} edited"] = [new.numpy() for new in after]
         notes[name] = {"edits": updated.count, "seconds of them": updated.seconds}

@@ -20,14 +20,22 @@ from texgs.core.io import reading_as
 from texgs.core.tensor_file import read_tensor_file, write_tensor_file
 from texgs.fields.field import Asked, Role, UnlitField, UnlitScene, require_depth, sizes_in_mib
 from texgs.fields.palette.networks import Parameters, free_color, light, network_shapes, palette_color
-from texgs.fields.palette.rendering import RAYS, Geometry, Points, merged, points_on, shown, view_harmonics
+from texgs.fields.palette.rendering import (
+    RAYS,
+    Geometry,
+    Points,
+    merge_points,
+    points_on,
+    view_harmonics,
+    visible_points,
+)
 from texgs.fields.voxels import grid_of, lattice, march_of
 from texgs.raster import Render
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxels import camera_rays
 
 LEAST_WEIGHT = 1e-4  # of points whose colours are looked at
-OCCUPIED = 128  # places along each side of the two lattices of the authors
+OCCUPANCY_SIDE = 128  # places along each side of the two lattices of the authors
 FORMAT = "texgs-palette"
 VERSION = 1
 GRID = ("masks", "density")  # its tensors, before networks
@@ -92,7 +100,7 @@ class PaletteField(UnlitField):
         networks, and a mask for each block of voxels and a number for each voxel.
         """
         grid, groups = self.geometry.grid, {"density": "geometry", "free": "texture"}
-        counted = {"geometry": 2 * 4 * OCCUPIED**3, "shading": 0, "texture": 0}
+        counted = {"geometry": 2 * 4 * OCCUPANCY_SIDE**3, "shading": 0, "texture": 0}
         stored = {"geometry": 8 * grid.masks.numel() + 4 * len(grid.rows), "shading": 0, "texture": 0}
         for name, x in self.parameters.items():
             group = groups.get(name.split(".")[0], "shading")
@@ -129,8 +137,8 @@ class PaletteScene(UnlitScene[PaletteField]):
             points = points_on(rays, each.geometry, each.parameters)
             points = points.take((points.distance >= near[points.ray]) & (points.distance < far[points.ray]))
             several.append(points._replace(depth=factor * points.depth))
-        points, owner = merged(several)
-        shows = shown(points, LEAST_WEIGHT)
+        points, owner = merge_points(several)
+        shows = visible_points(points, LEAST_WEIGHT)
         owner, harmonics = owner[shows.chosen], view_harmonics(rays)
         values = torch.ones(len(owner), 5)
         values[:, 4] = shows.points.distance

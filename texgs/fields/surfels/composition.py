@@ -71,7 +71,7 @@ class Part:
             return self.colors + palettes[0]
         return self.colors + torch.stack(palettes)[self.labels]
 
-    def edited(self, edits: Sequence[PartEdit]) -> Edited:
+    def apply(self, edits: Sequence[PartEdit]) -> Edited:
         """Return what edits make of the model."""
         a, d, s, b = (
             self.material[name] * self.per_surfel([getattr(edit, name) for edit in edits])
@@ -83,7 +83,7 @@ class Part:
             tint = self.colors.new_tensor(tints)[0 if self.labels is None else self.labels]
         return Edited(self.colored(edits), (a, d, s, b), self.opacity(edits), tint)
 
-    def look(self, edited: Edited, camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
+    def shade(self, edited: Edited, camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
         """Return base [N, 3] and gain [N]: the colour of a fragment is base + gain * texel."""
         colors, n = edited.colors, len(self.model)
         if look == "unshaded":
@@ -119,7 +119,7 @@ class Composition:
         self.options = models[0].shading.options
         geometries = [geometry(model.parameters)[:3] for model in models]
         self.means, self.quats, self.scales = (torch.cat(x) for x in zip(*geometries, strict=True))
-        self.texels, self.sizes, self.offsets = joined_textures(models)
+        self.texels, self.sizes, self.offsets = join_textures(models)
         self.has_normals = any("normals" in model.parameters for model in models)
         self._latest: tuple[list[PartEdit] | None, list[Edited], Tensor] | None = None
 
@@ -153,7 +153,7 @@ class Composition:
         if look not in get_args(Look):
             raise ArgumentError(f"look: expected one of {', '.join(get_args(Look))}, got {look}")
         edited, opacities = self._edited(edits)
-        looks = [part.look(own, camera, light, look) for part, own in zip(self.parts, edited, strict=True)]
+        looks = [part.shade(own, camera, light, look) for part, own in zip(self.parts, edited, strict=True)]
         base, gain = (torch.cat(x) for x in zip(*looks, strict=True))
         if background is None:
             background = self.means.new_full((3,), float(look not in MATERIAL))
@@ -180,7 +180,7 @@ class Composition:
         latest = self._latest  # another thread may put another one there
         if latest is None or latest[0] != own:
             pairs = zip(self.parts, by_part(self.parts, own), strict=True)
-            edited = [part.edited(each) for part, each in pairs]
+            edited = [part.apply(each) for part, each in pairs]
             self._latest = latest = (own, edited, torch.cat([each.opacities for each in edited]))
         return latest[1:]
 
@@ -196,7 +196,7 @@ def by_part(parts: Sequence[Part], edits: Sequence[PartEdit] | None) -> list[Seq
     return [edits[end - count : end] for count, end in zip(counts, accumulate(counts), strict=True)]
 
 
-def joined_textures(models: Sequence[Surfels]) -> tuple[Tensor, Tensor, Tensor]:
+def join_textures(models: Sequence[Surfels]) -> tuple[Tensor, Tensor, Tensor]:
     """Join texels [T, 3], sizes [N, 2] and offsets [N] of models; surfels without any get one texel of 0."""
     textures, count = [], 0
     for model in models:
