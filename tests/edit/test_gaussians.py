@@ -8,7 +8,7 @@ import torch
 from tests.edit.scenes import RADIUS, sphere_points
 from tests.fitting.scenes import cameras
 from texgs.edit.gaussians import HIGHER, stylize_gaussians
-from texgs.edit.methods.stylesplat import StyleSplatKeys
+from texgs.edit.methods.style_baselines import StyleSplatKeys
 from texgs.edit.objective import Objective
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.gaussians import Gaussians

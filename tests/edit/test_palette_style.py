@@ -10,7 +10,7 @@ from tests.fitting.scenes import ball_images, cameras
 from tests.fitting.test_palette import SETTINGS
 from texgs.core.errors import ArgumentError
 from texgs.edit import palette_style
-from texgs.edit.methods.stylerf import StyleRfKeys
+from texgs.edit.methods.style_baselines import StyleRfKeys
 from texgs.edit.objective import Objective
 from texgs.edit.palette_style import PalettePainting, stylize_palette
 from texgs.edit.style_loop import learn_style

@@ -8,7 +8,7 @@ import torch
 from tests.edit.scenes import images_of, plain_style
 from tests.fields.voxels.test_voxels import ball
 from tests.fitting.scenes import cameras
-from texgs.edit.methods.arf import ArfKeys
+from texgs.edit.methods.style_baselines import ArfKeys
 from texgs.edit.objective import Objective
 from texgs.edit.style_loop import learn_style
 from texgs.edit.style_picture import StylePicture

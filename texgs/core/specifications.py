@@ -38,7 +38,7 @@ def specifications(package: str, attribute: str) -> dict[str, Any]:
                     "twice; rename yours"
                 )
             defined[name], modules[name] = specification, module
-    return defined
+    return dict(sorted(defined.items()))
 
 
 def named(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""StyleRF-VolVis (Tang et al. 2024), one of the paper's baselines: styles of pictures for palette fields."""
+"""The paper's baselines that follow pictures: ARF on voxels, StyleSplat on 3D Gaussians, StyleRF-VolVis."""
 
 from __future__ import annotations
 
@@ -15,15 +15,62 @@ from texgs.edit.methods.style import FeatureKeys, StyleWork, picture_of, require
 if TYPE_CHECKING:
     from texgs.edit.style_loop import Losses
     from texgs.edit.style_picture import StylePicture
+    from texgs.fields.gaussians import Gaussians
     from texgs.fields.palette.model import PaletteField
+    from texgs.fields.voxels import Voxels
     from texgs.volume.view_set import View
 
 STYLES = "edit.stylerf.styles"
 
 
 @dataclass(frozen=True)
+class ArfKeys(FeatureKeys):
+    """How colours of voxels take on a style (ARF, Zhang et al. 2022)."""
+
+    epochs: float = key(10.0, "rounds through the training views, for the style", least=0)
+    ray_epochs: float = key(1.0, "rounds through the rays of recoloured views before that", least=0)
+    content: float = key(5e-3, "weight of the features that views have as recoloured", least=0)
+    variation: float = key(1.0, "weight of total variation of the image", least=0)
+    sh_variation: float = key(5e-3, "weight of total variation of the coefficients", least=0)
+    exact: bool = key(True, "colours are moved, not their coefficients as if they were colours (ARF's code)")
+
+    def stylize(
+        self, work: StyleWork, name: str, model: Voxels, views: Sequence[View]
+    ) -> tuple[Voxels, Losses]:
+        """Give a grid the style of its picture; features see half of the resolution, and the style too."""
+        from texgs.edit.voxels import stylize_voxels
+        from texgs.volume.images import load
+
+        recipe = self.recipe(round(self.epochs * len(views)), work.task.edit.seed, reduce=2)
+        images, picture = load(views, work.task.reduce), work.picture(name)
+        weights = {"content": self.content, "variation": self.variation, "sh_variation": self.sh_variation}
+        how = self.ray_epochs, self.exact, weights, work.vgg, work.task.title_of(name)
+        return stylize_voxels(model, images, picture, recipe, *how)
+
+
+@dataclass(frozen=True)
+class StyleSplatKeys(FeatureKeys):
+    """How colours of 3D Gaussians take on a style (StyleSplat, Jain et al. 2024)."""
+
+    iterations: int = key(2000, "steps of the style, of one view each", least=0)
+    rate: float = key(0.005, "learning rate of zeroth harmonics; the others have a twentieth", above=0)
+
+    def stylize(
+        self, work: StyleWork, name: str, model: Gaussians, views: Sequence[View]
+    ) -> tuple[Gaussians, Losses]:
+        """Give Gaussians the style of their picture; features see every pixel."""
+        from texgs.edit.gaussians import stylize_gaussians
+        from texgs.volume.images import smaller
+
+        task = work.task
+        recipe = self.recipe(self.iterations, task.edit.seed, reduce=1, rate=self.rate)
+        cameras = [smaller(view.camera, task.reduce) for view in views]
+        return stylize_gaussians(model, cameras, work.picture(name), recipe, work.vgg, task.title_of(name))
+
+
+@dataclass(frozen=True)
 class StyleRfKeys(FeatureKeys):
-    """How palette colours take on styles."""
+    """How palette colours take on styles (StyleRF-VolVis, Tang et al. 2024)."""
 
     styles: list[str] = key(
         [], "a picture for each palette colour of the fit, whatever looks say; default: `style` for all"
@@ -78,11 +125,29 @@ class StyleRfKeys(FeatureKeys):
         return edited, losses
 
 
-METHOD = Method(
-    "stylerf",
-    "give a scene of palette fields the styles of pictures, as StyleRF-VolVis does",
-    StyleRfKeys,
-    run,
-    fields=frozenset({"palette"}),
-    follows="style",
+METHOD = (
+    Method(
+        "arf",
+        "give a scene of voxels the style of a picture, as ARF does",
+        ArfKeys,
+        run,
+        fields=frozenset({"voxels"}),
+        follows="style",
+    ),
+    Method(
+        "stylerf",
+        "give a scene of palette fields the styles of pictures, as StyleRF-VolVis does",
+        StyleRfKeys,
+        run,
+        fields=frozenset({"palette"}),
+        follows="style",
+    ),
+    Method(
+        "stylesplat",
+        "give a scene of 3D Gaussians the style of a picture, as StyleSplat does",
+        StyleSplatKeys,
+        run,
+        fields=frozenset({"gaussians"}),
+        follows="style",
+    ),
 )
