@@ -6,7 +6,7 @@ from torch.nn.functional import normalize
 
 from texgs.core.errors import ShapeError
 
-BITS = 10  # of each coordinate in a box: cells of a thousandth of its sides
+BITS = 10  # bits of each coordinate in a box: cells of a thousandth of its sides
 
 
 def quats_to_matrices(quats: Tensor) -> Tensor:

@@ -19,7 +19,7 @@ CONTAINERS = (  # for versions 2 and 1 of cgroups: the line that names a group, 
     (r"^\d+:(?:.*,)?memory(?:,.*)?:/(.*)$", "memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
 )
 MIB, GIB = 1 << 20, 1 << 30
-SMALL_BYTES = 64 << 20  # bytes that are there without asking
+SMALL_BYTES = 64 << 20  # bytes that need no question
 # How threads wait. A fit has thousands of loops a second of less than a millisecond. To wake a thread
 # that sleeps takes as long as many of them, above all on virtual machines; one that spins on takes a core
 # from others. So they spin for some tens of microseconds and then sleep. docs/accuracy.md has the gain.
@@ -27,7 +27,7 @@ POLICY = {
     "OMP_WAIT_POLICY": "passive",  # of every OpenMP: sleep
     "GOMP_SPINCOUNT": "1000",  # of GCC's, which torch has on Linux: look so often before that
 }
-NEW_OBJECTS = 50_000  # before the garbage collector looks at them
+NEW_OBJECTS = 50_000  # objects made before the garbage collector looks at them
 GLIBC_OPTIONS = {-1: 1 << 30, -4: 0}  # M_TRIM_THRESHOLD; M_MMAP_MAX: map no block by itself
 
 

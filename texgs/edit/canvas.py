@@ -14,8 +14,8 @@ from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.raster import Texture
 
-VIEWS = 6  # that tell how translucent a scene is
-SEEN_ALPHA = 0.02  # of alpha: less is not looked at
+VIEWS = 6  # views that tell how translucent a scene is
+SEEN_ALPHA = 0.02  # pixels with less alpha are not looked at
 MARGIN, MULTIPLE = 4, 8  # pixels around what is seen, and what sides of the part are a multiple of
 
 

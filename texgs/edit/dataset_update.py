@@ -150,7 +150,7 @@ class Updated:
     losses: list[float] = field(default_factory=list)  # in each iteration
     edited: set[int] = field(default_factory=set)
     count: int = 0  # edits of single views
-    seconds: float = 0.0  # that these took
+    seconds: float = 0.0  # the time of all edits
 
     @torch.no_grad()
     def edit(self, ids: Sequence[int], level: float) -> None:

@@ -27,11 +27,11 @@ from texgs.models.vgg import Vgg
 from texgs.raster.voxels import camera_rays
 from texgs.volume.images import Images
 
-CLUSTERS = 4  # of the colours of a style, the largest of which is its dominant one
+CLUSTERS = 4  # clusters of a style's colours; the largest is its dominant one
 DRAWN, RUN = 4096, 2  # rays a step of the distillation, and neighbours among them
 RATE, LAST_RATE = 1e-2, 7e-5  # of Adam in the distillation
 BETAS = (0.9, 0.99)
-LEAST_WEIGHT = 1e-3  # of points that learn
+LEAST_WEIGHT = 1e-3  # weight of points that learn
 
 
 def stylize_palette(

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from texgs.scene.scene import Scene
 
 READABLE_ALPHA = 0.9  # mean alpha of a part from which its pattern is plain
-LARGEST_FACTOR = 16.0  # of a factor: beyond, next to nothing changes
+LARGEST_FACTOR = 16.0  # beyond this factor next to nothing changes
 KEPT_SHARE = 0.5  # share of its pixels that every part keeps
 SHOWN_SHARE = 0.1  # share of a pixel's colour from which the pixel shows a part
-VIEWS, SIZE = 6, 100  # that tell, and pixels of their sides
-BISECTIONS = 5  # of a bisection
-CHANNELS = 32  # that are rasterized at once
+VIEWS, SIZE = 6, 100  # views that are looked at, and pixels of their sides
+BISECTIONS = 5  # halvings of the interval that has a share
+CHANNELS = 32  # channels that are rasterized at once
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ ALIKE = 0.8  # cosine between the normal of a surfel and the mean normal of its 
 DRIFT = 0.125  # longer sides of the picture between where a chunk and where the surfel alone would read it
 RIM = 0.98  # part of a sphere's radius that is read: the last pixels have some of the background
 MOST_CELLS = 1 << 16  # cells along an axis
-TEXELS = 1 << 18  # at a time
+TEXELS = 1 << 18  # texels at a time
 # What the picture shows to the right and down, where a surface faces x, y or z: (z, -y), (x, z), (x, -y).
 RIGHT, DOWN = ((0.0, 0, 1), (1, 0, 0), (1, 0, 0)), ((0.0, -1, 0), (0, 0, 1), (0, -1, 0))
 

@@ -15,8 +15,8 @@ from texgs.fields.surfels.texels import bare_colors, owners
 from texgs.raster.losses import l1_dssim
 
 FAINT_GAIN = 1e-4  # gain times alpha below which a pixel says nothing
-HARDLY_SEEN = 0.01  # of the mean weight: what is seen less than that is hardly seen
-FIRST_STEP = 1.5  # of a Newton step in a typical observation: 2 is the limit of stability
+HARDLY_SEEN = 0.01  # share of the mean weight: texels below it are hardly seen
+FIRST_STEP = 1.5  # share of a Newton step in a typical observation: 2 is the limit of stability
 LAST_STEP = 0.1  # what single observations disagree about averages out as steps fall
 RIDGE = 0.02  # added to curvatures, relative to their median: texels that are hardly seen stay
 DSSIM = 0.2  # share of D-SSIM in what Adam follows

@@ -24,7 +24,7 @@ from texgs.models.instruction import require_instruction
 
 SIZE = 512  # pixels along the longer side of the views: what InstructPix2Pix was trained on
 PIXEL = 64  # bytes of memory for a pixel of a view: what the guidance sees, returns, and the colours there
-FOLLOWED, SURFEL = 24, 28  # for a pixel and a surfel in a view at one opacity, which texels follow
+FOLLOWED, SURFEL = 24, 28  # bytes for a pixel and a surfel that texels follow in a view at one opacity
 # Azimuth and polar angle of cameras at the front (+z), back, left, right, top and bottom, degrees.
 AXES = ((-90, 0), (90, 0), (180, 0), (0, 0), (-90, 90), (-90, -90))
 ANY_FOV = 45.0  # degrees, of cameras that only their directions are needed of

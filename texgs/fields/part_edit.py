@@ -7,7 +7,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.names import is_number
 from texgs.fields.kinds import kinds
 
-MOST_FACTOR = 1000.0  # of a factor: what is larger is a typing error
+MOST_FACTOR = 1000.0  # a larger factor is a typing error
 MOST_OPAQUE = 1 - 1e-6  # has a logit
 # What a field has to be capable of for a value of an edit; all others are factors of a material.
 NEEDS = {"visible": "opacity", "opacity": "opacity", "palette": "palette"}

@@ -18,7 +18,7 @@ from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
 HELD = ("colors", "normals")
-NEIGHBOURS = 3  # of a surfel, whose normals are compared
+NEIGHBOURS = 3  # neighbours of a surfel whose normals are compared with its own
 # Where data are smooth, normals of the volume are better than learned ones; where they are noisy, or bend
 # from one surfel to the next, learned ones are, which average many samples. Between these two coherences the
 # strength of the hold grows from none to all.

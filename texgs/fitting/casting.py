@@ -19,10 +19,10 @@ from texgs.volume.images import Images, smaller
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
-FREQUENCY = 4  # of the icosphere of cameras, of which it has 162
+FREQUENCY = 4  # frequency of the icosphere of cameras, which has 162
 HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of their own
 GLANCE_SIZE = 64  # pixels of the longer side of views whose rays are followed, about
-PIXELS = 4000  # of each view
+PIXELS = 4000  # pixels of each view whose rays are followed
 FAINT_ALPHA = 0.02  # alpha below which a pixel shows nothing to speak of
 DENSEST_OPACITY = 1 - 1e-6  # opacity of a point
 LitCamera = tuple[Camera, Light]

@@ -9,7 +9,7 @@ from torch import Tensor
 from texgs.volume.images import Images
 
 DRAWN_COLORS = 50_000  # colours that are clustered
-OPAQUE = 128  # of 255: alpha from which a pixel tells a colour
+OPAQUE = 128  # alpha, of 255, from which a pixel tells a colour
 
 
 def mean_color(images: Images) -> Tensor:

@@ -20,8 +20,8 @@ class FitSpec:
     phases: tuple[str, ...]  # stages in their order; the last makes what scenes are composed of
     settings: type[Any] | None = None  # of the keys `fit.NAME`; None for surfels, whose keys are `fit`
     function: str = ""  # from a task to what is fitted; none for surfels: each phase is a stage
-    check: Callable[[Any], None] = lambda settings: None  # that they fit each other
-    devices: frozenset[str] = frozenset({"cpu", "cuda"})  # where it can be fitted
+    check: Callable[[Any], None] = lambda settings: None  # raises where settings do not fit each other
+    devices: frozenset[str] = frozenset({"cpu", "cuda"})  # kinds of device that fit it
 
     @property
     def field(self) -> fields.Kind:

@@ -21,7 +21,7 @@ from texgs.fitting.settings import Phase, Rates
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 
-USUAL_DISTANCE = 4.0  # of cameras, in radii of the object
+USUAL_DISTANCE = 4.0  # distance of cameras, in radii of the object
 SMALLEST_EXTENT = 1e-3  # distance, world units
 
 

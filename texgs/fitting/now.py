@@ -21,7 +21,7 @@ from texgs.volume.transfer import TransferFunction
 
 SURFELS, OPACITY = 40_000, 0.05
 FEWEST_POINTS = 100
-CAST_EVERY = 2  # of the views that have no headlight, one of so many is cast
+CAST_EVERY = 2  # one of so many views without a headlight is cast
 SAMPLE_DISTANCE = 1.0  # voxels between the samples of views
 PHASE = Phase(
     rates=Rates(quats=0.016, scales=0.05, opacities=0.1),

@@ -35,9 +35,9 @@ from texgs.volume.images import Images
 NEIGHBOURS = 2  # rays of a step that follow each other
 BETAS = (0.9, 0.99)  # of Adam
 MIXED = ("palette", "mixture", "trunk", "light")  # networks that learn in the last period
-TRUSTED_SHARE = 0.5  # of the grid's densities, for where rays may end
-LEAST_DENSITY = 0.1  # of its voxels, so that points of rays are there
-SEEDS = 16_384  # of these voxels, in a step in which density learns that of the grid
+TRUSTED_SHARE = 0.5  # share of the grid's densities that says where rays may end
+LEAST_DENSITY = 0.1  # density of the grid's voxels at least, so that rays have points there
+SEEDS = 16_384  # voxels of a step in which density learns that of the grid
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Period:
 
     start: int  # among the steps of networks
     end: int
-    networks: tuple[str, ...]  # that learn
+    networks: tuple[str, ...]  # those that learn
     last_rate: float  # of Adam at its end, relative to that at its start
 
 

@@ -36,8 +36,8 @@ USUAL_COUNT = 10_000  # seeds, where nothing says how many
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
 LEAST_SCALE = 1e-4  # scale, world units
 # A quick fit finds what is seen of more surfels than are kept.
-CANDIDATES = 2  # for each surfel that is kept
-PIXELS = 200  # of the longer side of its small images, about
+CANDIDATES = 2  # seeds for each surfel that is kept
+PIXELS = 200  # pixels of the longer side of small images, about
 PHASE = Phase(
     iterations=100,
     rates=Rates(quats=0.016),

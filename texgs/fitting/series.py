@@ -34,7 +34,7 @@ ROUNDS = 3  # through all views: a part of one would bend surfels towards the vi
 SLOWER = 0.3  # times the rates of surfels that start anywhere
 MOVED = UNITS.keys() - {"normals"}  # these turn as fast as surfels
 RATES = Rates(**{name: SLOWER * getattr(PHASE.rates, name) for name in MOVED}, material=0.0)
-PLANTED_SHARE = 0.1  # of all surfels: so many of those that show least are planted where most is missing
+PLANTED_SHARE = 0.1  # share of all surfels: those that show least are planted where most is missing
 FEWEST_PLANTED = 4  # surfels to plant: of fewer the size is not known, see `surfels_at`
 HIDDEN_LOGIT = -12.0  # raw opacity of surfels where nothing is to be seen
 FARTHEST, STRETCH = 0.05, 2.0  # world units at which the ends of axes are carried; and how much they stretch

@@ -31,7 +31,7 @@ class FitTask(Generic[Settings]):
     seed: int
     title: str  # of progress bars
     metadata: Mapping[str, str]  # of the field: where it is from
-    volume: Grid | None = None  # that the views show, where the fit starts from it
+    volume: Grid | None = None  # what the views show, where the fit starts from it
 
 
 @dataclass(frozen=True, eq=False)

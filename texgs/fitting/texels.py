@@ -19,7 +19,7 @@ from texgs.volume.cameras import farthest_first
 from texgs.volume.images import Images
 
 SIGHT_VIEWS = 54  # views, spread, that tell what is seen of surfels
-HALVINGS = 40  # of the interval that the edge of texels is searched in
+HALVINGS = 40  # halvings of the interval that has the edge of texels
 
 
 def texturize(

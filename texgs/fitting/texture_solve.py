@@ -20,7 +20,7 @@ from texgs.raster.losses import l1_dssim
 from texgs.volume.cameras import farthest_first
 from texgs.volume.images import Images
 
-FIRST_STEP = 1.3  # of a Newton step in a typical view: 2 is the limit of stability, and views differ
+FIRST_STEP = 1.3  # share of a Newton step in a typical view: 2 is the limit of stability, and views differ
 LAST_STEP = 0.3  # noise of single views averages out as steps fall
 FARTHEST_TEXEL = (
     1.0  # texels from the colours of their surfels: more brings noise of views that hardly see them

@@ -12,7 +12,7 @@ from texgs.core.errors import ArgumentError, MissingDataError, first_line
 from texgs.core.io import read_json
 from texgs.models.catalogue import File, Single, Snapshot, entry_of
 
-VERIFIED = Checksums()  # of files that this process has read
+VERIFIED = Checksums()  # checksums of the files that this process has read
 CONNECTED = 20.0  # seconds within which a hub answers
 
 

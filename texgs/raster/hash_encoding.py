@@ -15,7 +15,7 @@ from texgs.core.errors import ArgumentError
 from texgs.raster import native
 from texgs.raster.arguments import require
 
-FEATURES = 2  # of each level
+FEATURES = 2  # numbers of a point at each level
 CPU = torch.device("cpu")
 NativeHash = native.struct("texgs_hash", "i levels, p resolution first")
 native.declare("texgs_hash_encode", NativeHash, "nppp")

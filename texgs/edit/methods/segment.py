@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from texgs.fields.surfels.model import Surfels
 
 SHOWN_VIEWS = 3  # views of the segment around the object
-POLAR = 20.0  # of these views, degrees
+POLAR = 20.0  # polar angle of these views, degrees
 DIMMED = 0.15  # opacity of what is not in the segment, in its picture
 MASKS = ("mobile_sam", "sam_vit_h", "grabcut")  # the second is the paper's
 

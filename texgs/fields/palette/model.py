@@ -34,7 +34,7 @@ from texgs.raster import Render
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxels import camera_rays
 
-LEAST_WEIGHT = 1e-4  # of points whose colours are looked at
+LEAST_WEIGHT = 1e-4  # weight of points whose colours are looked at
 OCCUPANCY_SIDE = 128  # places along each side of the two lattices of the authors
 FORMAT = "texgs-palette"
 VERSION = 1

@@ -13,7 +13,7 @@ from texgs.raster.reference.shading import harmonics
 from texgs.raster.voxel_grid import VoxelGrid
 from texgs.raster.voxels import March, ray_points
 
-RAYS = 8192  # at a time
+RAYS = 8192  # rays at a time
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,15 +27,15 @@ from texgs.fields.surfels.texels import mean_texels, offsets_of, owners, with_fi
 FORMAT = "texgs-compact"
 VERSION = 1
 MAGIC = b'{"texgs-compact":'
-TEXEL_STEP = 1 / 128  # of texels: none is off by more than 1/256, a level of an 8-bit picture
-MOST_STEPS = 2**23  # of a texel; float32 holds so many exactly
+TEXEL_STEP = 1 / 128  # unit of texels: none is off by more than 1/256, a level of an 8-bit picture
+MOST_STEPS = 2**23  # units of a texel; float32 holds so many exactly
 TEXTURE_TENSORS = ("texels", "sizes", "offsets")
 EXACT_TENSORS = (
     "means",
     "palette",
 )  # half precision would move surfels by up to a tenth of a pixel at 800x800
 LONGEST_HEADER = 2**20  # bytes, of the tensors' names and shapes
-COPIES = 6  # of what is unpacked, in memory at a time: texels are bytes in the file and floats in a model
+COPIES = 6  # copies of the tensors in memory: texels are bytes in the file and floats in a model
 MEMORY = 2**28  # bytes that unpacking may use besides its result; these files need 9 MiB
 
 
