@@ -118,6 +118,6 @@ class Checksums:
         return digest
 
     def forget(self, path: Path) -> None:
-        """Compute the checksum of a file anew the next time."""
+        """Compute the checksum of a file again the next time."""
         if self._known.pop(str(path.absolute()), None) is not None:
             self._is_new = True

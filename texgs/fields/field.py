@@ -68,20 +68,29 @@ class Field(Protocol):
         """
 
 
-class Composed(Protocol):
+class Asked(NamedTuple):
+    """What is asked of a view, see `Composed.render`."""
+
+    background: Tensor | None
+    outputs: Collection[str]
+    depth_range: Tensor | None
+
+
+class Composed(ABC):
     """Fields of one kind as a scene. Edits are one for each field, behind it one for each of its segments."""
 
+    device: torch.device  # of its tensors
+
+    @abstractmethod
     def __len__(self) -> int:
         """Return the number of primitives of all fields."""
 
     @property
-    def device(self) -> torch.device:
-        """Where its tensors are."""
-
-    @property
+    @abstractmethod
     def palettes(self) -> list[tuple[float, ...]]:
         """The colour of each field as fitted, which edits replace; black for those without one."""
 
+    @torch.no_grad()
     def render(
         self,
         camera: Camera,
@@ -108,6 +117,13 @@ class Composed(Protocol):
         Raises:
             ArgumentError: if there are not as many edits as parts, or fields of this kind cannot show one.
         """
+        return self._draw(camera, light, edits, look, Asked(background, outputs, depth_range))
+
+    @abstractmethod
+    def _draw(
+        self, camera: Camera, light: Light, edits: Sequence[PartEdit] | None, look: Look, asked: Asked
+    ) -> Render:
+        """Render one view of all visible fields, see `render`."""
 
 
 def sizes_in_mib(
@@ -122,14 +138,6 @@ def sizes_in_mib(
     sizes = {**counted, "total": total, "files": total if n_files is None else n_files}
     sizes |= {f"stored_{group}": count for group, count in {**stored, "total": sum(stored.values())}.items()}
     return {f"{group}_mib": count / MIB for group, count in sizes.items()}
-
-
-class Asked(NamedTuple):
-    """What is asked of a view, see `Composed.render`."""
-
-    background: Tensor | None
-    outputs: Collection[str]
-    depth_range: Tensor | None
 
 
 class UnlitField(ABC):
@@ -153,10 +161,10 @@ class UnlitField(ABC):
         """Render the field with the colours that it has."""
 
 
-class UnlitScene(ABC, Generic[F]):
+class UnlitScene(Composed, Generic[F]):
     """Fields of one kind that are drawn together.
 
-    There is at least one, all are on one device, and none has segments.
+    There is at least one, all are on one device, and none has segments. Light changes nothing.
     """
 
     def __init__(self, fields: Sequence[F], segments: Sequence[Sequence[Tensor]] = ()) -> None:
@@ -175,25 +183,15 @@ class UnlitScene(ABC, Generic[F]):
         """Black for each field: edits of a scene replace no palette."""
         return [(0.0, 0.0, 0.0)] * len(self.counts)
 
-    @torch.no_grad()
-    def render(
-        self,
-        camera: Camera,
-        light: Light = HEADLIGHT,
-        edits: Sequence[PartEdit] | None = None,
-        *,
-        look: Look = "shaded",
-        background: Tensor | None = None,
-        outputs: Collection[str] = (),
-        depth_range: Tensor | None = None,
+    def _draw(
+        self, camera: Camera, light: Light, edits: Sequence[PartEdit] | None, look: Look, asked: Asked
     ) -> Render:
-        """Render one view, see `Composed`; light changes nothing, and the look is "shaded"."""
         if look != "shaded":
             raise ArgumentError(
                 f"look: expected shaded, got {look}; {self.kind} have light in their colours, fit surfels"
             )
         factors = opacity_factors(edits, len(self.counts), self.kind)
-        return self._blend(factors, camera, Asked(background, outputs, depth_range))
+        return self._blend(factors, camera, asked)
 
     @abstractmethod
     def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:

@@ -1,4 +1,4 @@
-"""Photorealistic edits of a basic model in a scene: numbers, applied anew to every frame."""
+"""Photorealistic edits of a basic model in a scene: numbers, applied to every frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields

@@ -41,7 +41,7 @@ class VoxelFit(ResumableFit):
         self._begin(hull_grid(images, s.stages[0].side, s.half_size, s.degree, s.start_density))
 
     def _begin(self, grid: VoxelGrid) -> None:
-        """Go on with another grid; the optimiser starts anew."""
+        """Go on with another grid and a new optimiser."""
         self.grid = grid
         self.optimizer = VoxelOptimizer(grid, self.settings.optimizer)
 

@@ -41,7 +41,8 @@ class Kind:
     @property
     def modules(self) -> tuple[str, ...]:
         """The modules that read, write and compose it."""
-        return tuple(name.partition(":")[0] for name in (self.reader, self.writer, self.composer))
+        names = (self.reader, self.writer, self.composer)
+        return tuple(dict.fromkeys(name.partition(":")[0] for name in names))
 
     def read(self, path: Path) -> Any:
         """Read the `Field` in a file."""
