@@ -18,7 +18,7 @@ from texgs.core.io import read_json
 from texgs.report.given_row import plotted
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
-from texgs.workflow.stages.settings import basic_tfs_of
+from texgs.volume.basic_tfs import basic_tfs_of
 
 LINE = {"color": "0.35", "linewidth": 1.2}
 TF, SIZE = "TF02", 280  # of the models shown alone, and pixels of pictures

@@ -41,6 +41,11 @@ def recompose(overrides: Words) -> Config:
     return _composed.__wrapped__(overrides, folders(), os.environ.get("TEXGS_DATA"))
 
 
+def preset(group: str, name: str) -> Config:
+    """Return the configuration with one file of conf/, such as `fit` and `quick`, and nothing else chosen."""
+    return compose((f"{group}={name}",))
+
+
 @lru_cache(maxsize=1024)
 def _composed(overrides: Words, places: tuple[Path, ...], _data_folder: str | None) -> Config:
     from texgs.config.composition import composition

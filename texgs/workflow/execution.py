@@ -15,9 +15,10 @@ from texgs.core.keys import ValueMismatch, typed
 from texgs.core.progress import curve_logger
 from texgs.edit.method import NO_METHOD
 from texgs.report.results import Result, plain
+from texgs.volume.settings import cached_volume
 from texgs.workflow import result, tracked
 from texgs.workflow.job import Job
-from texgs.workflow.locate import cached_volume, source_file
+from texgs.workflow.locate import source_file
 from texgs.workflow.missing import needed, require_same
 from texgs.workflow.provenance import record
 from texgs.workflow.runs import run

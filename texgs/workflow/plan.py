@@ -20,10 +20,10 @@ from texgs.core.cache import keep, recall
 from texgs.core.checksum import Checksums, digest, of_folders
 from texgs.core.errors import ConfigError
 from texgs.core.io import write_bytes
+from texgs.volume.settings import cached_volume
 from texgs.workflow.experiments import LeftOut, apart
 from texgs.workflow.graph import drawn, earlier
 from texgs.workflow.job import Job, settings_file
-from texgs.workflow.locate import cached_volume
 from texgs.workflow.notes import note_results, note_tables
 from texgs.workflow.stage import Rule, edit_folder, fit_folder
 from texgs.workflow.stage_table import RULES, STAGES, SWEPT

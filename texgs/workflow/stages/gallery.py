@@ -12,11 +12,12 @@ from texgs.config.compose import compose
 from texgs.core.progress import progress
 from texgs.edit.method import method_of
 from texgs.report.results import GalleryResult, Shown
+from texgs.volume.basic_tfs import basic_tfs_of
 from texgs.workflow.edits import looks_of
 from texgs.workflow.galleries import GalleryCell, Grid, gallery_command, gallery_grids, gallery_inputs
 from texgs.workflow.inputs import has_scene, is_first_recipe
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import OfScene, OfVolume, basic_tfs_of
+from texgs.workflow.stages.settings import OfScene, OfVolume
 from texgs.workflow.sweep import changes
 
 if TYPE_CHECKING:

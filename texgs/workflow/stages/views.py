@@ -11,7 +11,6 @@ from pathlib import Path
 from statistics import mean, median
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.dataset import BasicTF
 from texgs.config.views import CameraPath, LightKeys, ViewKeys
 from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.io import write_atomic
@@ -19,11 +18,12 @@ from texgs.core.lens import Lens
 from texgs.core.names import is_number
 from texgs.core.progress import progress
 from texgs.report.results import ViewsResult
+from texgs.volume.basic_tfs import BasicTF, basic_tfs_of
 from texgs.workflow.inputs import has_volume, prepared_volume, view_settings
 from texgs.workflow.locate import basic_tf
 from texgs.workflow.result import TIMES
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import OfTF, basic_tfs_of
+from texgs.workflow.stages.settings import OfTF
 
 if TYPE_CHECKING:
     from texgs.core.camera import Camera
