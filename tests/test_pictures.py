@@ -11,7 +11,7 @@ from benchmarks.results import DOCS, RESULTS, parts
 from tests.scene.balls import write_balls
 from texgs.core.checksum import Checksums
 from texgs.core.io import write_json
-from texgs.workflow.graph import drawn
+from texgs.workflow.graph import graph_of
 from texgs.workflow.sweep import as_sweep
 from tools import pictures
 from tools.pictures import PICTURES, RUN
@@ -63,7 +63,7 @@ def runs(tmp_path_factory):
 def planned(name):
     """The folders that a run writes, below the one of its name."""
     words = [word for word in shlex.split(RUN[name]) if "=" in word]
-    return drawn(as_sweep((*words, f"results={name}")), Checksums.load())[1].jobs
+    return graph_of(as_sweep((*words, f"results={name}")), Checksums.load())[1].jobs
 
 
 @pytest.mark.parametrize("name", OF_RUNS)

@@ -14,7 +14,7 @@ from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
 from texgs.models import weights
 from texgs.models.catalogue import CATALOGUE, Single
-from texgs.workflow.experiments import LeftOut, selected
+from texgs.workflow.cases import LeftOut, cases_of
 from texgs.workflow.missing import lacking
 from texgs.workflow.plan import make, words_of
 from texgs.workflow.stage import edit_folder, fit_folder
@@ -225,9 +225,9 @@ def test_edits_are_the_first_that_lack_no_weights(machine, experiment, there, ex
     machine(*there)
     name, *words = experiment.split()
     skips = ("on_missing=skip",) if name == "lambda_s" else ()
-    selection = selected((f"experiment={name}", *skips, *words), lacking)
-    assert {edit_folder(each) for each in selection.configs if each.edit.name != "none"} == expected
-    assert bool(selection.configs) is bool(expected)
+    cases = cases_of((f"experiment={name}", *skips, *words), lacking)
+    assert {edit_folder(each) for each in cases.configs if each.edit.name != "none"} == expected
+    assert bool(cases.configs) is bool(expected)
 
 
 @pytest.mark.parametrize(
@@ -246,9 +246,9 @@ def test_edits_are_the_first_that_lack_no_weights(machine, experiment, there, ex
 def test_a_data_set_that_is_named_wins_over_what_stands_in(machine, words, expected):
     machine()
     write("both", "experiments: [pse, five_scenes]\n")
-    selection = selected(words, lacking)
-    assert {each.dataset.name for each in selection.configs} == expected
-    assert len({fit_folder(each) for each in selection.configs}) == (2 if "meshes" in words[0] else 1)
+    cases = cases_of(words, lacking)
+    assert {each.dataset.name for each in cases.configs} == expected
+    assert len({fit_folder(each) for each in cases.configs}) == (2 if "meshes" in words[0] else 1)
 
 
 def write(name, text):
@@ -260,7 +260,7 @@ def write(name, text):
 
 def test_what_is_replaced_is_told_with_its_reason(machine):
     machine()
-    told = {each.what: each.why for each in selected(("experiment=relighting",), lacking).left_out}
+    told = {each.what: each.why for each in cases_of(("experiment=relighting",), lacking).left_out}
     assert told.keys() == {"data set supernova", "data set five_jets", "edit style_paper"}
     assert told["data set supernova"].endswith("TEXGS_DATA; `turbulence` stands in for it")
     assert LeftOut("edit style_paper", told["edit style_paper"]).why == (
@@ -279,19 +279,19 @@ def test_a_mistake_is_one_sentence(machine, table, message):
     machine()
     write("mine", f"datasets: [jets]\nstand_ins:\n  {table}\n")
     with pytest.raises(ConfigError, match=message):
-        selected(("experiment=mine",), lacking)
+        cases_of(("experiment=mine",), lacking)
 
 
 def test_where_all_lack_something_it_is_the_first_that_is_told(machine):
     machine()
     write("mine", "datasets: [mantle]\nstand_ins:\n  datasets: {mantle: wood, wood: mantle}\n")
-    selection = selected(("experiment=mine", "on_missing=skip"), lacking)
-    assert not selection.configs
-    assert [each.what for each in selection.left_out] == ["data set mantle"]
+    cases = cases_of(("experiment=mine", "on_missing=skip"), lacking)
+    assert not cases.configs
+    assert [each.what for each in cases.left_out] == ["data set mantle"]
 
 
 def test_a_part_is_where_the_data_set_says(machine):
     machine()
     assert compose(("dataset=engine", "edit=wooden_part")).edit.parts == ["TF02/part"]
     with pytest.raises(ConfigError, match=r"edit.segment.model: expected one of TF01, TF02, got none"):
-        selected(("dataset=turbulence", "edits=[part]"), lacking)
+        cases_of(("dataset=turbulence", "edits=[part]"), lacking)

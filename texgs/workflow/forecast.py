@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.config.schema import Config
-from texgs.workflow.experiments import Selection
+from texgs.workflow.cases import Cases
 from texgs.workflow.job import Job
 from texgs.workflow.locate import source_file
 from texgs.workflow.sweep import as_sweep
@@ -26,7 +26,7 @@ REPEATS = 15  # of the probe; the median counts
 class Forecast:
     """A run before it is started."""
 
-    selection: Selection
+    cases: Cases
     missing: Sequence[str]  # what it would stop at, a sentence each
     to_do: Mapping[str, int]  # jobs by stage
     done: int  # jobs whose results are there
@@ -49,9 +49,9 @@ class Speed:
 def forecast(words: tuple[str, ...]) -> Forecast:
     """Return what a run with these words would do; nothing is written."""
     from texgs.core.checksum import Checksums
-    from texgs.workflow.graph import drawn
+    from texgs.workflow.graph import graph_of
 
-    selection, planned = drawn(as_sweep(words), Checksums.load())
+    cases, planned = graph_of(as_sweep(words), Checksums.load())
     lack_files = {folder for folders in planned.missing.values() for folder in folders}
     table, to_do, seconds, done = speeds(), Counter[str](), 0.0, 0
     for folder, job in planned.run.items():
@@ -63,7 +63,7 @@ def forecast(words: tuple[str, ...]) -> Forecast:
         to_do[job.stage.name] += 1
         speed = table.get(job.stage.name, Speed(0, 0, 0))  # nobody has measured stages of one's own
         seconds += STEP_SECONDS + speed.seconds(*work_of(job, planned.configs[folder]))
-    return Forecast(selection, [*planned.missing], to_do, done, seconds + (START_SECONDS if to_do else 0))
+    return Forecast(cases, [*planned.missing], to_do, done, seconds + (START_SECONDS if to_do else 0))
 
 
 def work_of(job: Job, config: Config) -> tuple[float, int]:
@@ -112,10 +112,10 @@ def probe() -> float:
 def show(words: tuple[str, ...]) -> int:
     """Print a forecast, a line for each thing; return 1 if the run would not start."""
     expected = forecast(words)
-    for name, config in {each.dataset.name: each for each in expected.selection.configs[::-1]}.items():
+    for name, config in {each.dataset.name: each for each in expected.cases.configs[::-1]}.items():
         if not any(line.startswith(f"data set {name}:") for line in expected.missing):
             print(f"ok       data set {name:16} {source(config)}")
-    for entry in expected.selection.left_out:
+    for entry in expected.cases.left_out:
         print(f"left out {entry.what}: {entry.why}")
     for line in expected.missing:
         print(f"missing  {line}")

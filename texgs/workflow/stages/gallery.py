@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.config.compose import compose
+from texgs.config.compose import preset
 from texgs.core.progress import progress
 from texgs.edit.method import method_of
 from texgs.report.results import GalleryResult, Shown
@@ -37,7 +37,7 @@ GIVEN = "Below them what they were given: basic transfer functions, and pictures
 
 def given(config: Config, follows: str) -> dict[str, str]:
     """Return the pictures or instructions of a comparison by basic TF; none where grids say what is shown."""
-    edits = [compose((f"edit={name}",)).edit for name in config.edits if config.edit.looks]
+    edits = [preset("edit", name).edit for name in config.edits if config.edit.looks]
     own = [edit for edit in edits if method_of(edit).follows == follows and not config.gallery.grids]
     return looks_of(replace(config, edit=replace(own[0], looks=True))) if own else {}
 
