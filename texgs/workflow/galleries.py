@@ -1,12 +1,12 @@
 """What a gallery shows in each place: its row and its column, put together and checked."""
 
 import re
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 from texgs.config.case import Case
 from texgs.config.compose import preset
-from texgs.config.gallery import AS_FITTED, GridKeys, ShotKeys
+from texgs.config.gallery import AS_FITTED, GalleryCell, GalleryRow, Grid, GridKeys, ShotKeys
 from texgs.config.project import members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
@@ -18,38 +18,6 @@ from texgs.workflow.stage import edit_folder, fit_folder, made
 from texgs.workflow.sweep import changes
 
 FRONT, SIDE, ABOVE = [-90.0, 20.0], [0.0, 20.0], [-130.0, 50.0]  # azimuth, polar angle of cameras, degrees
-
-
-@dataclass
-class GalleryCell:
-    """What the configuration says of one picture, see `ShotKeys`."""
-
-    scene: str  # its name among the inputs
-    show: str  # scene, volume, error, or "" for nothing
-    view: list[float]
-    fov_y: float | None
-    box: list[float]
-    pixels: int | None
-    light: list[float]
-    changes: list[str]
-
-
-@dataclass
-class GalleryRow:
-    """Places side by side."""
-
-    title: str
-    pictures: list[GalleryCell]
-
-
-@dataclass
-class Grid:
-    """What one file shows."""
-
-    name: str
-    caption: str
-    columns: list[str]
-    rows: list[GalleryRow]
 
 
 def gallery_command(config: Config) -> str:
