@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from texgs.config.compose import compose
 from texgs.config.project import Words
 from texgs.config.schema import Config
+from texgs.edit.method import NO_METHOD
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,13 @@ class Case:
         return Case(tuple(word for word in self.words if word.partition("=")[0] not in keys))
 
     def edited(self, name: str) -> "Case":
-        """Return the case with an edit of conf/edit; `none` for the fit alone."""
+        """Return the case with an edit of conf/edit."""
         return self.but(f"edit={name}")
+
+    @property
+    def unedited(self) -> "Case":
+        """The case of the fit alone."""
+        return self if self.config.edit.method == NO_METHOD else self.edited("none")
 
     def says(self, key: str) -> str | None:
         """Return the last value that the words give a key; None where they do not name it."""

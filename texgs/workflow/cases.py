@@ -70,7 +70,7 @@ class Cases:
 
         def choose(name: str) -> Choice:
             keys = StandIns() if name in wanted else config.stand_ins
-            return chosen_data_set(keys, name, lambda other: self.lacking(of(other).edited("none").config))
+            return chosen_data_set(keys, name, lambda other: self.lacking(of(other).unedited.config))
 
         choices: dict[str, list[Choice]] = defaultdict(list)  # by the data set that is taken
         for choice in map(choose, listed or [config.dataset.name]):
@@ -111,7 +111,7 @@ class Cases:
 
         Of several recipes not each can be edited in every way.
         """
-        config = case.edited("none").config
+        config = case.unedited.config
         if not self.takes(config, f"data set {config.dataset.name}"):
             return
         cases = self.by_sweep[config.sweep.name if changes(config) else ""]
@@ -123,7 +123,7 @@ class Cases:
                 continue  # the fits alone are no variant of it
             if names != variant.config.edits:  # a gallery shows those that are left
                 variant = variant.but(f"edits=[{','.join(names)}]", "gallery.grids=[]")
-            cases += [variant.edited("none"), *edits]
+            cases += [variant.unedited, *edits]
 
     def possible_edits(self, case: Case, is_one_of_several: bool) -> tuple[list[Case], list[str]]:
         """Return the edits that are possible and lack nothing, and what `edits` has left of them."""

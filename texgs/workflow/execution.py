@@ -110,7 +110,7 @@ def makers(case: Case) -> dict[Path, tuple[Stage, Config]]:
     """Return the jobs that can make what a stage reads, by their folders."""
     config = case.config
     fits = [case.but(f"fit={recipe}") for recipe in config.fits] or [case]
-    configs = [each.edited("none").config for each in fits]
+    configs = [each.unedited.config for each in fits]
     configs += [config] if config.edit.method != NO_METHOD else []
     return {stage.output(each): (stage, each) for config in configs for stage, each in jobs(config)}
 
