@@ -22,7 +22,8 @@ from benchmarks.command import call
 from texgs.core.checksum import Checksums
 from texgs.core.io import read_json
 from texgs.core.names import METRICS
-from texgs.workflow.forecast import PROBE, Speed, probe, speeds, work_of
+from texgs.raster.probe import probe
+from texgs.workflow.forecast import PROBE, Speed, speeds, work_of
 from texgs.workflow.graph import graph_of
 from texgs.workflow.sweep import as_sweep
 

@@ -7,7 +7,6 @@ import torch
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
 from texgs.config.gallery import GalleryCell
-from texgs.config.views import ViewKeys
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Frame
@@ -20,6 +19,7 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
+from texgs.volume.view_settings import ViewKeys
 from texgs.workflow.stages.pse import compared
 
 SIZE = 48

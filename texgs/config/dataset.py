@@ -6,8 +6,7 @@ from typing import Any
 from texgs.core.keys import REQUIRED, key
 from texgs.volume.basic_tfs import BasicTF
 from texgs.volume.settings import VolumeKeys
-
-LARGEST = 16384  # pixels of a side of a view
+from texgs.volume.view_settings import LARGEST
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from typing import Literal
 from texgs.config.dataset import Dataset, MeshKeys
 from texgs.config.gallery import GalleryKeys
 from texgs.config.recipes import Edit, Fit
-from texgs.config.views import ViewKeys
 from texgs.core.keys import key
 from texgs.models.catalogue import CLIP_BACKBONES
+from texgs.volume.view_settings import ViewKeys
 
 NO_SWEEP = "none"  # name of the sweep without variants
 

@@ -1,8 +1,6 @@
 """What a run would find on this machine, what it would do, and about how long that takes."""
 
 import csv
-import statistics
-import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +17,6 @@ from texgs.workflow.sweep import as_sweep
 PROBE = "probe"  # the row of speeds.csv with the seconds of `probe` on the same machine
 START_SECONDS = 8  # of a run before its first job, on that machine
 STEP_SECONDS = 0.8  # between two jobs of a run
-REPEATS = 15  # of the probe; the median counts
 
 
 @dataclass(frozen=True)
@@ -87,30 +84,10 @@ def speeds() -> dict[str, Speed]:
     return {row.pop("stage"): Speed(**{k: float(v) for k, v in row.items()}) for row in csv.DictReader(lines)}
 
 
-def probe() -> float:
-    """Return the seconds of a view of 20,000 surfels with its gradients at 400x400 pixels, on all threads."""
-    import torch
-
-    from texgs.raster import rasterize
-
-    generator = torch.Generator().manual_seed(0)
-    means = torch.rand(20000, 3, generator=generator) - 0.5
-    colors = torch.rand(20000, 3, generator=generator).requires_grad_()
-    quats = torch.randn(20000, 4, generator=generator)
-    scales, opacities = torch.full((20000, 2), 0.01), torch.full((20000,), 0.5)
-    viewmat, K = torch.eye(4), torch.tensor([[750.0, 0, 200], [0, 750, 200], [0, 0, 1]])
-    viewmat[2, 3] = 2.0
-    times = []
-    for _ in range(REPEATS):
-        begin = time.perf_counter()
-        shown = rasterize(means, quats, scales, opacities, viewmat, K, 400, 400, features=colors)
-        shown.color.sum().backward()
-        times.append(time.perf_counter() - begin)
-    return statistics.median(times)
-
-
 def show(words: tuple[str, ...]) -> int:
     """Print a forecast, a line for each thing; return 1 if the run would not start."""
+    from texgs.raster.probe import probe
+
     expected = forecast(words)
     for name, config in {each.dataset.name: each for each in expected.cases.configs[::-1]}.items():
         if not any(line.startswith(f"data set {name}:") for line in expected.missing):
