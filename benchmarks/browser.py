@@ -1,7 +1,5 @@
 """A Chromium that draws WebGL2 in software: of benchmarks, films and tests."""
 
-from __future__ import annotations
-
 import shutil
 
 SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")

@@ -6,8 +6,6 @@ factor, so that pixels and iterations keep the weights that longer runs have giv
 has are scaled as the probe says that this machine is faster or slower than that of the file.
 """
 
-from __future__ import annotations
-
 import csv
 import shlex
 from collections import defaultdict

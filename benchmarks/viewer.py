@@ -4,8 +4,6 @@
 What the client gets is what a browser on another machine can show: none runs on the same cores.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
 import subprocess

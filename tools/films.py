@@ -8,8 +8,6 @@ that of the model is faster by `FASTER`.
 fitted and with a style, through all steps while the camera turns.
 """
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -6,8 +6,6 @@ the paper's views, without which four pictures cannot be made (those of methods 
 there), and VGG-16 and a browser are needed for some.
 """
 
-from __future__ import annotations
-
 import shlex
 import subprocess
 import sys

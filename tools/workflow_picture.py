@@ -1,7 +1,5 @@
 """Draw the workflow, from a volume to tables, with pictures from the results of the demo."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -3,8 +3,9 @@ from math import radians, tan
 import pytest
 import torch
 
+from tests.refusals import refused
 from texgs.core.camera import Camera, intrinsics, look_at, orbit, orbit_direction
-from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.errors import ShapeError
 
 
 def project(camera, point):
@@ -26,8 +27,8 @@ def test_points_go_to_the_pixels_of_the_definition_and_back():
             assert project(camera, points[row, column].tolist()) == pytest.approx(expected, abs=1e-4)
             assert pixels[row, column].tolist() == pytest.approx(expected[:2], abs=1e-4)
     torch.testing.assert_close(camera.position + depth[..., None] * camera.rays(), points)
-    with pytest.raises(ShapeError, match=r"depth: expected \[4, 5\], got \[5, 4\]"):
-        camera.unproject(depth.T)
+    torch.testing.assert_close(camera.ray_lengths(), camera.rays().norm(dim=-1))
+    refused(lambda: camera.unproject(depth.T), "depth: ", ShapeError)
 
 
 @pytest.mark.parametrize(("longer", "size"), [(14, (14, 10)), (3, (3, 2)), (1, (1, 1))])
@@ -72,20 +73,14 @@ def test_look_at_is_differentiable_in_the_position():
 
 
 def test_mistakes_are_named():
-    with pytest.raises(ArgumentError, match="position and target to differ"):
-        look_at(torch.zeros(3), torch.zeros(3))
-    with pytest.raises(ArgumentError, match="not along up"):
-        look_at(torch.tensor([0.0, 1.0, 0.0]), torch.zeros(3))
-    with pytest.raises(ArgumentError, match="polar: expected degrees from -90 to 90, got 91"):
-        orbit(0, 91, 1, 40, 8, 8)
-    with pytest.raises(ArgumentError, match="radius: expected more than 0, got 0"):
-        orbit(0, 0, 0, 40, 8, 8)
-    with pytest.raises(ArgumentError, match="fov_y: expected degrees between 0 and 180, got 180"):
-        intrinsics(180, 8, 8)
-    with pytest.raises(ArgumentError, match="height: expected at least 1 pixel, got 0"):
-        Camera(torch.eye(4), torch.eye(3), 8, 0)
-    with pytest.raises(ShapeError, match=r"viewmat: expected \[4, 4\], got \[3, 4\]"):
-        Camera(torch.eye(4)[:3], torch.eye(3), 8, 8)
+    eye, zero, up = torch.eye(4), torch.zeros(3), torch.tensor([0.0, 1.0, 0.0])
+    refused(lambda: look_at(zero, zero), "position and target")
+    refused(lambda: look_at(up, zero), "not along up")
+    refused(lambda: orbit(0, 91, 1, 40, 8, 8), "polar: ")
+    refused(lambda: orbit(0, 0, 0, 40, 8, 8), "radius: ")
+    refused(lambda: intrinsics(180, 8, 8), "fov_y: ")
+    refused(lambda: Camera(eye, torch.eye(3), 8, 0), "height: ")
+    refused(lambda: Camera(eye[:3], torch.eye(3), 8, 8), "viewmat: ", ShapeError)
 
 
 def test_an_orbit_around_a_target_is_one_around_the_origin_moved():
@@ -95,8 +90,3 @@ def test_an_orbit_around_a_target_is_one_around_the_origin_moved():
     for one, other in zip(still.project(points), moved.project(points + target), strict=True):
         torch.testing.assert_close(one, other, atol=1e-4, rtol=1e-5)  # pixels and lengths, of float32
     assert still.viewmat.equal(orbit(40, 25, 2.5, 30, 64, 48).viewmat)
-
-
-def test_lengths_of_rays():
-    camera = orbit(30, 20, radius=3, fov_y=40, width=7, height=5).crop(1, 1, 7, 4)
-    torch.testing.assert_close(camera.ray_lengths(), camera.rays().norm(dim=-1))

@@ -3,7 +3,8 @@ import pytest
 import torch
 from PIL import Image
 
-from texgs.core.errors import ArgumentError, ShapeError
+from tests.refusals import refused
+from texgs.core.errors import ShapeError
 from texgs.core.image import read_rgba, to_pillow, write_png
 
 
@@ -44,11 +45,7 @@ def test_one_channel_is_grey():
 
 
 def test_mistakes_are_named(tmp_path):
-    with pytest.raises(ShapeError, match=r"color: expected \[H, W, 3\] or \[H, W, 1\], got \[3, 2, 2\]"):
-        to_pillow(torch.zeros(3, 2, 2))
-    with pytest.raises(ShapeError, match=r"alpha: expected \[2, 2\], got \[2, 3\]"):
-        to_pillow(torch.zeros(2, 2, 3), torch.zeros(2, 3))
-    with pytest.raises(ArgumentError, match="color: expected finite values"):
-        to_pillow(torch.full((1, 1, 3), float("nan")))
-    with pytest.raises(ArgumentError, match="no such file"):
-        read_rgba(tmp_path / "none.png")
+    refused(lambda: to_pillow(torch.zeros(3, 2, 2)), "color: ", ShapeError)
+    refused(lambda: to_pillow(torch.zeros(2, 2, 3), torch.zeros(2, 3)), "alpha: ", ShapeError)
+    refused(lambda: to_pillow(torch.full((1, 1, 3), float("nan"))), "color: .*finite")
+    refused(lambda: read_rgba(tmp_path / "none.png"), "no such file")

@@ -2,7 +2,7 @@
 
 import signal
 import sys
-from threading import Thread
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -22,47 +22,33 @@ def _handler_stays():
     assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
 
 
-def test_it_ends_a_loop_at_its_next_item():
+def a_loop(done):
+    for item in progress(range(9), title="loop", unit="item"):
+        if item == 3:
+            ctrl_c()
+        done.append(item)
+
+
+def no_loop(done):
+    ctrl_c()
+    done.append("end")
+
+
+def twice(done):
+    ctrl_c()
+    done.append("first")
+    ctrl_c()
+    done.append("second")
+
+
+@pytest.mark.parametrize(
+    ("work", "expected"), [(a_loop, [0, 1, 2, 3]), (no_loop, ["end"]), (twice, ["first"])]
+)
+def test_it_comes_at_the_next_item_at_the_end_or_the_second_time_at_once(work, expected):
     done = []
-
-    @interrupts_between_items()
-    def work():
-        for item in progress(range(9), title="loop", unit="item"):
-            if item == 3:
-                ctrl_c()
-            done.append(item)
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert done == [0, 1, 2, 3]
-
-
-def test_without_a_loop_it_comes_at_the_end():
-    done = []
-
-    @interrupts_between_items()
-    def work():
-        ctrl_c()
-        done.append(1)
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert done == [1]
-
-
-def test_the_second_comes_at_once():
-    done = []
-
-    @interrupts_between_items()
-    def work():
-        ctrl_c()
-        done.append(1)
-        ctrl_c()
-        done.append(2)
-
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert done == [1]
+    with pytest.raises(KeyboardInterrupt), interrupts_between_items():
+        work(done)
+    assert done == expected
 
 
 def test_packages_are_imported_as_a_whole(tmp_path, monkeypatch):
@@ -82,13 +68,6 @@ def test_packages_are_imported_as_a_whole(tmp_path, monkeypatch):
 def test_what_goes_wrong_is_told_and_other_threads_are_left_alone():
     with pytest.raises(ValueError, match="wrong"), interrupts_between_items():
         raise ValueError("wrong")
-    done = []
-
-    @interrupts_between_items()
-    def work():
-        done.append(signal.getsignal(signal.SIGINT))
-
-    thread = Thread(target=work)
-    thread.start()
-    thread.join()
-    assert done == [signal.getsignal(signal.SIGINT)]
+    work = interrupts_between_items()(lambda: signal.getsignal(signal.SIGINT))
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(work).result() == signal.getsignal(signal.SIGINT)

@@ -4,6 +4,7 @@ import stat
 
 import pytest
 
+from tests.refusals import refused
 from texgs.core import io
 from texgs.core.errors import LONGEST, ArgumentError, TexgsError, printable
 from texgs.core.image import read_rgba
@@ -48,32 +49,23 @@ def test_mode_follows_the_umask(tmp_path):
 
 
 def test_mistakes_are_named(tmp_path):
-    with pytest.raises(ArgumentError, match="cannot be written as JSON"):
-        io.write_json(tmp_path / "x.json", {"x": float("nan")})
-    with pytest.raises(ArgumentError, match="no such file"):
-        read_json(tmp_path / "none.json")
     path = write_bytes(tmp_path / "bad.json", b"")
-    with pytest.raises(ArgumentError, match="cannot write there"):
-        write_bytes(path / "below", b"")
-    wrong = {
-        b"{\n]": ".*line 2",
-        b"[" * 100_000: "what is nested",
-        b"9" * 5000: "Exceeds the limit",
-    }
-    for text, message in wrong.items():
-        with pytest.raises(ArgumentError, match=f"expected JSON, got {message}"):
-            read_json(write_bytes(path, text))
+    refused(lambda: io.write_json(tmp_path / "x.json", {"x": float("nan")}), "x.json: .*JSON")
+    refused(lambda: read_json(tmp_path / "none.json"), "none.json: no such file")
+    refused(lambda: write_bytes(path / "below", b""), "below: cannot write there")
+    for text, named in ((b"{\n]", "line 2"), (b"[" * 100_000, "nested"), (b"9" * 5000, "limit")):
+        refused(lambda text=text: read_json(write_bytes(path, text)), f"{path}: expected JSON, got .*{named}")
 
 
 @pytest.mark.parametrize(
     ("error", "message"),
     [
-        (ValueError("no\n  good"), r"f: expected a thing, got no good; is the file damaged"),
-        (KeyError("size"), r"expected a thing, got a header without 'size'"),
-        (RecursionError("maximum"), r"expected a thing, got what is nested too deeply"),
-        (AssertionError(), r"expected a thing, got AssertionError"),
+        (ValueError("no\n  good"), "f: expected a thing, got no good; is the file damaged"),
+        (KeyError("size"), "got a header without 'size'"),
+        (RecursionError("maximum"), "nested too deeply"),
+        (AssertionError(), "got AssertionError"),
         (PermissionError(13, "Permission denied"), r"f: cannot be read \(Permission denied\)"),
-        (OSError("broken data stream"), r"expected a thing, got broken data stream"),
+        (OSError("broken data stream"), "got broken data stream"),
     ],
 )
 def test_what_a_library_raises_is_one_sentence(tmp_path, error, message):
@@ -86,12 +78,10 @@ def test_what_a_library_raises_is_one_sentence(tmp_path, error, message):
 def test_a_named_pipe_a_folder_and_a_device_are_no_files(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     kinds = ((tmp_path / "pipe", "a named pipe"), (tmp_path, "a folder"), ("/dev/zero", "a device"))
-    for path, kind in kinds:
-        for read in (read_json, read_rgba):
-            with pytest.raises(ArgumentError, match=rf"expected .*, got {kind}"):
-                read(path)
-    with pytest.raises(ArgumentError, match="got a device or a named pipe"):
-        write_bytes(tmp_path / "pipe", b"")
+    for read in (read_json, read_rgba):
+        for path, kind in kinds:
+            refused(lambda read=read, path=path: read(path), f"got {kind}")
+    refused(lambda: write_bytes(tmp_path / "pipe", b""), "a named pipe")
 
 
 def test_a_message_is_one_line_of_bounded_length_that_a_terminal_can_show():

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare, kstest
 
+from tests.refusals import refused
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
 from texgs.core.light import Light, random_lights
 
 CAMERA = orbit(0, 0, 3, 30, 8, 8)
@@ -15,8 +15,7 @@ def directions(lights):
 
 @pytest.mark.parametrize("azimuth", [float("nan"), float("inf")])
 def test_an_azimuth_that_is_no_angle_is_refused(azimuth):
-    with pytest.raises(ArgumentError, match=f"light: expected an azimuth in degrees, got {azimuth}"):
-        Light("directional", azimuth)
+    refused(lambda: Light("directional", azimuth), f"light: .*{azimuth}")
 
 
 @pytest.mark.parametrize("seed", [(0,), (0, 2), (7, 1)])

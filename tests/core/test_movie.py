@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from texgs.core.errors import ArgumentError
+from tests.refusals import refused
 from texgs.core.movie import write_frames
 
 
@@ -20,12 +20,10 @@ def test_one_picture_and_a_folder_of_pictures_that_is_never_another_films(tmp_pa
     assert [path.name for path in paths] == ["0000.png", "0001.png", "0002.png"]
     assert np.asarray(Image.open(paths[2]))[0, 0, 0] == 120
     before = [path.read_bytes() for path in paths]
-    with pytest.raises(ArgumentError, match="expected a folder without numbered pictures, got 0000"):
-        write_frames(tmp_path / "turn", frames(2))
+    refused(lambda: write_frames(tmp_path / "turn", frames(2)), "numbered pictures, got 0000")
     assert [path.read_bytes() for path in sorted((tmp_path / "turn").iterdir())] == before
     paths[0].unlink()
-    with pytest.raises(ArgumentError, match=r"expected a folder without numbered pictures, got 0001\.png"):
-        write_frames(tmp_path / "turn", frames(2))
+    refused(lambda: write_frames(tmp_path / "turn", frames(2)), "numbered pictures, got 0001")
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.gif", "a.mp4", "a", "deep/er/a"])
@@ -35,13 +33,9 @@ def test_where_nothing_can_be_written_nothing_is_rendered(tmp_path, monkeypatch,
         yield
 
     (tmp_path / "file").touch()
-    with pytest.raises(
-        ArgumentError, match=rf"file/{name}.*: cannot write there \(Not a directory\); choose"
-    ):
-        write_frames(tmp_path / "file" / name, rendered())
+    refused(lambda: write_frames(tmp_path / "file" / name, rendered()), f"file/{name}.*Not a directory")
     monkeypatch.setattr("os.access", lambda *_: False)  # as for others than root
-    with pytest.raises(ArgumentError, match=rf"{name}.*: cannot write there \(Permission denied\); choose"):
-        write_frames(tmp_path / name, rendered())
+    refused(lambda: write_frames(tmp_path / name, rendered()), f"{name}.*Permission denied")
 
 
 @pytest.mark.parametrize("fps", [15, 24, 30, 40, 50])
@@ -69,25 +63,22 @@ def test_gif_and_mp4_hold_the_frames_at_their_rate(tmp_path):
     write_frames(tmp_path / "b.mp4", frames(), fps=2.5)
     with av.open(str(tmp_path / "b.mp4")) as film:
         assert float(film.streams.video[0].average_rate) == 2.5
-    with pytest.raises(ArgumentError, match="MP4: 17000 x 16 pixels cannot be encoded"):
-        write_frames(tmp_path / "c.mp4", frames(2, 16, 17000))
+    refused(lambda: write_frames(tmp_path / "c.mp4", frames(2, 16, 17000)), "17000 x 16 pixels")
     assert not (tmp_path / "c.mp4").exists()
 
 
 @pytest.mark.parametrize(
-    ("name", "given", "fps", "message"),
+    ("name", "given", "fps", "named"),
     [
-        ("a.gif", 2, 51, "fps: expected 0.01 to 50 in a GIF, got 51; write an MP4 film"),
-        ("a.gif", 2, 0.001, "fps: expected 0.01 to 50 in a GIF, got 0.001; write an MP4 film"),
-        ("a.avi", 2, 25, r"expected \.png, \.gif, \.mp4 or a folder, got \.avi"),
-        ("a.png", 2, 25, "expected one frame, got several"),
-        ("a.mp4", 0, 25, "expected at least one frame, got none"),
-        ("a.mp4", 2, 0, "fps: expected more than 0 and at most 240, got 0"),
+        *(("a.gif", 2, fps, f"fps: .*{fps}; write an MP4") for fps in (51, 0.001)),
+        ("a.avi", 2, 25, r"\.avi"),
+        ("a.png", 2, 25, "one frame"),
+        ("a.mp4", 0, 25, "at least one frame"),
+        ("a.mp4", 2, 0, "fps: "),
     ],
 )
-def test_what_cannot_be_written(tmp_path, name, given, fps, message):
-    with pytest.raises(ArgumentError, match=message):
-        write_frames(tmp_path / name, frames(given), fps)
+def test_what_cannot_be_written(tmp_path, name, given, fps, named):
+    refused(lambda: write_frames(tmp_path / name, frames(given), fps), named)
     assert list(tmp_path.iterdir()) == []
 
 

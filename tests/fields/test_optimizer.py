@@ -108,14 +108,6 @@ def test_autograd_sees_that_parameters_change():
         value.backward()
 
 
-def test_it_is_adam_with_a_rate_for_each_parameter():
-    optimizer = Optimizer(parameters(), RATES)
-    descend(optimizer, range(8))
-    assert_close(optimizer, oracle(range(8), parameters()))
-    rate = Rate(0.02, 0.01)
-    assert [rate.at(t) for t in (0.0, 0.5, 1.0)] == pytest.approx([0.02, 0.002, 0.0002])
-
-
 def test_parameters_without_a_rate_are_constant_and_given_ones_stay_untouched():
     given = parameters()
     optimizer = Optimizer(given, RATES)

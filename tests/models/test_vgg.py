@@ -5,7 +5,8 @@ from torch.testing import assert_close
 
 from tests.models.networks import outputs, random_weights
 from tests.real_data import real_data
-from texgs.core.errors import ArgumentError, ShapeError
+from tests.refusals import refused
+from texgs.core.errors import ShapeError
 from texgs.models.vgg import Vgg
 
 STYLE = {11: "relu3_1", 13: "relu3_2", 15: "relu3_3"}  # by index of the module in torchvision's list
@@ -71,11 +72,9 @@ def test_layers_of_several_blocks_come_one_by_one_or_joined_by_their_stride(file
 def test_weights_of_something_else_are_refused(tmp_path):
     weights = random_weights(last=14)
     torch.save({name: x for name, x in weights.items() if "14" not in name}, tmp_path / "short.pth")
-    with pytest.raises(ArgumentError, match=r"short\.pth: expected tensor features\.14\.weight"):
-        Vgg.load(tmp_path / "short.pth")
+    refused(lambda: Vgg.load(tmp_path / "short.pth"), r"short\.pth: .* features\.14\.weight")
     torch.save({**weights, "features.5.weight": torch.ones(128, 32, 3, 3)}, tmp_path / "other.pth")
-    with pytest.raises(ShapeError, match=r"other\.pth: features\.5\.weight: expected \[128, 64, 3, 3\]"):
-        Vgg.load(tmp_path / "other.pth")
+    refused(lambda: Vgg.load(tmp_path / "other.pth"), r"other\.pth: features\.5\.weight", ShapeError)
 
 
 def test_real_weights_tell_an_edge_from_noise():

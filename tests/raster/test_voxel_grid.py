@@ -5,9 +5,9 @@ import math
 import pytest
 import torch
 
-from tests.raster.requirements import refuses
 from tests.raster.voxel_scenes import LOWER, SPACING, voxel_scene
-from texgs.core.errors import ArgumentError, DeviceError, ShapeError
+from tests.refusals import refused
+from texgs.core.errors import DeviceError, ShapeError
 from texgs.raster.reference.voxels import interpolate
 from texgs.raster.voxel_grid import drop_sh, interpolate_rows, pack_rows, recolored, unpack_rows, voxel_grid
 from texgs.raster.voxels import March, render_rays
@@ -86,19 +86,16 @@ def test_dropped_harmonics():
 
 
 def test_what_makes_no_grid():
-    mask, grid = torch.ones(8, 8, 8, dtype=torch.bool), voxel_scene().grid
-    message = r"multiples of 4 from 8 to 1024, got \[8, 6, 8\] bool; pad it"
-    refuses(ShapeError, message, voxel_grid, mask[:, :6], LOWER, SPACING)
-    refuses(ShapeError, "expected bool", voxel_grid, mask.float(), LOWER, SPACING)
-    refuses(ArgumentError, "degree: expected 0, 1 or 2, got 3", voxel_grid, mask, LOWER, SPACING, 3)
+    mask, grid, wide = torch.ones(8, 8, 8, dtype=torch.bool), voxel_scene().grid, torch.zeros(3, 4)
+    for given in ((mask[:, :6], LOWER, SPACING), (mask.float(), LOWER, SPACING)):
+        refused(lambda given=given: voxel_grid(*given), "bool", ShapeError)
+    refused(lambda: voxel_grid(mask, LOWER, SPACING, 3), "degree: ")
     for spacing in (0, -1, math.inf, math.nan):
-        message = f"spacing: expected a length above 0, got {spacing}"
-        refuses(ArgumentError, message, voxel_grid, mask, LOWER, spacing)
+        refused(lambda spacing=spacing: voxel_grid(mask, LOWER, spacing), "spacing: ")
     for lower in (LOWER[:2], (0, 0, math.nan)):
-        refuses(ArgumentError, "lower: expected 3 finite numbers, got", voxel_grid, mask, lower, SPACING)
-    refuses(DeviceError, "rows: expected device cpu as masks", grid.with_rows, grid.rows.to("meta"))
-    refuses(ShapeError, r"rows: expected \[\d+, K\], got \[3, 32\]", grid.with_rows, torch.zeros(3, 32))
-    refuses(ShapeError, "rows: expected 4, 16 or 32 floats", grid.with_rows, torch.zeros(len(grid.rows), 8))
-    wide = torch.zeros(3, 4)
-    refuses(ShapeError, r"matrix: expected \[3, 3\], got \[3, 4\]", recolored, grid, wide, OFFSET)
-    refuses(ShapeError, r"offset: expected \[3\], got \[1\]", recolored, grid, MATRIX, torch.zeros(1))
+        refused(lambda lower=lower: voxel_grid(mask, lower, SPACING), "lower: ")
+    refused(lambda: grid.with_rows(grid.rows.to("meta")), "rows: ", DeviceError)
+    for rows in (torch.zeros(3, 32), torch.zeros(len(grid.rows), 8)):
+        refused(lambda rows=rows: grid.with_rows(rows), "rows: ", ShapeError)
+    refused(lambda: recolored(grid, wide, OFFSET), "matrix: ", ShapeError)
+    refused(lambda: recolored(grid, MATRIX, torch.zeros(1)), "offset: ", ShapeError)

@@ -3,9 +3,9 @@
 import pytest
 import torch
 
-from tests.raster.requirements import refuses
 from tests.raster.voxel_scenes import voxel_scene
-from texgs.core.errors import ArgumentError, DeviceError, ShapeError
+from tests.refusals import refused
+from texgs.core.errors import DeviceError, ShapeError
 from texgs.raster.voxel_grid import voxel_grid
 from texgs.raster.voxel_optimizer import (
     EPSILON,
@@ -116,7 +116,7 @@ def test_a_backward_pass_after_a_step_is_refused():
     optimizer = VoxelOptimizer(grid)
     color = render_rays(grid, scene.rays).color
     optimizer.step(RATES)
-    refuses(RuntimeError, "modified by an inplace operation", color.sum().backward)
+    refused(color.sum().backward, "modified by an inplace operation", RuntimeError)
 
 
 def test_a_grid_without_voxels_has_no_variation():
@@ -128,12 +128,9 @@ def test_a_grid_without_voxels_has_no_variation():
 
 def test_errors_name_the_argument():
     grid = voxel_scene().grid
-    refuses(ArgumentError, "optimizer: expected rmsprop or adam, got 'sgd'", VoxelOptimizer, grid, "sgd")
-    other = RowGradient(voxel_scene(size=(8, 8, 8)).grid)
-    message, own = r"into: expected the gradient of .* make a new one for each grid", RowGradient(grid)
-    refuses(ShapeError, message, add_total_variation, grid, torch.tensor([0]), 1.0, 1.0, other)
-    for error, message, blocks in (
-        (DeviceError, "blocks: expected device cpu as rows, got meta", torch.tensor([0]).to("meta")),
-        (ArgumentError, "blocks: expected places from 0 to", torch.tensor([-1])),
-    ):
-        refuses(error, message, add_total_variation, grid, blocks, 1.0, 1.0, own)
+    other, own = RowGradient(voxel_scene(size=(8, 8, 8)).grid), RowGradient(grid)
+    away, below = torch.tensor([0]).to("meta"), torch.tensor([-1])
+    refused(lambda: VoxelOptimizer(grid, "sgd"), "optimizer: .*'sgd'")
+    refused(lambda: add_total_variation(grid, torch.tensor([0]), 1.0, 1.0, other), "into: ", ShapeError)
+    refused(lambda: add_total_variation(grid, away, 1.0, 1.0, own), "blocks: ", DeviceError)
+    refused(lambda: add_total_variation(grid, below, 1.0, 1.0, own), "blocks: ")

@@ -1,10 +1,9 @@
-import pytest
 import torch
 from torch.testing import assert_close
 
 from tests.fields.gaussians.samples import sample
+from tests.refusals import refused
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
 from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
 from texgs.fields.part_edit import PartEdit
 
@@ -46,5 +45,4 @@ def test_an_opacity_is_a_factor_and_at_most_one():
 
 
 def test_filters_that_differ_are_no_scene():
-    with pytest.raises(ArgumentError, match="expected all antialiased or none, got both"):
-        JoinedGaussians([sample(), sample(antialiased=True)])
+    refused(lambda: JoinedGaussians([sample(), sample(antialiased=True)]), "antialiased")

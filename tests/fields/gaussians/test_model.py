@@ -6,8 +6,6 @@ from torch.testing import assert_close
 
 from tests.fields.gaussians.samples import sample
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError, ShapeError
-from texgs.fields.gaussians.model import Gaussians
 from texgs.raster import Options
 from texgs.raster.reference.render import rasterize
 
@@ -60,19 +58,3 @@ def test_parameters_by_role():
     assert set(model.tensors("geometry")) == {"means", "quats", "scales", "opacities"}
     assert set(model.tensors("appearance")) == {"sh"}
     assert (len(model), str(model.device), str(model.to("cpu").device)) == (7, "cpu", "cpu")
-
-
-@pytest.mark.parametrize(
-    ("change", "error", "message"),
-    [
-        ({"sh": None}, ArgumentError, "expected means, quats, scales, opacities, sh, got means"),
-        ({"mood": torch.zeros(7)}, ArgumentError, "got means, quats, scales, opacities, sh, mood"),
-        ({"scales": torch.zeros(7, 2)}, ShapeError, r"scales: expected \[7, 3\], got \[7, 2\]"),
-        ({"opacities": torch.zeros(6)}, ShapeError, r"opacities: expected \[7\], got \[6\]"),
-        ({"sh": torch.zeros(7, 5, 3)}, ShapeError, "sh: expected 1, 4, 9 or 16 coefficients"),
-    ],
-)
-def test_what_is_no_model_is_refused(change, error, message):
-    changed = {**sample().parameters, **change}
-    with pytest.raises(error, match=message):
-        Gaussians({name: x for name, x in changed.items() if x is not None})

@@ -4,6 +4,7 @@ from safetensors.torch import load_file
 
 from tests.fields.rewritten import rewritten
 from tests.fields.surfels.samples import same, sample
+from tests.refusals import refused
 from texgs.core.errors import TexgsError
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import mean_texels, owners
@@ -48,17 +49,16 @@ def test_a_file_without_colours_keeps_those_of_the_model(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "message"),
+    ("name", "value"),
     [
-        ("colors", torch.zeros(3, 3), "colors: expected"),
-        ("colors", torch.full((7, 3), torch.nan), "colors: expected finite values"),
-        ("sizes", torch.ones(4, 2, dtype=torch.int32), "expected texels and sizes that fit"),
-        ("sizes", sample().parameters["sizes"].long(), "expected texels and sizes that fit"),
-        ("texels", sample().parameters["texels"].double(), "expected texels and sizes that fit"),
+        ("colors", torch.zeros(3, 3)),
+        ("colors", torch.full((7, 3), torch.nan)),
+        ("sizes", torch.ones(4, 2, dtype=torch.int32)),
+        ("sizes", sample().parameters["sizes"].long()),
+        ("texels", sample().parameters["texels"].double()),
     ],
 )
-def test_tensors_of_another_model_are_refused(tmp_path, name, value, message):
+def test_tensors_of_another_model_are_refused(tmp_path, name, value):
     model = sample()
-    path = rewritten(write_texture(tmp_path / "style.safetensors", restyled(model)), FORMAT, {name: value})
-    with pytest.raises(TexgsError, match=f"style.safetensors: {message}"):
-        with_texture(model, path)
+    path = rewritten(write_texture(tmp_path / "style", restyled(model)), FORMAT, {name: value})
+    refused(lambda: with_texture(model, path), f"{path}: .*{name}", TexgsError)
