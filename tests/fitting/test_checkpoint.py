@@ -1,6 +1,3 @@
-import gc
-import weakref
-
 import pytest
 import torch
 from safetensors.torch import save
@@ -9,7 +6,7 @@ from tests.refusals import refused
 from texgs.core.errors import FitError
 from texgs.core.progress import curve_logger
 from texgs.fitting import checkpoint
-from texgs.fitting.checkpoint import ResumableFit, run_to_end
+from texgs.fitting.checkpoint import run_to_end
 
 from .scenes import assert_same, new_fit, run
 
@@ -62,42 +59,6 @@ def test_a_damaged_file_or_one_of_another_kind_is_named(tmp_path):
     for content in (whole[:-100], whole[:4], b"no tensors", save({"means": torch.zeros(1, 3)})):
         path.write_bytes(content)
         refused(lambda: checkpoint.latest(tmp_path), f"{path}: ")
-
-
-class Counter(ResumableFit):
-    """A fit that adds 1 to a tensor, and looks whether what it was restored from is still there."""
-
-    def __init__(self):
-        super().__init__(5)
-        self.rows = torch.zeros(4)
-        self.read, self.was_kept = None, None
-
-    def state(self):
-        return {"rows": self.rows, **super().state()}
-
-    def restore(self, state):
-        super().restore(state)
-        self.read = weakref.ref(state["rows"])
-        self.rows = state["rows"].clone()
-
-    def run(self):
-        while self.iteration < self.iterations:
-            gc.collect()
-            self.was_kept = self.read is not None and self.read() is not None
-            self.iteration += 1
-            self.rows = self.rows + 1
-            yield self.iteration
-
-
-def test_a_resumed_fit_goes_on_and_lets_go_of_the_checkpoint(tmp_path):
-    stopped = Counter()
-    next(stopped.run())
-    checkpoint.save(tmp_path, stopped)
-    fit = Counter()
-    run_to_end(fit, tmp_path, "test")
-    assert fit.rows.tolist() == [5] * 4
-    assert fit.read is not None
-    assert fit.was_kept is False
 
 
 def test_curves_are_told_while_a_fit_runs_and_change_no_bit(tmp_path):

@@ -7,7 +7,6 @@ from tests.refusals import refused
 from texgs.core.camera import Camera, look_at, orbit
 from texgs.core.errors import FitError
 from texgs.core.image import write_png
-from texgs.fields.splats import split, zeroth
 from texgs.fields.surfels.shading import raw_material
 from texgs.fitting import checkpoint
 from texgs.fitting.checkpoint import CHECKED_EVERY
@@ -49,16 +48,6 @@ def test_it_fits_a_ball():
     assert quality(model_of(new_fit()), fit.images) < 16
     assert quality(model_of(fit), fit.images) > 21
     assert 80 < len(fit.parameters["means"]) <= 150
-
-
-def test_harmonics_fit_too():
-    seeds = ball_seeds()
-    sh = torch.cat([zeroth(seeds.pop("colors")), torch.zeros(80, 15, 3)], dim=1)
-    start = {name: x for name, x in seeds.items() if name not in MATERIAL} | split(sh)
-    fit = run(new_fit(parameters=start, iterations=200, densify=Densify(stop=0), sh_every=40))
-    assert quality(model_of(fit), fit.images) > 17
-    assert fit.parameters["sh_rest"].shape == (80, 15, 3)
-    assert fit.parameters["sh_rest"].any()
 
 
 def test_the_same_seed_is_bit_equal_and_another_one_differs():

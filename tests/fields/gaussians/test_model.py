@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import pytest
 import torch
 from torch.testing import assert_close
@@ -44,17 +42,3 @@ def test_a_view_is_that_of_the_float64_reference(antialiased):
     assert_close(rendered.color.double(), expected.color, atol=5e-3, rtol=0)
     assert float((rendered.color - expected.color).abs().mean()) < 1e-5
     assert float((rendered.depth - expected.depth).abs().mean()) < 1e-3
-
-
-def test_the_filter_matters():
-    model = sample(30)
-    thin = replace(model, parameters={**model.parameters, "scales": torch.full((30, 3), -6.0)})
-    other = replace(thin, shading=sample(antialiased=True).shading)
-    assert float(other.render(CAMERA).alpha.sum()) < 0.5 * float(thin.render(CAMERA).alpha.sum())
-
-
-def test_parameters_by_role():
-    model = sample()
-    assert set(model.tensors("geometry")) == {"means", "quats", "scales", "opacities"}
-    assert set(model.tensors("appearance")) == {"sh"}
-    assert (len(model), str(model.device), str(model.to("cpu").device)) == (7, "cpu", "cpu")
