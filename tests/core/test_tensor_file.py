@@ -13,14 +13,6 @@ from texgs.core.tensor_file import DTYPES, read_tensor_file, write_tensor_file, 
 TENSORS = {"x": torch.arange(6.0).reshape(2, 3)}
 
 
-def test_what_is_read_is_what_was_written(tmp_path):
-    description = {"version": 1, "metadata": {"made of": ["a", 0.5]}}
-    path = write_tensor_file(tmp_path / "file", "texgs-test", description, TENSORS)
-    read, tensors = read_tensor_file(path, "texgs-test", 1)
-    assert read == description
-    assert torch.equal(tensors["x"], TENSORS["x"])
-
-
 @pytest.mark.parametrize(
     ("header", "named"),
     [

@@ -69,12 +69,6 @@ def test_light_behind_the_face_that_the_camera_sees_leaves_ambient_light(shinine
     assert all(x.any() for x in gradients(given)[1][:5])
 
 
-def test_facing_changes_nothing_for_a_headlight(device):
-    given = placed(device, 3001, ("diffuse",))
-    pairs = zip(sum(gradients(given, facing=True), ()), sum(gradients(given), ()), strict=True)
-    assert all(torch.equal(one, other) for one, other in pairs)
-
-
 @pytest.mark.parametrize("light", LIGHTS)
 def test_surfels_have_no_front(light, facing, device):
     given = placed(device, 3001, ("specular",), light=light)
