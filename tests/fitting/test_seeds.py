@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from tests.real_data import real_data
@@ -252,7 +253,7 @@ def near(masks, places):
     found = {}
     for name, mask in masks.items():
         own = np.argwhere(mask)[:, ::-1] / (mask.shape[0] - 1) - 0.5
-        found[name] = int((cdist(places, own).min(axis=1) < 3 / mask.shape[0]).sum())
+        found[name] = int((cKDTree(own).query(places)[0] < 3 / mask.shape[0]).sum())
     return found
 
 

@@ -1,9 +1,100 @@
+"""Pictures, grids of pictures, and films."""
+
 import numpy as np
 import pytest
+import torch
 from PIL import Image, ImageSequence
 
 from tests.refusals import refused
+from texgs.core.errors import ShapeError
+from texgs.core.figures import CELL, DPI, FOOT, GAP, HEAD, LEFT, content, write_grid
+from texgs.core.image import read_rgba, to_pillow, write_png
 from texgs.core.movie import write_frames
+
+
+@pytest.mark.parametrize(
+    ("colors", "alphas", "pixels"),
+    [
+        ([[0.0, 0.5, 1.0], [-0.2, 1.7, 0.501]], None, [(0, 128, 255), (0, 255, 128)]),
+        ([[0.25, 0.5, 0.0], [0.0, 0.0, 0.0]], [[0.5, 0.0]], [(128, 255, 0, 128), (0, 0, 0, 0)]),
+    ],
+)
+def test_values_are_rounded_and_clamped_and_of_straight_alpha(tmp_path, colors, alphas, pixels):
+    write_png(tmp_path / "x.png", torch.tensor([colors]), None if alphas is None else torch.tensor(alphas))
+    with Image.open(tmp_path / "x.png") as picture:
+        assert picture.mode == ("RGB" if alphas is None else "RGBA")
+        assert [picture.getpixel((x, 0)) for x in range(2)] == pixels
+
+
+def test_round_trip_is_within_rounding(tmp_path):
+    generator = torch.Generator().manual_seed(0)
+    alpha = torch.rand(9, 7, generator=generator)
+    color = torch.rand(9, 7, 3, generator=generator) * alpha[..., None]
+    write_png(tmp_path / "x.png", color, alpha)
+    straight = torch.from_numpy(read_rgba(tmp_path / "x.png")) / 255
+    color_read, alpha_read = straight[..., :3] * straight[..., 3:], straight[..., 3]
+    # Half a level of the straight colour and half a level of alpha.
+    torch.testing.assert_close(color_read, color, atol=1.01 / 255, rtol=0)
+    torch.testing.assert_close(alpha_read, alpha, atol=0.51 / 255, rtol=0)
+
+
+def test_grey_of_16_bits_is_rounded(tmp_path):
+    Image.fromarray(np.array([[0, 257 * 100, 65535]], dtype=np.uint16)).save(tmp_path / "x.png")
+    assert read_rgba(tmp_path / "x.png")[0].tolist() == [[0, 0, 0, 255], [100, 100, 100, 255], [255] * 4]
+
+
+def test_one_channel_is_grey():
+    assert to_pillow(torch.ones(2, 2, 1)).mode == "L"
+    assert to_pillow(torch.ones(2, 2, 1), torch.ones(2, 2)).mode == "RGBA"
+
+
+def test_mistakes_are_named(tmp_path):
+    refused(lambda: to_pillow(torch.zeros(3, 2, 2)), "color: ", ShapeError)
+    refused(lambda: to_pillow(torch.zeros(2, 2, 3), torch.zeros(2, 3)), "alpha: ", ShapeError)
+    refused(lambda: to_pillow(torch.full((1, 1, 3), float("nan"))), "color: .*finite")
+    refused(lambda: read_rgba(tmp_path / "none.png"), "no such file")
+
+
+def picture(rows, columns, size=(60, 80), value=0.2):
+    """White with a grey block."""
+    pixels = np.ones((*size, 3))
+    pixels[rows, columns] = value
+    return pixels
+
+
+BLOCK = picture(slice(20, 30), slice(30, 40))
+
+
+def test_a_row_for_each_name_and_a_column_for_each_title(tmp_path):
+    rows = dict.fromkeys(("scene", "volume"), [BLOCK] * 3)
+    path = write_grid(tmp_path / "a.png", rows, ["one", "two", "three"])
+    width, height = Image.open(path).size
+    assert width == round((LEFT + 3 * (CELL + GAP)) * DPI)
+    assert height == round((GAP + HEAD + 2 * (CELL + GAP)) * DPI)
+    again = write_grid(tmp_path / "b.png", rows, ["one", "two", "three"])
+    assert path.read_bytes() == again.read_bytes()
+
+
+def test_all_show_the_square_around_what_any_shows():
+    pictures = [picture(slice(20, 24), slice(30, 34)), picture(slice(26, 30), slice(50, 54))]
+    rows, columns = content(pictures)
+    assert rows.stop - rows.start == columns.stop - columns.start == 24 + 8
+    assert rows.start < 20 < 30 < rows.stop
+    assert columns.start <= 30 < 54 <= columns.stop
+    assert content([np.ones((4, 4, 3))]) == (slice(None), slice(None))
+
+
+def test_places_may_be_empty_and_pictures_have_words_below(tmp_path):
+    rows, titles = {"a": [BLOCK, None], "b": [None, BLOCK]}, ["one", "two"]
+    plain = write_grid(tmp_path / "plain.png", rows, titles)
+    noted = write_grid(tmp_path / "noted.png", rows, titles, {"a": ["", ""], "b": ["", "31.2 dB"]})
+    (width, height), (_, higher) = Image.open(plain).size, Image.open(noted).size
+    assert higher - height == round((FOOT - GAP) * DPI)
+    pixels = np.asarray(Image.open(plain).convert("L"))
+    right = pixels[70 : height // 2 - 20, width // 2 + 20 :]
+    assert right.min() == 255, "nothing is drawn in the empty place"
+    assert pixels[70 : height // 2 - 20, 20 : width // 2 - 20].min() < 100
+    refused(lambda: write_grid(tmp_path / "a.png", rows, ["one", "two", "three"]), "a: .*3 pictures, got 2")
 
 
 def frames(count=4, height=33, width=47):
