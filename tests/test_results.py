@@ -148,21 +148,6 @@ def test_results_may_be_those_of_later_code_that_was_compared(clone, monkeypatch
     assert "1 of 1" in called(monkeypatch, capsys)
 
 
-@pytest.mark.parametrize(
-    ("file", "words", "named"),
-    [
-        ("a.csv", "shade", "--code: .*'shade'"),
-        ("a.csv", "shading --revision 0", "--revision: .* shading, got 0"),
-        ("b.csv", "shading", "b.csv"),
-    ],
-)
-def test_mistakes_are_named(clone, monkeypatch, capsys, file, words, named):
-    monkeypatch.chdir(clone / "benchmarks/results")
-    with pytest.raises(SystemExit, match=named):
-        called(monkeypatch, capsys, file, "--code", *words.split())
-    assert results.index().empty
-
-
 def test_only_files_of_the_folder_enter_themselves(clone, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["benchmarks", "--sections", "views"])
     monkeypatch.setattr(sys.modules["__main__"], "__spec__", SimpleNamespace(name="benchmarks.__main__"))

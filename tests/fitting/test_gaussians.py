@@ -65,12 +65,13 @@ def test_an_interrupted_fit_goes_on_to_the_same_bits(tmp_path):
 
 def test_the_part_of_a_view_that_is_fitted_shows_all_gaussians(tmp_path):
     """The box of surfels is as good for Gaussians, whose filter is wider."""
+    images = ball_images()
     for seed in range(20):
         generator = torch.Generator().manual_seed(seed)
-        p = seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), SEEDS, 0, seed)
+        p = seed_gaussians(images, ViewSet(tmp_path, [], [], {}), SEEDS, 0, seed)
         p["scales"] = p["scales"] + 0.5 * torch.randn(80, 3, generator=generator)
         model = Gaussians({**p, "opacities": torch.full((80,), 4.0)})
-        camera = ball_images().cameras[seed % 6]
+        camera = images.cameras[seed % 6]
         box = screen_box(p, model.shading.options, camera).within(SIZE, SIZE)
         alpha = model.render(camera).alpha
         alpha[box.top : box.bottom, box.left : box.right] = 0

@@ -155,10 +155,10 @@ def moved(model, texels):
 
 @pytest.mark.parametrize("scale", [1.0, 0.1, -1.0])
 def test_the_share_of_the_way_is_that_of_a_search_along_it(start, images, scale):
-    """With the error of all views at 201 places of the way, brightest colours not clamped."""
+    """With the error of all views at 101 places of the way, brightest colours not clamped."""
     towards = solved_from(start, images, sweeps=3).parameters["texels"] * scale
-    errors = [squared(moved(start, towards * step / 200), images) for step in range(201)]
-    best = errors.index(min(errors)) / 200
+    errors = [squared(moved(start, towards * step / 100), images) for step in range(101)]
+    best = errors.index(min(errors)) / 100
     share = share_of(moved(start, towards), start, images, range(len(images)))
     assert share == pytest.approx(best, abs=0.01)
     assert (scale > 0) == (share > 0)
