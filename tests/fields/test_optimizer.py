@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from tests.devices import device  # noqa: F401, a fixture
-from tests.raster.requirements import require_same_bits
+from tests.raster.requirements import require_equal, require_same_bits
 from texgs.fields.optimizer import Optimizer, Rate
 
 
@@ -114,8 +114,7 @@ def test_parameters_without_a_rate_are_constant_and_given_ones_stay_untouched():
     descend(optimizer, range(3))
     assert not optimizer.parameters["still"].requires_grad
     assert torch.equal(optimizer.parameters["still"], torch.ones(6))
-    for name, x in parameters().items():
-        assert torch.equal(given[name], x)
+    require_equal(given, parameters())
 
 
 def test_rows_that_stay_keep_their_moments_and_new_ones_have_none():
@@ -170,6 +169,4 @@ def test_a_restored_one_goes_on_bit_for_bit(steps):
     second.restore(state)
     for optimizer in (first, second):
         descend(optimizer, range(steps, 9))
-    assert first.state().keys() == second.state().keys()
-    for name, x in first.state().items():
-        assert torch.equal(second.state()[name], x), name
+    require_equal(second.state(), first.state())

@@ -32,8 +32,9 @@ def test_a_scene_of_one_is_the_field_bit_for_bit(field, edits):
     alone = field.render(CAMERA, outputs=("depth",))
     scene = compose([field])
     shown = scene.render(CAMERA, Light("directional", 100, 30), edits, outputs=("depth",))
-    for name in ("color", "alpha", "depth"):
-        assert torch.equal(getattr(shown, name), getattr(alone, name)), name
+    assert all(
+        torch.equal(getattr(shown, name), getattr(alone, name)) for name in ("color", "alpha", "depth")
+    )
     assert (len(scene), str(scene.device), scene.palettes) == (len(field), "cpu", [(0.0, 0.0, 0.0)])
 
 

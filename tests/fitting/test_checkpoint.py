@@ -2,13 +2,14 @@ import pytest
 import torch
 from safetensors.torch import save
 
+from tests.raster.requirements import require_equal
 from tests.refusals import refused
 from texgs.core.errors import FitError
 from texgs.core.progress import curve_logger
 from texgs.fitting import checkpoint
 from texgs.fitting.checkpoint import run_to_end
 
-from .scenes import assert_same, new_fit, run
+from .scenes import new_fit, run
 
 
 @pytest.fixture(scope="module")
@@ -24,14 +25,14 @@ def test_a_resumed_run_is_bit_equal_to_an_uninterrupted_one(tmp_path, whole, sto
     resumed = run(new_fit(), 7)  # another state of the optimizer, of other surfels
     resumed.restore(checkpoint.latest(tmp_path))
     assert resumed.iteration == stop
-    assert_same(run(resumed).state(), whole)
+    require_equal(run(resumed).state(), whole)
 
 
 def test_a_state_before_the_first_step_has_no_moments(tmp_path):
     checkpoint.save(tmp_path, new_fit())
     fit = run(new_fit(), 5)
     fit.restore(checkpoint.latest(tmp_path))
-    assert_same(run(fit, 12).state(), run(new_fit(), 12).state())
+    require_equal(run(fit, 12).state(), run(new_fit(), 12).state())
 
 
 def test_a_checkpoint_replaces_the_one_before(tmp_path):
@@ -74,7 +75,7 @@ def test_curves_are_told_while_a_fit_runs_and_change_no_bit(tmp_path):
     quality = {step: values["train_view_psnr"] for step, values in told if "train_view_psnr" in values}
     assert list(quality) == [150, 200, 210]
     assert 5 < quality[150] <= quality[210] + 1 < 60
-    assert_same(fits[1].parameters, fits[0].parameters)
+    require_equal(fits[1].parameters, fits[0].parameters)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 import pytest
 import torch
 
+from tests.raster.requirements import require_equal
 from texgs.fields.gaussians.model import Baked, Gaussians
 from texgs.fields.splats import screen_box
 from texgs.fitting import checkpoint
@@ -13,7 +14,7 @@ from texgs.raster.shading import Y00
 from texgs.volume.generate import sphere
 from texgs.volume.view_set import ViewSet
 
-from .scenes import SIZE, assert_same, ball_images, is_finite, quality, run
+from .scenes import SIZE, ball_images, is_finite, quality, run
 
 SEEDS = Seeds(kind="hull", count=80, opacity=0.1, half_size=0.8)
 DENSIFY = Densify(start=20, stop=120, every=20, cap=150)  # no resets, after which images are pale
@@ -60,7 +61,7 @@ def test_an_interrupted_fit_goes_on_to_the_same_bits(tmp_path):
     checkpoint.save(task.output / checkpoint.FOLDER, half)
     fitted = FIT.fit(task)
     assert fitted.seconds > 1000
-    assert_same(fitted.field.parameters, whole.parameters)
+    require_equal(fitted.field.parameters, whole.parameters)
 
 
 def test_the_part_of_a_view_that_is_fitted_shows_all_gaussians(tmp_path):

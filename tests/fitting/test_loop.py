@@ -3,7 +3,7 @@ from contextlib import suppress
 import pytest
 import torch
 
-from tests.raster.requirements import require_same_bits
+from tests.raster.requirements import require_equal, require_same_bits
 from tests.refusals import refused
 from texgs.core.camera import Camera, look_at, orbit
 from texgs.core.errors import FitError
@@ -20,7 +20,6 @@ from texgs.volume.view_set import View, ViewSet, read_views, write_transforms
 
 from .scenes import (
     HEADLIGHT,
-    assert_same,
     ball_images,
     ball_planes,
     ball_seeds,
@@ -53,7 +52,7 @@ def test_it_fits_a_ball():
 
 def test_the_same_seed_is_bit_equal_and_another_one_differs():
     first, same, other = (run(new_fit(seed=seed)).state() for seed in (0, 0, 1))
-    assert_same(same, first)
+    require_equal(same, first)
     assert not all(torch.equal(x, other[name]) for name, x in first.items())
 
 

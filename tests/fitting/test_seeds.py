@@ -6,6 +6,7 @@ import torch
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from tests.raster.requirements import require_equal
 from tests.real_data import real_data
 from tests.refusals import refused
 from texgs.core.geometry import quats_to_matrices
@@ -22,7 +23,7 @@ from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet, read_views
 
-from .scenes import HEADLIGHT, RADIUS, assert_same, ball_images, blank_images, cameras, images_of, is_finite
+from .scenes import HEADLIGHT, RADIUS, ball_images, blank_images, cameras, images_of, is_finite
 
 BOX = (torch.full((3,), -0.55), torch.full((3,), 0.55))
 
@@ -130,7 +131,7 @@ def test_the_same_seed_gives_the_same_surfels_and_another_one_others(kind):
     assert colors.shape == (300, 3)
     assert 0 <= colors.min() <= colors.max() <= 1
     assert torch.equal(colors, same_colors)
-    assert_same(same, first)
+    require_equal(same, first)
     assert not torch.equal(first["means"], other["means"])
 
 

@@ -22,3 +22,10 @@ def require_same_bits(function, *arguments, threads=(2, 7)):
     for n in threads:
         for name, value in with_threads(n, function, *arguments).items():
             assert torch.equal(value, alone[name]), f"{name} with {n} threads"
+
+
+def require_equal(results, expected):
+    """Require the same tensors by name, bit for bit."""
+    assert results.keys() == expected.keys()
+    for name, value in expected.items():
+        assert torch.equal(results[name], value), name

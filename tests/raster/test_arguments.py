@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from tests.raster.agreement import gradients, images, names_of, random_cotangents
+from tests.raster.requirements import require_equal
 from tests.raster.scenes import gaussians, random_scene, textured, textured_with_features
 from tests.refusals import refused
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
@@ -205,8 +206,7 @@ def test_memory_layout_does_not_matter(device, drawn):
     cotangents = random_cotangents(scene, names_of(scene))
     expected |= gradients(rasterize, scene, cotangents)
     result |= gradients(rasterize, strided, cotangents)
-    for name, value in expected.items():
-        assert torch.equal(result[name], value), name
+    require_equal(result, expected)
     half = torch.tensor(0.5, device=device)
     expanded, dense = (replace(scene, opacities=x) for x in (half.expand(N), half.repeat(N)))
     assert torch.equal(expanded.render(rasterize).color, dense.render(rasterize).color)
@@ -216,8 +216,7 @@ def test_inputs_are_left_alone(device):
     scene = textured(random_scene()).to(device)
     copy = scene.map(torch.clone)
     gradients(rasterize, scene, random_cotangents(scene, ("color", "depth")))
-    for name, leaf in scene.leaves().items():
-        assert torch.equal(leaf, copy.leaves()[name])
+    require_equal(scene.leaves(), copy.leaves())
 
 
 def test_camera_changed_before_backward():
