@@ -1,3 +1,6 @@
+import gc
+import weakref
+
 import pytest
 import torch
 from safetensors.torch import save
@@ -60,6 +63,25 @@ def test_a_damaged_file_or_one_of_another_kind_is_named(tmp_path):
     for content in (whole[:-100], whole[:4], b"no tensors", save({"means": torch.zeros(1, 3)})):
         path.write_bytes(content)
         refused(lambda: checkpoint.latest(tmp_path), f"{path}: ")
+
+
+def test_a_resumed_fit_lets_go_of_the_checkpoint(tmp_path, monkeypatch):
+    checkpoint.save(tmp_path, run(new_fit(iterations=6), 4))
+    fit, read, kept = new_fit(iterations=6), [], []
+    restore, go_on = fit.restore, fit.run
+
+    def watched():
+        for done in go_on():
+            gc.collect()
+            kept.append(read[0]() is not None)
+            yield done
+
+    monkeypatch.setattr(
+        fit, "restore", lambda state: read.append(weakref.ref(state["means"])) or restore(state)
+    )
+    monkeypatch.setattr(fit, "run", watched)
+    run_to_end(fit, tmp_path, "test")
+    assert kept == [False, False]
 
 
 def test_curves_are_told_while_a_fit_runs_and_change_no_bit(tmp_path):

@@ -76,6 +76,20 @@ def test_thicker_matter_lets_a_power_of_the_light_through(alpha, factor):
     assert 1 - thickened(tf, factor).opacity[0][1] == pytest.approx((1 - alpha) ** factor, abs=1e-12)
 
 
+def test_one_of_two_views_has_a_headlight_and_the_others_lights_of_their_own(small, grid, monkeypatch):
+    """42 cameras, of which 14 have a headlight; of the others one of two is cast."""
+    seen = []
+    refine = now.refined
+    watched = lambda model, images, *rest: seen.append(images) or refine(model, images, *rest)  # noqa: E731
+    monkeypatch.setattr(now, "refined", watched)
+    tf = of_range(HIGH, grid)
+    assert len(list(now.fit_now(Caster(grid, LOOK), LOOK, tf, LENS, "sphere", soon=False))) == 1
+    (images,) = seen
+    assert (images.size, len(images)) == ((64, 64), 28)
+    assert sum(light == HEADLIGHT for light in images.lights) == 14
+    assert len(set(images.lights)) == 15
+
+
 def test_a_function_that_shows_nothing_is_told(small, grid):
     nothing = TransferFunction(((1e6, 0), (2e6, 1)), ((0, 1, 1, 1),))
     refused(lambda: list(now.fit_now(Caster(grid, LOOK), LOOK, nothing, LENS, "nothing")), "got little")
