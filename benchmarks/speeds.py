@@ -6,8 +6,6 @@ factor, so that pixels and iterations keep the weights that longer runs have giv
 has are scaled as the probe says that this machine is faster or slower than that of the file.
 """
 
-from __future__ import annotations
-
 import csv
 import shlex
 from collections import defaultdict
@@ -22,8 +20,9 @@ from benchmarks.command import call
 from texgs.core.cache import Checksums
 from texgs.core.io import read_json
 from texgs.core.names import METRICS
-from texgs.workflow.forecast import PROBE, Speed, probe, speeds, work_of
-from texgs.workflow.graph import drawn
+from texgs.raster.probe import probe
+from texgs.workflow.forecast import PROBE, Speed, speeds, work_of
+from texgs.workflow.graph import graph_of
 from texgs.workflow.sweep import as_sweep
 
 FILE = Path(str(files("texgs.workflow").joinpath("speeds.csv")))
@@ -62,7 +61,7 @@ def samples(runs: Sequence[str]) -> dict[str, list[Sample]]:
     """Jobs of runs that are done, by stage."""
     by_stage: dict[str, list[Sample]] = defaultdict(list)
     for words in runs:
-        _, planned = drawn(as_sweep(tuple(shlex.split(words))), Checksums.load())
+        _, planned = graph_of(as_sweep(tuple(shlex.split(words))), Checksums.load())
         for folder, job in planned.run.items():
             metrics = job.output / METRICS
             if metrics.exists():

@@ -9,8 +9,7 @@ from tests.workflow.project import TINY
 from texgs.cli.main import main
 from texgs.core.cache import Checksums
 from texgs.workflow import forecast
-from texgs.workflow.experiments import selected
-from texgs.workflow.graph import graph
+from texgs.workflow.graph import graph_of
 from texgs.workflow.stage_table import STAGES
 
 
@@ -43,7 +42,7 @@ def test_the_jobs_of_a_run_are_counted_each_once():
     orbital = {"volume": 1, "transfer": 1, "views": 2, "surfels": 2, "texture": 2, "edit_text": 1}
     assert {name: expected.to_do[name] for name in orbital} == orbital
     assert expected.done == 0
-    planned = graph(selected(words, lambda config: ()).by_sweep, Checksums())
+    _, planned = graph_of(words, Checksums())
     by_hand = forecast.START_SECONDS + sum(
         forecast.STEP_SECONDS
         + forecast.speeds()[job.stage.name].seconds(*forecast.work_of(job, planned.configs[folder]))

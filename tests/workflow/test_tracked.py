@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from texgs.config.compose import compose
+from texgs.config.case import Case
 from texgs.core.cache import Checksums
 from texgs.report.results import Comparison, EditResult, FitResult, GalleryResult, PseResult, Shown, plain
 from texgs.workflow.job import Job
@@ -23,7 +23,7 @@ IDENTITY = {"settings": "0123", "code": "4567"}
 
 def job(stage, words, tf=None):
     """The job of the last variant of some words."""
-    config = compose(variants(as_sweep(("dataset=sphere", "fit=demo", *words)))[-1])
+    config = variants(Case(as_sweep(("dataset=sphere", "fit=demo", *words))))[-1].config
     return Job.of(STAGES[stage], replace(config, tf=tf) if tf else config, Checksums())
 
 

@@ -4,6 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
+from texgs.config.case import Case
 from texgs.config.compose import compose
 from texgs.core.errors import ArgumentError
 from texgs.workflow.checks import check_basic_tfs, require_edit, require_fit, require_fits
@@ -54,15 +55,15 @@ def run(arguments: argparse.Namespace) -> int:
             "--input, --output: expected only with --settings, as the workflow runs a job; by hand, "
             "results=FOLDER says where results go"
         )
-    words = tuple(arguments.overrides)
-    config, stage = compose(words), STAGES[arguments.verb]
+    case, stage = Case(tuple(arguments.overrides)), STAGES[arguments.verb]
+    config = case.config
     check_basic_tfs(config.dataset)
     require_fit(stage, config)
     if stage.place == "edit" or stage.name == "edit_metrics":
-        require_edit(stage, words)
+        require_edit(stage, case)
     if stage.name == "comparison":
-        require_fits(words)
-    known = makers(words)
+        require_fits(case)
+    known = makers(case)
     for each in [replace(config, tf=name) for name in tf_names(config)] if stage.per_tf else [config]:
         ensure(stage, each, known, force=arguments.force)
     return 0

@@ -11,11 +11,11 @@ from pathlib import Path
 
 from texgs.config.project import LONGEST, Words, check_name, folders, is_scene_file
 from texgs.config.schema import Config
-from texgs.config.views import LightKeys
 from texgs.core.errors import ConfigError
 from texgs.core.keys import mismatch, typed
 from texgs.core.names import close
 from texgs.fields.kinds import kinds
+from texgs.volume.view_settings import LightKeys
 
 ONE_LIGHT = "-one-light"  # end of the names of folders of views for fields that cannot be relit
 NAMED = ("dataset", "fit", "edit")  # groups whose files have names, which folders of results get
@@ -39,6 +39,11 @@ def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> Confi
 def recompose(overrides: Words) -> Config:
     """Return the same of files that may have changed since this process has read them."""
     return _composed.__wrapped__(overrides, folders(), os.environ.get("TEXGS_DATA"))
+
+
+def preset(group: str, name: str) -> Config:
+    """Return the configuration with one file of conf/, such as `fit` and `quick`, and nothing else chosen."""
+    return compose((f"{group}={name}",))
 
 
 @lru_cache(maxsize=1024)

@@ -34,7 +34,7 @@ from texgs.core.errors import ConfigError
 from texgs.core.keys import UnknownKey, mismatch
 
 Places = tuple[Path, ...]
-ALONE = ("fit", "edit")  # groups of which a run combines many files with those of others
+ALONE = ("dataset", "views", "fit", "edit", "sweep")  # groups whose files a run combines with each other
 REFERENCE = re.compile(r"(?<!\\)\$\{(\.*)([\w.-]+)\}")
 DEEPEST = 20  # references that refer to another one
 
@@ -82,8 +82,8 @@ def listed(files: CachingConfigRepository, name: str, choices: Words = ()) -> li
 def chosen(files: CachingConfigRepository, choices: Words) -> list[tuple[str, str]]:
     """Return names and packages of the files that some words choose, those that count most at the end.
 
-    What a recipe or an edit consists of does not depend on other choices, unless its files override them:
-    a run, which needs all combinations, finds each once.
+    What a data set, a recipe or an edit consists of does not depend on other choices, unless its files
+    override them: a run, which needs all combinations, lists each once.
     """
     plain = listed(files, "config")
     alone: dict[str, list[tuple[str, str]]] = {}
@@ -131,7 +131,7 @@ def composition(words: Words, places: Places) -> dict[str, Any]:
             raise ConfigError(several_values(word))
         if files.group_exists(override.key_or_group) and not isinstance(override.value(), dict):
             choices = (*choices, word)
-    values = asdict(Config())
+    values = deepcopy(defaults())
     values["data_folder"] = os.environ.get("TEXGS_DATA", values["data_folder"])
     for name, package in chosen(files, choices):
         merge(values, values_of(files, name, package))
@@ -139,6 +139,12 @@ def composition(words: Words, places: Places) -> dict[str, Any]:
         if word not in choices:
             apply(values, parsed(word))
     return resolve(values)
+
+
+@cache
+def defaults() -> dict[str, Any]:
+    """Return the values of the schema."""
+    return asdict(Config())
 
 
 def merge(table: dict[str, Any], later: Mapping[str, Any]) -> None:

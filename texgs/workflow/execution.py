@@ -6,7 +6,7 @@ from os.path import relpath
 from pathlib import Path
 from typing import Any
 
-from texgs.config.compose import compose
+from texgs.config.case import Case
 from texgs.config.schema import Config
 from texgs.core.cache import Checksums
 from texgs.core.errors import ArgumentError, ConfigError
@@ -15,9 +15,10 @@ from texgs.core.keys import ValueMismatch, typed
 from texgs.core.progress import curve_logger
 from texgs.edit.method import NO_METHOD
 from texgs.report.results import Result, plain
+from texgs.volume.settings import cached_volume
 from texgs.workflow import result, tracked
 from texgs.workflow.job import Job
-from texgs.workflow.locate import cached_volume, source_file
+from texgs.workflow.locate import source_file
 from texgs.workflow.missing import needed, require_same
 from texgs.workflow.provenance import record
 from texgs.workflow.runs import run
@@ -105,11 +106,11 @@ def fetch_volume(config: Config) -> None:
         download(volume.url, str(volume.sha256), path)
 
 
-def makers(words: tuple[str, ...]) -> dict[Path, tuple[Stage, Config]]:
+def makers(case: Case) -> dict[Path, tuple[Stage, Config]]:
     """Return the jobs that can make what a stage reads, by their folders."""
-    config = compose(words)
-    fits = [(*words, f"fit={recipe}") for recipe in config.fits] or [words]
-    configs = [compose((*each, "edit=none")) for each in fits]
+    config = case.config
+    fits = [case.but(f"fit={recipe}") for recipe in config.fits] or [case]
+    configs = [each.unedited.config for each in fits]
     configs += [config] if config.edit.method != NO_METHOD else []
     return {stage.output(each): (stage, each) for config in configs for stage, each in jobs(config)}
 

@@ -1,8 +1,6 @@
 """What a run would find on this machine, what it would do, and about how long that takes."""
 
 import csv
-import statistics
-import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.config.schema import Config
-from texgs.workflow.experiments import Selection
+from texgs.workflow.cases import Cases
 from texgs.workflow.job import Job
 from texgs.workflow.locate import source_file
 from texgs.workflow.sweep import as_sweep
@@ -19,14 +17,13 @@ from texgs.workflow.sweep import as_sweep
 PROBE = "probe"  # the row of speeds.csv with the seconds of `probe` on the same machine
 START_SECONDS = 8  # of a run before its first job, on that machine
 STEP_SECONDS = 0.8  # between two jobs of a run
-REPEATS = 15  # of the probe; the median counts
 
 
 @dataclass(frozen=True)
 class Forecast:
     """A run before it is started."""
 
-    selection: Selection
+    cases: Cases
     missing: Sequence[str]  # what it would stop at, a sentence each
     to_do: Mapping[str, int]  # jobs by stage
     done: int  # jobs whose results are there
@@ -49,9 +46,9 @@ class Speed:
 def forecast(words: tuple[str, ...]) -> Forecast:
     """Return what a run with these words would do; nothing is written."""
     from texgs.core.cache import Checksums
-    from texgs.workflow.graph import drawn
+    from texgs.workflow.graph import graph_of
 
-    selection, planned = drawn(as_sweep(words), Checksums.load())
+    cases, planned = graph_of(as_sweep(words), Checksums.load())
     lack_files = {folder for folders in planned.missing.values() for folder in folders}
     table, to_do, seconds, done = speeds(), Counter[str](), 0.0, 0
     for folder, job in planned.run.items():
@@ -63,7 +60,7 @@ def forecast(words: tuple[str, ...]) -> Forecast:
         to_do[job.stage.name] += 1
         speed = table.get(job.stage.name, Speed(0, 0, 0))  # nobody has measured stages of one's own
         seconds += STEP_SECONDS + speed.seconds(*work_of(job, planned.configs[folder]))
-    return Forecast(selection, [*planned.missing], to_do, done, seconds + (START_SECONDS if to_do else 0))
+    return Forecast(cases, [*planned.missing], to_do, done, seconds + (START_SECONDS if to_do else 0))
 
 
 def work_of(job: Job, config: Config) -> tuple[float, int]:
@@ -87,35 +84,15 @@ def speeds() -> dict[str, Speed]:
     return {row.pop("stage"): Speed(**{k: float(v) for k, v in row.items()}) for row in csv.DictReader(lines)}
 
 
-def probe() -> float:
-    """Return the seconds of a view of 20,000 surfels with its gradients at 400x400 pixels, on all threads."""
-    import torch
-
-    from texgs.raster import rasterize
-
-    generator = torch.Generator().manual_seed(0)
-    means = torch.rand(20000, 3, generator=generator) - 0.5
-    colors = torch.rand(20000, 3, generator=generator).requires_grad_()
-    quats = torch.randn(20000, 4, generator=generator)
-    scales, opacities = torch.full((20000, 2), 0.01), torch.full((20000,), 0.5)
-    viewmat, K = torch.eye(4), torch.tensor([[750.0, 0, 200], [0, 750, 200], [0, 0, 1]])
-    viewmat[2, 3] = 2.0
-    times = []
-    for _ in range(REPEATS):
-        begin = time.perf_counter()
-        shown = rasterize(means, quats, scales, opacities, viewmat, K, 400, 400, features=colors)
-        shown.color.sum().backward()
-        times.append(time.perf_counter() - begin)
-    return statistics.median(times)
-
-
 def show(words: tuple[str, ...]) -> int:
     """Print a forecast, a line for each thing; return 1 if the run would not start."""
+    from texgs.raster.probe import probe
+
     expected = forecast(words)
-    for name, config in {each.dataset.name: each for each in expected.selection.configs[::-1]}.items():
+    for name, config in {each.dataset.name: each for each in expected.cases.configs[::-1]}.items():
         if not any(line.startswith(f"data set {name}:") for line in expected.missing):
             print(f"ok       data set {name:16} {source(config)}")
-    for entry in expected.selection.left_out:
+    for entry in expected.cases.left_out:
         print(f"left out {entry.what}: {entry.why}")
     for line in expected.missing:
         print(f"missing  {line}")
