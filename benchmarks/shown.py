@@ -29,7 +29,7 @@ from texgs.fields.surfels.model_file import read_model
 from texgs.metrics.quality import VISIBLE
 from texgs.volume.images import over_white
 from texgs.volume.view_set import View, read_views
-from texgs.workflow.execution import ensure
+from texgs.workflow.execution import Task, ensure
 from texgs.workflow.stage import made
 from texgs.workflow.stage_table import STAGES, jobs
 
@@ -59,7 +59,7 @@ def rows(volume: texgs.Volume, size: int) -> Iterator[tuple[object, ...]]:
     with TemporaryDirectory(prefix="texgs-") as folder:
         words = ("fit=quick", *few, f"views.height={size}")
         config = configuration(volume, dict(volume.suggest()), words, Path(folder))
-        known = {stage.output(each): (stage, each) for stage, each in jobs(config)}
+        known = {stage.output(each): Task(stage, each) for stage, each in jobs(config)}
         for name in config.dataset.basic_tfs:
             own = replace(config, tf=name)
             ensure(STAGES["shading"], own, known, tell=lambda line: None)

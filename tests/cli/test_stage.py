@@ -1,12 +1,16 @@
 """The verbs of the stages, by hand: what they write, when they do nothing, and what survives a kill."""
 
+import shlex
+
 import numpy as np
 import pytest
 
 from tests.cli.conftest import SPHERE, numbers
 from texgs.cli.main import main
 from texgs.config.compose import compose
+from texgs.core.checksum import sha256
 from texgs.core.errors import DeviceError
+from texgs.core.io import read_json
 from texgs.core.light import HEADLIGHT, Light, random_lights
 from texgs.core.names import METRICS
 from texgs.volume.view_set import read_views
@@ -86,12 +90,38 @@ def test_a_volume_that_memory_does_not_hold_is_told(folder, capsys, monkeypatch)
     assert "dataset.volume.reduce=2 makes it smaller" in said
 
 
-def test_another_setting_does_not_mix_with_what_is_there(folder):
-    main(["views", *TINY])
-    (views,) = folder.glob("*/views")
-    main(["views", *TINY, "views.train.kind=orbit", "views.train.count=2"])
-    assert len(list((views / "train").iterdir())) == 2
-    assert len(read_views(views).train) == 2
+def test_results_of_other_settings_are_replaced_on_request_alone(folder, capsys):
+    """A verb that needs the views would render other ones; none of them mixes with what is there."""
+    assert main(["sheet", *TINY]) == 0
+    capsys.readouterr()
+    views = next(folder.glob("*/views"))
+    before = checksums_below(folder)
+    fewer = ["views.train.kind=orbit", "views.train.count=2"]
+    for verb in (["sheet"], ["views", "--force"]):
+        assert main([*verb, *TINY, *fewer]) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err.count("\n") == 1
+        for told in ("sphere/TF01/views holds", "views.train.count is 61, not 2", "--replace", *TINY):
+            assert told in said.err
+    assert checksums_below(folder) == before
+    assert main(["sheet", "--replace", *TINY, *fewer]) == 0
+    assert len(list((views / "train").iterdir())) == len(read_views(views).train) == 2
+
+
+def test_a_result_names_the_command_that_does_nothing_but_make_it(folder):
+    """Whatever asked for it: a sheet of all basic TFs needs views of each."""
+    assert main(["sheet", *TINY, "views.seed=3"]) == 0
+    before = checksums_below(folder)
+    commands = [read_json(path)["command"] for path in folder.rglob(METRICS)]
+    assert {command.split()[1] for command in commands} == {"volume", "views", "sheet"}
+    for command in commands:
+        assert main(shlex.split(command)[1:]) == 0
+    assert checksums_below(folder) == before
+
+
+def checksums_below(folder):
+    return {path: sha256(path) for path in folder.rglob("*") if path.is_file() and path.suffix != ".lock"}
 
 
 def test_geometry_of_the_test_views(folder):
@@ -129,7 +159,7 @@ def test_more_test_views_are_under_lights_that_no_training_view_has(folder):
     assert {view.light for view in views.test} == {HEADLIGHT}
     assert [view.light for view in views.relit] == random_lights(4, 0, 2)
     assert not {view.light for view in views.train} & {view.light for view in views.relit}
-    main(["views", *TINY, "views.relit=0", "views.seed=1"])
+    main(["views", *TINY, "views.relit=0", "views.seed=1", "--replace"])
     views = read_views(views.folder)
     assert (views.relit, (views.folder / "relit").exists()) == ([], False)
     assert [view.light for view in views.train] == some_headlights(random_lights(12, 1, 0))
@@ -194,7 +224,7 @@ def test_a_job_of_the_workflow(folder, capsys):
     assert "expected the settings of a views job" in capsys.readouterr().err
     assert main(["volume", "--settings", settings, "--output", str(output), "dataset=sphere"]) == 2
     assert main(["volume", "--settings", settings, "--output", str(output), "--force"]) == 2
-    assert "no KEY=VALUE or --force" in capsys.readouterr().err
+    assert "expected --settings and --output" in capsys.readouterr().err
     assert main(["volume", *TINY, "--output", str(output)]) == 2
     assert "--input, --output: expected only with --settings" in capsys.readouterr().err
 

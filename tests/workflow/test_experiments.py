@@ -25,7 +25,7 @@ def without(*names):
 
 def configs(*words):
     """The configurations of no sweep."""
-    return selected(words, nothing).by_sweep[""]
+    return [case.config for case in selected(words, nothing).by_sweep[""]]
 
 
 @pytest.fixture
@@ -76,7 +76,9 @@ ALL = ["engine", "jets", "sphere"]
 )
 def test_data_sets_of_a_run_and_of_its_sweeps(project, words, expected):
     by_sweep = selected(words, nothing).by_sweep.items()
-    assert {sweep: sorted({each.dataset.name for each in some}) for sweep, some in by_sweep} == expected
+    assert {
+        sweep: sorted({each.config.dataset.name for each in some}) for sweep, some in by_sweep
+    } == expected
 
 
 @pytest.mark.parametrize(
@@ -150,8 +152,8 @@ def test_what_is_missing_is_left_out_and_told_where_that_is_asked_for(project, w
 def test_edits_that_lack_something_go_with_all_that_start_from_them():
     words = ("dataset=orbital", "fit=demo", "edits=[glass,gold,crimson]", "on_missing=skip")
     selection = selected(words, lambda config: ["no weights"] if config.edit.name == "lobe" else [])
-    assert [config.edit.name for config in selection.by_sweep[""]] == ["none", "glass", "gold"]
-    assert list(selection.by_sweep[""][0].edits) == ["glass", "gold"]  # what the gallery shows
+    assert [case.config.edit.name for case in selection.by_sweep[""]] == ["none", "glass", "gold"]
+    assert list(selection.by_sweep[""][0].config.edits) == ["glass", "gold"]  # what the gallery shows
     assert [each.what for each in selection.left_out] == ["edit lobe"]
 
 
@@ -182,7 +184,12 @@ def test_the_experiments_of_a_union_make_no_two_jobs_in_one_folder():
 @pytest.mark.workflow
 def test_the_whole_paper_has_images_of_each_data_sets_size():
     by_sweep = selected(("experiment=paper", "on_missing=stop"), nothing).by_sweep
-    listed = [each for sweep, some in by_sweep.items() if sweep != "resolution" for each in some]
+    listed = [
+        each
+        for sweep, some in by_sweep.items()
+        if sweep != "resolution"
+        for each in (case.config for case in some)
+    ]
     sizes = {(each.dataset.name, each.dataset.image, each.views.width, each.views.height) for each in listed}
     assert {image for _, image, _, _ in sizes} >= {512, 800}
     assert not [each for each in sizes if len({*each[1:]}) > 1]

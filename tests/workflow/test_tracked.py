@@ -80,13 +80,14 @@ def test_edits_by_numbers_and_pictures_of_a_gallery_have_a_metric_each_and_their
 
 def test_the_workflow_says_which_run_a_job_is_inside_of(tmp_path, monkeypatch):
     output = tmp_path / "a"
-    assert of_workflow(output) == (Tracking(None, "texgs"), {})
+    assert of_workflow(output) == (Tracking(None, "texgs"), {}, "")
     monkeypatch.setenv("TEXGS_TRACKING", "sqlite:///x.db")
     monkeypatch.setenv(RUNS, str(tmp_path / "runs.json"))
-    assert of_workflow(output) == (Tracking("sqlite:///x.db", "texgs"), {})
-    told = {output.as_posix(): {"parent": "abc", "swept": {"fit.seed": "1"}}}
+    assert of_workflow(output) == (Tracking("sqlite:///x.db", "texgs"), {}, "")
+    told = {output.as_posix(): {"parent": "abc", "swept": {"fit.seed": "1"}, "command": "texgs views"}}
     (tmp_path / "runs.json").write_text(json.dumps(told))
-    assert of_workflow(output) == (Tracking("sqlite:///x.db", "texgs", "abc"), {"fit.seed": "1"})
+    expected = Tracking("sqlite:///x.db", "texgs", "abc"), {"fit.seed": "1"}, "texgs views"
+    assert of_workflow(output) == expected
 
 
 class Cuda:

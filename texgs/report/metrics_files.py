@@ -14,7 +14,7 @@ from texgs.metrics.metric import metrics
 from texgs.report.results import EditMeasures, Result
 
 COPIES = "mlartifacts"  # folder of the files that MLflow keeps of runs
-WORDS = ("stage", "dataset", "field", "variant", "sweep", "stand_in", "result")
+WORDS = ("stage", "dataset", "field", "variant", "sweep", "stand_in", "command", "result")
 FACTS: dict[str, tuple[Any, str]] = {  # what a metrics file holds beside its numbers, as far as it is read
     **dict.fromkeys((*WORDS, "tf", "recipe"), (str, "words")),
     **dict.fromkeys(("seed", "fit_seed"), (int, "a whole number")),

@@ -4,7 +4,6 @@ import base64
 import io
 import json
 import os
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from PIL import Image
 from texgs.edit.method import NO_METHOD
 from texgs.report.metrics_files import Record
 from texgs.report.published import in_order
-from texgs.report.results import SECTIONS, ComparisonResult, EditResult, GalleryResult, PageResult
+from texgs.report.results import SECTIONS, EditResult, GalleryResult, PageResult
 
 OF_PICTURES = {"relight.png": "relight"}  # where a stage has pictures of several sections
 OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
@@ -52,7 +51,14 @@ def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figu
             is_of_all = isinstance(record.result, GalleryResult) or not record.is_swept
             if picture.is_file() and name not in UNREPORTED and is_of_all:
                 is_narrow, uri = name in NARROW or name.startswith("style"), data_uri(Image.open(picture))
-                told = (record.title, label(record), words, uri, command(record), is_narrow)
+                told = (
+                    record.title,
+                    label(record),
+                    words,
+                    uri,
+                    str(record.facts.get("command", "")),
+                    is_narrow,
+                )
                 by_section[section_of(record, name)].append(Figure(*told, *page(record, folder)))
     return by_section
 
@@ -87,25 +93,6 @@ def edit_of(record: Record[Any]) -> str:
     """Return the edit of a job that has made a scene or its page, if it is of one."""
     edit = record.result.edit if isinstance(record.result, EditResult | PageResult) else ""
     return "" if edit == NO_METHOD else edit
-
-
-def command(record: Record[Any]) -> str:
-    """Return the command that makes a job's pictures, but for overrides; words of a gallery tell it."""
-    result = record.result
-    if isinstance(result, GalleryResult):
-        return ""
-    fits = result.recipes if isinstance(result, ComparisonResult) else [record.recipe]
-    words = {
-        "tf": record.tf,
-        "fit": next(iter(fits), ""),
-        "edit": edit_of(record),
-        "variant": record.variant,
-        "fit.seed": record.facts.get("fit_seed", 0),
-        "edit.seed": record.seed if edit_of(record) else 0,
-        "fits": f"[{','.join(fits)}]" if len(fits) > 1 else "",
-    }
-    given = [f"{key}={value}" for key, value in words.items() if value]
-    return shlex.join(["texgs", record.stage, f"dataset={record.dataset}", *given])
 
 
 def data_uri(picture: Image.Image) -> str:

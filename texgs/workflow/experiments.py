@@ -4,6 +4,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from typing import Self
 
 from texgs.config.compose import compose
 from texgs.config.dataset import Dataset
@@ -11,7 +12,7 @@ from texgs.config.project import Words, members
 from texgs.config.schema import Config, StandIns
 from texgs.core.errors import ConfigError
 from texgs.core.names import close
-from texgs.edit.method import method_of
+from texgs.edit.method import NO_METHOD, method_of
 from texgs.workflow.edits import edits
 from texgs.workflow.stage import edit_folder
 from texgs.workflow.stage_table import STAGES
@@ -36,19 +37,34 @@ class LeftOut:
     why: str  # one sentence
 
 
+@dataclass(frozen=True)
+class Case:
+    """One configuration of a run."""
+
+    words: Words  # that compose it
+    config: Config
+
+    @classmethod
+    def of(cls, words: Words) -> Self:
+        """Return the case without an edit; `edit=none` is among its words where these have one."""
+        plain = compose(words)
+        own = words if plain.edit.method == NO_METHOD else (*words, "edit=none")
+        return cls(own, compose(own))
+
+
 @dataclass
 class Selection:
     """The configurations of a run."""
 
     lacking: Callable[[Config], Sequence[str]]  # sentences on what a configuration lacks
     skips: bool  # whether what lacks something is left out
-    by_sweep: dict[str, list[Config]] = field(default_factory=lambda: defaultdict(list))  # "": of none
+    by_sweep: dict[str, list[Case]] = field(default_factory=lambda: defaultdict(list))  # "": of none
     left_out: dict[LeftOut, dict[str, None]] = field(default_factory=dict)  # with the places of its jobs
 
     @property
     def configs(self) -> list[Config]:
         """All configurations, one after another."""
-        return [each for some in self.by_sweep.values() for each in some]
+        return [case.config for some in self.by_sweep.values() for case in some]
 
     def takes(self, config: Config, what: str) -> bool:
         """Return whether a configuration is run; what is left out is noted."""
@@ -88,17 +104,18 @@ class Selection:
             own: Words = ()
             if left != compose(each).edits:  # a gallery then shows what is left
                 own = f"edits=[{','.join(left)}]", "gallery.grids=[]"
-            listed += [compose((*each, *own, "edit=none")), *edited]
+            listed += [Case.of((*each, *own)), *edited]
 
-    def edited(self, words: Words, several: bool) -> tuple[list[Config], list[str]]:
+    def edited(self, words: Words, several: bool) -> tuple[list[Case], list[str]]:
         """Return the edits that are possible and lack nothing, and what `edits` has left of them."""
-        made: list[Config] = []
+        made: list[Case] = []
         gone: set[str] = set()
-        for config in map(compose, edits(words)):
+        for own in edits(words):
+            config = compose(own)
             if config.edit.base in gone or not self.takes(config, f"edit {edit_folder(config)}"):
                 gone.add(config.edit.name)
             elif not several or method_of(config.edit).takes(config.fit.field):
-                made.append(config)
+                made.append(Case(own, config))
         return made, [name for name in compose(words).edits if name not in gone]
 
 

@@ -16,7 +16,7 @@ from texgs.core.names import METRICS
 from texgs.report import metrics_files
 from texgs.report.metrics_files import Record, below, read_known
 from texgs.workflow.checks import check_basic_tfs, check_edit, check_fit
-from texgs.workflow.experiments import LeftOut, Selection, selected
+from texgs.workflow.experiments import Case, LeftOut, Selection, selected
 from texgs.workflow.job import Job
 from texgs.workflow.missing import lacking, missing_weights
 from texgs.workflow.result import damaged, fingerprint, is_complete, stamped
@@ -68,8 +68,9 @@ class Graph:
     def _replaced(self) -> dict[str, bool]:
         return {}
 
-    def add(self, config: Config, checksums: Checksums) -> list[str]:
+    def add(self, case: Case, checksums: Checksums) -> list[str]:
         """Add the jobs of a configuration, which is checked before, and return their folders."""
+        config = case.config
         check_basic_tfs(config.dataset)
         check_fit(config)
         check_edit(config)
@@ -82,7 +83,7 @@ class Graph:
         folders = []
         for stage, each in listed:
             try:
-                job = Job.of(stage, each, checksums)
+                job = Job.of(stage, each, checksums, case.words)
             except MissingDataError as error:
                 job = Job(stage, stage.settings(each), {}, stage.output(each))
                 self.missing.setdefault(str(error), []).append(job.output.as_posix())
@@ -99,11 +100,11 @@ class Graph:
         return folders
 
 
-def graph(by_sweep: Mapping[str, Iterable[Config]], checksums: Checksums) -> Graph:
+def graph(by_sweep: Mapping[str, Iterable[Case]], checksums: Checksums) -> Graph:
     """Return the jobs of some configurations, which are listed by sweep; see `Graph.add`."""
     made = Graph()
-    for sweep, configs in by_sweep.items():
-        folders = (folder for config in configs for folder in made.add(config, checksums))
+    for sweep, cases in by_sweep.items():
+        folders = (folder for case in cases for folder in made.add(case, checksums))
         made.sweeps[sweep] = list(dict.fromkeys(folders))
     return made
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from texgs.workflow.job import Job
     from texgs.workflow.plan import Plan
 
-RUNS = "TEXGS_RUNS"  # environment variable: the file that says which run each job is inside of
+RUNS = "TEXGS_RUNS"  # environment variable: the file of `runs_file`
 WHOLE = ""  # the run of the workflow among those of its sweeps
 
 
@@ -36,13 +36,13 @@ class Tracking:
     parent: str | None = None  # identifier of the run that it is inside of
 
 
-def of_workflow(output: Path) -> tuple[Tracking, dict[str, str]]:
-    """Return where the workflow wants the job of a folder recorded, and the values of its variant."""
+def of_workflow(output: Path) -> tuple[Tracking, dict[str, str], str]:
+    """Return where the workflow wants a folder's job recorded, the values of its variant, and its command."""
     uri, experiment = os.environ.get("TEXGS_TRACKING"), os.environ.get("TEXGS_EXPERIMENT", "texgs")
     own: dict[str, Any] = {}
     with suppress(KeyError, OSError, ValueError):  # of a job that no run of the workflow has started
-        own = json.loads(Path(os.environ[RUNS]).read_text())[output.as_posix()] if uri else {}
-    return Tracking(uri, experiment, own.get("parent")), own.get("swept", {})
+        own = json.loads(Path(os.environ[RUNS]).read_text())[output.as_posix()]
+    return Tracking(uri, experiment, own.get("parent")), own.get("swept", {}), own.get("command", "")
 
 
 def name(job: Job) -> str:
@@ -131,7 +131,7 @@ def rows(key: str, listed: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def runs_file(results: str) -> str:
-    """Return the file that tells jobs which run they are inside of, and their swept values."""
+    """Return the file that tells jobs which run they are inside of, their swept values and commands."""
     return f"{results}/.conf/runs.json"
 
 
@@ -155,10 +155,11 @@ def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, Run]:
         keys = {key for folder in plan.sweeps[name] for key in plan.jobs[folder]["swept"]}
         tags = {"stage": "sweep", "sweep": name, PARENT: str(runs[WHOLE].id)}
         runs[name] = run(name, f"sweep {name}", tags, {"keys": ", ".join(sorted(keys))})
-    if plan.tracking is not None:
-        jobs = plan.jobs.items()
-        told = {x: {"parent": runs[owner(plan, x)].id, "swept": job["swept"]} for x, job in jobs}
-        write_json(runs_file(plan.results), told)
+    known = {
+        folder: {"parent": runs[owner(plan, folder)].id, "swept": job["swept"], "command": job["command"]}
+        for folder, job in plan.jobs.items()
+    }
+    write_json(runs_file(plan.results), known)
     return runs
 
 

@@ -144,12 +144,11 @@ def finish(status):
 
 # In front of the commands, not a parameter of the rules: where runs are recorded and how threads wait changes no
 # result.
-ENVIRONMENT = waiting()
+ENVIRONMENT = waiting() | {"TEXGS_RUNS": tracked.runs_file(RESULTS)}
 if PLAN.tracking is not None:
     ENVIRONMENT |= {
         "TEXGS_TRACKING": PLAN.tracking,
         "TEXGS_EXPERIMENT": PLAN.experiment,
-        "TEXGS_RUNS": tracked.runs_file(RESULTS),
     }
 CLIENT = fork_client.__file__
 SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())
