@@ -82,7 +82,8 @@ class Selection:
             for why in each.lacks:
                 told = f"{why.removeprefix(f'{each.what}: ').rstrip('. ')}; `{each.name}` stands in for it"
                 self.left_out.setdefault(LeftOut(each.what, told), {})
-        own = (f"edits=[{','.join(dict.fromkeys(each.name for each in edits))}]",) if edits else ()
+        taken = ",".join(dict.fromkeys(each.name for each in edits))
+        own = (f"edits=[{taken}]",) if any(each.caption for each in edits) else ()
         captions = " ".join(filter(None, (each.caption for each in (*datasets, *edits))))
         return (*own, f"gallery.note={quoted(captions)}") if captions else own
 
