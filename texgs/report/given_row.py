@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image, ImageOps
 
 from texgs.core.figures import Cell, Row, as_picture
+from texgs.core.names import style_file
 from texgs.volume.transfer import TransferFunction
 
 SIDE, INCHES = 512, 3.2  # of a picture; letters are as large as for so many inches
@@ -23,7 +24,7 @@ def given_row(
     """Return a row of a plot, of pictures, which are files beside edited scenes, and of instructions."""
     cells = [] if plot is None else [Cell("transfer functions", plot)]
     for name, style in styles.items():
-        files = [scene.with_name(file) for scene in scenes for file in (f"style-{name}.png", "style.png")]
+        files = [scene.with_name(file) for scene in scenes for file in map(style_file, (name, ""))]
         for file in [file for file in files if file.is_file()][:1]:  # none of methods with several pictures
             with Image.open(file) as picture:
                 square = ImageOps.pad(picture.convert("RGB"), (SIDE, SIDE), color="white")

@@ -12,17 +12,15 @@ from urllib.parse import quote
 
 from PIL import Image
 
+from texgs.core.names import PAGE
 from texgs.edit.method import NO_METHOD
 from texgs.report.metrics_files import Record
 from texgs.report.published import in_order
 from texgs.report.results import SECTIONS, EditResult, GalleryResult, PageResult
 
-OF_PICTURES = {"relight.png": "relight"}  # where a stage has pictures of several sections
 OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
-# Side by side where there is room, as pictures of styles are.
-NARROW = ("scene.png", "poster.jpg", "transfer.png", "convergence.png")
+NARROW = 1000  # pixels across, up to which pictures stand side by side where there is room
 QUALITY, EFFORT = 85, 2  # of pictures in the report; the whole ones are in the folders of their jobs
-UNREPORTED = ("turntable.png",)  # a film: it would be most of the report
 
 
 @dataclass(frozen=True)
@@ -46,26 +44,27 @@ def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figu
     """
     by_section: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
     for record in in_order(records):
-        for name, words in record.facts.get("pictures", {}).items():
-            picture = record.path.with_name(name)
-            is_of_all = isinstance(record.result, GalleryResult) or not record.is_swept
-            if picture.is_file() and name not in UNREPORTED and is_of_all:
-                is_narrow, uri = name in NARROW or name.startswith("style"), data_uri(Image.open(picture))
-                told = (
-                    record.title,
-                    label(record),
-                    words,
-                    uri,
-                    str(record.facts.get("command", "")),
-                    is_narrow,
-                )
-                by_section[section_of(record, name)].append(Figure(*told, *page(record, folder)))
+        is_of_all = isinstance(record.result, GalleryResult) or not record.is_swept
+        for name, words in record.facts.get("pictures", {}).items() if is_of_all else ():
+            file = record.path.with_name(name)
+            if file.is_file() and (figure := figure_of(record, file, words, folder)):
+                by_section[section_of(record, file)].append(figure)
     return by_section
+
+
+def figure_of(record: Record[Any], file: Path, words: str, folder: Path) -> Figure | None:
+    """Return a picture of a job, with a page or a link from a folder; None of a film, which is too large."""
+    with Image.open(file) as picture:
+        if getattr(picture, "is_animated", False):
+            return None
+        uri, is_narrow = data_uri(picture), picture.width <= NARROW
+    command = str(record.facts.get("command", ""))
+    return Figure(record.title, label(record), words, uri, command, is_narrow, *page(record, folder))
 
 
 def page(record: Record[Any], folder: Path) -> tuple[str, str]:
     """Return the page of a scene, or the way to it, where a job has made one; the other is empty."""
-    file = record.path.with_name("scene.html")
+    file = record.path.with_name(PAGE)
     if not isinstance(record.result, PageResult) or not file.is_file():
         return "", ""
     if record.result.is_embedded:
@@ -73,15 +72,15 @@ def page(record: Record[Any], folder: Path) -> tuple[str, str]:
     return "", quote(Path(os.path.relpath(file, folder)).as_posix())
 
 
-def section_of(record: Record[Any], picture: str) -> str:
-    """Return the section of a picture, which a job has made; `picture` is the name of its file."""
+def section_of(record: Record[Any], picture: Path) -> str:
+    """Return the section of a picture of a job: that of its name, or else that of the job's results."""
     result = record.result
     if isinstance(result, EditResult):
         is_part = any("/" in name for name in result.followed)
         return "parts" if is_part else OF_EDITS[result.follows]
     if isinstance(result, GalleryResult):
         return result.section
-    return OF_PICTURES.get(picture, result.pictured_in)
+    return picture.stem if picture.stem in SECTIONS else result.pictured_in
 
 
 def label(record: Record[Any]) -> str:
