@@ -20,7 +20,7 @@ from texgs.core.errors import ArgumentError
 from texgs.edit.keys import EditKeys
 from texgs.edit.methods.image import ImageKeys, run
 from texgs.edit.methods.style import picture_of
-from texgs.metrics.edits.retrieval import named
+from texgs.metrics.edits.retrieval import places_among
 from texgs.metrics.retrieval import LAYERS, Likeness, known, scene_likeness
 from texgs.models.pictures import PICTURES
 from texgs.models.vgg import Vgg
@@ -82,7 +82,7 @@ def rows_of(arguments: argparse.Namespace, vgg: Vgg) -> list[dict[str, object]]:
                 lifts = " ".join(f"{model.edit.opacity:g}" for model in made.models.values())
                 told.append({"scene": title, "recipe": recipe, "style": Path(style).name, "opacity": lifts})
                 print(title, recipe, style, lifts, f"{seconds:.1f} s", flush=True)
-            for row, places in zip(told, named(looks), strict=True):
+            for row, places in zip(told, places_among(looks), strict=True):
                 firsts = {key.replace("place", "first"): int(place == 1) for key, place in places.items()}
                 rows.append({**row, **places, **firsts})
     return rows

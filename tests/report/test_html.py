@@ -23,7 +23,7 @@ from texgs.report.results import (
     TimingResult,
 )
 from texgs.study.ballots import Ballot, Votes
-from texgs.study.votes import shown, study_table
+from texgs.study.votes import study_table, votes_figure
 from texgs.workflow.differences import differences_of
 
 
@@ -58,7 +58,7 @@ def write_report(path, paths, left_out=(), votes=None):
     """A report of metrics files with all tables, as `texgs report` writes it."""
     found, old = read_known(paths)
     given = {"user_study": study_table(found, votes), "differences": differences_of(found)}
-    more = {} if given["user_study"].is_empty else {"study": [shown(votes)]}
+    more = {} if given["user_study"].is_empty else {"study": [votes_figure(votes)]}
     return write_records(path, found, [*left_out, *old], given, more)
 
 

@@ -56,13 +56,13 @@ def run_report(arguments: argparse.Namespace) -> int:
     from texgs.report.html import write_report
     from texgs.report.metrics_files import read_left_out
     from texgs.study.ballots import votes_beside
-    from texgs.study.votes import shown
+    from texgs.study.votes import votes_figure
 
     require_there(arguments)
     records, old = records_of(arguments)
     left_out, votes = [*read_left_out(arguments.missing), *old], votes_beside(study_of(arguments))
     given = given_tables(records, votes)
-    more = {} if given["user_study"].is_empty else {"study": [shown(votes)]}
+    more = {} if given["user_study"].is_empty else {"study": [votes_figure(votes)]}
     output = arguments.output or results_of(arguments) / "report.html"
     print(write_report(output, records, left_out, given, more))
     return 0

@@ -52,25 +52,25 @@ def paper_measures(follows: str) -> list[Measure]:
 
 def image_driven(records: Iterable[Record[Any]]) -> Table:
     """Return the comparison of edits by pictures, of which the paper measures no CLIP scores."""
-    return table("style", compared(records, "style"), paper_measures("style"))
+    return comparison("style", compared_rows(records, "style"), paper_measures("style"))
 
 
 def text_driven(records: Iterable[Record[Any]]) -> Table:
     """Return the comparison of edits by instructions, but for other methods with frozen geometry."""
-    rows = compared(records, "instruction")
+    rows = compared_rows(records, "instruction")
     free = [row for row in rows if row["has_texture"] or not row["is_kept"]]
-    return table("instruction", free, paper_measures("instruction"))
+    return comparison("instruction", free, paper_measures("instruction"))
 
 
 def text_driven_frozen(records: Iterable[Record[Any]]) -> Table:
     """Return the comparison of edits that keep geometry; none where only those do that always do."""
-    rows = compared(records, "instruction")
+    rows = compared_rows(records, "instruction")
     kept = [row for row in rows if row["has_texture"] or row["is_kept"]]
     is_chosen = not all(row["has_texture"] for row in kept)
-    return table("", kept if is_chosen else [], paper_measures("instruction"))
+    return comparison("", kept if is_chosen else [], paper_measures("instruction"))
 
 
-def compared(records: Iterable[Record[Any]], follows: str) -> Rows:
+def compared_rows(records: Iterable[Record[Any]], follows: str) -> Rows:
     """Return the rows of the edits of a comparison."""
     return [row for row in rows_of(records) if row["is_compared"] and row["kind"] == follows]
 
@@ -90,13 +90,13 @@ def looks(records: Iterable[Record[Any]]) -> Table:
     return Table(" ".join([caption, *told]), [*labels, *columns], rows)
 
 
-def table(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
+def comparison(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
     """Return rows of edits, means of those of one size, and the paper's rows of its own."""
     titles = [measure.title for measure in listed]
     columns = [Column(measure.title, measure.digits) for measure in listed]
     means = mean_rows(rows, (LABEL, "edit", "pixels", "device"), ["method", *titles])
     means = [{**row, "method": row["method"] or ADAPTS} for row in means]
-    theirs = published(follows, listed) if rows and follows else []
+    theirs = paper_rows(follows, listed) if rows and follows else []
     sentences = [CAPTION, NOT_ALIKE, *notes(rows, titles)] if theirs else [CAPTION, *notes(rows, titles)]
     return Table(" ".join(sentences), [*LABELS, *columns], [*rows, *means, *theirs])
 
@@ -170,7 +170,7 @@ def words_of(followed: Mapping[str, str]) -> str:
     return ", ".join(f"{name}: {value}" for name, value in followed.items()) or "-"
 
 
-def published(follows: str, listed: Sequence[Measure]) -> list[dict[str, Any]]:
+def paper_rows(follows: str, listed: Sequence[Measure]) -> list[dict[str, Any]]:
     """Return rows of the paper, means over four data sets each."""
     name, pixels = PAPER[follows]
     numbers = {measure.published: measure.title for measure in listed if measure.published}

@@ -12,7 +12,7 @@ from texgs.core.names import style_file
 from texgs.volume.transfer import TransferFunction
 
 SIDE, INCHES = 512, 3.2  # of a picture; letters are as large as for so many inches
-LETTERS = 18  # of a line of words
+LINE_LENGTH = 18  # letters
 
 
 def given_row(
@@ -29,11 +29,11 @@ def given_row(
             with Image.open(file) as picture:
                 square = ImageOps.pad(picture.convert("RGB"), (SIDE, SIDE), color="white")
             cells.append(Cell(f"{name}: {Path(style).stem}", np.asarray(square)))
-    cells += [Cell(name, words=fill(f"“{text}”", LETTERS)) for name, text in instructions.items()]
+    cells += [Cell(name, words=fill(f"“{text}”", LINE_LENGTH)) for name, text in instructions.items()]
     return Row("given", cells)
 
 
-def plotted(volume: Path, basic: Mapping[str, TransferFunction]) -> np.ndarray:
+def tf_plot(volume: Path, basic: Mapping[str, TransferFunction]) -> np.ndarray:
     """Return a square plot [S, S, 3] of transfer functions over the histogram of volume.nrrd."""
     from texgs.volume.summaries import read_summaries
     from texgs.volume.tf_plot import plot

@@ -13,7 +13,7 @@ from texgs.core.names import METRICS
 from texgs.metrics.metric import metrics
 from texgs.report.results import EditMeasures, Result
 
-COPIES = "mlartifacts"  # folder of the files that MLflow keeps of runs
+ARTIFACTS = "mlartifacts"  # folder of the files that MLflow keeps of runs
 WORDS = ("stage", "dataset", "field", "variant", "sweep", "stand_in", "command", "result")
 FACTS: dict[str, tuple[Any, str]] = {  # what a metrics file holds beside its numbers, as far as it is read
     **dict.fromkeys((*WORDS, "tf", "recipe"), (str, "words")),
@@ -140,7 +140,7 @@ def below(folder: str | Path) -> list[Path]:
     """Find the metrics files of all results in a folder, not of jobs at work or copies of tracked runs."""
 
     def is_aside(name: str) -> bool:
-        return name.startswith(".") or name == COPIES
+        return name.startswith(".") or name == ARTIFACTS
 
     paths = Path(folder).rglob(METRICS)
     return sorted(path for path in paths if not any(map(is_aside, path.relative_to(folder).parts)))

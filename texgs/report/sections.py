@@ -18,9 +18,9 @@ from texgs.report.metrics_files import Record
 from texgs.report.published import in_order
 from texgs.report.results import SECTIONS, EditResult, GalleryResult, PageResult
 
-OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
-NARROW = 1000  # pixels across, up to which pictures stand side by side where there is room
-QUALITY, EFFORT = 85, 2  # of pictures in the report; the whole ones are in the folders of their jobs
+SECTIONS_OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
+NARROW_WIDTH = 1000  # pixels across, up to which pictures stand side by side where there is room
+WEBP_QUALITY, WEBP_EFFORT = 85, 2  # the whole pictures are in the folders of their jobs
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def figure_of(record: Record[Any], file: Path, words: str, folder: Path) -> Figu
     with Image.open(file) as picture:
         if getattr(picture, "is_animated", False):
             return None
-        uri, is_narrow = data_uri(picture), picture.width <= NARROW
+        uri, is_narrow = data_uri(picture), picture.width <= NARROW_WIDTH
     command = str(record.facts.get("command", ""))
     return Figure(record.title, label(record), words, uri, command, is_narrow, *page(record, folder))
 
@@ -77,7 +77,7 @@ def section_of(record: Record[Any], picture: Path) -> str:
     result = record.result
     if isinstance(result, EditResult):
         is_part = any("/" in name for name in result.followed)
-        return "parts" if is_part else OF_EDITS[result.follows]
+        return "parts" if is_part else SECTIONS_OF_EDITS[result.follows]
     if isinstance(result, GalleryResult):
         return result.section
     return picture.stem if picture.stem in SECTIONS else result.pictured_in
@@ -97,5 +97,5 @@ def edit_of(record: Record[Any]) -> str:
 def data_uri(picture: Image.Image) -> str:
     """Return a picture as text for the attribute of a tag, compressed to about an eighth of its PNG."""
     file = io.BytesIO()
-    picture.convert("RGBA").save(file, format="WEBP", quality=QUALITY, method=EFFORT)
+    picture.convert("RGBA").save(file, format="WEBP", quality=WEBP_QUALITY, method=WEBP_EFFORT)
     return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}"

@@ -11,7 +11,7 @@ from texgs.core.io import reading
 from texgs.study.questions import Question, Study, read_key
 
 COLUMNS = ["study", "ballot", "question", "option", "rank"]
-LARGEST = 1 << 20  # bytes
+MOST_BYTES = 1 << 20
 WHAT, ADVICE = "a ballot", "ask the voter for the file that the page saves"
 
 
@@ -92,8 +92,8 @@ def read_ballot(study: Study, path: Path) -> Ballot:
 def rows_of(path: Path) -> list[dict[str, str]]:
     """Return the lines of a ballot by column, at least one."""
     with reading(path, WHAT, ADVICE):
-        if path.stat().st_size > LARGEST:
-            raise ArgumentError(f"{path}: expected {WHAT} of at most {LARGEST} bytes; is it another file?")
+        if path.stat().st_size > MOST_BYTES:
+            raise ArgumentError(f"{path}: expected {WHAT} of at most {MOST_BYTES} bytes; is it another file?")
         lines = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
     header, *rows = lines or [[]]
     if header != COLUMNS or any(len(row) != len(COLUMNS) for row in rows) or not rows:
