@@ -102,7 +102,13 @@ def test_results_of_other_settings_are_replaced_on_request_alone(folder, capsys)
         said = capsys.readouterr()
         assert said.out == ""
         assert said.err.count("\n") == 1
-        for told in ("sphere/TF01/views holds", "views.train.count is 61, not 2", "--replace", *TINY):
+        for told in (
+            "/TF01/views ",
+            "views.train.count is 61, not 2",
+            "--replace",
+            f" {TINY[-1]} ",
+            "tf=TF01",
+        ):
             assert told in said.err
     assert checksums_below(folder) == before
     assert main(["sheet", "--replace", *TINY, *fewer]) == 0

@@ -86,8 +86,9 @@ class Job:
 
 def command(stage: Stage, config: Config, words: Words) -> str:
     """Return the command line that makes one job's result; the words compose its configuration."""
-    tf = [] if config.tf is None or f"tf={config.tf}" in words else [f"tf={config.tf}"]
-    return shlex.join(["texgs", stage.name, *words, *tf])
+    every = words if config.tf is None else (*words, f"tf={config.tf}")
+    last = {word.partition("=")[0]: word for word in every}
+    return shlex.join(["texgs", stage.name, *last.values()])
 
 
 def settings_file(settings: dict[str, Any], results: str) -> str:
