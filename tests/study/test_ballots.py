@@ -44,14 +44,14 @@ def test_the_ballots_beside_a_key_are_counted(tmp_path):
 @pytest.mark.parametrize(
     ("lines", "key"),
     [
-        (LINES[:2] + LINES[3:], "question 1: .*C none"),
+        (LINES[:2] + LINES[3:], "question 1: .*got A 2, B 3;"),
         (["1,A,2", "1,B,2", "1,C,1", *LINES[3:]], "question 1: .*B 2"),
         (["1,A,2", "1,B,3", "1,C,0", *LINES[3:]], "question 1: .*C 0"),
         (["1,A,2", "1,B,3", "1,C,best", *LINES[3:]], "question 1: .*C best"),
-        (LINES[:3], "question 2: .*A none, B none"),
-        ([*LINES, "2,C,3"], "question 2: .*C"),
+        (LINES[:3], "question 2: .*got none;"),
+        ([*LINES, "2,C,3"], "question 2: .*got A 1, B 2, C 3;"),
         ([*LINES, "3,A,1"], "question 3"),
-        ([*LINES, "2,B,2"], "question 2: .*B"),
+        ([*LINES, "2,B,2"], "question 2: .*got A 1, B 2, B 2;"),
         ([], "study, ballot, question, option, rank"),
         (["1;A;1"], "study, ballot, question, option, rank"),
     ],

@@ -124,14 +124,11 @@ def pairs_of(records: Sequence[Record[Any]]) -> list[tuple[Edit, Record[EditMeas
         listed = [(name, each.result.values) for name, each in zip(pictures, seen, strict=True)]
         for metric in metrics().values():
             more = metric.among(listed) if metric.among else []
-            seen = [with_values(*pair) for pair in zip(seen, more, strict=True)] if more else seen
+            for index, values in enumerate(more):
+                known = seen[index].result
+                seen[index] = replace(seen[index], result=replace(known, values={**known.values, **values}))
         measured |= {key(edit): each for edit, each in zip(own, seen, strict=True)}
     return [(edit, measured.get(key(edit))) for edit in edits]
-
-
-def with_values(record: Record[EditMeasures], more: Mapping[str, Any]) -> Record[EditMeasures]:
-    """Return a record with more values."""
-    return replace(record, result=replace(record.result, values={**record.result.values, **more}))
 
 
 def row_of(edit: Edit, measured: Record[EditMeasures] | None) -> dict[str, Any]:
