@@ -19,7 +19,7 @@ from texgs.workflow.missing import weights_of
 from texgs.workflow.stage import Stage
 from texgs.workflow.sweep import swept
 
-LISTED = 3  # settings that a message names
+LISTED_KEYS = 3  # of settings, in a message
 
 
 @dataclass(frozen=True)
@@ -65,13 +65,13 @@ class Job:
             return
         known = result.stamped(self.output) or {}
         there = read_settings(Path(results, ".conf", f"{known.get('stage')}-{known.get('settings')}.yaml"))
-        keys = differing(there, self.settings)
+        keys = difference(there, self.settings)
         if there and not keys:
             return
         made_by = read_json(self.output / METRICS).get("command")
         raise ArgumentError(
             f"{self.output} holds a result of other settings{f' ({keys})' if there else ''}, which would be "
-            "lost; results=FOLDER keeps both, and --replace this one"
+            "lost; results=FOLDER keeps both, --replace the new one alone"
             + (f"; what is there was made by: {made_by}" if made_by else "")
         )
 
@@ -105,12 +105,12 @@ def read_settings(file: Path) -> dict[str, Any]:
     return yaml.load(file.read_bytes(), yaml.CSafeLoader) if file.is_file() else {}
 
 
-def differing(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
+def difference(there: Mapping[str, Any], here: Mapping[str, Any]) -> str:
     """Return the keys, with both values, in which settings differ in more than the weights, in words."""
     old, new = dict(leaves(there)), dict(leaves(here))
     keys = [key for key in {**old, **new} if old.get(key) != new.get(key) and not key.startswith("weights.")]
-    named = [f"{key} is {old.get(key)!s:.40}, not {new.get(key)!s:.40}" for key in keys[:LISTED]]
-    return "; ".join(named) + (f" and {len(keys) - LISTED} more" if keys[LISTED:] else "")
+    named = [f"{key} is {old.get(key)!s:.40}, not {new.get(key)!s:.40}" for key in keys[:LISTED_KEYS]]
+    return "; ".join(named) + (f" and {len(keys) - LISTED_KEYS} more" if keys[LISTED_KEYS:] else "")
 
 
 def leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -40,9 +40,7 @@ class Plan:
     tracking: str | None  # URI of the store
     experiment: str  # of the store
     gpu: list[str]  # what GPUs are for: "views", "fit" or both
-    jobs: dict[
-        str, dict[str, Any]
-    ]  # by folder: stage, place, settings file, code, inputs, swept values, command
+    jobs: dict[str, dict[str, Any]]  # by folder, see `plain`
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
     wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
