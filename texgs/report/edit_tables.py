@@ -30,7 +30,7 @@ NOT_ALIKE = (
     "The paper's rows are means over four data sets on an RTX 4090. It publishes neither its pictures nor "
     "its instructions nor its transfer functions, so they stand by themselves."
 )
-ADAPTS = "adapts"  # in mean rows, of methods that do not work with the same on all data sets
+ADAPTS = "adapts"  # method in mean rows over data sets where it works with different things
 FOLLOWED = ("style", "instruction", "")  # what edits follow, in the order of the table of all edits
 Edit = Record[EditResult]
 Rows = list[dict[str, Any]]
@@ -56,7 +56,7 @@ def image_driven(records: Iterable[Record[Any]]) -> Table:
 
 
 def text_driven(records: Iterable[Record[Any]]) -> Table:
-    """Return the comparison of edits by instructions, but for other methods with frozen geometry."""
+    """Return the comparison of edits by instructions, without other methods with frozen geometry."""
     rows = compared_rows(records, "instruction")
     free = [row for row in rows if row["has_texture"] or not row["is_kept"]]
     return comparison("instruction", free, paper_measures("instruction"))
@@ -86,8 +86,8 @@ def looks(records: Iterable[Record[Any]]) -> Table:
     rows = sorted(rows_of(records), key=lambda row: FOLLOWED.index(row["kind"]))
     labels = [*LABELS[:4], Column("follows"), Column("lambda_s", 2, "-")]
     columns = [Column(measure.title, measure.digits) for measure in measures()]
-    told = notes(rows, [measure.title for measure in measures()])
-    return Table(" ".join([caption, *told]), [*labels, *columns], rows)
+    own = notes(rows, [measure.title for measure in measures()])
+    return Table(" ".join([caption, *own]), [*labels, *columns], rows)
 
 
 def comparison(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:

@@ -11,7 +11,7 @@ from texgs.core.figures import Cell, Row, as_picture
 from texgs.core.names import style_file
 from texgs.volume.transfer import TransferFunction
 
-SIDE, INCHES = 512, 3.2  # of a picture; letters are as large as for so many inches
+SIDE, INCHES = 512, 3.2  # side of a picture, pixels and inches; the inches decide the size of letters
 LINE_LENGTH = 18  # letters
 
 

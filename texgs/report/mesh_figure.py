@@ -17,7 +17,7 @@ from texgs.volume.isosurface import Mesh
 
 DISCS = 300_000  # discs that a surface is drawn with
 VIEW_SIZE = 640  # pixels
-POLAR = 20.0  # of the cameras, degrees
+POLAR = 20.0  # polar angle of the cameras, degrees
 LARGEST_ERROR = 0.02  # world units, the brightest colour of an error
 CLAY, AMBIENT = 0.8, 0.2  # colour of a surface, and its share without light
 

@@ -28,7 +28,7 @@ R_co = TypeVar("R_co", bound=Result, covariant=True)
 class Record(Generic[R_co]):
     """A job: its result, and what is known of it."""
 
-    path: Path  # of metrics.json
+    path: Path  # its metrics.json
     stage: str
     dataset: str
     tf: str | None  # None for jobs of a whole data set
@@ -63,7 +63,7 @@ class LeftOut:
 
     what: str  # such as "data set wood"
     why: str  # one sentence
-    places: list[str]  # of the jobs that there are none of, names of rules of the workflow
+    places: list[str]  # rules of the workflow whose jobs are missing
 
     def __str__(self) -> str:
         why = self.why.removeprefix(f"{self.what}: ")  # sentences that name it themselves

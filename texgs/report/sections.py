@@ -31,10 +31,10 @@ class Figure:
     label: str  # basic TF, fit and edit
     words: str
     uri: str
-    command: str  # that makes it
+    command: str  # command line that makes it
     is_narrow: bool = False
-    page: str = ""  # that shows the same in a browser, as JSON; or
-    link: str = ""  # the way to its file
+    page: str = ""  # page that shows the same in a browser, as JSON; or
+    link: str = ""  # path of its file
 
 
 def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figure]]:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 ACROSS, WIDTH = 4, 2.6  # panels in a row, and inches of each
 HEIGHT, BAR = 2.2, 0.22  # inches of a panel over numbers, and of each bar
-PIXELS = 400  # of a picture
-LOGARITHMIC_FROM = 30.0  # a range of values is logarithmic where the last is so many times the first
+PICTURE_SIZE = 400  # pixels
+LOGARITHMIC_FROM = 30.0  # ratio of the ends of an axis from which it is logarithmic
 
 
 def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
@@ -139,5 +139,5 @@ def picture(path: Path) -> np.ndarray:
     from texgs.volume.cameras import orbit_path
 
     scene = read_scene(path)
-    cameras = orbit_path(1, POLAR, scene.framed().lens().square(PIXELS))
+    cameras = orbit_path(1, POLAR, scene.framed().lens().square(PICTURE_SIZE))
     return next(pictures(scene, cameras, [scene.light], torch.device("cpu")))

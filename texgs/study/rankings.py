@@ -13,7 +13,7 @@ from texgs.study.questions import Compared
 if TYPE_CHECKING:
     from scipy.stats._result_classes import BinomTestResult
 
-CONFIDENCE = 0.95  # of intervals
+CONFIDENCE = 0.95  # level of intervals
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,7 +38,7 @@ STATISTICS = (
     Column("chi2 (Friedman)", 2, UNPUBLISHED),
     Column("p (Friedman)", None, UNPUBLISHED),
 )
-THE_PAPER = "the paper"  # in place of an edit
+THE_PAPER = "the paper"  # edit in rows of its votes
 NO_BALLOTS = "only counts are published"
 TOO_FEW_METHODS = "needs three methods"
 WIDTH, DPI = 5.0, 150  # inches of a chart

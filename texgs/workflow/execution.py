@@ -1,4 +1,4 @@
-"""Run one job in a folder of its own, tracked, with its numbers in metrics.json; or with those before it."""
+"""Run jobs: each in a folder of its own, tracked, with its numbers in metrics.json."""
 
 import time
 from collections.abc import Callable
@@ -30,7 +30,7 @@ from texgs.workflow.stage_table import jobs
 
 @dataclass(frozen=True)
 class Task:
-    """A stage to run with a configuration, whose job is known when the files are there that it reads."""
+    """A stage to run with a configuration. Its job is known when the files are there that it reads."""
 
     stage: Stage
     config: Config
@@ -110,7 +110,7 @@ def require_inputs(job: Job) -> None:
 
 
 def require_outcome(stage: Stage, outcome: Any, folder: Path) -> None:
-    """Require of a job that it tells what it has done, and has written what it names."""
+    """Require that a job has returned an Outcome and written the files that it names."""
     where = f"stage {stage.name}: work"
     if not isinstance(outcome, Outcome):
         raise ConfigError(f"{where}: expected an Outcome, got {type(outcome).__name__}")
@@ -142,9 +142,9 @@ def makers(words: Words) -> dict[Path, Task]:
 
 
 def with_makers(task: Task, known: dict[Path, Task]) -> list[Task]:
-    """Return a task behind those that make what it reads, which are taken out of `known`.
+    """Return a task behind the tasks that make what it reads, which are taken out of `known`.
 
-    A volume that is not on this machine is downloaded: where its file is decides what reads it.
+    A volume that is not on this machine is downloaded, so that its job knows the path of the file.
     """
     if task.stage.name == "volume":
         fetch_volume(task.config)
