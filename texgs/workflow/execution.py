@@ -135,8 +135,9 @@ def fetch_volume(config: Config) -> None:
 def makers(words: Words) -> dict[Path, Task]:
     """Return the tasks that can make what a stage reads, by their folders."""
     config = compose(words)
-    cases = [Case.of((*words, f"fit={recipe}")) for recipe in config.fits] or [Case.of(words)]
-    cases += [Case(words, config)] if config.edit.method != NO_METHOD else []
+    fits = [(*words, f"fit={recipe}") for recipe in config.fits] or [words]
+    cases = [Case(each).unedited for each in fits]
+    cases += [Case(words)] if config.edit.method != NO_METHOD else []
     tasks = (Task(stage, each, case.words) for case in cases for stage, each in jobs(case.config))
     return {task.output: task for task in tasks}
 

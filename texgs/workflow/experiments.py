@@ -4,7 +4,6 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Self
 
 from texgs.config.compose import compose
 from texgs.config.dataset import Dataset
@@ -39,17 +38,19 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Case:
-    """One configuration of a run."""
+    """One configuration of a run, and the words that compose it."""
 
-    words: Words  # that compose it
-    config: Config
+    words: Words
 
-    @classmethod
-    def of(cls, words: Words) -> Self:
-        """Return the case without an edit; `edit=none` is among its words where these have one."""
-        plain = compose(words)
-        own = words if plain.edit.method == NO_METHOD else (*words, "edit=none")
-        return cls(own, compose(own))
+    @property
+    def config(self) -> Config:
+        """What the words compose."""
+        return compose(self.words)
+
+    @property
+    def unedited(self) -> "Case":
+        """The case of the fit alone."""
+        return self if self.config.edit.method == NO_METHOD else Case((*self.words, "edit=none"))
 
 
 @dataclass
@@ -105,18 +106,18 @@ class Selection:
             own: Words = ()
             if left != compose(each).edits:  # a gallery then shows what is left
                 own = f"edits=[{','.join(left)}]", "gallery.grids=[]"
-            listed += [Case.of((*each, *own)), *edited]
+            listed += [Case((*each, *own)).unedited, *edited]
 
     def edited(self, words: Words, several: bool) -> tuple[list[Case], list[str]]:
         """Return the edits that are possible and lack nothing, and what `edits` has left of them."""
         made: list[Case] = []
         gone: set[str] = set()
-        for own in edits(words):
-            config = compose(own)
+        for case in map(Case, edits(words)):
+            config = case.config
             if config.edit.base in gone or not self.takes(config, f"edit {edit_folder(config)}"):
                 gone.add(config.edit.name)
             elif not several or method_of(config.edit).takes(config.fit.field):
-                made.append(Case(own, config))
+                made.append(case)
         return made, [name for name in compose(words).edits if name not in gone]
 
 

@@ -86,9 +86,9 @@ class Job:
 
 def command(stage: Stage, config: Config, words: Words) -> str:
     """Return the command line that makes one job's result; the words compose its configuration."""
-    every = words if config.tf is None else (*words, f"tf={config.tf}")
-    last = {word.partition("=")[0]: word for word in every}
-    return shlex.join(["texgs", stage.name, *last.values()])
+    last = {word.partition("=")[0]: word for word in words}
+    tf = [] if config.tf is None or "tf" in last else [f"tf={config.tf}"]
+    return shlex.join(["texgs", stage.name, *last.values(), *tf])
 
 
 def settings_file(settings: dict[str, Any], results: str) -> str:
