@@ -17,7 +17,7 @@ from texgs.core.io import write_json
 from texgs.report.metrics_files import label
 from texgs.workflow import result
 from texgs.workflow.provenance import facts, git_revision, user
-from texgs.workflow.runs import PARENT, Run, begin, process_tags
+from texgs.workflow.runs import OUTPUT, PARENT, Run, begin
 
 if TYPE_CHECKING:
     from texgs.workflow.job import Job
@@ -67,8 +67,7 @@ def tags(job: Job, identity: Mapping[str, Any], parent: str | None) -> dict[str,
         "config.sha": identity["settings"],
         "code.sha": identity["code"],
         "git.sha": git_revision(),
-        "output": job.output.as_posix(),
-        **process_tags(job.output / result.METRICS),
+        OUTPUT: job.output.absolute().as_posix(),
     }
 
 
@@ -142,7 +141,7 @@ def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, Run]:
     """
     place = Path(plan.results).absolute().as_posix()
     key = digest("\n".join([place, *words]))
-    common = {"mlflow.user": user(), "git.sha": git_revision(), "output": place}
+    common = {"mlflow.user": user(), "git.sha": git_revision()}
 
     def run(name: str, title: str, tags: Mapping[str, str], params: Mapping[str, object]) -> Run:
         given: dict[str, Any] = {"name": title, "tags": {**common, **tags}, "params": params}
@@ -150,11 +149,12 @@ def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, Run]:
 
     values = {word.partition("=")[0].lstrip("+"): word.partition("=")[2] for word in words}
     groups = " ".join(word for word in words if "." not in word.partition("=")[0])
-    runs = {WHOLE: run(WHOLE, groups or "texgs", {"stage": "workflow"}, values)}
+    runs = {WHOLE: run(WHOLE, groups or "texgs", {"stage": "workflow", OUTPUT: place}, values)}
     for name in filter(None, plan.sweeps):
         keys = {key for folder in plan.sweeps[name] for key in plan.jobs[folder]["swept"]}
-        tags = {"stage": "sweep", "sweep": name, PARENT: str(runs[WHOLE].id)}
+        tags = {"stage": "sweep", "sweep": name}
         runs[name] = run(name, f"sweep {name}", tags, {"keys": ", ".join(sorted(keys))})
+        runs[name].end("FINISHED")  # it only holds those of its jobs
     if plan.tracking is not None:
         jobs = plan.jobs.items()
         told = {x: {"parent": runs[owner(plan, x)].id, "swept": job["swept"]} for x, job in jobs}
@@ -163,16 +163,16 @@ def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, Run]:
 
 
 def end_runs(runs: Mapping[str, Run], status: str, plan: Plan, made: Iterable[str]) -> None:
-    """End the runs of a workflow, with the tables and the report among the files that it has made."""
+    """End the run of a workflow; it and its sweeps get the tables and the report that it has made."""
     files = [Path(file) for file in sorted(made) if Path(file).is_file()]
     tables, report = Path(plan.results, "tables"), Path(plan.results, "report.html")
-    for name, run in reversed([*runs.items()]):
+    for name, run in runs.items():
         for file in files:
             if file.parent == tables and (name == WHOLE or file.stem == f"sweep-{name}"):
                 run.artifact(file, tables.name)
             elif file == report and name == WHOLE:
                 run.artifact(file)
-        run.end(status)
+    runs[WHOLE].end(status)
 
 
 def owner(plan: Plan, folder: str) -> str:
