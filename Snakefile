@@ -26,11 +26,11 @@ rule all:
 
 
 onstart:
-    begin()
+    RUN.begin()
 
 
 onsuccess:
-    made = finish("FINISHED")
+    made = RUN.succeed()
     report = f"{RESULTS}/report.html"
     print("Done:", report if report in made else "what was asked for")
     scenes = [
@@ -48,8 +48,4 @@ onsuccess:
 
 
 onerror:
-    finish("FAILED")
-    # When the process ends, because Snakemake has more to print; it goes back to another folder before that.
-    atexit.register(
-        tell_last_words, [Path(log).absolute() for job in workflow.scheduler.failed for log in job.log]
-    )
+    RUN.fail()

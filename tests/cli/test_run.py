@@ -14,7 +14,8 @@ from snakemake.api import SnakemakeApi
 from snakemake.cli import parse_config
 
 from tests.workflow.project import TINY
-from texgs.cli.run import WORD, overrides, snakemake, told_errors
+from texgs.cli.run import WORD, snakemake
+from texgs.cli.snakemake import overrides, told_places
 from texgs.core.errors import ArgumentError
 
 TEXGS = [sys.executable, "-m", "texgs.cli.main"]
@@ -176,7 +177,7 @@ def test_jobs_go_on_where_nobody_reads_their_output(tmp_path, words, also):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["-n"], "SNAKEMAKE_PROFILE={profile}: argument --executor/-e: invalid choice: 'nowhere'"),
+        (["-n"], "{profile}: argument --executor/-e: invalid choice: 'nowhere'"),
         (
             ["-n", "--profile", "none", "--executor", "there"],
             "argument --executor/-e: invalid choice: 'there'",
@@ -201,7 +202,7 @@ def test_a_user_without_a_home_folder_is_told_so(monkeypatch):
 
 def test_a_full_temporary_folder_is_named():
     told = r"the temporary folder: the run cannot work there \(No space left on device\); make room"
-    with pytest.raises(ArgumentError, match=told), told_errors():
+    with pytest.raises(ArgumentError, match=told), told_places():
         SnakemakeApi.print_exception(None, OSError(errno.ENOSPC, "No space left on device"))
 
 

@@ -48,7 +48,8 @@ def assert_eight_jobs_lose_nothing(folder, *uris):
     for uri in uris:
         client = MlflowClient(tracking_uri=uri)
         runs = client.search_runs([client.get_experiment_by_name("race").experiment_id])
-        assert sorted(run.data.params["fit.seed"] for run in runs) == [str(index) for index in range(N_JOBS)]
+        seeds = sorted(run.data.params["fit.seed"] for run in runs)
+        assert seeds == [str(index) for index in range(N_JOBS)], seeds
         for each in runs:
             seed = int(each.data.params["fit.seed"])
             assert (each.info.status, each.info.run_name) == ("FINISHED", f"job {seed}")

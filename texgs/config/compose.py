@@ -116,10 +116,6 @@ def check_chosen(overrides: Words, config: Config) -> None:
         chosen = [word.partition("=")[2].strip("'\"") for word in overrides if word.startswith(f"{group}=")]
         if any(re.match(rf"[+]*{group}\.name=", word) for word in overrides) or not chosen:
             continue
-        if chosen[-1].startswith("["):
-            raise ConfigError(
-                f"{group}: expected one name, got {chosen[-1]}; several go to {group}s={chosen[-1]}"
-            )
         if (name := getattr(config, group).name) != chosen[-1]:
             raise ConfigError(
                 f"{group}={chosen[-1]}: expected `name: {chosen[-1]}` in its file, got {name}; "

@@ -62,7 +62,7 @@ class Run:
         self._send(lambda mlflow: mlflow.set_tags(tags, synchronous=False))
 
     def artifact(self, path: str | Path, folder: str | None = None) -> None:
-        """Record a copy of a file or folder, in a folder of the run where one is given; even after its end."""
+        """Record a copy of a file or folder, in a folder of the run if one is given; also after its end."""
         self._send(lambda mlflow: mlflow.log_artifact(str(path), folder, run_id=self.id))
 
     def end(self, status: str, error: BaseException | None = None) -> None:
@@ -116,29 +116,29 @@ def begin(
     if uri is None:
         return Run()
     with translated(uri):
-        mlflow = opened(uri, experiment)
+        mlflow, experiment_id = opened(uri, experiment)
         if OUTPUT in tags:
-            end_killed(mlflow, tags[OUTPUT])
+            end_killed(mlflow, experiment_id, tags[OUTPUT])
         own, known = {allowed_name(each): str(value) for each, value in tags.items()}, []
         if key is not None:
             own[KEY] = key
-            found = {"max_results": 1, "output_format": "list"}
-            known = mlflow.search_runs(filter_string=f"tags.`{KEY}` = '{key}'", **found)
+            words = f"tags.`{KEY}` = '{key}'"
+            known = mlflow.search_runs([experiment_id], words, max_results=1, output_format="list")
         id = known[0].info.run_id if known else None
-        run = mlflow.start_run(id, run_name=name, nested=True, tags=own)
+        run = mlflow.start_run(id, experiment_id, name, nested=True, tags=own)
         if id is None:
             mlflow.log_params(flatten(params))
     return Run(run.info.run_id, public(uri))
 
 
-def end_killed(mlflow: Any, output: str) -> None:
+def end_killed(mlflow: Any, experiment_id: str, output: str) -> None:
     """End the runs at and below a folder of results that are RUNNING: their processes were killed.
 
     The process that begins a run has locked its folder, so nobody else works there. Where a job of another
     node does, its run has its right status when it ends.
     """
-    running = mlflow.search_runs(filter_string="attributes.status = 'RUNNING'", output_format="list")
-    for each in running:
+    words = "attributes.status = 'RUNNING'"
+    for each in mlflow.search_runs([experiment_id], words, output_format="list"):
         if Path(each.data.tags.get(OUTPUT, "")).is_relative_to(output):
             mlflow.MlflowClient().set_terminated(each.info.run_id, "KILLED")
 
@@ -160,8 +160,8 @@ def run(uri: str | None, **job: Any) -> Iterator[Run]:
     recorded.end("FINISHED")
 
 
-def opened(uri: str, experiment: str) -> Any:
-    """Return MLflow, with a store, made where there is none, and an experiment of it as the active ones."""
+def opened(uri: str, experiment: str) -> tuple[Any, str]:
+    """Return MLflow with its store, made where there is none, and the identifier of an experiment there."""
     os.environ.update({key: value for key, value in SETTINGS.items() if key not in os.environ})
     import mlflow  # sets the levels of its loggers, so that it comes before they are changed
 
@@ -169,8 +169,8 @@ def opened(uri: str, experiment: str) -> Any:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     if uri.startswith(("http://", "https://")):
         mlflow.set_tracking_uri(uri)
-        mlflow.set_experiment(experiment)
-        return mlflow
+        # Where another process makes it at once, this returns it, but does not make it the active one.
+        return mlflow, mlflow.set_experiment(experiment).experiment_id
     from filelock import FileLock
 
     database = path_of(uri)
@@ -180,8 +180,7 @@ def opened(uri: str, experiment: str) -> Any:
         mlflow.set_tracking_uri(address(database))
         if mlflow.get_experiment_by_name(experiment) is None:
             mlflow.create_experiment(experiment, database.with_name(ARTIFACTS).as_uri())
-        mlflow.set_experiment(experiment)
-    return mlflow
+        return mlflow, mlflow.set_experiment(experiment).experiment_id
 
 
 def path_of(uri: str) -> Path:
@@ -201,7 +200,7 @@ def address(database: Path) -> str:
 
 
 def require_store(database: Path) -> None:
-    """Require a file with the tables of MLflow; make it, beside its place and renamed, where there is none."""
+    """Require a file with the tables of MLflow; where there is none, make it beside its place and move it."""
     if database.exists() and database.stat().st_size:
         with closing(sqlite3.connect(database)) as connection:
             tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_master")}

@@ -172,7 +172,8 @@ def end_runs(runs: Mapping[str, Run], status: str, plan: Plan, made: Iterable[st
                 run.artifact(file, tables.name)
             elif file == report and name == WHOLE:
                 run.artifact(file)
-    runs[WHOLE].end(status)
+    if runs:
+        runs[WHOLE].end(status)
 
 
 def owner(plan: Plan, folder: str) -> str:

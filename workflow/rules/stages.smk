@@ -10,25 +10,34 @@ for target in TARGETS:
             PLAN.target(target),
 
 
+def made(each):
+    """The files of a job that others read; pictures go into the report of Snakemake, too."""
+    for file in (*each.files, "metrics.json"):
+        path = f"<results>/{each.folder}/{file}"
+        in_report = {"caption": "../report/figure.rst", "category": each.target, "subcategory": each.name}
+        yield report(path, **in_report) if file in each.shown else path
+
+
 for each in RULES.values():
 
     rule:
         name:
             each.name
         input:
-            reads(each),
+            JOBS.reads(each),
         output:
-            writes(each),
+            list(made(each)),
         log:
-            log_of(each),
+            f"<logs>/{each.folder}.log",
         threads: each.threads
         resources:
             gpu=PLAN.gpus(each),
         params:
-            code=code(each),
-            words=words(each),
+            code=JOBS.code(each),
+            words=JOBS.words(each),
+        # Snakemake removes the log of an earlier attempt.
         shell:
-            RUN
+            "texgs {params.words:q} 2>&1 | tee {log:q}"
 
 
 rule downloads:
