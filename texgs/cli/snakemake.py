@@ -10,7 +10,7 @@ import atexit
 import shlex
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,6 @@ from typing import Any
 
 import yaml
 
-from texgs.cli import fork_server
 from texgs.cli.options import Parser
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.workflow import tracked
@@ -107,10 +106,15 @@ def told_places() -> Iterator[None]:
 
 
 class WorkflowRun:
-    """What a run holds while its jobs run: the lock of its results, a fork server and the tracked runs."""
+    """What a run holds while its jobs run: the lock of its results, a server and the tracked runs.
 
-    def __init__(self, workflow: Any, plan: Plan, words: tuple[str, ...], environment: Mapping[str, str]):
-        self._workflow, self._plan, self._words, self._environment = workflow, plan, words, environment
+    `start_server` starts what forks the jobs, where there are several on this machine.
+    """
+
+    def __init__(
+        self, workflow: Any, plan: Plan, words: tuple[str, ...], start_server: Callable[[], object]
+    ) -> None:
+        self._workflow, self._plan, self._words, self._start_server = workflow, plan, words, start_server
         self._tracked: dict[str, tracked.Run] = {}
         self._held: list[object] = []  # which end with this process, however that ends
 
@@ -124,7 +128,7 @@ class WorkflowRun:
                 # a long run does so all the time: github.com/snakemake/snakemake/issues/2967.
                 self._workflow.scheduler.job_rate_limiter = None
             if self._workflow.local_exec and len(jobs) > 1:
-                self._held.append(fork_server.start(self._environment))
+                self._held.append(self._start_server())
             self._tracked = tracked.begin_runs(self._plan, self._words)
         except TexgsError as error:
             print(f"texgs: {error}", file=sys.stderr)

@@ -2,9 +2,10 @@
 import re
 import shlex
 import sys
+from functools import partial
 from pathlib import Path
 
-from texgs.cli import fork_client
+from texgs.cli import fork_client, fork_server
 from texgs.cli.snakemake import WorkflowRun
 from texgs.core.errors import TexgsError
 from texgs.core.cache import cache_folder
@@ -63,7 +64,7 @@ if PLAN.tracking is not None:
         "TEXGS_EXPERIMENT": PLAN.experiment,
         "TEXGS_RUNS": tracked.runs_file(RESULTS),
     }
-RUN = WorkflowRun(workflow, PLAN, WORDS, ENVIRONMENT)
+RUN = WorkflowRun(workflow, PLAN, WORDS, partial(fork_server.start, ENVIRONMENT))
 CLIENT = fork_client.__file__
 SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())
 # A job goes on where nobody reads its output any more, and so does its log: tee would end with a signal, or where
