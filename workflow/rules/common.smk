@@ -80,6 +80,14 @@ def any_of(names, otherwise="none"):
     return "|".join(map(re.escape, names)) or otherwise
 
 
+def made(each):
+    """The files of a job that others read; pictures go into the report of Snakemake, too."""
+    for file in (*each.files, "metrics.json"):
+        path = f"<results>/{each.folder}/{file}"
+        in_report = {"caption": "../report/figure.rst", "category": each.target, "subcategory": each.name}
+        yield report(path, **in_report) if file in each.shown else path
+
+
 # What is there stays until the job has made something better: it swaps its files in at the end.
 outputflags:
     update,

@@ -10,14 +10,6 @@ for target in TARGETS:
             PLAN.target(target),
 
 
-def made(each):
-    """The files of a job that others read; pictures go into the report of Snakemake, too."""
-    for file in (*each.files, "metrics.json"):
-        path = f"<results>/{each.folder}/{file}"
-        in_report = {"caption": "../report/figure.rst", "category": each.target, "subcategory": each.name}
-        yield report(path, **in_report) if file in each.shown else path
-
-
 for each in RULES.values():
 
     rule:
