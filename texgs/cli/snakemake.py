@@ -134,12 +134,21 @@ class WorkflowRun:
             print(f"texgs: {error}", file=sys.stderr)
             sys.exit(2)
 
-    def succeed(self) -> set[str]:
-        """End well; return all files that the workflow makes."""
-        made = self._made()
-        note_written(self._plan.results, made)
-        tracked.end_runs(self._tracked, "FINISHED", self._plan, made)
-        return made
+    def succeed(self) -> None:
+        """End the tracked runs; print where the report is, and how to look at the scenes and the runs."""
+        plan, made = self._plan, self._made()
+        note_written(plan.results, made)
+        tracked.end_runs(self._tracked, "FINISHED", plan, made)
+        report = f"{plan.results}/report.html"
+        print("Done:", report if report in made else "what was asked for")
+        files = [file for file in plan.done("steps") or plan.done("compose") if file in made]
+        if files:
+            program = Path(sys.executable).with_name("texgs")
+            scene = Path(files[0]).with_name("scene.yaml")
+            print("View:", shlex.join([str(program), "view", str(scene)]))
+        if (plan.tracking or "").startswith("sqlite"):
+            interface = ("-m", "mlflow", "ui", "--backend-store-uri", str(plan.tracking))
+            print("Runs:", shlex.join([sys.executable, *interface]))
 
     def fail(self) -> None:
         """End the tracked runs; print why jobs failed as the process ends, after all that Snakemake says."""

@@ -1,9 +1,13 @@
 """What the rules of Snakemake ask of a plan: inputs, command and code of the job of some wildcards."""
 
+import shlex
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from texgs.core.process import waiting
+from texgs.workflow import tracked
 from texgs.workflow.plan import Plan
 from texgs.workflow.stage import Rule
 
@@ -44,3 +48,42 @@ class RuleJobs:
     def code(self, rule: Rule) -> Callable[[Wildcards], str]:
         """Return the digest of the code that a job runs."""
         return lambda wildcards: str(self.of(rule, wildcards)[1]["code"])
+
+
+def shown_beside(plan: Plan) -> dict[str, Any]:
+    """Return what tables and the report show beside the jobs of a run, by the names of their parameters."""
+    study = Path(plan.results, "study")  # its ballots never change, and more of them make another table
+    ballots = sorted(map(str, study.glob("votes/*.csv")))
+    return {
+        "earlier": list(plan.earlier),
+        "of_earlier": list(plan.earlier.values()),
+        "left_out": plan.left_out,
+        "ballots": ballots,
+        "study": ["--study", f"{study}/key.json"] if ballots else [],
+    }
+
+
+def environment_of(plan: Plan) -> dict[str, str]:
+    """Return environment variables of all jobs: where runs are recorded, and how threads wait."""
+    own = waiting()
+    if plan.tracking is not None:
+        own |= {
+            "TEXGS_TRACKING": plan.tracking,
+            "TEXGS_EXPERIMENT": plan.experiment,
+            tracked.RUNS: tracked.runs_file(plan.results),
+        }
+    return own
+
+
+def shell_prefix(environment: Mapping[str, str], client: str) -> str:
+    """Return what stands in front of the commands of all rules: `texgs`, by a client of the fork server.
+
+    A job goes on where nobody reads its output any more, and so does its log: `tee` would end with a signal,
+    or where it is BSD's, at its end with an error.
+    """
+    setting = " ".join(f"{name}={shlex.quote(value)}" for name, value in environment.items())
+    program = f"{setting} {shlex.quote(sys.executable)} -PSE {shlex.quote(client)}"
+    return (
+        "set -euo pipefail; trap '' PIPE; tee() {{ command tee \"$@\" || true; }}; "
+        f'texgs() {{{{ {program} "$@"; }}}}; '
+    )

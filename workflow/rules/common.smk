@@ -1,27 +1,27 @@
-# The plan of the run, and what the command lines of all jobs share.
+# The plan of the run, and what all rules share.
+#
+# The plan has each job of the run by the folder of its result: its settings, the files that it reads and the digest
+# of its code. A rule (stages.smk) is for one kind of result; its wildcards are parts of that folder, by which JOBS
+# finds the job in the plan.
 import re
-import shlex
 import sys
 from functools import partial
-from pathlib import Path
 
 from texgs.cli import fork_client, fork_server
 from texgs.cli.snakemake import WorkflowRun
 from texgs.core.errors import TexgsError
 from texgs.core.cache import cache_folder
-from texgs.core.process import collect_rarely, waiting
+from texgs.core.process import collect_rarely
 from texgs.report.table import DOCUMENT, FORMATS
 from texgs.report.tables import specs
-from texgs.workflow import tracked
 from texgs.workflow.code import code_digest
 from texgs.workflow.plan import planned, words_of
-from texgs.workflow.rule_jobs import RuleJobs
+from texgs.workflow.rule_jobs import RuleJobs, environment_of, shell_prefix, shown_beside
 from texgs.workflow.stage_table import RULES
 
 collect_rarely()
 
-# The configuration becomes a plan: the jobs, with their settings and inputs, by the folders of their results. A
-# mistake of the user ends here in one sentence, before any job.
+# A mistake of the user ends here in one sentence, before any job.
 try:
     CACHE = (cache_folder() / "volumes").as_posix()
     WORDS = words_of(config)
@@ -44,35 +44,13 @@ JOBS = RuleJobs(PLAN)
 RESULTS = PLAN.results
 TARGETS = dict.fromkeys(each.target for each in RULES.values() if each.target)
 TABLES = specs(PLAN.swept())
-STUDY = Path(RESULTS, "study")  # its ballots never change, and more of them make another table
-BESIDE = {  # what tables and the report show beside the jobs of this run
-    "earlier": list(PLAN.earlier),
-    "of_earlier": list(PLAN.earlier.values()),
-    "left_out": PLAN.left_out,
-    "ballots": (BALLOTS := sorted(map(str, STUDY.glob("votes/*.csv")))),
-    "study": ["--study", f"{STUDY}/key.json"] if BALLOTS else [],
-}
 # What workflow/report/figure.rst shows.
 config["captions"] = {each.name: each.shown for each in RULES.values()}
 
-# In front of the commands, not a parameter of the rules: where runs are recorded and how threads wait changes no
-# result.
-ENVIRONMENT = waiting()
-if PLAN.tracking is not None:
-    ENVIRONMENT |= {
-        "TEXGS_TRACKING": PLAN.tracking,
-        "TEXGS_EXPERIMENT": PLAN.experiment,
-        "TEXGS_RUNS": tracked.runs_file(RESULTS),
-    }
+# In front of the commands, not a parameter of the rules: it changes no result.
+ENVIRONMENT = environment_of(PLAN)
+shell.prefix(shell_prefix(ENVIRONMENT, fork_client.__file__))
 RUN = WorkflowRun(workflow, PLAN, WORDS, partial(fork_server.start, ENVIRONMENT))
-CLIENT = fork_client.__file__
-SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())
-# A job goes on where nobody reads its output any more, and so does its log: tee would end with a signal, or where
-# it is BSD's, at its end with an error.
-shell.prefix(
-    "set -euo pipefail; trap '' PIPE; tee() {{ command tee \"$@\" || true; }}; "
-    f'texgs() {{{{ {SETTING} {shlex.quote(sys.executable)} -PSE {shlex.quote(CLIENT)} "$@"; }}}}; '
-)
 
 
 def any_of(names, otherwise="none"):
