@@ -30,11 +30,11 @@ MISTAKES = (
     *(HydraException, OmegaConfBaseException, yaml.YAMLError),
     *(ArithmeticError, OSError, RecursionError, TypeError, ValueError),
 )
-LONGEST = 200  # characters of what Hydra or OmegaConf says
+LONGEST_TEXT = 200  # characters of what Hydra or OmegaConf says
 
 
 @contextmanager
-def told() -> Iterator[None]:
+def translated() -> Iterator[None]:
     """Make one ConfigError of what Hydra, OmegaConf and `typed` raise."""
     try:
         yield
@@ -115,4 +115,4 @@ def children(node: yaml.Node | None) -> dict[str, yaml.Node]:
 def one_line(error: object) -> str:
     """Return what an exception says in one line, cut where it is too long for a sentence."""
     text = " ".join(str(error).partition("\n    full_key: ")[0].split()) or type(error).__name__
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}... ({len(text)} characters)"
+    return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}... ({len(text)} characters)"

@@ -95,8 +95,6 @@ def forecast(words: tuple[str, ...]) -> Forecast:
 
 def show(words: tuple[str, ...]) -> int:
     """Print a forecast, a line for each thing; return 1 if the run would not start."""
-    from texgs.raster.probe import probe
-
     expected = forecast(words)
     for name, config in {each.dataset.name: each for each in expected.cases.configs[::-1]}.items():
         if not any(line.startswith(f"data set {name}:") for line in expected.missing):
