@@ -17,7 +17,7 @@ N_JOBS, N_METRICS = 8, 20
 
 def job(index, barrier, uri, file):
     barrier.wait()
-    job = {"name": f"job {index}", "tags": {"dataset": f"volume {index}"}, "params": {"fit": {"seed": index}}}
+    job = {"name": f"job {index}", "tags": {"dataset": f"volume {index}"}, "params": {"fit.seed": str(index)}}
     with run(uri, experiment="race", **job) as record:
         for step in range(N_METRICS):
             record.log({"loss": index + step / 100}, step)

@@ -15,7 +15,7 @@ from texgs.workflow import runs
 from texgs.workflow.runs import OUTPUT, TrackingError, begin, run
 
 ROOT = Path(__file__).parents[2]
-JOB = {"experiment": "texgs", "name": "fit", "tags": {"git.sha": "0f3c"}, "params": {"fit": {"steps": 7}}}
+JOB = {"experiment": "texgs", "name": "fit", "tags": {"git.sha": "0f3c"}, "params": {"fit.steps": "7"}}
 
 
 def lose(monkeypatch):
@@ -168,19 +168,6 @@ def test_a_run_ends_those_of_its_folder_that_a_killed_process_has_left(uri, clie
     assert statuses == ["KILLED", "RUNNING", "KILLED", "RUNNING", "RUNNING", "RUNNING"]
     begin(uri, **{**JOB, "experiment": "elsewhere", "tags": {OUTPUT: "/results"}})
     assert [client.get_run(id).info.status for id in left[1:]] == ["KILLED", "KILLED", "RUNNING", "RUNNING"]
-
-
-def test_nested_parameters_become_dotted_names_and_text():
-    params = {
-        "fit": {"steps": 30000, "rate": {"means": 1.6e-4}, "windows": [1, 2.5, None]},
-        **{"shaded": True, "mask": None, "edits": {}, "volume": Path("a.vti"), "prompt": 'a "blue" one'},
-    }
-    assert runs.flatten(params) == {
-        "fit.steps": "30000",
-        "fit.rate.means": "0.00016",
-        "fit.windows": "[1, 2.5, null]",
-        **{"shaded": "true", "mask": "null", "edits": "{}", "volume": "a.vti", "prompt": 'a "blue" one'},
-    }
 
 
 def test_names():

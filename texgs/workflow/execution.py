@@ -64,7 +64,7 @@ def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
         experiment=tracking.experiment,
         name=tracked.name(job),
         tags=tracked.tags(job, identity, tracking.parent),
-        params={**job.swept, **job.settings},
+        params=tracked.params(job),
     ) as recorded:
         start = time.perf_counter()
         with curve_logger(recorded.log if recorded.id else None):

@@ -6,7 +6,6 @@ none, in many steps, so that two processes at once, or one that is killed, leave
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import re
@@ -25,7 +24,6 @@ OUTPUT = "output"  # tag with the absolute path of the results of a run
 # What MLflow is told where the user has not decided otherwise: by default it tries again for minutes.
 SETTINGS = {
     "MLFLOW_ASYNC_LOGGING_BUFFERING_SECONDS": "5",
-    "MLFLOW_ASYNC_LOGGING_THREADPOOL_SIZE": "4",
     "MLFLOW_DISABLE_TELEMETRY": "true",
     "MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR": "false",
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "1",
@@ -104,7 +102,7 @@ def begin(
     experiment: str,
     name: str,
     tags: Mapping[str, str],
-    params: Mapping[str, object],
+    params: Mapping[str, str],
     key: str | None = None,
 ) -> Run:
     """Begin a run of an experiment, which `Run.end` ends, and end those that a killed process has left.
@@ -127,7 +125,7 @@ def begin(
         id = known[0].info.run_id if known else None
         run = mlflow.start_run(id, experiment_id, name, nested=True, tags=own)
         if id is None:
-            mlflow.log_params(flatten(params))
+            mlflow.log_params({allowed_name(each): value for each, value in params.items()})
     return Run(run.info.run_id, public(uri))
 
 
@@ -216,18 +214,6 @@ def require_store(database: Path) -> None:
         left.unlink()
     SqlAlchemyStore(address(fresh), database.with_name(ARTIFACTS).as_uri()).engine.dispose()
     fresh.replace(database)
-
-
-def flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, str]:
-    """Return parameters of a nested mapping: keys joined by dots, lists and such as JSON."""
-    flat: dict[str, str] = {}
-    for key, value in values.items():
-        if isinstance(value, Mapping) and value:
-            flat |= flatten(value, f"{prefix}{key}.")
-        else:
-            is_plain = not (value is None or isinstance(value, bool | list | tuple | Mapping))
-            flat[allowed_name(f"{prefix}{key}")] = str(value) if is_plain else json.dumps(value, default=str)
-    return flat
 
 
 def allowed_name(text: str) -> str:

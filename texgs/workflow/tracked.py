@@ -71,6 +71,23 @@ def tags(job: Job, identity: Mapping[str, Any], parent: str | None) -> dict[str,
     }
 
 
+def params(job: Job) -> dict[str, str]:
+    """Return the settings of a job as text, by their whole keys, and the values that its sweep gives it."""
+    return flatten({**job.swept, **job.settings})
+
+
+def flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, str]:
+    """Return parameters of a nested mapping: keys joined by dots, lists and such as JSON."""
+    flat: dict[str, str] = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping) and value:
+            flat |= flatten(value, f"{prefix}{key}.")
+        else:
+            is_plain = not (value is None or isinstance(value, bool | list | tuple | Mapping))
+            flat[f"{prefix}{key}"] = str(value) if is_plain else json.dumps(value, default=str)
+    return flat
+
+
 def log_result(run: Run, job: Job, metrics: Mapping[str, Any]) -> None:
     """Record the numbers, curves and pictures of a job, and the path and checksum of what others read."""
     run.log({name: metrics[name] for name in ("seconds", "peak_memory_mib")} | scalars(metrics["numbers"]))
@@ -143,7 +160,7 @@ def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, Run]:
     key = digest("\n".join([place, *words]))
     common = {"mlflow.user": user(), "git.sha": git_revision()}
 
-    def run(name: str, title: str, tags: Mapping[str, str], params: Mapping[str, object]) -> Run:
+    def run(name: str, title: str, tags: Mapping[str, str], params: Mapping[str, str]) -> Run:
         given: dict[str, Any] = {"name": title, "tags": {**common, **tags}, "params": params}
         return begin(plan.tracking, experiment=plan.experiment, key=f"{key} {name}", **given)
 
