@@ -35,7 +35,13 @@ from texgs.core.errors import ConfigError
 from texgs.core.keys import UnknownKey, mismatch
 
 Places = tuple[Path, ...]
-SEPARATE_GROUPS = ("dataset", "views", "fit", "edit", "sweep")  # groups whose files a run combines with each other
+SEPARATE_GROUPS = (
+    "dataset",
+    "views",
+    "fit",
+    "edit",
+    "sweep",
+)  # whose files a run combines
 REFERENCE = re.compile(r"(?<!\\)\$\{(\.*)([\w.-]+)\}")
 MOST_REFERENCES = 20  # references that refer to another one
 
