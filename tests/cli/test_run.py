@@ -15,7 +15,7 @@ from snakemake.cli import parse_config
 
 from tests.workflow.project import TINY
 from texgs.cli.run import WORD, snakemake
-from texgs.cli.snakemake import overrides, told_places
+from texgs.cli.snakemake import overrides, place_errors
 from texgs.core.errors import ArgumentError
 
 TEXGS = [sys.executable, "-m", "texgs.cli.main"]
@@ -193,7 +193,7 @@ def test_a_user_without_a_home_folder_is_told_so(monkeypatch):
 
 def test_a_full_temporary_folder_is_named():
     told = r"the temporary folder: the run cannot work there \(No space left on device\); make room"
-    with pytest.raises(ArgumentError, match=told), told_places():
+    with pytest.raises(ArgumentError, match=told), place_errors():
         SnakemakeApi.print_exception(None, OSError(errno.ENOSPC, "No space left on device"))
 
 

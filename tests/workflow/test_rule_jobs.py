@@ -3,7 +3,7 @@
 import subprocess
 from types import SimpleNamespace
 
-from texgs.workflow.rule_jobs import RuleJobs, shell_prefix, shown_beside
+from texgs.workflow.rule_jobs import RuleJobs, report_params, shell_prefix
 from texgs.workflow.stage_table import RULES
 
 SHADING = {
@@ -30,12 +30,12 @@ def test_a_job_is_found_by_its_wildcards():
 
 def test_ballots_of_a_study_go_into_the_tables(tmp_path):
     plan = SimpleNamespace(results=str(tmp_path), earlier={"a": "b"}, left_out="x.json")
-    assert shown_beside(plan)["study"] == []
+    assert report_params(plan)["study"] == []
     (tmp_path / "study" / "votes").mkdir(parents=True)
     (tmp_path / "study" / "votes" / "ada.csv").touch()
-    beside = shown_beside(plan)
-    assert beside["ballots"] == [str(tmp_path / "study" / "votes" / "ada.csv")]
-    assert beside["study"] == ["--study", f"{tmp_path}/study/key.json"]
+    params = report_params(plan)
+    assert params["ballots"] == [str(tmp_path / "study" / "votes" / "ada.csv")]
+    assert params["study"] == ["--study", f"{tmp_path}/study/key.json"]
 
 
 def test_commands_have_the_environment_of_jobs_and_go_on_without_a_reader(tmp_path):

@@ -56,9 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def snakemake(words: Sequence[str]) -> bool:
     """Run the workflow of texgs in this process; return whether it ended well."""
-    from texgs.cli.snakemake import execute, overrides, parser_of, translated
+    from texgs.cli.snakemake import execute, option_errors, overrides, parser_of
 
-    with translated():
+    with option_errors():
         parser = parser_of()
         given, unknown = parser.parse_known_intermixed_args(list(words))
         require_pairs([word for word in words if word in (*given.targets, *unknown)])

@@ -30,7 +30,7 @@ INTERRUPTED = ": interrupted; "  # of `texgs.cli.main`: the end of a run says so
 
 
 @contextmanager
-def translated() -> Iterator[None]:
+def option_errors() -> Iterator[None]:
     """Make an ArgumentError of options that Snakemake cannot read."""
     from snakemake.cli import CliException
     from snakemake.exceptions import WorkflowError
@@ -77,12 +77,12 @@ def execute(options: argparse.Namespace) -> bool:
 
     if options.cores is None and options.jobs is None:
         options.cores = parse_cores("all")
-    with told_places():
+    with place_errors():
         return bool(args_to_api(options, parser_of()))
 
 
 @contextmanager
-def told_places() -> Iterator[None]:
+def place_errors() -> Iterator[None]:
     """Raise one sentence for a place that Snakemake cannot use, which it would print with a traceback."""
     from snakemake.api import SnakemakeApi
 

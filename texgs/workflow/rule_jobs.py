@@ -15,7 +15,7 @@ Wildcards = Mapping[str, str]
 
 
 class RuleJobs:
-    """The jobs of a plan, each found by the wildcards of its rule; the methods return functions of these."""
+    """The jobs of a plan, each found by the wildcards of its rule. Methods return functions of wildcards."""
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
@@ -50,8 +50,8 @@ class RuleJobs:
         return lambda wildcards: str(self.of(rule, wildcards)[1]["code"])
 
 
-def shown_beside(plan: Plan) -> dict[str, Any]:
-    """Return what tables and the report show beside the jobs of a run, by the names of their parameters."""
+def report_params(plan: Plan) -> dict[str, Any]:
+    """Return parameters of the rules of tables and the report: what they show beside the jobs of a run."""
     study = Path(plan.results, "study")  # its ballots never change, and more of them make another table
     ballots = sorted(map(str, study.glob("votes/*.csv")))
     return {

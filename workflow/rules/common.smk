@@ -16,7 +16,7 @@ from texgs.report.table import DOCUMENT, FORMATS
 from texgs.report.tables import specs
 from texgs.workflow.code import code_digest
 from texgs.workflow.plan import planned, words_of
-from texgs.workflow.rule_jobs import RuleJobs, environment_of, shell_prefix, shown_beside
+from texgs.workflow.rule_jobs import RuleJobs, environment_of, report_params, shell_prefix
 from texgs.workflow.stage_table import RULES
 
 collect_rarely()
