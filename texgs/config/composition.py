@@ -159,8 +159,8 @@ def require_name(override: Override) -> None:
     """Require of the choice of a group that it is the name of a file, not a list or another value."""
     group, value = override.key_or_group, override.value()
     if isinstance(value, list):
-        several = f"; several go to {group}s" if f"{group}s" in Config.__dataclass_fields__ else ""
-        raise ConfigError(f"{group}: expected one name, got a list{several}")
+        hint = f"; several go to {group}s" if f"{group}s" in Config.__dataclass_fields__ else ""
+        raise ConfigError(f"{group}: expected one name, got a list{hint}")
     if not isinstance(value, str | None):
         raise ConfigError(
             f"{group}: expected the name of a file of conf/, such as dataset=engine, got {value}"
