@@ -83,7 +83,7 @@ def forecast(words: tuple[str, ...]) -> Forecast:
     to_do, seconds, done = Counter[str](), 0.0, 0
     for folder, job in planned.run.items():
         if folder in lack_files:
-            continue  # told where the selection is shown
+            continue  # reported with the missing things
         if job.is_done() and not planned.is_replaced(folder):
             done += 1
             continue
