@@ -1,7 +1,5 @@
 """Features of VGG-16 and their gradient: texgs's convolutions on CPUs beside those of torch."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import torch

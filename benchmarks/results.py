@@ -16,8 +16,6 @@ is drawn from. A row without a digest was measured with code of another layout, 
 of code that is no longer here leads nowhere: such a result is of older code.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import shlex

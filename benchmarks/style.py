@@ -1,7 +1,5 @@
 """An image-driven edit of a textured model: seconds of its start, milliseconds of an iteration, by part."""
 
-from __future__ import annotations
-
 from benchmarks.convolution import random_vgg
 from benchmarks.fit import DISTANCE, VIEWS
 from benchmarks.report import Measurement, Section

@@ -19,6 +19,7 @@ from texgs.config.project import ROOT
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.edit.function_model import with_model
 from texgs.scene.scene_file import write_scene
+from texgs.volume.basic_tfs import basic_tfs_of
 from texgs.volume.generate import sphere
 from texgs.volume.grid import Grid
 from texgs.volume.prepare import prepare_channels
@@ -26,7 +27,6 @@ from texgs.volume.slabs import ArraySource
 from texgs.volume.summaries import write_summaries
 from texgs.volume.transfer import TransferFunction
 from texgs.workflow.checks import check_basic_tfs
-from texgs.workflow.stages.settings import basic_tfs_of
 
 IN_DATA = DATA_SET.replace("tf_values: fraction\n", "")
 FLOW = "basic_tfs: {TF01: {opacity: [[0.3, 0.0], [0.4, 0.1]], color: [[0.3, 0, 0, 1]]}}\n"

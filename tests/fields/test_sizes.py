@@ -108,12 +108,3 @@ def test_stored_is_the_file_without_its_header(tmp_path, stage):
     groups = ("stored_geometry_mib", "stored_shading_mib", "stored_texture_mib")
     assert by_group["stored_total_mib"] == pytest.approx(sum(by_group[group] for group in groups))
     assert header < 2048
-
-
-def test_groups():
-    by_group = sample("shading", n=64, shared=True).sizes()
-    assert by_group["geometry_mib"] == 64 * 40 / MIB
-    assert by_group["shading_mib"] == 4 * 4 / MIB
-    assert by_group["stored_shading_mib"] == (64 * 12 + 4 * 4) / MIB
-    assert by_group["texture_mib"] == by_group["stored_texture_mib"] == 0
-    assert sample("surfels").sizes()["shading_mib"] == 0

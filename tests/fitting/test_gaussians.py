@@ -1,6 +1,7 @@
 import pytest
 import torch
 
+from tests.raster.requirements import require_equal
 from texgs.fields.gaussians.model import Baked, Gaussians
 from texgs.fields.splats import screen_box
 from texgs.fitting import checkpoint
@@ -13,7 +14,7 @@ from texgs.raster.shading import Y00
 from texgs.volume.generate import sphere
 from texgs.volume.view_set import ViewSet
 
-from .scenes import SIZE, assert_same, ball_images, is_finite, quality, run
+from .scenes import SIZE, ball_images, is_finite, quality, run
 
 SEEDS = Seeds(kind="hull", count=80, opacity=0.1, half_size=0.8)
 DENSIFY = Densify(start=20, stop=120, every=20, cap=150)  # no resets, after which images are pale
@@ -60,17 +61,18 @@ def test_an_interrupted_fit_goes_on_to_the_same_bits(tmp_path):
     checkpoint.save(task.output / checkpoint.FOLDER, half)
     fitted = FIT.fit(task)
     assert fitted.seconds > 1000
-    assert_same(fitted.field.parameters, whole.parameters)
+    require_equal(fitted.field.parameters, whole.parameters)
 
 
 def test_the_part_of_a_view_that_is_fitted_shows_all_gaussians(tmp_path):
     """The box of surfels is as good for Gaussians, whose filter is wider."""
+    images = ball_images()
     for seed in range(20):
         generator = torch.Generator().manual_seed(seed)
-        p = seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), SEEDS, 0, seed)
+        p = seed_gaussians(images, ViewSet(tmp_path, [], [], {}), SEEDS, 0, seed)
         p["scales"] = p["scales"] + 0.5 * torch.randn(80, 3, generator=generator)
         model = Gaussians({**p, "opacities": torch.full((80,), 4.0)})
-        camera = ball_images().cameras[seed % 6]
+        camera = images.cameras[seed % 6]
         box = screen_box(p, model.shading.options, camera).within(SIZE, SIZE)
         alpha = model.render(camera).alpha
         alpha[box.top : box.bottom, box.left : box.right] = 0

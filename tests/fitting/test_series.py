@@ -7,16 +7,17 @@ import pytest
 import torch
 
 from tests.fitting.short_fits import shorten
+from tests.refusals import refused
 from tests.scene.test_twin import LOOK
 from tests.volume.test_motion import TF, blob
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.light import HEADLIGHT
 from texgs.fitting import now, series
 from texgs.fitting.ends import Points
 from texgs.fitting.now import fit_now
 from texgs.fitting.series import Follower
+from texgs.metrics import quality
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
@@ -47,8 +48,7 @@ def small(monkeypatch):
 def psnr(model, grid):
     camera = orbit(17, 23, 3.0, 30.0, 64, 64)
     seen = Caster(grid, LOOK).cast(TF, camera, HEADLIGHT).rgba
-    error = model.render(camera).color - seen[..., :3] - 1 + seen[..., 3:]
-    return float(-10 * error.square().mean().log10())
+    return quality.psnr(model.render(camera).color, seen[..., :3] + 1 - seen[..., 3:])
 
 
 def test_surfels_move_with_a_ball_and_all_else_stays(key):
@@ -131,12 +131,11 @@ def test_surfels_that_show_least_are_planted_where_none_are(key):
 
 def test_other_lattices_and_models_without_shading_are_refused(key):
     model, before = key
-    with pytest.raises(ArgumentError, match=r"expected the samples of the other steps, .*resample"):
-        Follower(model, LOOK, TF).step(model, before, blob((0, 0, 0), sizes=(30, 30, 30)), "ball")
+    other = blob((0, 0, 0), sizes=(30, 30, 30))
+    refused(lambda: Follower(model, LOOK, TF).step(model, before, other, "ball"), "resample")
     p = {name: x for name, x in model.parameters.items() if name in ("means", "quats", "scales", "opacities")}
     early = replace(model, parameters={**p, "sh": torch.zeros(len(model), 1, 3)})
-    with pytest.raises(ArgumentError, match="expected stage shading or texture, got surfels"):
-        Follower(early, LOOK, TF)
+    refused(lambda: Follower(early, LOOK, TF), "got surfels")
 
 
 def test_matter_that_is_about_to_go_or_come_does_not_end_a_series(key):

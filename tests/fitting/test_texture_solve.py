@@ -17,6 +17,7 @@ from tests.fitting.scenes import (
     run,
     striped,
 )  # fmt: skip
+from tests.refusals import refused
 from texgs.core.errors import FitError
 from texgs.core.light import random_lights
 from texgs.fields.splats import geometry
@@ -148,21 +149,16 @@ def test_curvatures_of_texels_sum_to_those_of_surfels():
     assert int(curvatures[7:].argmax()) == 2 * 7 + 3  # rows of v, the middle one
 
 
-def test_solve_finds_detail(start, images):
-    solved = solved_from(start, images, sweeps=3, ridge=0.2)
-    assert squared(solved, images) < 0.7 * squared(start, images)
-
-
 def moved(model, texels):
     return changed(model, texels=model.parameters["texels"] + texels)
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.1, -1.0])
 def test_the_share_of_the_way_is_that_of_a_search_along_it(start, images, scale):
-    """With the error of all views at 201 places of the way, brightest colours not clamped."""
+    """With the error of all views at 101 places of the way, brightest colours not clamped."""
     towards = solved_from(start, images, sweeps=3).parameters["texels"] * scale
-    errors = [squared(moved(start, towards * step / 200), images) for step in range(201)]
-    best = errors.index(min(errors)) / 200
+    errors = [squared(moved(start, towards * step / 100), images) for step in range(101)]
+    best = errors.index(min(errors)) / 100
     share = share_of(moved(start, towards), start, images, range(len(images)))
     assert share == pytest.approx(best, abs=0.01)
     assert (scale > 0) == (share > 0)
@@ -308,8 +304,7 @@ def test_the_paper_recipe_begins_with_the_mean_colour(plain, images):
 
 def test_numbers_that_are_not_finite_are_reported(bare, images):
     model = changed(bare, colors=bare.parameters["colors"] * torch.nan)
-    with pytest.raises(FitError, match="texture: texels: expected finite values"):
-        refined(model, images, 2)
+    refused(lambda: refined(model, images, 2), "texture: texels: .*finite", FitError)
 
 
 def test_lights_from_many_sides_do_not_drive_texels_away(start):

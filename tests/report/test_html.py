@@ -9,6 +9,7 @@ from PIL import Image
 
 from tests.report.written import Page, job
 from tests.study.studies import study
+from texgs.report.differences import differences_of
 from texgs.report.html import write_report as write_records
 from texgs.report.metrics_files import LeftOut, read_known
 from texgs.report.results import (
@@ -24,7 +25,6 @@ from texgs.report.results import (
 )
 from texgs.study.ballots import Ballot, Votes
 from texgs.study.votes import study_table, votes_figure
-from texgs.workflow.differences import differences_of
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 
 from texgs.config.compose import compose
 from texgs.core.checksum import Checksums
-from texgs.workflow.graph import drawn
+from texgs.workflow.graph import graph_of
 from texgs.workflow.stage_table import STAGES
 
 
@@ -20,7 +20,7 @@ from texgs.workflow.stage_table import STAGES
     ],
 )
 def test_a_command_describes_its_job_whatever_the_run_was(words):
-    _, planned = drawn(words, Checksums())
+    _, planned = graph_of(words, Checksums())
     assert len(planned.jobs) > 10
     for folder, job in planned.jobs.items():
         verb, *own = shlex.split(job.command)[1:]

@@ -135,9 +135,10 @@ def configuration(
 ) -> Config:
     """Return the configuration of a data set that is a volume with basic transfer functions."""
     from texgs.config.compose import recompose
-    from texgs.config.dataset import BasicTF, Dataset
-    from texgs.config.dataset import Volume as VolumeKeys
+    from texgs.config.dataset import Dataset
     from texgs.config.project import check_name
+    from texgs.volume.basic_tfs import BasicTF
+    from texgs.volume.settings import VolumeKeys
     from texgs.volume.transfer import check_disjoint
 
     check_disjoint(functions)

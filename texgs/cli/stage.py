@@ -4,6 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
+from texgs.config.case import Case
 from texgs.config.compose import compose
 from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
@@ -56,17 +57,17 @@ def run(arguments: argparse.Namespace) -> int:
             "--input, --output: expected only with --settings, as the workflow runs a job; by hand, "
             "results=FOLDER says where results go"
         )
-    words = tuple(arguments.overrides)
-    config, stage = compose(words), STAGES[arguments.verb]
+    case, stage = Case(tuple(arguments.overrides)), STAGES[arguments.verb]
+    config = case.config
     check_basic_tfs(config.dataset)
     require_fit(stage, config)
     if stage.place == "edit" or stage.name == "edit_metrics":
-        require_edit(stage, words)
+        require_edit(stage, case)
     if stage.name == "comparison":
-        require_fits(words)
-    known = makers(words)
+        require_fits(case)
+    known = makers(case)
     configs = [replace(config, tf=name) for name in tf_names(config)] if stage.per_tf else [config]
-    tasks = [task for each in configs for task in with_makers(Task(stage, each, words), known)]
+    tasks = [task for each in configs for task in with_makers(Task(stage, each, case.words), known)]
     checksums = Checksums.load()
     for task in () if arguments.replace else tasks:
         task.job(checksums).require_same_settings(config.results)

@@ -116,7 +116,7 @@ def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[L
 
 def given_tables(records: list[Record[Any]], votes: Votes | None) -> dict[str, Table]:
     """Make the tables that need more than metrics files: votes, and the configuration."""
+    from texgs.report.differences import differences_of
     from texgs.study.votes import study_table
-    from texgs.workflow.differences import differences_of
 
     return {"user_study": study_table(records, votes), "differences": differences_of(records)}

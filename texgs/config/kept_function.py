@@ -5,13 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from texgs.config.compose import recompose
-from texgs.config.dataset import BasicTF
 from texgs.config.dataset_text import require_read, with_basic_tf
 from texgs.config.project import ROOT, check_name, own_folder, shown
 from texgs.core.errors import ArgumentError, ConfigError, located
 from texgs.core.io import read_json, write_bytes
 from texgs.core.names import METRICS
 from texgs.scene.scene import Scene
+from texgs.volume.basic_tfs import BasicTF
 from texgs.volume.framing import frame_of, out_of_frame
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.summaries import read_summaries

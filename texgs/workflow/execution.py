@@ -7,7 +7,7 @@ from os.path import relpath
 from pathlib import Path
 from typing import Any
 
-from texgs.config.compose import compose
+from texgs.config.case import Case
 from texgs.config.project import Words
 from texgs.config.schema import Config
 from texgs.core.checksum import Checksums
@@ -17,10 +17,10 @@ from texgs.core.keys import ValueMismatch, typed
 from texgs.core.progress import curve_logger
 from texgs.edit.method import NO_METHOD
 from texgs.report.results import Result, plain
+from texgs.volume.settings import cached_volume
 from texgs.workflow import result, tracked
-from texgs.workflow.experiments import Case
 from texgs.workflow.job import Job, settings_file
-from texgs.workflow.locate import cached_volume, source_file
+from texgs.workflow.locate import source_file
 from texgs.workflow.missing import needed, require_same
 from texgs.workflow.provenance import record
 from texgs.workflow.runs import run
@@ -78,7 +78,7 @@ def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
         experiment=tracking.experiment,
         name=tracked.name(job),
         tags=tracked.tags(job, identity, tracking.parent),
-        params={**job.swept, **job.settings},
+        params=tracked.params(job),
     ) as recorded:
         start = time.perf_counter()
         with curve_logger(recorded.log if recorded.id else None):
@@ -132,13 +132,12 @@ def fetch_volume(config: Config) -> None:
         download(volume.url, str(volume.sha256), path)
 
 
-def makers(words: Words) -> dict[Path, Task]:
+def makers(case: Case) -> dict[Path, Task]:
     """Return the tasks that can make what a stage reads, by their folders."""
-    config = compose(words)
-    fits = [(*words, f"fit={recipe}") for recipe in config.fits] or [words]
-    cases = [Case(each).unedited for each in fits]
-    cases += [Case(words)] if config.edit.method != NO_METHOD else []
-    tasks = (Task(stage, each, case.words) for case in cases for stage, each in jobs(case.config))
+    config = case.config
+    fits = [case.but(f"fit={recipe}") for recipe in config.fits] or [case]
+    cases = [each.unedited for each in fits] + ([case] if config.edit.method != NO_METHOD else [])
+    tasks = (Task(stage, each, one.words) for one in cases for stage, each in jobs(one.config))
     return {task.output: task for task in tasks}
 
 

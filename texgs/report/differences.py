@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from texgs.config.compose import compose
+from texgs.config.compose import preset
 from texgs.config.describe import value_at
 from texgs.config.project import members
 from texgs.core.keys import typed
@@ -125,7 +125,7 @@ def views_of(records: Sequence[Record[Any]]) -> dict[str, dict[int, list[str]]]:
 
 def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
     """Yield claims of the paper that a file of conf/ can be compared with, each with the value there."""
-    config, prefix, numbers = compose((f"{group}={name}",)), "fit.", dict[str, Any]()
+    config, prefix, numbers = preset(group, name), "fit.", dict[str, Any]()
     if group == "edit" and config.edit.method != NO_METHOD:
         method = method_of(config.edit)
         prefix, numbers = f"edit.{method.name}.", dict(method.of(config.edit).numbers())

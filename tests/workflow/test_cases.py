@@ -7,7 +7,7 @@ import pytest
 
 from texgs.config.project import ROOT
 from texgs.core.errors import ConfigError, MissingDataError
-from texgs.workflow.experiments import LeftOut, selected
+from texgs.workflow.cases import LeftOut, cases_of
 from texgs.workflow.locate import tf_names
 from texgs.workflow.plan import make
 from texgs.workflow.stage import fit_folder
@@ -25,7 +25,7 @@ def without(*names):
 
 def configs(*words):
     """The configurations of no sweep."""
-    return [case.config for case in selected(words, nothing).by_sweep[""]]
+    return [case.config for case in cases_of(words, nothing).by_sweep[""]]
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ ALL = ["engine", "jets", "sphere"]
     ],
 )
 def test_data_sets_of_a_run_and_of_its_sweeps(project, words, expected):
-    by_sweep = selected(words, nothing).by_sweep.items()
+    by_sweep = cases_of(words, nothing).by_sweep.items()
     assert {
         sweep: sorted({each.config.dataset.name for each in some}) for sweep, some in by_sweep
     } == expected
@@ -99,7 +99,7 @@ def test_data_sets_of_a_run_and_of_its_sweeps(project, words, expected):
 )
 def test_a_mistake_is_one_sentence(project, words, message):
     with pytest.raises(ConfigError, match=message):
-        selected(words, nothing)
+        cases_of(words, nothing)
 
 
 def test_words_can_be_aimed_at_one_data_set():
@@ -141,29 +141,29 @@ def test_a_union_runs_each_of_its_experiments(project):
     ],
 )
 def test_what_is_missing_is_left_out_and_told_where_that_is_asked_for(project, words, skips):
-    selection = selected(words, without("jets"))
-    assert ("jets" in {each.dataset.name for each in selection.configs}) is not skips
-    assert ("views" in selection.by_sweep) is not skips
+    cases = cases_of(words, without("jets"))
+    assert ("jets" in {each.dataset.name for each in cases.configs}) is not skips
+    assert ("views" in cases.by_sweep) is not skips
     told = {LeftOut("data set jets", "jets is not there")} if skips else set()
-    assert set(selection.left_out) == told
-    assert all({"views", "phase", "pse"} <= set(places) for places in selection.left_out.values())
+    assert set(cases.left_out) == told
+    assert all({"views", "phase", "pse"} <= set(places) for places in cases.left_out.values())
 
 
 def test_edits_that_lack_something_go_with_all_that_start_from_them():
     words = ("dataset=orbital", "fit=demo", "edits=[glass,gold,crimson]", "on_missing=skip")
-    selection = selected(words, lambda config: ["no weights"] if config.edit.name == "lobe" else [])
-    assert [case.config.edit.name for case in selection.by_sweep[""]] == ["none", "glass", "gold"]
-    assert list(selection.by_sweep[""][0].config.edits) == ["glass", "gold"]  # what the gallery shows
-    assert [each.what for each in selection.left_out] == ["edit lobe"]
+    cases = cases_of(words, lambda config: ["no weights"] if config.edit.name == "lobe" else [])
+    assert [case.config.edit.name for case in cases.by_sweep[""]] == ["none", "glass", "gold"]
+    assert list(cases.by_sweep[""][0].config.edits) == ["glass", "gold"]  # what the gallery shows
+    assert [each.what for each in cases.left_out] == ["edit lobe"]
 
 
 def test_a_sweep_of_edits_without_any_has_no_fits_either():
     """Its table would be promised, and nothing would be in it."""
     words = ("dataset=orbital", "fit=demo", "sweep=lambda_s", "on_missing=skip")
-    selection = selected(words, lambda config: ["no weights"] if config.edit.name == "style" else [])
-    assert not selection.by_sweep.get("lambda_s")
-    assert {entry.why for entry in selection.left_out} == {"no weights"}
-    assert selected(words, nothing).by_sweep["lambda_s"]
+    cases = cases_of(words, lambda config: ["no weights"] if config.edit.name == "style" else [])
+    assert not cases.by_sweep.get("lambda_s")
+    assert {entry.why for entry in cases.left_out} == {"no weights"}
+    assert cases_of(words, nothing).by_sweep["lambda_s"]
 
 
 @pytest.mark.workflow
@@ -174,7 +174,7 @@ def test_the_experiments_of_a_union_make_no_two_jobs_in_one_folder():
     assert {"paper", "paper_quick"} <= set(unions)
     for union in unions:
         of_folder = {}
-        for config in selected((f"experiment={union}", "on_missing=stop"), nothing).configs:
+        for config in cases_of((f"experiment={union}", "on_missing=stop"), nothing).configs:
             for stage, each in stages_of(config):
                 with contextlib.suppress(MissingDataError):
                     job = stage.settings(each), stage.inputs(each)
@@ -183,13 +183,8 @@ def test_the_experiments_of_a_union_make_no_two_jobs_in_one_folder():
 
 @pytest.mark.workflow
 def test_the_whole_paper_has_images_of_each_data_sets_size():
-    by_sweep = selected(("experiment=paper", "on_missing=stop"), nothing).by_sweep
-    listed = [
-        each
-        for sweep, some in by_sweep.items()
-        if sweep != "resolution"
-        for each in (case.config for case in some)
-    ]
+    by_sweep = cases_of(("experiment=paper", "on_missing=stop"), nothing).by_sweep
+    listed = [each.config for sweep, some in by_sweep.items() if sweep != "resolution" for each in some]
     sizes = {(each.dataset.name, each.dataset.image, each.views.width, each.views.height) for each in listed}
     assert {image for _, image, _, _ in sizes} >= {512, 800}
     assert not [each for each in sizes if len({*each[1:]}) > 1]

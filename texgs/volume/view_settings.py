@@ -1,12 +1,24 @@
-"""The schema of conf/views: cameras, lights and the look of the volume in them."""
+"""What a configuration says of views, a file of conf/views, and the cameras, lights and files it comes to."""
 
-from dataclasses import dataclass
+from __future__ import annotations
 
-from texgs.config.dataset import LARGEST
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.core.lens import Frame, Lens
 
+if TYPE_CHECKING:
+    from texgs.core.camera import Camera
+    from texgs.core.light import Light
+    from texgs.volume.render import Appearance
+    from texgs.volume.view_set import Split, View
+
 LENS = Lens()
+LARGEST = 16384  # pixels of a side of a view
 
 
 @dataclass(frozen=True)
@@ -84,3 +96,55 @@ class ViewKeys:
         if frame and self.radius is None:
             return frame.lens(*size)
         return Lens(self.radius or LENS.radius, *size)
+
+
+def appearance_of(views: ViewKeys) -> Appearance:
+    """Return how the volume looks in views."""
+    from texgs.volume.render import Appearance
+
+    return Appearance(**asdict(views.shading), step=views.step, opacity_unit=views.opacity_unit)
+
+
+def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
+    """Return the cameras of one arrangement."""
+    from texgs.volume.cameras import icosphere, orbit_path, spiral
+
+    if path.kind == "icosphere":
+        return icosphere(path.frequency, lens)
+    if path.kind == "spiral":
+        return spiral(path.count, lens)
+    return orbit_path(path.count, path.polar, lens)
+
+
+def views_of(views: ViewKeys, lens: Lens, output: Path) -> dict[Split, list[View]]:
+    """Return cameras, lights and files of the training and the test views, by split; no split is empty."""
+    from texgs.volume.view_set import View
+
+    for name in ("lights", "test_lights"):
+        if not getattr(views, name):
+            raise ArgumentError(f"views.{name}: expected at least one light, got none")
+    splits: dict[Split, tuple[CameraPath, Sequence[LightKeys]]] = {
+        "train": (views.train, views.lights),
+        "test": (views.test, views.test_lights),
+    }
+    if views.relit:
+        splits["relit"] = CameraPath("spiral", count=views.relit), [LightKeys("random")]
+    shots = {}
+    for place, (split, (path, lights)) in enumerate(splits.items()):
+        placed = cameras(path, lens)
+        files = [output / split / f"r_{index:04}.png" for index in range(len(placed))]
+        lit = lights_of(lights, len(placed), views.seed, place)
+        shots[split] = [View(*each) for each in zip(placed, files, lit, strict=True)]
+    return shots
+
+
+def lights_of(lights: Sequence[LightKeys], count: int, *seed: int) -> list[Light]:
+    """Return the lights of so many views, which take turns; random ones are others in each view."""
+    from texgs.core.light import Light, random_lights
+
+    turns = [lights[index % len(lights)] for index in range(count)]
+    drawn = random_lights(count, *seed)
+    return [
+        other if light.kind == "random" else Light(**asdict(light))
+        for light, other in zip(turns, drawn, strict=True)
+    ]

@@ -18,11 +18,11 @@ from tests.volume.test_dicom import write_series as write_slices
 from tests.volume.test_motion import TF, blob
 from tests.volume.zarr_files import axes_of, write_image
 from texgs.cli.main import main
-from texgs.config.dataset import Volume
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.image import read_rgba
 from texgs.core.io import write_json
+from texgs.edit.series import make_series, settings_of
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
@@ -35,14 +35,14 @@ from texgs.scene.segment_file import write_segment
 from texgs.scene.session import Session
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
+from texgs.volume.moments import in_time, matching
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
+from texgs.volume.settings import VolumeKeys
 from texgs.volume.slabs import ArraySource
 from texgs.volume.sources import open_source
 from texgs.volume.summaries import read_summaries
-from texgs.workflow.moments import in_time, matching
-from texgs.workflow.series import make_series, settings_of
 
 pytestmark = pytest.mark.stages
 
@@ -165,7 +165,7 @@ def test_segments_textures_and_edits_of_one_step_hold_for_all(folder, fitted):
 
 
 def test_a_volume_near_the_root_is_of_no_workflow():
-    assert settings_of(Path("/volume.nrrd")) == Volume()
+    assert settings_of(Path("/volume.nrrd")) == VolumeKeys()
 
 
 def test_a_copy_of_the_scene_has_all_steps(folder):
@@ -428,7 +428,9 @@ def test_one_folder_has_a_series_for_each_phase(folder):
         tags = {"uid": generate_uid(), "SeriesDescription": f"{50 * step}%"}
         write_dicom(folder / "lung", place, number=9 - step, **tags)
     prepare(open_source(folder / "lung", series="all", time=1), folder / "volume.nrrd")
-    file = make_series(read_scene("scene.yaml"), [folder / "lung"], folder / "s", CPU, Volume(series="all"))
+    file = make_series(
+        read_scene("scene.yaml"), [folder / "lung"], folder / "s", CPU, VolumeKeys(series="all")
+    )
     scene = read_scene(file)
     assert (scene.time, [*scene.series.steps]) == (1, [f"lung, step {time}" for time in range(3)])
     for time, place in enumerate(PLACES):

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from texgs.config.dataset import Volume
 from texgs.core.checksum import Checksums, digest
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import read_json, write_json
@@ -23,11 +22,11 @@ from texgs.scene.scene_file import write_scene
 from texgs.scene.series_file import MOST, Series, read_series, write_series
 from texgs.volume.framing import shown_corners, smallest_ball
 from texgs.volume.headers import NRRD
+from texgs.volume.input_files import checksum_of_input
+from texgs.volume.moments import Moment, in_time
 from texgs.volume.nrrd_file import open_grid
+from texgs.volume.settings import VolumeKeys, open_field, prepare_fields
 from texgs.volume.summaries import write_summaries
-from texgs.workflow.moments import Moment, in_time
-from texgs.workflow.result import fingerprint
-from texgs.workflow.stages.volume import prepared, source
 
 
 def make_series(
@@ -35,7 +34,7 @@ def make_series(
     files: Sequence[Path],
     folder: Path,
     device: torch.device,
-    settings: Volume | None = None,
+    settings: VolumeKeys | None = None,
     seed: int = 0,
 ) -> Path:
     """Follow the models of a scene through a series of volumes, and write a scene of all steps.
@@ -71,7 +70,7 @@ def make_series(
     return write_scene(folder / SCENE, whole.at(start))
 
 
-def moments_of(files: Sequence[Path], settings: Volume) -> list[Moment]:
+def moments_of(files: Sequence[Path], settings: VolumeKeys) -> list[Moment]:
     """Return the steps of several files or folders, or of one: of a folder of NRRD, or along its own time.
 
     Without files, they are those of a generator.
@@ -84,27 +83,31 @@ def moments_of(files: Sequence[Path], settings: Volume) -> list[Moment]:
         if inner:
             return in_time(sorted(inner, key=natural_order))
         with located(only):
-            count = source(replace(settings, time=0), only).n_steps
+            count = open_field(replace(settings, time=0), only).n_steps
         if count > 1:
             return [Moment(f"{only.name}, step {time}", only, time) for time in range(count)]
     return in_time(files)
 
 
-def prepare_steps(series: Series, moments: Sequence[Moment], settings: Volume, volume: SceneVolume) -> None:
+def prepare_steps(
+    series: Series, moments: Sequence[Moment], settings: VolumeKeys, volume: SceneVolume
+) -> None:
     """Prepare the volumes that are missing, as that of the scene was, and require its lattice."""
     grid, record, checksums = open_grid(volume.file), series.file.with_name("sources.json"), Checksums.load()
     made_of = read_json(record) if record.exists() else {}
     for step, moment in enumerate(progress(moments, title="volumes", unit="step")):
         target = series.volume(step)
         own = settings if moment.time is None else replace(settings, time=moment.time)
-        identity = digest(f"{own} {moment.file and fingerprint(moment.file, checksums)}")
+        identity = digest(f"{own} {moment.file and checksum_of_input(moment.file, checksums)}")
         with located(moment.name):
             if is_other := made_of.get(target.name) != identity:
                 require_unfollowed(series, step)
             if is_other or not target.exists():
                 target.unlink(missing_ok=True)
                 write_json(record, made_of := {**made_of, target.name: identity})
-                write_summaries(target, prepared(settings, [source(own, moment.file)], target), [""])
+                write_summaries(
+                    target, prepare_fields(settings, [open_field(own, moment.file)], target), [""]
+                )
             other = open_grid(target)
             if other.dims != grid.dims or not np.allclose(other.spacing, grid.spacing):
                 raise ArgumentError(
@@ -133,15 +136,15 @@ def require_own_scene(folder: Path) -> None:
         raise ArgumentError(f"{folder}: expected a folder for the series, got {what}; choose another")
 
 
-def settings_of(file: Path) -> Volume:
+def settings_of(file: Path) -> VolumeKeys:
     """Return how the workflow has read and prepared a volume; plainly, where it was not the workflow."""
     facts = file.with_name(METRICS)
     if not facts.is_file():
-        return Volume()
+        return VolumeKeys()
     record = file.resolve().parents[2] / ".conf" / f"volume-{read_json(facts).get('config_sha')}.yaml"
     if not record.is_file():
-        return Volume()
-    return replace(typed(Volume, parse_yaml(record.read_text(encoding="utf-8"))["volume"]), url=None)
+        return VolumeKeys()
+    return replace(typed(VolumeKeys, parse_yaml(record.read_text(encoding="utf-8"))["volume"]), url=None)
 
 
 def follow(
