@@ -13,10 +13,10 @@ from texgs.core.errors import DeviceError
 from texgs.core.io import read_json
 from texgs.core.light import HEADLIGHT, Light, random_lights
 from texgs.core.names import METRICS
+from texgs.volume import view_files
 from texgs.volume.view_set import read_views
 from texgs.workflow.job import settings_file
 from texgs.workflow.stage_table import STAGES
-from texgs.workflow.stages import views as views_stage
 
 TINY = [*SPHERE, "dataset.volume.size=24", "views.height=32", "views.step=0.5", "views.radius=4.0311"]
 TINY.append("views.relit=0")
@@ -183,8 +183,8 @@ def test_vtk_renders_some_views_to_compare_times(folder, capsys, monkeypatch, wo
         monkeypatch.setattr(Blank, "render", lambda _self, _tf, camera, _light: shown.append(camera))
         return Blank()
 
-    renderer_for = views_stage.renderer_for
-    monkeypatch.setattr(views_stage, "renderer_for", vtk_or_none)
+    renderer_for = view_files.renderer_for
+    monkeypatch.setattr(view_files, "renderer_for", vtk_or_none)
     assert main(["views", *TINY, "metric.vtk_frames=2"]) == 0
     (views,) = folder.glob("*/views")
     assert len(shown) == 3 * works, "the first one is rendered twice and does not count"
@@ -193,7 +193,7 @@ def test_vtk_renders_some_views_to_compare_times(folder, capsys, monkeypatch, wo
 
 
 def test_empty_views_fail_again_the_same_way(folder, capsys, monkeypatch):
-    monkeypatch.setattr(views_stage, "renderer_for", lambda *_: Blank())
+    monkeypatch.setattr(view_files, "renderer_for", lambda *_: Blank())
     for _ in range(2):
         assert main(["views", *TINY]) == 2
         error = capsys.readouterr().err.splitlines()[-1]
@@ -210,7 +210,7 @@ def test_a_resumed_job_may_have_only_empty_views_left(folder, monkeypatch):
     lost = [views / "train" / "r_0011.png", *(views / "test").iterdir(), views / METRICS]
     for path in lost:
         path.unlink()
-    monkeypatch.setattr(views_stage, "renderer_for", lambda *_: Blank())
+    monkeypatch.setattr(view_files, "renderer_for", lambda *_: Blank())
     assert main(["views", *TINY]) == 0
     assert len(whole["frames_ms"]) == 15 - 1
     resumed = numbers(views)
