@@ -120,12 +120,12 @@ def compose_in(
     volume: Volume, functions: Mapping[str, TransferFunction], words: tuple[str, ...], folder: Path
 ) -> Path:
     """Run the stages up to the scene with results in a folder; return the scene's file."""
-    from texgs.workflow.execution import ensure
+    from texgs.workflow.execution import Task, ensure
     from texgs.workflow.stage import made
     from texgs.workflow.stage_table import STAGES, jobs
 
     config = configuration(volume, functions, words, folder)
-    known = {stage.output(each): (stage, each) for stage, each in jobs(config)}
+    known = {stage.output(each): Task(stage, each) for stage, each in jobs(config)}
     ensure(STAGES["compose"], config, known, tell=lambda line: None, warn=warnings.warn)
     return made("compose", config)
 

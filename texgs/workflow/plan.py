@@ -38,7 +38,7 @@ class Plan:
     tracking: str | None  # URI of the store
     experiment: str  # of the store
     gpu: list[str]  # what GPUs are for: "views", "fit" or both
-    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code, inputs and swept values, by folder
+    jobs: dict[str, dict[str, Any]]  # by folder, see `plain`
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
     wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
@@ -159,6 +159,7 @@ def plain(job: Job, results: str) -> dict[str, Any]:
         "code": job.stage.code(job.settings),
         "inputs": {name: path.as_posix() for name, path in job.inputs.items()},
         "swept": dict(job.swept),
+        "command": job.command,
     }
 
 

@@ -27,7 +27,7 @@ from texgs.volume.input_files import checksum_of_input
 
 STAMP = ".job.json"
 FILES = ".files.json"
-TIMES = "times.json"  # of single views; like METRICS it differs from one run to the next
+TIMES = "times.json"  # times of single views; like METRICS it differs from one run to the next
 
 
 @contextmanager
@@ -112,7 +112,7 @@ def recover(output: Path) -> None:
     """Finish what a process that was killed while it swapped two results had begun."""
     work, old = work_folder(output), output.with_name(f".{output.name}.old")
     if output.exists() and not output.is_dir():
-        return  # it is none of ours
+        return  # somebody else's
     if not output.exists() or not any(output.iterdir()):
         complete = (folder for folder in (work, old) if (folder / FILES).exists())
         if (folder := next(complete, None)) is not None:
@@ -209,5 +209,5 @@ def require_intact(path: Path) -> None:
     maker = (stamped(folder) or {}).get("stage", "the stage before")
     raise ArgumentError(
         f"{folder / lost[0]}: missing or damaged since {maker} made it; "
-        "run the same command again, and it is made anew"
+        "run the same command again to repair it"
     )

@@ -134,6 +134,7 @@ class StyleWork:
         import torch
 
         from texgs.core.image import write_png
+        from texgs.core.names import style_file
 
         pictures = self.pictures
         first, *others = (picture.image for picture in pictures.values())
@@ -141,7 +142,7 @@ class StyleWork:
             pictures = {"": next(iter(pictures.values()))}
         shown = {}
         for name, picture in pictures.items():
-            file = f"style-{name.replace('/', '-')}.png" if name else "style.png"
+            file = style_file(name)
             write_png(self.task.output / file, picture.image.permute(1, 2, 0))
             shown[file] = f"The style picture{f' of {name}' if name else ''}."
         return shown

@@ -97,7 +97,7 @@ class FitJob(FitTask[Recipe]):
         import torch
 
         from texgs.fitting import checkpoint
-        from texgs.metrics.shown import what_is_lost
+        from texgs.metrics.quality import what_is_lost
         from texgs.volume.images import smaller
 
         camera = smaller(self.views.train[0].camera, self.settings.reduce)
