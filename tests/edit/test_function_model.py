@@ -14,7 +14,7 @@ from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.edit import function_model
 from texgs.edit.function_model import overlap_of, tried, with_model
-from texgs.fields.gaussians.files import write_gaussians
+from texgs.fields.gaussians import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel

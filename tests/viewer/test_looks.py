@@ -18,7 +18,7 @@ from tests.viewer.pages import TOKEN, on_page, origin, page
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
 from texgs.core.errors import ArgumentError
-from texgs.edit.material import MATERIALS
+from texgs.edit.readable import MATERIALS
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.parts import NewLook
 from texgs.scene.scene_file import read_scene

@@ -15,10 +15,10 @@ import torch
 from texgs.api.display import as_python, camera_of, picture_of
 from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
-from texgs.core.interrupts import interrupts_between_items
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.light import Light
 from texgs.core.names import part_file
+from texgs.core.progress import interrupts_between_items
 from texgs.scene.changes import apply_all
 from texgs.scene.parts import part_names
 from texgs.scene.scene_file import light_of

@@ -13,8 +13,8 @@ from texgs.api.editing import Editing
 from texgs.core.check import torch_device
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
-from texgs.core.interrupts import interrupts_between_items
 from texgs.core.names import EXPORTS, check_count, require_numbers
+from texgs.core.progress import interrupts_between_items
 from texgs.scene.copied import write_copy
 from texgs.scene.frame import Mode
 from texgs.scene.scene_file import known

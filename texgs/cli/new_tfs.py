@@ -13,9 +13,10 @@ from texgs.config.project import NO_NAME, check_name
 from texgs.core.errors import ArgumentError, ConfigError, TexgsError
 
 if TYPE_CHECKING:
-    from texgs.config.dataset import BasicTF, Dataset
+    from texgs.config.dataset import Dataset
     from texgs.config.schema import Config
     from texgs.volume.axes import Channel
+    from texgs.volume.basic_tfs import BasicTF
     from texgs.volume.transfer import TransferFunction
 
 

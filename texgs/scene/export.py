@@ -15,8 +15,8 @@ from texgs.core.lens import Frame
 from texgs.core.names import check_count, require_numbers
 from texgs.fields import files
 from texgs.fields.field import Field, Look
-from texgs.fields.gaussians.files import write_ply as write_gaussians
-from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
+from texgs.fields.gaussians import Gaussians, JoinedGaussians
+from texgs.fields.gaussians import write_ply as write_gaussians
 from texgs.fields.kinds import Kind, kinds
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.ply_columns import Told, colored, write_columns
@@ -150,7 +150,7 @@ def export_scene(path: Path, scene: Scene, export: Export) -> Path:
         render = partial(composed.render, edits=edits, look=look)
         return _write_fused(path, export, export.cameras(scene.framed(composed)), render, field.depth)
     if isinstance(composed, JoinedGaussians):
-        return write_gaussians(path, composed.edited(edits), told)
+        return write_gaussians(path, composed.with_edits(edits), told)
     return _write(path, export, joined(cast(Composition, composed).parts, edits))
 
 

@@ -18,7 +18,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed
 from texgs.core.names import part_file
 from texgs.edit.method import method_of
-from texgs.edit.readable import raised
+from texgs.edit.readable import raise_opacities
 from texgs.edit.task import EditedScene, OrbitTask, orbit_task, parts_with_surfels
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import write_texture
@@ -111,7 +111,7 @@ class Looks:
         """Return the task with opacities for its look; those of the latest scene are not measured again."""
         asked, latest = (task.scene, task.edit.parts, task.settings.factor), self._latest
         if latest is None or latest[0] != asked:  # another thread may put another one there
-            self._latest = latest = (asked, raised(task).scene)
+            self._latest = latest = (asked, raise_opacities(task).scene)
         return replace(task, scene=latest[1], settings=replace(task.settings, opacity="keep"))
 
     def preview(self, scene: Scene, asked: Look, page: int) -> dict[str, NewLook]:

@@ -29,8 +29,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.core.memory import require_memory
 from texgs.raster import native
+from texgs.raster.api import CutRange
 from texgs.raster.arguments import pinhole, require
-from texgs.raster.cuts import CutRange
 from texgs.volume.grid import Grid
 from texgs.volume.render import Appearance, directions
 from texgs.volume.transfer import TransferFunction, left_limit, right_limit

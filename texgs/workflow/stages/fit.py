@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed
 from texgs.core.memory import MIB
-from texgs.fitting.kinds import FitSpec, FitTask, fit_specs
+from texgs.fitting.kinds import FitSpec, fit_specs
 from texgs.fitting.settings import Phase
+from texgs.fitting.task import FitTask
 from texgs.report.results import FitResult
 from texgs.workflow.inputs import is_fit_of, start_of_fit
 from texgs.workflow.stage import Outcome, Rule, Stage, read
@@ -75,7 +76,7 @@ class FitJob(FitTask[Recipe]):
 
         fit = Fit(parameters, shading, self.images, phase, self.seed, held)
         seconds = run_to_end(fit, self.output / FOLDER, self.title)
-        fitted = {name: x.detach() for name, x in fit.fitted.items()}
+        fitted = fit.result
         order = z_order_of(fitted["means"])
         ordered = {name: x if is_shared(name, x) else x[order] for name, x in fitted.items()}
         return Surfels(ordered, shading), seconds, fit.losses
@@ -96,7 +97,7 @@ class FitJob(FitTask[Recipe]):
         import torch
 
         from texgs.fitting import checkpoint
-        from texgs.metrics.shown import what_is_lost
+        from texgs.metrics.quality import what_is_lost
         from texgs.volume.images import smaller
 
         camera = smaller(self.views.train[0].camera, self.settings.reduce)
@@ -135,7 +136,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     It reads `views`, the transforms_train.json; where seeds come from it also `volume`, the volume.nrrd.
     """
     kind, job = fit_specs()[settings.stage], FitJob.of(settings, inputs, output)
-    if kind.settings is None or kind.fit is None:
+    if kind.settings is None:
         raise ArgumentError(f"{kind.name}: expected a kind of field that is fitted in one phase")
     keys = typed(kind.settings, settings.keys)
     fitted = kind.fit(replace(job, settings=keys))
@@ -145,7 +146,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return job.outcome(field, *told, measured=("test", "train"), sizes=field.sizes(), notes=notes)
 
 
-def stage_of(kind: FitSpec[Any]) -> Stage:
+def stage_of(kind: FitSpec) -> Stage:
     """Return the stage of a kind of field that is fitted in one phase."""
     return Stage(
         kind.name,
@@ -159,4 +160,4 @@ def stage_of(kind: FitSpec[Any]) -> Stage:
     )
 
 
-STAGES = [stage_of(kind) for kind in fit_specs().values() if kind.fit is not None]
+STAGES = [stage_of(kind) for kind in fit_specs().values() if kind.function]
