@@ -1,7 +1,5 @@
 """`python -m benchmarks`: measure speed and memory on this machine, print tables, write JSON."""
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import asdict

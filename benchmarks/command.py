@@ -1,7 +1,5 @@
 """The command line of a benchmark whose words are the arguments of its `main`."""
 
-from __future__ import annotations
-
 import inspect
 import sys
 from collections.abc import Callable

@@ -4,8 +4,6 @@
 fitted and edited. Rows have means, and what a tenth misses, of pictures, faces and bands along their edges.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from math import asin, atan2, cos, degrees, radians

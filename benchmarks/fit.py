@@ -1,34 +1,19 @@
-"""A step of the shading phase with every map and loss, and where its time goes.
+"""A step of the shading phase with every map and loss, and where its time goes."""
 
-`python -m benchmarks.fit OUTPUT.json TREE` times steps of `quick`'s losses, of few surfels in small views,
-which are all overhead, and of many in larger ones, by the code here and by that of another source tree, which
-is built. Two processes take turns; a ratio is the median of those of the turns.
-"""
-
-from __future__ import annotations
-
-import json
-import subprocess
-import sys
 from collections import defaultdict
-from itertools import pairwise
-from pathlib import Path
-from statistics import median
-from time import perf_counter
 
 import torch
 from torch import Tensor
 from torch.profiler import ProfilerActivity, profile
 
-from benchmarks import machine, scenes
-from benchmarks.command import call
+from benchmarks import scenes
 from benchmarks.report import Measurement, Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.core.light import Light
-from texgs.core.process import keep_freed_memory
+from texgs.core.memory import keep_freed_memory
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fitting.loop import Fit
@@ -42,8 +27,6 @@ DISTANCE = 2 * Lens().radius  # as the paper's cameras see an object of side 2
 PROFILED = 40  # steps
 LOSSES = Losses(alpha=0.1, normal=0.05, smoothness=0.01)
 RATES = Rates(*[1e-12] * 8)  # the scene stays as heavy as it is
-TURNS, STEPS, WARM = 15, {33: 200, 400: 25}, 20
-PAIRS = (("shells", 33, 200), ("ball", 400, 20_000), ("shells", 400, 20_000))  # scene, image size, surfels
 PARTS = {  # by what the profiler's names contain; the first that fits
     "rasterizer and losses": ("_ViewLoss", "_ViewLossBackward"),
     "shading": ("_BlinnPhong", "_BlinnPhongBackward"),
@@ -65,70 +48,14 @@ def run(settings: Settings) -> Section:
     return section
 
 
-def beside(output: str, tree: str) -> None:
-    """Time both; print and write milliseconds and ratios."""
-    pairs = {}
-    for scene, size, n in PAIRS:
-        here, there = (stepping(root, scene, size, n) for root in (str(machine.ROOT), tree))
-        turns = [(turn(here), turn(there)) for _ in range(TURNS)]
-        here.communicate(), there.communicate()
-        new, old = (round(median(times), 4) for times in zip(*turns, strict=True))
-        ratio = round(median(mine / other for mine, other in turns), 4)
-        pairs[f"{scene}, {n} surfels, {size}x{size}"] = {"new ms": new, "old ms": old, "ratio": ratio}
-    print(json.dumps(pairs, indent=1))
-    described = machine.describe(torch.device("cpu"))
-    Path(output).write_text(json.dumps({"machine": described, "steps": pairs}, indent=1) + "\n")
-
-
-def stepping(root: str, scene: str, size: int, n: int) -> subprocess.Popen:
-    """Start a process that takes steps by the code of a source tree when asked."""
-    code = f"import sys; sys.path.insert(0, {root!r}); import texgs; sys.path[0] = {str(machine.ROOT)!r}; "
-    code += f"from benchmarks.fit import serve; serve({scene!r}, {size}, {n})"
-    return subprocess.Popen(
-        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-
-
-def turn(process: subprocess.Popen) -> float:
-    """Let a process take its steps; the median, milliseconds."""
-    assert process.stdin
-    assert process.stdout
-    process.stdin.write("\n")
-    process.stdin.flush()
-    return float(process.stdout.readline())
-
-
-def serve(scene: str, size: int, n: int) -> None:
-    """Take steps for each line of the input, and print their median, milliseconds."""
-    keep_freed_memory()
-    raw = raw_surfels(n, torch.device("cpu"))
-    fit = training(size, raw if scene == "shells" else raw | ball(n), Losses())
-    for _ in range(WARM):
-        fit.step()
-    for _ in sys.stdin:
-        times = [perf_counter()]
-        for _ in range(STEPS[size]):
-            fit.step()
-            times.append(perf_counter())
-        print(1e3 * median(b - a for a, b in pairwise(times)), flush=True)
-
-
 def with_maps(raw: dict[str, Tensor]) -> dict[str, Tensor]:
     """Return surfels with a material each."""
     return raw | {name: raw[name].repeat(len(raw["means"])) for name in MATERIAL}
 
 
-def ball(n: int) -> dict[str, Tensor]:
-    """Return the shape of surfels that cover a sphere of radius 1 once."""
-    points, normals = scenes.sphere(n)
-    scales = torch.full((n, 2), 0.6 * (4 * torch.pi / n) ** 0.5)
-    means = torch.nn.functional.normalize(points, dim=1).float()
-    return {"means": means, "quats": scenes.facing(normals.float(), torch.zeros(n)), "scales": scales.log()}
-
-
-def training(size: int, raw: dict[str, Tensor], losses: Losses = LOSSES) -> Fit:
+def training(size: int, raw: dict[str, Tensor]) -> Fit:
     """The shading phase of the paper on views of a generated scene that was slightly moved."""
-    phase = Phase(10**9, losses=losses, rates=RATES, densify=Densify(start=10**9, stop=10**9))
+    phase = Phase(10**9, losses=LOSSES, rates=RATES, densify=Densify(start=10**9, stop=10**9))
     moved = raw | {"means": raw["means"] + 0.003}
     return Fit(moved, ShadingModel(), views(Surfels(raw), size), phase, seed=0)
 
@@ -169,11 +96,4 @@ def parts(fit: Fit) -> dict[str, float]:
 
 def part(name: str) -> str:
     """The part that an event belongs to."""
-    for known, names in PARTS.items():
-        if name in names:
-            return known
-    return "everything else"
-
-
-if __name__ == "__main__":
-    call(beside, "benchmarks.fit")
+    return next((known for known, names in PARTS.items() if name in names), "everything else")

@@ -1,7 +1,5 @@
 """gsplat's torch functions for 2DGS on a CPU, handed the list of fragments for nothing."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 

@@ -1,7 +1,5 @@
 """The library's instruction sets against each other: worker processes that take turns."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

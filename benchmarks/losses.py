@@ -1,7 +1,5 @@
 """The fused losses and shadings, forward and backward, against their definitions in torch and kornia."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 

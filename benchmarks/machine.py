@@ -1,7 +1,5 @@
 """What the figures were measured on, and how busy it was with other things meanwhile."""
 
-from __future__ import annotations
-
 import os
 import platform
 import subprocess
@@ -10,7 +8,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, Self
 
 import torch
 
@@ -88,7 +86,7 @@ class Load:
     seconds: float = 0.0
     processors_of_others: float | None = None  # that they kept busy on average
 
-    def __enter__(self) -> Load:
+    def __enter__(self) -> Self:
         self._start = (perf_counter(), others())
         return self
 

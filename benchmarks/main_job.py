@@ -5,8 +5,6 @@ its own, where nothing is done yet; words with = are overrides for all of them. 
 for is the plan, starts of jobs, and waiting.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Memory of a forward and a backward pass, each in a process of its own."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import re

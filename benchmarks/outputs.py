@@ -1,7 +1,5 @@
 """What else a pass can give: more images and channels, textures, a backward pass of the colours, a splat."""
 
-from __future__ import annotations
-
 from benchmarks import workload
 from benchmarks.report import Section
 from benchmarks.settings import Settings

@@ -1,7 +1,5 @@
 """The rasterizer against what else renders surfels on this machine, in the same run."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import torch

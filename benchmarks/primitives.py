@@ -1,7 +1,5 @@
 """3D Gaussians beside the surfels that they are made from: rendering, and a pass with gradients."""
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Rendering alone, and a training step: forward, backward and fused Adam, for every scene."""
 
-from __future__ import annotations
-
 from itertools import product
 
 from benchmarks import workload

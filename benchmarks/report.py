@@ -1,11 +1,11 @@
 """What the sections return: measurements, their ratios, what could not be measured; and tables of these."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from statistics import median
-from typing import Any
+from typing import Any, Self
+
+import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -20,15 +20,15 @@ class Measurement:
     n: int
 
     @classmethod
-    def of(cls, name: str, parameters: dict[str, Any], unit: str, values: Iterable[float]) -> Measurement:
+    def of(cls, name: str, parameters: dict[str, Any], unit: str, values: Iterable[float]) -> Self:
         """Return the median and minimum of the values."""
         samples = list(values)
         return cls(name, parameters, unit, median(samples), min(samples), len(samples))
 
-    def over(self, other: Measurement, name: str, **more: Any) -> Measurement:
+    def over(self, other: Self, name: str, **more: Any) -> Self:
         """Return how many times as much it is as another one; medians by medians, minima by minima."""
         ratios = self.median / other.median, self.min / other.min
-        return Measurement(name, self.parameters | more, "ratio", *ratios, min(self.n, other.n))
+        return type(self)(name, self.parameters | more, "ratio", *ratios, min(self.n, other.n))
 
 
 @dataclass
@@ -72,16 +72,9 @@ def show(title: str, section: Section) -> None:
 
 def print_table(measurements: list[Measurement]) -> None:
     """Print a row for each set of parameters, a column for each quantity."""
-    names = list(dict.fromkeys(m.name for m in measurements))
-    rows: dict[tuple, dict[str, str]] = {}
-    for m in measurements:
-        rows.setdefault(tuple(m.parameters.values()), {})[m.name] = cell(m)
-    header = [*measurements[0].parameters, *(name.removeprefix("pass ") for name in names)]
-    lines = [header]
-    lines += [[*map(str, row), *(cells.get(name, "") for name in names)] for row, cells in rows.items()]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    for line in lines:
-        print("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)))
+    rows = [m.parameters | {m.name.removeprefix("pass "): cell(m)} for m in measurements]
+    table = pd.DataFrame(rows).groupby(list(measurements[0].parameters), sort=False).first()
+    print(table.reset_index().to_string(index=False, na_rep=""))
 
 
 def cell(m: Measurement) -> str:

@@ -1,7 +1,5 @@
 """Frames of a composed scene: four textured models, unedited and edited."""
 
-from __future__ import annotations
-
 import torch
 
 from benchmarks.fit import DISTANCE, raw_surfels

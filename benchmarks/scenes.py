@@ -12,8 +12,6 @@ blended fragments per covered pixel are
 | translheavy |     109.6 |     110.2 |
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What to measure: the arguments of `python -m benchmarks`."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Timing cases round-robin, so that the noise of a shared machine falls on all of them alike."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

@@ -4,12 +4,8 @@
 What the client gets is what a browser on another machine can show: none runs on the same cores.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
-import subprocess
-import sys
 import time
 from pathlib import Path
 from statistics import median, quantiles
@@ -19,6 +15,7 @@ import aiohttp
 import torch
 
 from benchmarks import machine
+from benchmarks.browser import viewer
 from benchmarks.command import call
 from texgs.scene.scene_file import read_scene
 
@@ -28,14 +25,8 @@ WARM = 10  # frames before those that count: the resolution has settled then
 
 def main(source: str, output: str) -> None:
     """Measure the viewer of a scene; print the medians and write all rounds."""
-    words = [sys.executable, "-m", "texgs.cli.main", "view", source, "--no-browser"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        try:
-            address = process.stdout.readline().strip()
-            rounds = [asyncio.run(turned(address, SIZE, SECONDS)) for _ in range(ROUNDS)]
-        finally:
-            process.terminate()
+    with viewer(source) as address:
+        rounds = [asyncio.run(turned(address, SIZE, SECONDS)) for _ in range(ROUNDS)]
     facts = {"machine": machine.describe(torch.device("cpu")), "primitives": len(read_scene(source).open())}
     Path(output).write_text(json.dumps({**facts, "size": SIZE, "rounds": rounds}, indent=1) + "\n")
     print({key: round(median(each[key] for each in rounds), 1) for key in rounds[0]})

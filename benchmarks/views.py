@@ -1,7 +1,5 @@
 """Volume rendering: the caster, VTK's, and whole view sets."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from contextlib import redirect_stderr

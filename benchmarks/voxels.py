@@ -1,7 +1,5 @@
 """A sparse voxel grid: whole views, a step of an edit, and a step of the fit with its parts."""
 
-from __future__ import annotations
-
 import torch
 
 from benchmarks.report import Section

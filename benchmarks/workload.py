@@ -1,7 +1,5 @@
 """A scene ready to be rendered, differentiated and stepped through the torch interface."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 

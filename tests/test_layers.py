@@ -170,6 +170,31 @@ def test_arrows_are_found(line):
     assert not arrows({"texgs.core.io": ast.parse('"""texgs.cli"""\ndef f():\n    "texgs.cli"')})
 
 
+ENGINE = "texgs.workflow"  # plans and runs jobs; what they do is in its stages and in the rooms below
+OF_JOBS = {"torch", "numpy", "scipy", "kornia", "PIL", "matplotlib", "pyvista"}
+
+
+def work_of_engine(sources: dict[str, ast.Module]) -> list[str]:
+    """Return a line for each file of the engine that does what jobs do, or composes words on its own."""
+    wrong = []
+    for module, tree in sources.items():
+        if not module.startswith(ENGINE):
+            continue
+        names = {name.partition(".")[0] for name in imported(tree, module)}
+        if heavy := sorted(names & OF_JOBS) if not module.startswith(f"{ENGINE}.stages") else []:
+            wrong.append(f"{module} imports {', '.join(heavy)}; put what a job does into a stage or below")
+        if "texgs.config.compose.compose" in imported(tree, module):
+            wrong.append(f"{module} composes words; take a Case, whose configuration is composed once")
+    return wrong
+
+
+def test_the_engine_of_the_workflow_has_no_code_of_jobs():
+    assert not work_of_engine(modules())
+    line = "def f():\n    import numpy as np\n    from texgs.config.compose import compose"
+    assert len(work_of_engine({"texgs.workflow.plan": ast.parse(line)})) == 2
+    assert len(work_of_engine({"texgs.workflow.stages.mesh": ast.parse(line)})) == 1
+
+
 LONGEST = 40  # lines of a function without its docstring
 
 

@@ -32,18 +32,10 @@ SCALES = {  # of what files hold, by the units of the pages
 ELSEWHERE = {  # page: numbers that are of no measurement, and what they are of
     "api.md": {"24 MB"},  # texgs/api/scene.py
     "data.md": {"0.64 GiB", "2.1 GiB", "16 GiB", "256 GiB", "6 %"},  # files of others, an example
-    "looks.md": {
-        "553 MB",
-        "41 MB",
-        "2.6 GB",
-        "605 MB",
-        "1.7 GB",
-        "4.3 GB",
-        "12.6 GB",
-        "16.0 GB",
-        "57.7 GB",
-        "29 MB",
-    },  # texgs/models/catalogue.py
+    "looks.md": {  # texgs/models/catalogue.py
+        *(f"{size} MB" for size in (553, 41, 605, 29)),
+        *(f"{size} GB" for size in (2.6, 1.7, 4.3, 12.6, 16.0, 57.7)),
+    },
     "report.md": {"95 %"},  # an interval
     "workflow.md": {"4 MiB", "16 GB", "24 GB", "3 MB"},  # conf, the profile of SLURM, a file of others
 }

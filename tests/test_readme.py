@@ -43,16 +43,8 @@ PLAN = "{python} -m snakemake --snakefile {root}/Snakefile --dry-run"
 INSTEAD = (
     (r"make ", "make --directory {root} --dry-run {words}", "it installs, or runs this test again"),
     (r"\./replicate", "", "it installs; test_the_script_without_parameters_runs_the_workflow reads it"),
-    (
-        r"texgs series ",
-        "texgs series --help",
-        "it needs files of steps; tests/workflow/test_series.py has some",
-    ),
-    (
-        r"texgs (edit|render) steps/",
-        "",
-        "it needs such a series; test_series.py in tests/workflow runs these verbs",
-    ),
+    (r"texgs series ", "texgs series --help", "it needs files of steps; test_series.py has some"),
+    (r"texgs (edit|render) steps/", "", "it needs such a series; test_series.py runs these verbs"),
     (r"texgs export .*--kind points", "texgs {words} --opacity 0.05", "30 iterations leave surfels faint"),
     (r"texgs study", "texgs study --help", "it takes scenes of several methods"),
     (r"texgs view ", "texgs view --help", "it serves until it is interrupted"),
@@ -66,11 +58,7 @@ INSTEAD = (
     (r"texgs run dataset=vortex ", "texgs run {words} --dry-run", "its views have to be downloaded"),
     (r"texgs run dataset=scan ", "texgs run {words} volumes sheets", "that of engine goes on to the report"),
     (r"snakemake .*/profiles/local ", f"{PLAN} {{words}}", "texgs run runs the same workflow"),
-    (
-        r"snakemake .*/profiles/slurm ",
-        f"{PLAN} --executor local --cores 1 {{words}}",
-        "it needs a cluster; make test-cluster runs the profile on one",
-    ),
+    (r"snakemake .*/profiles/slurm ", f"{PLAN} --executor local --cores 1 {{words}}", "it needs a cluster"),
     (r"(ssh|git clone|tmux)( |$)", "", "it needs another machine"),
 )
 

@@ -8,11 +8,7 @@ that of the model is faster by `FASTER`.
 fitted and with a style, through all steps while the camera turns.
 """
 
-from __future__ import annotations
-
 import subprocess
-from collections.abc import Iterator
-from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,7 +18,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from benchmarks.browser import SOFTWARE, browser_path
+from benchmarks.browser import SOFTWARE, browser_path, viewer
 from benchmarks.command import call
 from benchmarks.results import add
 from texgs.scene.film import Film as SceneFilm
@@ -146,16 +142,6 @@ def alone(page: Any) -> Film:
     return film
 
 
-@contextmanager
-def served(scene: Path) -> Iterator[str]:
-    """Yield the address of the viewer with a scene."""
-    words = [PROGRAM, "view", scene, "--no-browser"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server:
-        assert server.stdout is not None
-        yield server.stdout.readline().strip()
-        server.terminate()
-
-
 def main(source: str, *edited: str) -> None:
     """Make all films of a scene, or that of a series."""
     if edited:
@@ -169,7 +155,7 @@ def main(source: str, *edited: str) -> None:
         browser = playwright.chromium.launch(executable_path=browser_path(), args=SOFTWARE)
         context = browser.new_context(viewport=WINDOW)
         for name, show in (("drag", dragged), ("model", made)):
-            with served(Path(source)) as address:
+            with viewer(source) as address:
                 page = context.new_page()
                 page.goto(address + VIEW)
                 expect(page.locator("#pace")).to_contain_text("ms", timeout=WAIT)

@@ -4,8 +4,6 @@
 out in favour of their pictures; what programs say on stderr is left out, too.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from pathlib import Path

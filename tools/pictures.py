@@ -6,8 +6,6 @@ the paper's views, without which four pictures cannot be made (those of methods 
 there), and VGG-16 and a browser are needed for some.
 """
 
-from __future__ import annotations
-
 import shlex
 import subprocess
 import sys
@@ -19,6 +17,7 @@ import numpy as np
 from PIL import Image
 
 from benchmarks.browser import browser_path
+from benchmarks.browser import viewer as view
 from benchmarks.results import RESULTS, ROOT, add
 from texgs.core.camera import orbit
 from texgs.core.figures import Cell, Row, as_picture, content, grid_rows, lay_out
@@ -113,11 +112,10 @@ def viewer(run: Path) -> Image.Image:
     scene, edited = run / "engine/scene/quick/compose/scene.yaml", run / "edited.yaml"
     changes = ("TF02.palette=#2a9d8f", "light=-120,35")
     subprocess.run([PROGRAM, "edit", scene, *changes, "--output", edited], check=True)
-    words = [PROGRAM, "view", edited, "--no-browser"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as player:
+    with view(edited) as address, sync_playwright() as player:
         browser = player.chromium.launch(executable_path=browser_path())
         page = browser.new_page(viewport={"width": 1280, "height": 940})
-        page.goto(f"{server.stdout.readline().strip()}#azimuth=-60&polar=20")
+        page.goto(f"{address}#azimuth=-60&polar=20")
         expect(page.locator("#pace")).to_contain_text("ms", timeout=60_000)
         page.get_by_role("button", name="New", exact=True).click()
         page.get_by_label("Opacity of the point").fill("0.1")
@@ -125,7 +123,6 @@ def viewer(run: Path) -> Image.Image:
         page.wait_for_timeout(10_000)  # until the whole frame is there
         page.locator("#pace").evaluate("pace => pace.hidden = true")  # of this machine, and what else it does
         page.screenshot(path=run / "viewer.png")
-        server.terminate()
     return Image.open(run / "viewer.png")
 
 

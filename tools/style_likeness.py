@@ -3,8 +3,6 @@
 Needs the weights of VGG-16, see `texgs.metrics.retrieval`.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import torch

@@ -1,9 +1,8 @@
 """Draw the workflow, from a volume to tables, with pictures from the results of the demo."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +14,10 @@ from texgs.config.compose import compose
 from texgs.core.camera import orbit
 from texgs.core.figures import as_picture, new_figure
 from texgs.core.io import read_json
-from texgs.report.given_row import plotted
+from texgs.report.given_row import tf_plot
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
-from texgs.workflow.stages.settings import basic_tfs_of
+from texgs.volume.basic_tfs import basic_tfs_of
 
 LINE = {"color": "0.35", "linewidth": 1.2}
 TF, SIZE = "TF02", 280  # of the models shown alone, and pixels of pictures
@@ -26,6 +25,7 @@ WIDTH, DPI = 11.0, 110  # inches, dots per inch
 CELL, STEP, LEFT = 1.4, 1.8, 0.3  # inches: a picture, from one to the next, and before the first
 TOPS = 0.72, 3.34  # of pictures, from above
 HEIGHT = 5.27
+GOLD, CRIMSON = "edits/gold/scene.yaml", "edits/crimson/scene.yaml"
 BANDS = (
     ("#eaf2fb", "Scene representation: each basic transfer function is fitted by itself"),
     ("#fdf1e4", "Scene editing: geometry stays as it was fitted"),
@@ -70,28 +70,20 @@ def draw_step(axes: Any, step: Step, left: float, top: float) -> None:
     for line, words in enumerate(step.words.splitlines()):
         axes.text(left + CELL / 2, bottom + 0.18 + 0.14 * line, words, ha="center", size=8)
     if step.pixels is not None:
-        axes.imshow(
-            step.pixels, extent=(left, right, bottom, top), aspect="auto", interpolation="antialiased"
-        )
-    axes.fill_between(
-        (left, right), top, bottom, facecolor="none" if step.table == () else "white", edgecolor="0.6"
-    )
+        extent = (left, right, bottom, top)
+        axes.imshow(step.pixels, extent=extent, aspect="auto", interpolation="antialiased")
+    face = "white" if step.table else "none"
+    axes.fill_between((left, right), top, bottom, facecolor=face, edgecolor="0.6")
     for line, cells in enumerate(step.table):
+        weight = "bold" if cells[-1] in ("SSIM", "RMSE") else "normal"
         for column, cell in enumerate(cells):
             place = left + 0.1 + column * (CELL - 0.1) / len(cells), top + 0.14 + line * 0.187
-            axes.text(
-                *place,
-                cell,
-                size=7,
-                va="center",
-                weight="bold" if cells[-1] in ("SSIM", "RMSE") else "normal",
-            )
+            axes.text(*place, cell, size=7, va="center", weight=weight)
     if step.arrow == "→":
         arrow(axes, (right + 0.05, middle), (left + STEP - 0.05, middle))
     elif step.arrow:
-        axes.text(
-            (right + left + STEP) / 2, middle, step.arrow, ha="center", va="center", size=9, color="0.35"
-        )
+        between = (right + left + STEP) / 2
+        axes.text(between, middle, step.arrow, ha="center", va="center", size=9, color="0.35")
 
 
 def arrow(axes: Any, start: tuple[float, float], end: tuple[float, float]) -> None:
@@ -106,21 +98,16 @@ def representation(folder: Path) -> list[Step]:
     values = nrrd.read(str(volume))[0]
     middle = values[values.shape[0] // 2][::-1]  # +y up
     grey = (255 * (middle - values.min()) / np.ptp(values)).astype(np.uint8)
-    plot = plotted(volume, basic_tfs_of(volume, dataset.basic_tfs, dataset.tf_values))
-    scene = folder / "scene/demo/compose/scene.yaml"
+    plot = tf_plot(volume, basic_tfs_of(volume, dataset.basic_tfs, dataset.tf_values))
+    show = partial(rendered, folder / "scene/demo/compose/scene.yaml", only=TF)
+    sheet = contact_sheet(folder / TF / "views/train")
     return [
         Step("volume", "values on a grid", np.repeat(grey[..., None], 3, axis=2), arrow="+"),
         Step("basic TFs", "colours and opacities\nof ranges of values", plot),
-        Step(
-            "views",
-            "ray-cast from all sides,\nwith their cameras",
-            contact_sheet(folder / TF / "views/train"),
-        ),
-        Step(
-            "surfels", "flat 2D Gaussians, placed\non what is visible", rendered(scene, mode="discs", only=TF)
-        ),
-        Step("shading", "normals and a material\nfor Blinn-Phong", rendered(scene, mode="normal", only=TF)),
-        Step("texture", "a palette colour,\nand texels on surfels", rendered(scene, only=TF), arrow=""),
+        Step("views", "ray-cast from all sides,\nwith their cameras", sheet),
+        Step("surfels", "flat 2D Gaussians, placed\non what is visible", show(mode="discs")),
+        Step("shading", "normals and a material\nfor Blinn-Phong", show(mode="normal")),
+        Step("texture", "a palette colour,\nand texels on surfels", show(), arrow=""),
     ]
 
 
@@ -134,26 +121,14 @@ def editing(folder: Path) -> list[Step]:
     for name in ("glass", "gold"):
         numbers = read_json(folder / "edit_metrics" / name / "metrics.json")["numbers"]
         table.append((name, f"{numbers['megabytes']:.1f}", f"{numbers['short_rmse']:.3f}"))
+    files = ("compose/scene.yaml", "pse/pse-2.yaml", GOLD, CRIMSON)
+    edited = {file: rendered(folder / file) for file in files}
     return [
-        Step("scene", "all models together:\na small text file", rendered(folder / "compose/scene.yaml")),
-        Step(
-            "by numbers",
-            "colour, opacity, light,\nin every frame",
-            rendered(folder / "pse/pse-2.yaml"),
-            arrow="or",
-        ),
+        Step("scene", "all models together:\na small text file", edited["compose/scene.yaml"]),
+        Step("by numbers", "colour, opacity, light,\nin every frame", edited["pse/pse-2.yaml"], arrow="or"),
         Step("by a picture", "texels follow\nits style", with_inset(folder), arrow="or"),
-        Step(
-            "by words",
-            "“turn it into gold”:\ntexels follow edited views",
-            rendered(folder / "edits/gold/scene.yaml"),
-            arrow="or",
-        ),
-        Step(
-            "in parts",
-            "segments by clicks,\neach with its own look",
-            rendered(folder / "edits/crimson/scene.yaml"),
-        ),
+        Step("by words", "“turn it into gold”:\ntexels follow edited views", edited[GOLD], arrow="or"),
+        Step("in parts", "segments by clicks,\neach with its own look", edited[CRIMSON]),
         Step("measures", "tables, figures and\na report in one file", table=table, arrow=""),
     ]
 

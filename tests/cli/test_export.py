@@ -18,8 +18,7 @@ from texgs.cli.main import main
 from texgs.core.cuts import Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.fields.files import open_field
-from texgs.fields.gaussians.files import write_gaussians
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians import Gaussians, write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.compact import read_compact
 from texgs.fields.surfels.model import Surfels
@@ -27,7 +26,7 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texels import bare_colors
 from texgs.fields.surfels.variants import write_texture
-from texgs.fields.voxels.file import write_voxels
+from texgs.fields.voxels import write_voxels
 from texgs.scene.export_keys import ENDINGS
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene

@@ -20,7 +20,7 @@ from tests.scene.balls import write_balls
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.core.lens import Frame
-from texgs.fields.gaussians.files import write_gaussians
+from texgs.fields.gaussians import write_gaussians
 from texgs.fields.surfels.compact import read_compact, write_compact
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture

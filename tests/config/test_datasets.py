@@ -13,10 +13,10 @@ from tests.real_data import real_data
 from tests.shipped import DATASETS, ROOT, tracked
 from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
+from texgs.volume.basic_tfs import in_data_values
 from texgs.volume.sources import open_source
 from texgs.workflow.checks import check_basic_tfs
 from texgs.workflow.locate import source_file, tf_names, views_folder
-from texgs.workflow.stages.settings import in_data_values
 
 # The paper's Tables 1 and 8: samples along x, y, z; width of views; basic scenes.
 PAPER = {

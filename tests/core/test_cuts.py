@@ -5,8 +5,8 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.refusals import refused
 from texgs.core.cuts import Box, Cuts, Plane
-from texgs.core.errors import ArgumentError
 
 COORDINATE = st.floats(-10, 10)
 VECTOR = st.lists(COORDINATE, min_size=3, max_size=3)
@@ -37,20 +37,13 @@ def test_a_box_keeps_what_is_between_its_corners(first, second):
     assert torch.equal(kept(Cuts(box=Box(low.tolist(), high.tolist())), points), inside)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Plane([0.0, 0.0, 0.0]), "normal: expected three numbers that are not all 0"),
-        (lambda: Plane([1.0, 0.0]), "normal: expected three numbers"),
-        (lambda: Plane([0.0, 0.0, 1e-5], 100.0), r"offset: expected at most 1e\+06 .*, got 1e\+07"),
-        (lambda: Box([0.0] * 3, [1.0, 0.0, 1.0]), "box: expected two corners of three numbers, low below"),
-        (lambda: Box([0.0] * 2, [1.0] * 2), "box: expected two corners of three numbers"),
-        (lambda: Cuts([Plane([1.0, 0.0, 0.0])] * 7), "planes: expected at most 6, got 7"),
-    ],
-)
-def test_what_is_no_cut_is_refused(make, message):
-    with pytest.raises(ArgumentError, match=message):
-        make()
+def test_what_is_no_cut_is_refused():
+    refused(lambda: Plane([0.0, 0.0, 0.0]), "normal: ")
+    refused(lambda: Plane([1.0, 0.0]), "normal: ")
+    refused(lambda: Plane([0.0, 0.0, 1e-5], 100.0), r"offset: .*1e\+07")
+    refused(lambda: Box([0.0] * 3, [1.0, 0.0, 1.0]), "box: ")
+    refused(lambda: Box([0.0] * 2, [1.0] * 2), "box: ")
+    refused(lambda: Cuts([Plane([1.0, 0.0, 0.0])] * 7), "planes: .*7")
 
 
 def test_a_box_beside_six_planes_makes_twelve_half_spaces():

@@ -38,59 +38,47 @@ def test_log_file_gets_a_line_every_five_seconds_and_a_last_one(clock, log):
     assert len(lines) == 5  # at 5, 10, 15, 20 s and the end
 
 
-class Place:
-    """Stands for what shows an output of a cell and changes it."""
-
-    def __init__(self, all_places):
-        self.lines = []
-        all_places.append(self)
-
-    def display(self, data, raw):
-        assert not self.lines
-        self.update(data, raw)
+class Place(list):
+    """What an output of a cell has shown."""
 
     def update(self, data, raw):
         assert raw
-        self.lines.append(data["text/plain"])
+        self.append(data["text/plain"])
+
+    display = update
 
 
 def test_a_notebook_gets_a_bar_in_an_output_of_its_own_that_is_empty_when_it_is_done(monkeypatch, capsys):
     places = []
     monkeypatch.setitem(sys.modules, "ipykernel.kernelapp", sys)
     monkeypatch.setattr(module, "find_spec", lambda name: None)
-    monkeypatch.setattr("IPython.display.DisplayHandle", lambda: Place(places))
+    monkeypatch.setattr("IPython.display.DisplayHandle", lambda: places.append(Place()) or places[-1])
     for title in ("views", "steps"):
         assert list(progress(range(3), title=title, unit="view")) == [0, 1, 2]
     views, steps = places
-    assert "views:   0%" in views.lines[0]
-    assert "steps:   0%" in steps.lines[0]
-    assert views.lines[-1] == steps.lines[-1] == ""
+    assert "views:   0%" in views[0]
+    assert "steps:   0%" in steps[0]
+    assert views[-1] == steps[-1] == ""
     assert capsys.readouterr() == ("", ""), "each piece of a stream is a line of its own in a file"
 
 
-def test_slow_items_and_long_times(clock, log):
+def test_slow_items_and_unknown_and_given_lengths(clock, log):
     for _ in progress(range(200), title="fit", unit="step"):
         clock[0] += 90
     lines = log()
     assert lines[0] == "fit: 1 of 200 steps, 90.0 s/step, 4 h 58 min left"
-    assert lines[-2] == "fit: 199 of 200 steps, 90.0 s/step, 1 min 30 s left"
     assert lines[-1] == "fit: 200 of 200 steps, 90.0 s/step, took 5 h 00 min"
-
-
-def test_unknown_and_given_lengths(clock, log):
     for _ in progress((letter for letter in "abcd"), title="wait", unit="poll"):
         clock[0] += 3
     assert log() == [
-        "wait: 2 polls, 3.0 s/poll",
-        "wait: 4 polls, 3.0 s/poll",
+        *(f"wait: {n} polls, 3.0 s/poll" for n in (2, 4)),
         "wait: 4 polls, 3.0 s/poll, took 12 s",
     ]
     for _ in progress(iter("abc"), 3, title="a", unit="letter"):
         clock[0] += 1
     assert list(progress([], title="b", unit="view")) == []
-    assert log() == ["a: 3 of 3 letters, 1.0 letter/s, took 3 s"]
     assert list(progress("a", title="c", unit="view")) == ["a"]
-    assert log() == ["c: 1 of 1 view, took 0 s"]
+    assert log() == ["a: 3 of 3 letters, 1.0 letter/s, took 3 s", "c: 1 of 1 view, took 0 s"]
 
 
 def test_a_loop_left_early_says_how_far_it_came(clock, log):

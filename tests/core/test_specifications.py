@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.refusals import refused
 from texgs.core.errors import ConfigError
 from texgs.core.specifications import specifications
 
@@ -30,30 +31,18 @@ def test_helpers_are_passed_by(package):
 def test_two_of_one_name(package):
     for file in ("a.py", "b.py"):
         (package / file).write_text(MODULE.format("first"))
-    with pytest.raises(
-        ConfigError, match=r"\.a and .*\.b: expected THING of different names, got first twice"
-    ):
-        specifications(package.name, "THING")
-
-
-def test_what_is_no_specification(package):
-    (package / "a.py").write_text("def THING(): pass\n")
-    with pytest.raises(ConfigError, match=r"\.a: THING: expected a specification with a name, got function"):
-        specifications(package.name, "THING")
+    refused(lambda: specifications(package.name, "THING"), r"\.a and .*\.b: .*first twice", ConfigError)
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "named"),
     [
-        (
-            "import nope_of_texgs",
-            "line 1: ModuleNotFoundError where it is imported: No module named 'nope_of_texgs'",
-        ),
-        ("THING = (", r"SyntaxError where it is imported: '\(' was never closed \(broken.py, line 1\)"),
-        ("x = 1\nraise ValueError('odd')", "line 2: ValueError where it is imported: odd"),
+        ("def THING(): pass", "THING: .*function"),
+        ("import nope_of_texgs", "line 1: ModuleNotFoundError .*'nope_of_texgs'"),
+        ("THING = (", r"SyntaxError .*broken.py, line 1"),
+        ("x = 1\nraise ValueError('odd')", "line 2: ValueError .*odd"),
     ],
 )
-def test_a_module_that_cannot_be_imported(package, text, message):
+def test_a_module_that_cannot_be_used(package, text, named):
     (package / "broken.py").write_text(text)
-    with pytest.raises(ConfigError, match=rf"\.broken[:,] {message}$"):
-        specifications(package.name, "THING")
+    refused(lambda: specifications(package.name, "THING"), rf"\.broken[:,] {named}", ConfigError)

@@ -13,7 +13,7 @@ from tests.viewer.pages import on_page
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.edit.function_model import fit_function, overlap_of, tried, with_model
-from texgs.fields.gaussians.files import write_gaussians
+from texgs.fields.gaussians import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel

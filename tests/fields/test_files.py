@@ -13,13 +13,14 @@ from tests.fields.palette.test_palette import box
 from tests.fields.rewritten import rewritten
 from tests.fields.surfels.samples import sample as surfels
 from tests.fields.voxels.test_voxels import ball
-from texgs.core.errors import ArgumentError, TexgsError
+from tests.refusals import refused
+from texgs.core.errors import TexgsError
 from texgs.fields.files import open_field
-from texgs.fields.gaussians.files import read_gaussians, write_gaussians
-from texgs.fields.palette.file import read_palette, write_palette
+from texgs.fields.gaussians import read_gaussians, write_gaussians
+from texgs.fields.palette.model import read_palette, write_palette
 from texgs.fields.surfels.compact import read_compact, write_compact
 from texgs.fields.surfels.model_file import read_model, write_model
-from texgs.fields.voxels.file import read_voxels, write_voxels
+from texgs.fields.voxels import read_voxels, write_voxels
 
 LOSSLESS = {
     "texgs-model": (surfels, write_model, read_model),
@@ -44,64 +45,42 @@ def test_files_are_known_by_their_header_and_the_same_field_gives_the_same_bytes
         assert path.stat().st_size == pytest.approx(field.sizes()["stored_total_mib"] * 2**20, abs=4000)
 
 
-@pytest.mark.parametrize("kept", [0.0, 0.001, 0.1, 0.5, 0.9, 0.999])
 @pytest.mark.parametrize("format", FILES)
-def test_a_file_cut_anywhere_is_refused(tmp_path, format, kept):
+def test_files_that_are_no_field_or_cut_are_named(tmp_path, format):
     make, write, read = FILES[format]
+    refused(lambda: read(tmp_path / "none"), "none: no such file")
+    refused(lambda: read(tmp_path), "got a folder")
     path = write(tmp_path / "m", make())
     data = path.read_bytes()
-    path.write_bytes(data[: int(kept * len(data))])
-    whole = "cut short or damaged" if format in LOSSLESS else ""
-    message = whole if int(kept * len(data)) > 8 else "another format"
-    with pytest.raises(ArgumentError, match=f"{path}: expected .*{message}"):
-        read(path)
-
-
-@pytest.mark.parametrize("format", FILES)
-def test_files_that_are_no_field_are_named(tmp_path, format):
-    read = FILES[format][2]
-    with pytest.raises(ArgumentError, match="none: no such file"):
-        read(tmp_path / "none")
-    with pytest.raises(ArgumentError, match="got a folder"):
-        read(tmp_path)
-    for content in (b"", b"\x80\x04K\x01.", bytes(100), b'{"a":1}\n'):
-        (tmp_path / "m").write_bytes(content)
-        with pytest.raises(ArgumentError, match=rf"expected a {format} file, got .*another format|whole"):
-            read(tmp_path / "m")
-    for header in (None, {"format": "pt"}):
-        (tmp_path / "m").write_bytes(save({"weight": torch.zeros(3)}, header))
-        with pytest.raises(ArgumentError, match=f"expected a {format} file, got .* of another"):
-            read(tmp_path / "m")
+    for kept in (0.0, 0.001, 0.1, 0.5, 0.9, 0.999):
+        path.write_bytes(data[: int(kept * len(data))])
+        refused(lambda: read(path), f"{path}: expected ")
+    foreign = (save({"weight": torch.zeros(3)}, header) for header in (None, {"format": "pt"}))
+    for content in (b"\x80\x04K\x01.", bytes(100), b'{"a":1}\n', *foreign):
+        path.write_bytes(content)
+        refused(lambda: read(path), f"expected a {format} file, got .*another|whole")
 
 
 @pytest.mark.parametrize(
-    ("version", "message"),
-    [
-        (2, "expected version 1 of the format at most, got 2; update texgs"),
-        ("new", "expected JSON with a version"),
-        (math.inf, "expected JSON with a version"),
-    ],
+    ("version", "named"), [(2, "got 2; update"), ("new", "version"), (math.inf, "version")]
 )
 @pytest.mark.parametrize("format", LOSSLESS)
-def test_a_version_that_cannot_be_read_is_named(tmp_path, format, version, message):
+def test_a_version_that_cannot_be_read_is_named(tmp_path, format, version, named):
     make, write, read = FILES[format]
     path = rewritten(write(tmp_path / "m", make()), format, version=version)
-    with pytest.raises(ArgumentError, match=f"{path}: {message}"):
-        read(path)
+    refused(lambda: read(path), f"{path}: .*{named}")
 
 
 @pytest.mark.parametrize("format", FILES)
 def test_what_could_not_be_read_back_is_not_written(tmp_path, format):
     make, write, _ = FILES[format]
     path = write(tmp_path / "m", make())
-    before = path.read_bytes()
-    for bad in (torch.nan, path):
-        with pytest.raises(ArgumentError, match="metadata cannot be written as JSON"):
-            write(path, replace(make(), metadata={"x": bad}))
+    before, bad = path.read_bytes(), [replace(make(), metadata={"x": bad}) for bad in (torch.nan, path)]
     if hasattr(make(), "shading"):
         broken = {**make().parameters, "opacities": torch.full((7,), torch.inf)}
-        with pytest.raises(ArgumentError, match=f"{path}: opacities: .* got 0 NaN and 7 infinite"):
-            write(path, replace(make(), parameters=broken))
+        bad.append(replace(make(), parameters=broken))
+    for field in bad:
+        refused(lambda field=field: write(path, field), "metadata|opacities: .* 7 infinite")
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 
@@ -116,15 +95,13 @@ NETWORKS = "expected the networks of a palette field"
     ("format", "changes", "message"),
     [
         ("model", {"stage": "cooked"}, "expected stage surfels, shading, texture, got 'cooked'"),
-        ("model", {"stage": []}, "expected stage surfels, shading, texture"),
         ("model", {"optics": {"low_pass": 2.0, "lens": 1}}, f"expected {SURFELS}"),
         ("model", {"optics": {"material": "wood"}}, "optics: expected values"),
         ("model", {"optics": {"low_pass": -1}}, "optics: expected values"),
-        ("model", {"optics": {"low_pass": "thin"}}, "optics: expected values of texgs"),
+        *(("model", {"optics": {"low_pass": x}}, "optics: expected values") for x in ("thin", 0, True)),
         ("model", {"metadata": 3}, f"expected {SURFELS}"),
         ("model", {"tensors": {"means": None}}, "model: expected means, quats, scales, opacities"),
         ("model", {"tensors": {"texels": None}}, "expected tensor texels at stage texture, got"),
-        ("model", {"tensors": {"ambient": None}}, "expected tensor ambient at stage texture"),
         ("model", {"tensors": {"colors": None, "sh": torch.zeros(7, 1, 3)}}, "expected tensor colors at"),
         ("model", {"tensors": {"mood": torch.zeros(3)}}, "expected tensors of a texgs model, got mood"),
         ("model", {"tensors": {"quats": torch.zeros(6, 4)}}, r"quats: expected \[7, 4\], got \[6, 4\]"),
@@ -135,14 +112,12 @@ NETWORKS = "expected the networks of a palette field"
         ("model", {"tensors": {"offsets": torch.arange(7) + 1000}}, ".* textures within the"),
         ("model", {"tensors": {"offsets": torch.zeros(7).long()}}, ".* texels of its own for every surfel"),
         ("gaussians", {"filter": {"antialiased": 1}}, f"expected {GAUSSIANS}"),
-        ("gaussians", {"filter": {"lens": 1}}, f"expected {GAUSSIANS}"),
-        ("gaussians", {"filter": []}, f"expected {GAUSSIANS}"),
         ("gaussians", {"filter": None}, f"expected {GAUSSIANS}"),
         ("gaussians", {"metadata": 3}, f"expected {GAUSSIANS}"),
         ("gaussians", {"tensors": {"means": None}}, "model: expected means, .*, sh, got"),
+        ("gaussians", {"tensors": {"sh": torch.zeros(7, 5, 3)}}, "sh: expected 1, 4, 9 or 16"),
         ("gaussians", {"tensors": {"mood": torch.zeros(3)}}, "model: expected means, .*, got .*mood"),
         ("gaussians", {"tensors": {"quats": torch.zeros(6, 4)}}, r"quats: expected \[7, 4\], got \[6, 4\]"),
-        ("gaussians", {"tensors": {"means": torch.Tensor.double}}, "means: expected torch.float32, got"),
         ("gaussians", {"tensors": {"scales": lambda x: x * torch.nan}}, "scales: .* finite .*, got 21 NaN"),
         ("voxels", {"tensors": {"sh": None}}, f"expected {VOXELS}"),
         ("voxels", {"tensors": SHORTER}, "sh: expected .* got"),
@@ -156,7 +131,6 @@ NETWORKS = "expected the networks of a palette field"
         ("palette", {"tensors": {"extra": torch.ones(1)}}, f"extra: {NETWORKS}"),
         ("palette", {"tensors": {"palette.colors": None}}, f"expected {PALETTE}"),
         ("palette", {"tensors": {"light.1": lambda x: x[:5]}}, r"light.1: .* \[64, 64\], got \[5, 64\]"),
-        ("palette", {"tensors": {"light.1": torch.Tensor.double}}, "light.1: expected float32"),
         ("palette", {"tensors": {"free.0": None}}, f"free.0: {NETWORKS}"),
         ("palette", {"tensors": SHORTER}, "masks: expected the bits of"),
         ("palette", {"tensors": {"trunk.0": lambda x: x * torch.inf}}, "trunk.0: expected finite"),
@@ -167,5 +141,4 @@ NETWORKS = "expected the networks of a palette field"
 def test_what_cannot_be_used_is_named(tmp_path, format, changes, message):
     make, write, read = FILES[f"texgs-{format}"]
     path = rewritten(write(tmp_path / "m", make()), f"texgs-{format}", **changes)
-    with pytest.raises(TexgsError, match=f"^{path}: {message}"):
-        read(path)
+    refused(lambda: read(path), f"^{path}: {message}", TexgsError)

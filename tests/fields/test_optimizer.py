@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from tests.devices import device  # noqa: F401, a fixture
-from tests.raster.requirements import require_same_bits
+from tests.raster.requirements import require_equal, require_same_bits
 from texgs.fields.optimizer import Optimizer, Rate
 
 
@@ -108,22 +108,13 @@ def test_autograd_sees_that_parameters_change():
         value.backward()
 
 
-def test_it_is_adam_with_a_rate_for_each_parameter():
-    optimizer = Optimizer(parameters(), RATES)
-    descend(optimizer, range(8))
-    assert_close(optimizer, oracle(range(8), parameters()))
-    rate = Rate(0.02, 0.01)
-    assert [rate.at(t) for t in (0.0, 0.5, 1.0)] == pytest.approx([0.02, 0.002, 0.0002])
-
-
 def test_parameters_without_a_rate_are_constant_and_given_ones_stay_untouched():
     given = parameters()
     optimizer = Optimizer(given, RATES)
     descend(optimizer, range(3))
     assert not optimizer.parameters["still"].requires_grad
     assert torch.equal(optimizer.parameters["still"], torch.ones(6))
-    for name, x in parameters().items():
-        assert torch.equal(given[name], x)
+    require_equal(given, parameters())
 
 
 def test_rows_that_stay_keep_their_moments_and_new_ones_have_none():
@@ -178,6 +169,4 @@ def test_a_restored_one_goes_on_bit_for_bit(steps):
     second.restore(state)
     for optimizer in (first, second):
         descend(optimizer, range(steps, 9))
-    assert first.state().keys() == second.state().keys()
-    for name, x in first.state().items():
-        assert torch.equal(second.state()[name], x), name
+    require_equal(second.state(), first.state())

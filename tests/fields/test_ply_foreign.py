@@ -10,12 +10,13 @@ from plyfile import PlyData, PlyElement
 
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.ply_files import columns_of, write_vertices
-from tests.fields.surfels.samples import STAGES, same
+from tests.fields.surfels.samples import same
 from tests.fields.surfels.samples import sample as surfels
 from tests.real_data import real_data
-from texgs.core.errors import ArgumentError, TexgsError
+from tests.refusals import refused
+from texgs.core.errors import TexgsError
 from texgs.core.ply_file import read_vertices
-from texgs.fields.gaussians import files
+from texgs.fields import gaussians as files
 from texgs.fields.surfels import ply
 
 KINDS = {"surfels": (lambda: surfels("surfels"), ply), "gaussians": (gaussians, files)}
@@ -48,39 +49,36 @@ def test_there_may_be_fewer_harmonics(written):
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("changes", "named"),
     [
         *(({name: None}, f"a number {name} each") for name in ("y", "opacity", "scale_1", "rot_3", "f_dc_1")),
-        ({"f_rest_44": None}, "expected 0, 9, 24 or 45 properties f_rest, got 44"),
-        ({"rot_3": np.full(7, np.nan)}, "quats: expected finite values, got 7 NaN"),
+        ({"f_rest_44": None}, "f_rest, got 44"),
+        ({"rot_3": np.full(7, np.nan)}, "quats: .*7 NaN"),
     ],
 )
-def test_what_is_no_model_is_named(written, changes, message):
+def test_what_is_no_model_is_named(written, changes, named):
     _, path, read_ply = written
     write_vertices(path, columns_of(path, **changes))
-    with pytest.raises(ArgumentError, match=f"^{path}: .*{message}"):
-        read_ply(path)
+    refused(lambda: read_ply(path), f"^{path}: .*{named}")
 
 
-def test_files_that_are_no_ply_are_named(written, tmp_path):
+def test_files_that_are_no_ply_or_cut_are_named(written, tmp_path):
     _, path, read_ply = written
-    with pytest.raises(ArgumentError, match="none: no such file"):
-        read_ply(tmp_path / "none")
-    with pytest.raises(ArgumentError, match="got a folder"):
-        read_ply(tmp_path)
+    refused(lambda: read_ply(tmp_path / "none"), "none: no such file")
+    refused(lambda: read_ply(tmp_path), "got a folder")
+    whole = path.read_bytes()
     negative = b"ply\nformat ascii 1.0\nelement vertex -5\nproperty float x\nend_header\n"
-    for content in (b"hello", bytes(range(256)), negative):
+    for content in (b"hello", bytes(range(256)), negative, *(whole[: len(whole) * k // 9] for k in range(9))):
         path.write_bytes(content)
-        with pytest.raises(TexgsError, match="expected a whole PLY file"):
-            read_ply(path)
-    PlyData([PlyElement.describe(np.zeros(1, [("a", "i4")]), "face")]).write(path)
-    with pytest.raises(ArgumentError, match="expected vertices, got face"):
-        read_ply(path)
-    array = np.empty(1, [("x", object), ("scale_0", "f4"), ("scale_1", "f4"), ("scale_2", "f4")])
-    array[0] = (np.zeros(2, np.float32), 0, 0, -20)
-    PlyData([PlyElement.describe(array, "vertex")]).write(path)
-    with pytest.raises(ArgumentError, match="a number x each"):
-        read_ply(path)
+        refused(lambda: read_ply(path), f"{path}: expected a whole PLY file", TexgsError)
+    lists = np.empty(1, [("x", object), ("scale_0", "f4"), ("scale_1", "f4"), ("scale_2", "f4")])
+    lists[0] = (np.zeros(2, np.float32), 0, 0, -20)
+    for values, kind, named in (
+        (np.zeros(1, [("a", "i4")]), "face", "got face"),
+        (lists, "vertex", "number x"),
+    ):
+        PlyData([PlyElement.describe(values, kind)]).write(path)
+        refused(lambda: read_ply(path), named)
 
 
 @pytest.mark.parametrize("kind", [{"text": True}, {"byte_order": "<"}, {"byte_order": ">"}])
@@ -106,16 +104,6 @@ def test_a_file_is_byte_for_byte_what_plyfile_writes(written, tmp_path):
     assert (tmp_path / "again.ply").read_bytes() == path.read_bytes()
 
 
-@pytest.mark.parametrize("stage", STAGES)
-@pytest.mark.parametrize("kept", [0, 0.05, 0.5, 0.999])
-def test_a_file_cut_anywhere_is_refused(tmp_path, stage, kept):
-    path = ply.write_ply(tmp_path / "m.ply", surfels(stage))
-    data = path.read_bytes()
-    path.write_bytes(data[: int(kept * len(data))])
-    with pytest.raises(ArgumentError, match="expected a whole PLY file"):
-        ply.read_ply(path)
-
-
 def test_the_release_clamps_colours_at_zero(tmp_path):
     path = ply.write_ply(tmp_path / "m.ply", surfels("shading", material="paper"), "release")
     dark = write_vertices(path, columns_of(path, f_dc_1=np.full(7, -3.0)))
@@ -125,26 +113,23 @@ def test_the_release_clamps_colours_at_zero(tmp_path):
 def test_what_a_flavour_cannot_express(tmp_path):
     model = surfels("shading", shared=True)
     sharp, bad = {"shininess": torch.tensor([3.0])}, {"means": torch.full((7, 3), math.nan)}
-    for changes, flavour, message in (
-        ({}, "4dgs", "flavour: expected 2dgs, 3dgs, release, got '4dgs'"),
-        (sharp, "release", r"shininess: expected less than 50.*got up to 95\.3"),
-        (bad, "2dgs", "means: expected finite values, got 21 NaN"),
+    for given, changes, flavour, named in (
+        (model, {}, "4dgs", "flavour: .*'4dgs'"),
+        (model, sharp, "release", "shininess: "),
+        (model, bad, "2dgs", "means: .*21 NaN"),
+        (surfels("surfels"), {}, "release", "got stage surfels"),
     ):
-        changed = replace(model, parameters={**model.parameters, **changes})
-        with pytest.raises(ArgumentError, match=message):
-            ply.write_ply(tmp_path / "m.ply", changed, flavour)
-    with pytest.raises(ArgumentError, match="release needs a model with shading, got stage surfels"):
-        ply.write_ply(tmp_path / "m.ply", surfels("surfels"), "release")
+        changed = replace(given, parameters={**given.parameters, **changes})
+        refused(lambda m=changed, f=flavour: ply.write_ply(tmp_path / "m.ply", m, f), named)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_volumes_of_3dgs_are_no_surfels(tmp_path):
     path = ply.write_ply(tmp_path / "m.ply", surfels("surfels"), "3dgs")
     write_vertices(path, columns_of(path, scale_2=np.r_[np.full(4, -4.0), np.full(3, -13.0)]))
-    with pytest.raises(ArgumentError, match="expected flat Gaussians, got 4 of 7 with a third axis"):
-        ply.read_ply(path)
+    refused(lambda: ply.read_ply(path), "got 4 of 7 with a third axis")
 
 
 def test_a_point_cloud_of_the_papers_data_is_no_model():
-    with pytest.raises(ArgumentError, match="expected vertices with a number scale_0 each, got x, y, z, nx"):
-        ply.read_ply(real_data("vortex/TF01/points3d.ply"))
+    path = real_data("vortex/TF01/points3d.ply")
+    refused(lambda: ply.read_ply(path), "number scale_0 each, got x, y, z, nx")

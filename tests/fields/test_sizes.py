@@ -6,12 +6,12 @@ import torch
 from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import STAGES, sample
 from texgs.core.memory import MIB
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians import Gaussians
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import network_shapes
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.voxels.model import Voxels
+from texgs.fields.voxels import Voxels
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import VoxelGrid
 
@@ -108,12 +108,3 @@ def test_stored_is_the_file_without_its_header(tmp_path, stage):
     groups = ("stored_geometry_mib", "stored_shading_mib", "stored_texture_mib")
     assert by_group["stored_total_mib"] == pytest.approx(sum(by_group[group] for group in groups))
     assert header < 2048
-
-
-def test_groups():
-    by_group = sample("shading", n=64, shared=True).sizes()
-    assert by_group["geometry_mib"] == 64 * 40 / MIB
-    assert by_group["shading_mib"] == 4 * 4 / MIB
-    assert by_group["stored_shading_mib"] == (64 * 12 + 4 * 4) / MIB
-    assert by_group["texture_mib"] == by_group["stored_texture_mib"] == 0
-    assert sample("surfels").sizes()["shading_mib"] == 0

@@ -66,13 +66,6 @@ def quality(field, images):
     return sum(psnr(color, images.target(i).color) for i, color in enumerate(seen)) / len(seen)
 
 
-def assert_same(tensors, expected):
-    """Both have the same names and bits."""
-    assert tensors.keys() == expected.keys()
-    for name, x in expected.items():
-        assert torch.equal(tensors[name], x), name
-
-
 def ball_seeds(count=80, seed=0, opacity=0.1):
     """Raw surfels with colours and one material at random points in a cube that holds the ball."""
     generator = torch.Generator().manual_seed(seed)

@@ -1,19 +1,19 @@
 import pytest
 import torch
 
-from texgs.fields.gaussians.model import Baked, Gaussians
+from tests.raster.requirements import require_equal
+from texgs.fields.gaussians import Baked, Gaussians
 from texgs.fields.splats import screen_box
 from texgs.fitting import checkpoint
-from texgs.fitting.kinds import FitTask
-from texgs.fitting.kinds.gaussians import FIT, GaussianKeys
+from texgs.fitting.gaussians import fit_gaussians, seed_gaussians
 from texgs.fitting.loop import Fit
-from texgs.fitting.seeds import seed_gaussians
-from texgs.fitting.settings import CommonRates, Densify, Seeds
+from texgs.fitting.settings import CommonRates, Densify, GaussianKeys, Seeds
+from texgs.fitting.task import FitTask
 from texgs.raster.shading import Y00
 from texgs.volume.generate import sphere
 from texgs.volume.view_set import ViewSet
 
-from .scenes import SIZE, assert_same, ball_images, is_finite, quality, run
+from .scenes import SIZE, ball_images, is_finite, quality, run
 
 SEEDS = Seeds(kind="hull", count=80, opacity=0.1, half_size=0.8)
 DENSIFY = Densify(start=20, stop=120, every=20, cap=150)  # no resets, after which images are pale
@@ -30,8 +30,8 @@ def task_of(folder, **keys):
 
 def test_it_fits_a_ball(tmp_path):
     task = task_of(tmp_path)
-    fitted = FIT.fit(task)
-    seeds = FIT.fit(task_of(tmp_path / "none", iterations=0)).field
+    fitted = fit_gaussians(task)
+    seeds = fit_gaussians(task_of(tmp_path / "none", iterations=0)).field
     assert quality(seeds, task.images) < 19
     assert quality(fitted.field, task.images) > 24
     assert 80 < len(fitted.field) <= 150
@@ -44,33 +44,34 @@ def test_it_fits_a_ball(tmp_path):
     "keys", [{"antialiased": True}, {"alpha": 0.1}, {"sh_degree": 1}, {"dssim": 1.0}, {"sh_degree": 0}]
 )
 def test_keys_reach_the_fit(tmp_path, keys):
-    field = FIT.fit(task_of(tmp_path, iterations=40, sh_every=10, **keys)).field
+    field = fit_gaussians(task_of(tmp_path, iterations=40, sh_every=10, **keys)).field
     assert field.shading == Baked(keys.get("antialiased", False))
     assert field.parameters["sh"].shape[1] == HARMONICS[keys.get("sh_degree", 3)]
-    plain = FIT.fit(task_of(tmp_path / "plain", iterations=40, sh_every=10)).field
+    plain = fit_gaussians(task_of(tmp_path / "plain", iterations=40, sh_every=10)).field
     assert not torch.equal(field.parameters["means"], plain.parameters["means"])
 
 
 def test_an_interrupted_fit_goes_on_to_the_same_bits(tmp_path):
-    whole = FIT.fit(task_of(tmp_path / "whole", iterations=60)).field
+    whole = fit_gaussians(task_of(tmp_path / "whole", iterations=60)).field
     task = task_of(tmp_path / "parts", iterations=60)
     start = seed_gaussians(task.images, task.views, SEEDS, 3, 0)
     half = run(Fit(start, Baked(), task.images, task.settings.phase, 0), 45)
     half.seconds = 1000.0
     checkpoint.save(task.output / checkpoint.FOLDER, half)
-    fitted = FIT.fit(task)
+    fitted = fit_gaussians(task)
     assert fitted.seconds > 1000
-    assert_same(fitted.field.parameters, whole.parameters)
+    require_equal(fitted.field.parameters, whole.parameters)
 
 
 def test_the_part_of_a_view_that_is_fitted_shows_all_gaussians(tmp_path):
     """The box of surfels is as good for Gaussians, whose filter is wider."""
+    images = ball_images()
     for seed in range(20):
         generator = torch.Generator().manual_seed(seed)
-        p = seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), SEEDS, 0, seed)
+        p = seed_gaussians(images, ViewSet(tmp_path, [], [], {}), SEEDS, 0, seed)
         p["scales"] = p["scales"] + 0.5 * torch.randn(80, 3, generator=generator)
         model = Gaussians({**p, "opacities": torch.full((80,), 4.0)})
-        camera = ball_images().cameras[seed % 6]
+        camera = images.cameras[seed % 6]
         box = screen_box(p, model.shading.options, camera).within(SIZE, SIZE)
         alpha = model.render(camera).alpha
         alpha[box.top : box.bottom, box.left : box.right] = 0

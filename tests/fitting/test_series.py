@@ -7,16 +7,17 @@ import pytest
 import torch
 
 from tests.fitting.short_fits import shorten
+from tests.refusals import refused
 from tests.scene.test_twin import LOOK
 from tests.volume.test_motion import TF, blob
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.light import HEADLIGHT
-from texgs.fitting import now, series
-from texgs.fitting.ends import Points
+from texgs.fitting import casting, series
+from texgs.fitting.casting import RayEnds
 from texgs.fitting.now import fit_now
 from texgs.fitting.series import Follower
+from texgs.metrics import quality
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
@@ -39,16 +40,15 @@ def key():
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """Steps of a second."""
-    monkeypatch.setattr(now, "FREQUENCY", 2)
-    for name, value in {"SIZE": 48, "ROUNDS": 2}.items():
+    monkeypatch.setattr(casting, "FREQUENCY", 2)
+    for name, value in {"VIEW_SIZE": 48, "ROUNDS": 2}.items():
         monkeypatch.setattr(series, name, value)
 
 
 def psnr(model, grid):
     camera = orbit(17, 23, 3.0, 30.0, 64, 64)
     seen = Caster(grid, LOOK).cast(TF, camera, HEADLIGHT).rgba
-    error = model.render(camera).color - seen[..., :3] - 1 + seen[..., 3:]
-    return float(-10 * error.square().mean().log10())
+    return quality.psnr(model.render(camera).color, seen[..., :3] + 1 - seen[..., 3:])
 
 
 def test_surfels_move_with_a_ball_and_all_else_stays(key):
@@ -103,7 +103,7 @@ def test_axes_are_carried_as_matter_is_turned_and_stretched():
         "scales": torch.tensor([[0.02, 0.03]]).log(),
         "normals": torch.tensor([[1.0, 0, 1, 0]]),  # along x
     }
-    carried = series.carried(p, moves)
+    carried = series.carry(p, moves)
     torch.testing.assert_close(carried["means"], p["means"] @ turn.T)
     axes = quats_to_matrices(carried["quats"])[0]
     torch.testing.assert_close(axes[:, 0], torch.tensor([0.0, 1, 0]), atol=1e-5, rtol=0)
@@ -115,28 +115,27 @@ def test_axes_are_carried_as_matter_is_turned_and_stretched():
 
 def test_surfels_that_show_least_are_planted_where_none_are(key):
     model, _ = key
-    flat = {**model.parameters, "colors": model.parameters["colors"] + series.plain_texture(model)}
+    flat = {**model.parameters, "colors": model.parameters["colors"] + series.mean_texture(model)}
     n = len(flat["means"])
     weights = torch.ones(n)
     weights[:7] = 0
     places = torch.cat([flat["means"][50:90], torch.full((300, 3), 0.4) + 0.01 * torch.rand(300, 3)])
-    points = Points(places, torch.tensor([[0.0, 0, 1]]).repeat(340, 1), torch.full((340, 3), 0.5))
-    planted = series.planted(flat, points, weights, 0)
+    points = RayEnds(places, torch.tensor([[0.0, 0, 1]]).repeat(340, 1), torch.full((340, 3), 0.5))
+    planted = series.plant(flat, points, weights, 0)
     changed = (planted["means"] != flat["means"]).any(dim=1)
     assert bool(changed[:7].all())
-    assert int(changed.sum()) == int(series.SHARE * n)
+    assert int(changed.sum()) == int(series.PLANTED_SHARE * n)
     assert bool((planted["means"][changed] > 0.3).all())
     assert planted.keys() == flat.keys()
 
 
 def test_other_lattices_and_models_without_shading_are_refused(key):
     model, before = key
-    with pytest.raises(ArgumentError, match=r"expected the samples of the other steps, .*resample"):
-        Follower(model, LOOK, TF).step(model, before, blob((0, 0, 0), sizes=(30, 30, 30)), "ball")
+    other = blob((0, 0, 0), sizes=(30, 30, 30))
+    refused(lambda: Follower(model, LOOK, TF).step(model, before, other, "ball"), "resample")
     p = {name: x for name, x in model.parameters.items() if name in ("means", "quats", "scales", "opacities")}
     early = replace(model, parameters={**p, "sh": torch.zeros(len(model), 1, 3)})
-    with pytest.raises(ArgumentError, match="expected stage shading or texture, got surfels"):
-        Follower(early, LOOK, TF)
+    refused(lambda: Follower(early, LOOK, TF), "got surfels")
 
 
 def test_matter_that_is_about_to_go_or_come_does_not_end_a_series(key):

@@ -18,18 +18,18 @@ from tests.fitting.scenes import (
     new_fit,
     run,
 )  # fmt: skip
-from texgs.core.errors import ArgumentError
+from tests.refusals import refused
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, in_full_light, material, raw_material
 from texgs.fields.surfels.texels import offsets_of
+from texgs.fitting.colors import mean_color
 from texgs.fitting.settings import TextureKeys
 from texgs.fitting.texels import (
     Sight,
-    look,
-    mean_color,
+    add_texture,
+    gather_sight,
     sizes_for_budget,
     sizes_where_seen,
-    textured,
     texturize,
 )
 from texgs.raster.arguments import check_texture
@@ -101,8 +101,8 @@ def test_look_sees_the_size_of_pixels_and_what_is_hidden():
     p["opacities"] = torch.full((20,), 8.0)
     p["means"][0] = torch.tensor([0.0, 50.0, 0.0])  # in no view
     views = cameras()
-    seen = look(
-        textured(Surfels(p, ShadingModel()), torch.zeros(3), torch.ones(20, 2, dtype=torch.int32)),
+    seen = gather_sight(
+        add_texture(Surfels(p, ShadingModel()), torch.zeros(3), torch.ones(20, 2, dtype=torch.int32)),
         ball_images(),
         "",
     )
@@ -156,20 +156,14 @@ def test_same_seed_same_texels(ball, images):
     assert not torch.equal(first.parameters["texels"], other.parameters["texels"])
 
 
-def test_a_model_of_another_stage_is_refused(ball, images):
+def test_models_of_another_stage_and_budgets_that_cannot_be_had(ball, images):
     p = {name: ball.parameters[name] for name in ("means", "quats", "scales", "opacities")}
-    with pytest.raises(ArgumentError, match="expected stage shading, got surfels"):
-        texturize(Surfels({**p, "sh": torch.zeros(len(ball), 1, 3)}), images, TextureKeys())
-    with pytest.raises(ArgumentError, match="expected stage shading, got texture"):
-        texturize(texturize(ball, images, TextureKeys(sweeps=0)), images, TextureKeys())
-
-
-@pytest.mark.parametrize(
-    ("texels", "message"), [(0, "at least 1, got 0"), (2**25, r"at most 2\^24 for one surfel, got")]
-)
-def test_budgets_that_cannot_be_had(texels, message):
-    with pytest.raises(ArgumentError, match=f"texels: expected {message}"):
-        sizes_for_budget(torch.tensor([[1.0, 1.0]]), texels)
+    early = Surfels({**p, "sh": torch.zeros(len(ball), 1, 3)})
+    late = texturize(ball, images, TextureKeys(sweeps=0))
+    refused(lambda: texturize(early, images, TextureKeys()), "stage shading, got surfels")
+    refused(lambda: texturize(late, images, TextureKeys()), "stage shading, got texture")
+    for texels in (0, 2**25):
+        refused(lambda texels=texels: sizes_for_budget(torch.tensor([[1.0, 1.0]]), texels), "texels: ")
 
 
 @pytest.mark.parametrize("rows", [1, None])

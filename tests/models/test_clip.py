@@ -6,7 +6,8 @@ import torch
 from torch.nn.functional import interpolate, normalize
 
 from tests.models.clips import write_clip
-from texgs.core.errors import ArgumentError, MissingDataError, ShapeError
+from tests.refusals import refused
+from texgs.core.errors import ShapeError
 from texgs.edit.objective import ClipLoss
 from texgs.models.clip import DEVIATION, MEAN, Clip, clip_scores, direction, similarity
 
@@ -93,14 +94,10 @@ def test_directions_in_closed_form():
 
 
 def test_scores_that_cannot_be_computed(clip):
-    with pytest.raises(ArgumentError, match="as many of the edited scene as of the original, got 1 and 2"):
-        clip_scores(clip, [image(0)], [image(0)] * 2, *TEXTS)
-    with pytest.raises(ArgumentError, match="got 0 and 0"):
-        clip_scores(clip, [], [], *TEXTS)
-    with pytest.raises(ArgumentError, match="texts: expected words in each, got an empty one"):
-        clip_scores(clip, [image(0)], [image(0)], " ", "a beetle")
-    with pytest.raises(ShapeError, match=r"text: expected \[24\], got \[12\]"):
-        similarity(torch.ones(2, 24), torch.ones(12))
+    refused(lambda: clip_scores(clip, [image(0)], [image(0)] * 2, *TEXTS), "got 1 and 2")
+    refused(lambda: clip_scores(clip, [], [], *TEXTS), "got 0 and 0")
+    refused(lambda: clip_scores(clip, [image(0)], [image(0)], " ", "a beetle"), "texts: ")
+    refused(lambda: similarity(torch.ones(2, 24), torch.ones(12)), "text: ", ShapeError)
 
 
 def test_long_texts_are_cut_off(clip):
@@ -122,21 +119,11 @@ def test_the_loss_is_the_distance_of_features_of_whole_images_and_falls_along_it
     assert loss(picture.detach() - 0.5 * gradient / gradient.norm()) < before
 
 
-def test_weights_that_are_missing_or_of_another_model(folder, tmp_path, monkeypatch):
-    def refused(*_, **__):
-        raise OSError("no way out")
-
+def test_weights_that_are_of_another_model_or_damaged(folder, tmp_path, monkeypatch):
     monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path / "none"))
-    with pytest.raises(ArgumentError, match=r"weights: expected one of .*clip-vit-base-.*, got 'clip'"):
-        Clip.load("clip")
-    monkeypatch.setenv("HF_HOME", str(tmp_path / "hub"))
-    monkeypatch.setattr("huggingface_hub.snapshot_download", refused)
-    with pytest.raises(MissingDataError, match=r"clip-vit-large-patch14: its weights .* TEXGS_WEIGHTS"):
-        Clip.load("clip-vit-large-patch14")
+    refused(lambda: Clip.load("clip"), "weights: .*clip-vit-base-.*'clip'")
     (tmp_path / "config.json").write_text('{"model_type": "siglip"}')
-    with pytest.raises(ArgumentError, match="expected a model of type clip, got siglip"):
-        Clip.load(tmp_path)
+    refused(lambda: Clip.load(tmp_path), "type clip, got siglip")
     (tmp_path / "config.json").write_text((folder / "config.json").read_text())
     (tmp_path / "model.safetensors").write_bytes((folder / "model.safetensors").read_bytes()[:99])
-    with pytest.raises(ArgumentError, match=r"expected a clip model of transformers, got .*; copy"):
-        Clip.load(tmp_path)
+    refused(lambda: Clip.load(tmp_path), "clip model of transformers")

@@ -5,8 +5,8 @@ import torch
 
 from tests.edit.guidances import Tint
 from tests.models.views_of import random_views
+from tests.refusals import refused
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
 from texgs.models.filters import ProceduralFilters
 from texgs.models.guidance import Disagreeing
 
@@ -27,8 +27,7 @@ def test_without_an_amount_it_is_the_other_guidance():
     edited = Disagreeing(filters, 0.0)(views, "a stipple drawing", generator())
     torch.testing.assert_close(edited, filters(views, "a stipple drawing", generator()))
     assert Disagreeing(filters, 0.0).lit == filters.lit
-    with pytest.raises(ArgumentError, match="disagreement: expected 0 or more, got -1"):
-        Disagreeing(filters, -1)
+    refused(lambda: Disagreeing(filters, -1), "disagreement: ")
 
 
 def test_colours_are_off_by_a_factor_for_each_view_and_channel_and_white_stays():

@@ -14,10 +14,10 @@ from PIL import Image
 from torch.testing import assert_close
 
 from tests.models.servers import replies, served
-from tests.models.tiny_pipelines import save_klein, save_sdxl, tiny_qwen
+from tests.models.tiny_pipelines import save_klein, save_sdxl
 from tests.models.views_of import random_views
+from tests.refusals import refused
 from tests.toys.editor import Editor
-from texgs.core.errors import ArgumentError
 from texgs.models import editors
 from texgs.models.editors import Endpoint, ImagePipeline
 from texgs.models.instruct_pix2pix import NO_LIGHT
@@ -48,17 +48,17 @@ def pipelines(folders):
     return {name: ImagePipeline.open(folder, name, CPU, steps=4) for name, folder in folders.items()}
 
 
-def test_each_folder_becomes_the_pipeline_that_edits_images(pipelines):
-    assert {name: type(editor.pipeline).__name__ for name, editor in pipelines.items()} == {
-        "sdxl": "StableDiffusionXLInstructPix2PixPipeline",
-        "klein": "Flux2KleinPipeline",
-        "turbo": "StableDiffusionXLImg2ImgPipeline",
-    }
+CLASSES = {
+    "sdxl": "StableDiffusionXLInstructPix2PixPipeline",
+    "klein": "Flux2KleinPipeline",
+    "turbo": "StableDiffusionXLImg2ImgPipeline",
+}
 
 
-@pytest.mark.parametrize("name", ["sdxl", "klein", "turbo"])
+@pytest.mark.parametrize("name", CLASSES)
 def test_the_same_seed_gives_the_same_images_of_the_size_of_the_views(pipelines, name):
     editor, views = pipelines[name], random_views(2, height=70, width=100)
+    assert type(editor.pipeline).__name__ == CLASSES[name]
     first = editor(views, "make it gold", seeded(4))
     assert first.shape == views.images.shape
     assert bool(first.isfinite().all())
@@ -67,25 +67,10 @@ def test_the_same_seed_gives_the_same_images_of_the_size_of_the_views(pipelines,
     assert not torch.equal(first, editor(views, "light", seeded(4)))
 
 
-def test_views_that_are_alike_are_edited_alike(pipelines):
-    """All have the same noise."""
-    views = random_views(2)
-    views = replace(views, images=views.images[:1].expand(2, -1, -1, -1))
-    one, other = pipelines["sdxl"](views, "make it gold", seeded())
-    assert torch.equal(one, other)
-
-
-def test_qwen_image_edit_is_asked_as_its_pipeline_asks(monkeypatch, tmp_path):
-    pytest.importorskip("diffusers")
-    pipeline = tiny_qwen(monkeypatch, tmp_path / "words")
-    editor = ImagePipeline(pipeline, "qwen", steps=2, text_scale=3.0)
+def test_qwen_image_edit_is_asked_by_its_own_name_of_the_scale():
+    qwen = type("Qwen", (), {"__call__": pytest.importorskip("diffusers").QwenImageEditPipeline.__call__})
+    editor = ImagePipeline(qwen(), "qwen", steps=2, text_scale=3.0)
     assert editor.options == {"num_inference_steps": 2, "true_cfg_scale": 3.0, "negative_prompt": NO_LIGHT}
-    views = random_views(1, height=64, width=80)
-    edited = editor(views, "make it gold", seeded())
-    assert edited.shape == views.images.shape
-    assert torch.equal(edited, editor(views, "make it gold", seeded()))
-    plain = ImagePipeline(pipeline, "qwen", steps=2, text_scale=1.0)(views, "make it gold", seeded())
-    assert not torch.equal(edited, plain)
 
 
 class Recording:
@@ -138,44 +123,26 @@ def test_what_comes_back_lies_where_it_lay_at_the_size_of_the_view(shrink):
 
 @pytest.mark.parametrize(
     ("name", "key", "value", "argument"),
-    [
-        ("klein", "image_scale", 1.0, "image_guidance_scale"),
-        ("turbo", "image_scale", 1.0, "image_guidance_scale"),
-        ("klein", "negative", "fog", "negative_prompt"),
-    ],
+    [("turbo", "image_scale", 1.0, "image_guidance_scale"), ("klein", "negative", "fog", "negative_prompt")],
 )
 def test_what_a_pipeline_cannot_take_is_said(pipelines, name, key, value, argument):
-    with pytest.raises(ArgumentError) as caught:
-        ImagePipeline(pipelines[name].pipeline, name, **{key: value})
-    assert str(caught.value) == f"{key}: expected none, as {name} takes no {argument}; leave {key} out"
+    refused(lambda: ImagePipeline(pipelines[name].pipeline, name, **{key: value}), f"{key}: .* no {argument}")
 
 
-def test_folders_that_hold_no_such_pipeline_are_refused_in_a_sentence(folders, tmp_path, monkeypatch):
-    with pytest.raises(ArgumentError, match=r"expected a pipeline of diffusers .* no file named model_index"):
-        ImagePipeline.open(tmp_path, "x", CPU)
+def test_folders_that_hold_no_such_pipeline_are_refused(folders, tmp_path, monkeypatch):
+    refused(lambda: ImagePipeline.open(tmp_path, "x", CPU), "no file named model_index")
     (tmp_path / "model_index.json").write_text('{"_class_name": "NoSuchPipeline"}')
-    with pytest.raises(ArgumentError, match=r"got .*NoSuchPipeline; copy it again, install what it needs"):
-        ImagePipeline.open(tmp_path, "x", CPU)
-    from diffusers import DDPMPipeline, DDPMScheduler, UNet2DModel
-
-    blocks = {"down_block_types": ("DownBlock2D",), "up_block_types": ("UpBlock2D",)}
-    unet = UNet2DModel(8, block_out_channels=(8,), norm_num_groups=4, layers_per_block=1, **blocks)
-    DDPMPipeline(unet, DDPMScheduler()).save_pretrained(tmp_path / "ddpm")
-    with pytest.raises(ArgumentError, match=r"that edits images, got .*DDPMPipeline.*; copy it"):
-        ImagePipeline.open(tmp_path / "ddpm", "x", CPU)
+    refused(lambda: ImagePipeline.open(tmp_path, "x", CPU), "NoSuchPipeline")
     monkeypatch.setitem(sys.modules, "diffusers", None)
-    with pytest.raises(ArgumentError, match=r"got .*diffusers.*\(pip install '\.\[models\]'\)"):
-        ImagePipeline.open(folders["sdxl"], "x", CPU)
+    refused(lambda: ImagePipeline.open(folders["sdxl"], "x", CPU), r"pip install '\.\[models\]'")
 
 
-def test_what_a_pipeline_trips_over_is_one_sentence(pipelines):
+def test_what_a_pipeline_trips_over_names_it(pipelines):
     views = random_views(1)
-    with pytest.raises(ArgumentError, match=r"expected an edited view of turbo, got .*; change the edit"):
-        pipelines["turbo"](replace(views, level=0.0), "make it gold", seeded())
-    with pytest.raises(ArgumentError, match=r"expected an edited view of x, got .*; change the edit"):
-        ImagePipeline(Recording(lambda image: np.zeros(3)), "x")(views, "make it gold", seeded())
-    with pytest.raises(ArgumentError, match="expected what to do in words"):
-        pipelines["sdxl"](views, "  ", seeded())
+    nothing, broken = replace(views, level=0.0), ImagePipeline(Recording(lambda image: np.zeros(3)), "x")
+    refused(lambda: pipelines["turbo"](nothing, "make it gold", seeded()), "edited view of turbo")
+    refused(lambda: broken(views, "make it gold", seeded()), "edited view of x")
+    refused(lambda: pipelines["sdxl"](views, "  ", seeded()), "what to do in words")
 
 
 def test_the_server_of_the_documentation_edits_views(capfd):
@@ -214,55 +181,32 @@ def png(size=(32, 24), mode="RGB"):
 
 
 @pytest.mark.parametrize(
-    ("status", "reason", "body", "message"),
+    ("status", "body", "named"),
     [
-        (500, "the GPU is full", b"", "got HTTP Error 500: the GPU is full;"),
-        (404, "Not Found", b"", "got HTTP Error 404: Not Found;"),
-        (503, "Busy", b'{"error": "out of memory"}', 'got HTTP Error 503: Busy, {"error": "out of memory"};'),
-        (200, "OK", b'{"error": "out of memory"}', 'got {"error": "out of memory"};'),
-        (200, "OK", b"<html>", "got Expecting value: line 1 column 1"),
-        (200, "OK", b"[]", r"got \[\];"),
-        (200, "OK", b"{}", "got {};"),
-        (
-            200,
-            "OK",
-            b'{"image": 3}',
-            "got argument should be a bytes-like object or ASCII string, not 'i",
-        ),
-        (200, "OK", b'{"image": "!"}', "got .*"),
-        (200, "OK", b'{"image": "aaaa"}', "got cannot identify image file"),
-        (200, "OK", json.dumps({"image": png()[:60]}).encode(), "got .*"),
-        (200, "OK", json.dumps({"image": png((16, 24))}).encode(), "got RGB of 16 x 24 for RGB of 32 x 24;"),
-        (
-            200,
-            "OK",
-            json.dumps({"image": png(mode="RGBA")}).encode(),
-            "got RGBA of 32 x 24 for RGB of 32",
-        ),
+        (500, b"", "HTTP Error 500: why"),
+        (503, b"out of memory", "HTTP Error 503: why, out of memory"),
+        (200, b'{"error": "out of memory"}', "out of memory"),
+        (200, b"<html>", "line 1 column 1"),
+        (200, b'{"image": 3}', "bytes-like"),
+        (200, b'{"image": "aaaa"}', "cannot identify"),
+        (200, json.dumps({"image": png()[:60]}).encode(), ""),
+        (200, json.dumps({"image": png((16, 24))}).encode(), "RGB of 16 x 24 for RGB of 32 x 24"),
+        (200, json.dumps({"image": png(mode="RGBA")}).encode(), "RGBA of 32 x 24 for RGB"),
     ],
 )
-def test_what_a_server_does_wrong_is_one_sentence_and_nothing_is_tried_again(status, reason, body, message):
+def test_what_a_server_does_wrong_is_told_and_nothing_is_tried_again(status, body, named):
     count = []
-
-    def reply(_):
-        count.append(1)
-        return status, reason, body
-
-    expected = r'http://127\.0\.0\.1:\d+/edit: expected \{"image": a PNG in base64\}, '
-    with served(replies(reply)) as address, pytest.raises(ArgumentError, match=expected + message) as caught:
-        Endpoint(address, {})(random_views(1), "make it gold", seeded())
-    assert str(caught.value).endswith("; does the server run there, and reply as docs/extend.md says?")
+    with served(replies(lambda _: count.append(1) or (status, "why", body))) as address:
+        refused(
+            lambda: Endpoint(address, {})(random_views(1), "make it gold", seeded()), f"{address}: .*{named}"
+        )
     assert len(count) == 1
 
 
-def test_no_server_and_a_silent_one_are_one_sentence(monkeypatch):
+def test_no_server_and_a_silent_one_are_told(monkeypatch):
     with served(Editor) as address:
         pass  # it is gone afterwards
-    with pytest.raises(ArgumentError, match=r"edit: expected .*, got <urlopen error .*Connection refused>; "):
-        Endpoint(address, {})(random_views(1), "make it gold", seeded())
+    refused(lambda: Endpoint(address, {})(random_views(1), "make it gold", seeded()), "Connection refused")
     monkeypatch.setattr(editors, "TIMEOUT", 0.1)
-    with (
-        served(replies(lambda body: time.sleep(0.5) or (200, "OK", b""))) as address,
-        pytest.raises(ArgumentError, match=r"edit: expected .*, got timed out; does the server run there"),
-    ):
-        Endpoint(address, {})(random_views(1), "make it gold", seeded())
+    with served(replies(lambda body: time.sleep(0.5) or (200, "OK", b""))) as address:
+        refused(lambda: Endpoint(address, {})(random_views(1), "make it gold", seeded()), "timed out")

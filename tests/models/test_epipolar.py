@@ -9,8 +9,8 @@ from torch.nn.functional import cosine_similarity
 from torch.testing import assert_close
 
 from tests.models.tiny_diffusion import save_tiny
+from tests.refusals import refused
 from texgs.core.camera import Camera, orbit
-from texgs.core.errors import ArgumentError
 from texgs.models import epipolar
 from texgs.models.epipolar import Consistency, epipolar_mask
 
@@ -183,5 +183,4 @@ def test_the_two_nearest_keys_share_by_their_distances(unet):
 def test_a_network_without_self_attention_is_refused():
     network = torch.nn.Identity()
     network.attn_processors = {"mid.attn2.processor": None}
-    with pytest.raises(ArgumentError, match="UNet with self-attention"):
-        Consistency(network)
+    refused(lambda: Consistency(network), "self-attention")

@@ -4,6 +4,7 @@ from torch.nn.functional import avg_pool2d, conv2d, pad
 
 from tests.models.networks import outputs, random_weights
 from tests.real_data import real_data
+from tests.refusals import refused
 from texgs.core.errors import ShapeError
 from texgs.models.lpips import LAYERS, Lpips
 
@@ -40,10 +41,8 @@ def test_the_distance_is_the_published_one(files):
     assert float(lpips.distance(image, image)) == 0
     fastest = Lpips.load(folder / "vgg.pth", folder / "heads.pth", dtype=None)
     assert fastest.vgg.dtype == torch.float32  # on a CPU, also where that multiplies bfloat16 itself
-    with pytest.raises(ShapeError, match=r"other: expected \[1, 32, 40, 3\]"):
-        lpips.distance(image, other[:20])
-    with pytest.raises(ShapeError, match=r"image: expected \[N, H, W, 3\], got \[32, 40\]"):
-        lpips.distance(image[..., 0], other[..., 0])
+    refused(lambda: lpips.distance(image, other[:20]), "other: ", ShapeError)
+    refused(lambda: lpips.distance(image[..., 0], other[..., 0]), "image: ", ShapeError)
 
 
 @pytest.mark.parametrize(
@@ -67,8 +66,7 @@ def test_an_image_that_differs_in_a_part_has_the_same_distance(files, rows, colu
 def test_heads_of_another_backbone_are_refused(files, tmp_path):
     folder, heads = files
     torch.save({**heads, "lin1.model.1.weight": torch.ones(1, 192, 1, 1)}, tmp_path / "alex.pth")
-    with pytest.raises(ShapeError, match=r"alex\.pth: lin1\.model\.1\.weight: expected \[128\]"):
-        Lpips.load(folder / "vgg.pth", tmp_path / "alex.pth")
+    refused(lambda: Lpips.load(folder / "vgg.pth", tmp_path / "alex.pth"), r"alex\.pth: lin1", ShapeError)
 
 
 def test_real_weights_find_a_blur_worse_than_a_shade(monkeypatch):

@@ -1,3 +1,7 @@
+"""Files of weights, formats of numbers, and VGG-16 against torchvision's list of modules."""
+
+from pathlib import Path
+
 import pytest
 import torch
 from safetensors.torch import save_file
@@ -5,8 +9,72 @@ from torch.testing import assert_close
 
 from tests.models.networks import outputs, random_weights
 from tests.real_data import real_data
-from texgs.core.errors import ArgumentError, ShapeError
+from tests.refusals import refused
+from texgs.core.errors import ShapeError
+from texgs.models import networks
+from texgs.models.networks import read_tensors
 from texgs.models.vgg import Vgg
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("processor : 0\nflags\t\t: fpu avx512f avx512_bf16 amx_tile\n", torch.bfloat16),
+        ("Features : asimd sve bf16\n", torch.bfloat16),
+        ("flags : fpu avx2 avx512f\nbugs : bf16\n", torch.float32),
+        ("", torch.float32),
+    ],
+)
+def test_the_format_is_what_the_processor_says(tmp_path, monkeypatch, text, expected):
+    (tmp_path / "cpuinfo").write_text(text)
+    monkeypatch.setattr(networks, "CPUINFO", tmp_path / "cpuinfo")
+    networks.has_bfloat16.cache_clear()
+    assert networks.fast_dtype("cpu") == expected
+    assert networks.fast_dtype(torch.device("cuda")) == torch.float16
+    monkeypatch.setattr(networks, "CPUINFO", tmp_path / "none")
+    networks.has_bfloat16.cache_clear()
+    assert networks.fast_dtype("cpu") == torch.float32
+    networks.has_bfloat16.cache_clear()
+
+
+def test_only_the_tensors_asked_for_come_back(tmp_path):
+    tensors = {"a": torch.arange(3.0), "b": torch.ones(2, 2)}
+    save_file(tensors, tmp_path / "x.safetensors")
+    torch.save(tensors, tmp_path / "x.pth")
+    torch.save(tensors, tmp_path / "old.pth", _use_new_zipfile_serialization=False)
+    for name in ("x.safetensors", "x.pth", "old.pth"):
+        assert read_tensors(tmp_path / name).keys() == tensors.keys()
+        read = read_tensors(tmp_path / name, ["b"])
+        assert list(read) == ["b"]
+        assert torch.equal(read["b"], tensors["b"])
+        refused(lambda name=name: read_tensors(tmp_path / name, ["b", "c"]), f"{name}: .* tensor c")
+
+
+class Harmful:
+    def __reduce__(self):
+        return (Path.touch, (Path("harm"),))
+
+
+def test_a_damaged_file_and_one_that_holds_code_are_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    torch.save({"a": torch.ones(1000), "b": Harmful()}, tmp_path / "code.pth")
+    torch.save({"a": torch.ones(1000)}, tmp_path / "x.pth")
+    save_file({"a": torch.ones(1000)}, tmp_path / "x.safetensors")
+    bad = [tmp_path / "code.pth"]
+    for path in (tmp_path / "x.pth", tmp_path / "x.safetensors"):
+        whole = path.read_bytes()
+        for kind, content in (
+            ("cut", whole[: len(whole) // 2]),
+            ("text", b"<html>not found</html>"),
+            ("empty", b""),
+        ):
+            bad.append(path.with_stem(kind))
+            bad[-1].write_bytes(content)
+    for path in bad:
+        refused(lambda path=path: read_tensors(path), f"{path}: expected a file of weights")
+    assert not Path("harm").exists()
+    refused(lambda: read_tensors(tmp_path / "gone.pth"), r"gone\.pth: no such file")
+
 
 STYLE = {11: "relu3_1", 13: "relu3_2", 15: "relu3_3"}  # by index of the module in torchvision's list
 
@@ -71,11 +139,9 @@ def test_layers_of_several_blocks_come_one_by_one_or_joined_by_their_stride(file
 def test_weights_of_something_else_are_refused(tmp_path):
     weights = random_weights(last=14)
     torch.save({name: x for name, x in weights.items() if "14" not in name}, tmp_path / "short.pth")
-    with pytest.raises(ArgumentError, match=r"short\.pth: expected tensor features\.14\.weight"):
-        Vgg.load(tmp_path / "short.pth")
+    refused(lambda: Vgg.load(tmp_path / "short.pth"), r"short\.pth: .* features\.14\.weight")
     torch.save({**weights, "features.5.weight": torch.ones(128, 32, 3, 3)}, tmp_path / "other.pth")
-    with pytest.raises(ShapeError, match=r"other\.pth: features\.5\.weight: expected \[128, 64, 3, 3\]"):
-        Vgg.load(tmp_path / "other.pth")
+    refused(lambda: Vgg.load(tmp_path / "other.pth"), r"other\.pth: features\.5\.weight", ShapeError)
 
 
 def test_real_weights_tell_an_edge_from_noise():

@@ -9,7 +9,7 @@ from tests.models.tiny_diffusion import WORDS
 
 VAE = {"block_out_channels": (8, 8, 8, 8), "norm_num_groups": 4}
 VAE |= {"down_block_types": ("DownEncoderBlock2D",) * 4, "up_block_types": ("UpDecoderBlock2D",) * 4}
-QWEN = ("<|endoftext|>", "<|im_start|>", "<|im_end|>", "<|vision_start|>", "<|vision_end|>", "<|image_pad|>")
+QWEN = ("<|endoftext|>", "<|im_start|>", "<|im_end|>")
 CHAT = "{% for m in messages %}<|im_start|>{{ m['content'] }}<|im_end|>{% endfor %}"
 
 
@@ -61,60 +61,6 @@ def save_klein(folder):
         is_distilled=True,
     ).save_pretrained(folder, max_shard_size="20KB")
     return folder
-
-
-def tiny_qwen(monkeypatch, folder):
-    """Return Qwen-Image-Edit, which works at 64 pixels for 1024.
-
-    Its processor in transformers needs torchvision, for videos: here are its tokenizer and its images alone.
-    """
-    import diffusers
-    from diffusers.pipelines.qwenimage import pipeline_qwenimage_edit
-    from transformers import Qwen2_5_VLConfig, Qwen2_5_VLForConditionalGeneration
-
-    torch.manual_seed(0)
-    tokenizer = qwen_tokenizer(folder)
-    ids = dict(zip(QWEN, tokenizer.convert_tokens_to_ids(QWEN), strict=True))
-    small = {"hidden_size": 16, "intermediate_size": 16}
-    words = small | {"num_hidden_layers": 2, "num_attention_heads": 2, "num_key_value_heads": 2}
-    words |= {"vocab_size": 600, "rope_scaling": {"rope_type": "default", "mrope_section": [1, 1, 2]}}
-    config = Qwen2_5_VLConfig(
-        text_config=words,
-        vision_config=small | {"depth": 1, "num_heads": 2, "out_hidden_size": 16},
-        image_token_id=ids["<|image_pad|>"],
-        vision_start_token_id=ids["<|vision_start|>"],
-        vision_end_token_id=ids["<|vision_end|>"],
-    )
-    transformer = {"patch_size": 2, "in_channels": 16, "out_channels": 4, "num_layers": 1}
-    transformer |= {"attention_head_dim": 16, "num_attention_heads": 2, "joint_attention_dim": 16}
-    vae = {"base_dim": 8, "z_dim": 4, "dim_mult": [1, 1, 1, 1], "num_res_blocks": 1}
-    vae |= {"latents_mean": [0.0] * 4, "latents_std": [1.0] * 4}
-    exact = pipeline_qwenimage_edit.calculate_dimensions
-    smaller = pipeline_qwenimage_edit.__name__ + ".calculate_dimensions"
-    monkeypatch.setattr(smaller, lambda area, ratio: exact(area / 256, ratio))
-    return diffusers.QwenImageEditPipeline(
-        scheduler=diffusers.FlowMatchEulerDiscreteScheduler(),
-        vae=diffusers.AutoencoderKLQwenImage(**vae),
-        text_encoder=Qwen2_5_VLForConditionalGeneration(config),
-        tokenizer=tokenizer,
-        processor=WithoutVideos(tokenizer),
-        transformer=diffusers.QwenImageTransformer2DModel(**transformer, axes_dims_rope=(8, 4, 4)),
-    )
-
-
-class WithoutVideos:
-    """What Qwen2VLProcessor does with a prompt and an image."""
-
-    def __init__(self, tokenizer):
-        from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLImageProcessorPil
-
-        self.tokenizer, self.images = tokenizer, Qwen2VLImageProcessorPil()
-
-    def __call__(self, text, images, **options):
-        pixels = self.images(images=images, return_tensors="pt")
-        count = int(pixels["image_grid_thw"].prod()) // self.images.merge_size**2
-        text = [words.replace("<|image_pad|>", count * "<|image_pad|>") for words in text]
-        return pixels | self.tokenizer(text, **options)
 
 
 def qwen_tokenizer(folder):

@@ -9,9 +9,9 @@ from torch.nn.functional import normalize
 
 from texgs.core.camera import orbit, orbit_direction
 from texgs.raster import hash_encoding, losses, shading
-from texgs.raster.reference import hash_encoding as hash_definition
 from texgs.raster.reference import losses as loss_definition
 from texgs.raster.reference import shading as shading_definition
+from texgs.raster.reference import voxels as hash_definition
 from texgs.raster.shading import MATERIAL
 
 CAMERA = torch.tensor([0.5, 1.0, 3.0])
@@ -131,7 +131,7 @@ def of_shading(light, facing):
     inputs, leaves = partial(surfels, light=light), ("color", *MATERIAL, "means", "quats")
     large = (5000, ("diffuse", "shininess"))
     # a power of 40 amplifies the rounding of its base and of log2 as much
-    return Operation(*functions, inputs, leaves, constants, sizes, (12,), large, (2e-6, 1e-5))
+    return Operation(*functions, inputs, leaves, constants, sizes, (5,), large, (2e-6, 1e-5))
 
 
 IMAGES = (pair, ("image",), ("target",))
@@ -169,7 +169,7 @@ OPERATIONS = {
         *(partial(shading.blinn_phong, facing=True, ranges=RANGES), raw_blinn_phong, raw_surfels),
         *(("color", *MATERIAL, "means", "quats"), ("camera_position", "light")),
         tuple((n, shared) for n in (1, 17, 3001) for shared in ((), MATERIAL)),
-        *((12,), (5000, ("diffuse", "shininess")), (2e-6, 1e-5)),
+        *((5,), (5000, ("diffuse", "shininess")), (2e-6, 1e-5)),
     ),
     "spherical_harmonics": Operation(
         *(shading.spherical_harmonics, shading_definition.spherical_harmonics, harmonics),

@@ -1,8 +1,7 @@
-"""What tests require: the same bits on any number of threads, and one sentence for what is refused."""
+"""What tests require: the same bits on any number of threads."""
 
 from collections.abc import Mapping
 
-import pytest
 import torch
 
 
@@ -25,7 +24,8 @@ def require_same_bits(function, *arguments, threads=(2, 7)):
             assert torch.equal(value, alone[name]), f"{name} with {n} threads"
 
 
-def refuses(error, message, function, *arguments, **settings):
-    """Require that a call raises an error whose message matches."""
-    with pytest.raises(error, match=message):
-        function(*arguments, **settings)
+def require_equal(results, expected):
+    """Require the same tensors by name, bit for bit."""
+    assert results.keys() == expected.keys()
+    for name, value in expected.items():
+        assert torch.equal(results[name], value), name

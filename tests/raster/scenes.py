@@ -218,7 +218,7 @@ HARD_CASES: dict[str, Callable[[], Scene]] = {
     "opacity 1": lambda: few().with_leaves({"opacities": torch.ones(12)}),
     "coincident depths": _coincident,
     "1x1 image": lambda: few(width=1, height=1),
-    "641x359 image": lambda: few(n=4, width=641, height=359),
+    "161x89 image": lambda: few(n=4, width=161, height=89),
     "1x200 image": lambda: few(width=1, height=200),
     "far off the image": lambda: few().with_leaves({"means": few().means + 4 * few().viewmat[0, :3]}),
 }

@@ -8,11 +8,12 @@ import pytest
 import torch
 
 from tests.raster.agreement import gradients, images, names_of, random_cotangents
-from tests.raster.requirements import refuses
+from tests.raster.requirements import require_equal
 from tests.raster.scenes import gaussians, random_scene, textured, textured_with_features
+from tests.refusals import refused
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
 from texgs.raster import autograd, native
-from texgs.raster.api import rasterize, splat
+from texgs.raster.api import rasterize
 from texgs.raster.autograd import SurfelTensors, View, bin_surfels
 from texgs.raster.reference import rasterize as reference
 from texgs.raster.types import Options, Texture
@@ -32,17 +33,61 @@ WRONG_SHAPES = {
 
 
 @pytest.mark.parametrize("name", WRONG_SHAPES)
-def test_wrong_shape(device, name):
-    scene = replace(random_scene(), **{name: WRONG_SHAPES[name]}).to(device)
-    refuses(ShapeError, rf"(?i)\b{name}: expected \[.*\], got \[", scene.render, rasterize)
-
-
-@pytest.mark.parametrize("name", WRONG_SHAPES)
-@pytest.mark.parametrize("dtype", [torch.float64, torch.float16, torch.int32])
-def test_wrong_dtype(device, name, dtype):
+def test_wrong_shapes_and_types(name):
     scene = replace(random_scene(), shift=torch.zeros(N, 2))
-    scene = replace(scene, **{name: getattr(scene, name).to(dtype)}).to(device)
-    refuses(ArgumentError, rf"\b{name}: expected float32, got {str(dtype)[6:]}", scene.render, rasterize)
+    wrong = replace(scene, **{name: WRONG_SHAPES[name]})
+    refused(lambda: wrong.render(rasterize), rf"(?i)\b{name}: expected \[.*\], got \[", ShapeError)
+    for dtype in (torch.float64, torch.float16, torch.int32):
+        wrong = replace(scene, **{name: getattr(scene, name).to(dtype)})
+        refused(lambda wrong=wrong: wrong.render(rasterize), rf"\b{name}: expected float32")
+
+
+def turned(name):
+    """The scene with a matrix of its camera transposed."""
+    return replace(random_scene(), **{name: getattr(random_scene(), name).T})
+
+
+def seen_by(**changes):
+    return replace(random_scene(), **changes)
+
+
+def beside_a_texture(channels):
+    return textured_with_features(random_scene(), channels)
+
+
+STRETCHED = torch.cat([2 * random_scene().viewmat[:3], random_scene().viewmat[3:]])
+SIZES = ((0, 5), (5, -1), (2**31, 5), (2**20 - 15, 1), (1, 2**20 - 15), (5.0, 5))
+FOCAL = ((0.0, 9.0), (-10.0, 9.0), (9.0, -1.0))
+
+
+@pytest.mark.parametrize(("named", "scene", "outputs", "error"), [
+    *(("width, height: ", seen_by(width=width, height=height), (), ArgumentError) for width, height in SIZES),
+    *((rf"{name}\[.*transpose", turned(name), (), ArgumentError) for name in ("viewmat", "K")),
+    ("viewmat: .* rotation", seen_by(viewmat=STRETCHED), (), ArgumentError),
+    *(("K: .*focal", seen_by(K=torch.diag(torch.tensor([*each, 1.0]))), (), ArgumentError) for each in FOCAL),
+    ("'depths'", random_scene(), ("depths",), ArgumentError),
+    ("outputs: .* a string", random_scene(), "depth", ArgumentError),
+    ("scales: .*transpose", seen_by(scales=torch.rand(3, N)), (), ShapeError),
+    ("features: .*device cpu", seen_by(features=torch.rand(N, 3, device="meta")), (), DeviceError),
+    ("got meta", random_scene().to("meta"), (), DeviceError),
+    *((f"32 channels, got {n}", random_scene(channels=n), (), ArgumentError) for n in (0, 33)),
+    *((f"29 channels, got {n}", beside_a_texture(n), (), ArgumentError) for n in (0, 30)),
+    ("background: ", replace(beside_a_texture(2), background=torch.rand(3)), (), ShapeError),
+])  # fmt: skip
+def test_wrong_views_outputs_and_channels(named, scene, outputs, error):
+    refused(lambda: scene.render(rasterize, outputs), named, error)
+
+
+@pytest.mark.parametrize("render", [rasterize, reference])
+def test_what_nothing_can_draw(render):
+    in_space = replace(textured(random_scene()), scales=torch.rand(N, 3))
+    for named, scene, outputs in (
+        ("features, a texture or both", seen_by(features=None), ()),
+        *(("scales: .*3D Gaussians", seen_by(scales=torch.rand(N, columns)), ()) for columns in (1, 4)),
+        ("texture: .*3D Gaussians", in_space, ()),
+        ("outputs: .*normal", gaussians(random_scene()), ("depth", "normal")),
+    ):
+        refused(lambda scene=scene, outputs=outputs: scene.render(render, outputs), named, TexgsError)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +107,7 @@ def test_wrong_dtype(device, name, dtype):
 def test_wrong_texture(name, value, error):
     scene = textured(random_scene())
     scene = replace(scene, texture=replace(scene.texture, **{name: value}))
-    refuses(TexgsError, error, scene.render, rasterize)
+    refused(lambda: scene.render(rasterize), error, TexgsError)
 
 
 @pytest.mark.parametrize("order", ["one after the other", "mixed, with gaps"])
@@ -74,68 +119,19 @@ def test_textures_must_not_overlap(order):
     scene.render(rasterize)
     for other, texel in ((2, offsets[2] + 15), (1, offsets[1])):
         moved = torch.cat([offsets[:3], texel[None]])
-        with pytest.raises(ArgumentError, match=rf"surfels {other} and 3 sharing texel {texel}"):
-            replace(scene, texture=replace(texture, offsets=moved)).render(rasterize)
+        shared = replace(scene, texture=replace(texture, offsets=moved))
+        refused(
+            lambda shared=shared: shared.render(rasterize), f"surfels {other} and 3 sharing texel {texel}"
+        )
 
 
 @pytest.mark.parametrize("name", ["viewmat", "K", "background"])
-def test_camera_and_background_are_constants(device, name):
-    scene = random_scene().to(device)
+def test_camera_and_background_are_constants(name):
+    scene = random_scene()
     scene = replace(scene, **{name: getattr(scene, name).clone().requires_grad_()})
-    refuses(ArgumentError, rf"{name}: not differentiable .* pass {name}.detach\(\)", scene.render, rasterize)
+    refused(lambda: scene.render(rasterize), f"{name}: not differentiable")
     with torch.no_grad():
         scene.render(rasterize)
-
-
-@pytest.mark.parametrize("render", [rasterize, reference])
-def test_what_nothing_can_draw(render):
-    def refused(message, scene, outputs=()):
-        refuses((ArgumentError, ShapeError), message, scene.render, render, outputs)
-
-    scene = random_scene()
-    refused("expected features, a texture or both, got neither", replace(scene, features=None))
-    for columns in (1, 4):
-        message = r"scales: expected \[N, 2\] or \[N, 3\], got \[200, .*; 2 draw surfels, 3 draw 3D Gaussians"
-        refused(message, replace(scene, scales=torch.rand(N, columns)))
-    in_space = replace(textured(scene), scales=torch.rand(N, 3))
-    refused(r"texture: expected features for 3D Gaussians .* to draw surfels", in_space)
-    refused(r"outputs: 3D Gaussians .* have no normal; leave it out", gaussians(scene), ("depth", "normal"))
-
-
-def test_wrong_sizes_cameras_and_outputs():
-    scene = random_scene()
-
-    def refused(message, outputs=(), error=ArgumentError, **changes):
-        refuses(error, message, replace(scene, **changes).render, rasterize, outputs)
-
-    for width, height in ((0, 5), (5, -1), (2**31, 5), (2**20 - 15, 1), (1, 2**20 - 15)):
-        refused("width, height: expected 1 to", width=width, height=height)
-    refused(r"width, height: expected whole numbers, got 5\.0", width=5.0)
-    refused(r"viewmat\[.*did you transpose\?", viewmat=scene.viewmat.T)
-    refused(r"K\[.*did you transpose\?", K=scene.K.T)
-    stretched = torch.cat([2 * scene.viewmat[:3], scene.viewmat[3:]])
-    refused("viewmat: expected a rotation and a shift, got axes .*; normalise them", viewmat=stretched)
-    for fx, fy in ((0.0, 9.0), (-10.0, 9.0), (9.0, -1.0)):
-        message = rf"K: expected focal lengths above 0, got .*= {min(fx, fy)}"
-        refused(message, K=torch.diag(torch.tensor([fx, fy, 1.0])))
-    refused("'depths'", ("depths",))
-    refused(r"outputs: .* got a string; pass \('depth',\)", "depth")
-    refused(r"scales: .*\[200, 2\|3\], .*; did you transpose", (), ShapeError, scales=torch.rand(3, N))
-    refused("features: expected device cpu", (), DeviceError, features=torch.rand(N, 3, device="meta"))
-    refuses(DeviceError, "cpu or cuda, got meta", scene.to("meta").render, rasterize)
-
-
-def test_wrong_numbers_of_channels():
-    scene = random_scene()
-    for channels in (0, 33):
-        message, image = f"1 to 32 channels, got {channels}", torch.zeros(5, 5, channels)
-        refuses(ArgumentError, message, random_scene(channels=channels).render, rasterize)
-        refuses(ArgumentError, message, splat, image, **scene.geometry())
-    for channels in (0, 30):
-        message = f"features: expected 1 to 29 channels, got {channels}"
-        refuses(ArgumentError, message, textured_with_features(scene, channels).render, rasterize)
-    beside = replace(textured_with_features(scene, 2), background=torch.rand(3))
-    refuses(ShapeError, r"background: expected \[5\], got \[3\]", beside.render, rasterize)
 
 
 def tensors_of(scene, **changes):
@@ -146,14 +142,11 @@ def tensors_of(scene, **changes):
 
 
 def test_library_refuses_what_gaussians_do_not_have():
-    scene = gaussians(random_scene())
+    scene, normal = gaussians(random_scene()), {"normal": torch.zeros(3, 8, 8)}
     of_texture = tensors_of(replace(textured(random_scene()), scales=scene.scales))
-    refuses(ArgumentError, "texture: 3D Gaussians have none", bin_surfels, *of_texture, {})
-    normal = {"normal": torch.zeros(3, 8, 8)}
-    refuses(ArgumentError, "normal: 3D Gaussians have none", bin_surfels, *tensors_of(scene), normal)
-    five = tensors_of(scene, scales=torch.rand(N, 5))
-    message = "surfels: expected 2 scales of surfels or 3 of"
-    refuses(ArgumentError, message, bin_surfels, *five, {})
+    refused(lambda: bin_surfels(*of_texture, {}), "texture: ")
+    refused(lambda: bin_surfels(*tensors_of(scene), normal), "normal: ")
+    refused(lambda: bin_surfels(*tensors_of(scene, scales=torch.rand(N, 5)), {}), "surfels: .* scales")
 
 
 def test_library_refuses_what_is_not_of_the_forward_call():
@@ -162,34 +155,30 @@ def test_library_refuses_what_is_not_of_the_forward_call():
     frame = bin_surfels(surfels, view, images)
 
     def backward(surfels, **gradients):
-        images_and_gradients = (autograd.Image(**images), autograd.Image(**gradients), autograd.Gradients())
-        structures = (*view.structures(surfels), *images_and_gradients)
-        native.call("texgs_backward", frame.pointer, *structures, device=torch.device("cpu"))
+        structures = (autograd.Image(**images), autograd.Image(**gradients), autograd.Gradients())
+        given = (*view.structures(surfels), *structures)
+        return lambda: native.call("texgs_backward", frame.pointer, *given, device=torch.device("cpu"))
 
     for name in ("depth", "median", "distortion"):
-        message = "a gradient of depth, median or distortion without"
-        refuses(ArgumentError, message, backward, surfels, **{name: images["alpha"]})
-    fewer = SurfelTensors(*(None if x is None else x[1:] for x in surfels))
-    refuses(ArgumentError, "frame: expected as many surfels, scales and channels as", backward, fewer)
-    message = "frame: expected an image as large as in the forward call"
-    refuses(ArgumentError, message, autograd.contribute, frame, surfels, replace(view, width=9), None)
+        refused(backward(surfels, **{name: images["alpha"]}), "a gradient of depth, median or distortion")
+    refused(backward(SurfelTensors(*(None if x is None else x[1:] for x in surfels))), "frame: .*surfels")
+    refused(lambda: autograd.contribute(frame, surfels, replace(view, width=9), None), "frame: .*image")
 
 
 def test_library_refuses_colours_that_do_not_add_up():
     colored, view = tensors_of(textured_with_features(random_scene(), 2))
+    bare = colored._replace(features=None)
 
     def forward(surfels, channels):
         structures = view.structures(surfels)
         structures[0].channels = channels
-        handle = ctypes.byref(ctypes.c_void_p())
-        native.call("texgs_forward", *structures, autograd.Image(), handle, device=torch.device("cpu"))
+        given = (*structures, autograd.Image(), ctypes.byref(ctypes.c_void_p()))
+        return lambda: native.call("texgs_forward", *given, device=torch.device("cpu"))
 
-    refuses(ArgumentError, "features: expected C - 3 beside a texture", forward, colored, 3)
-    bare = colored._replace(features=None)
-    refuses(ArgumentError, "features: expected C - 3 beside a texture", forward, bare, 5)
-    refuses(ArgumentError, r"texture: .* are needed, with 3 channels at least", forward, colored, 2)
-    bare = bare._replace(base=None, gain=None, texels=None)
-    refuses(ArgumentError, "surfels: features or a texture are needed", forward, bare, 2)
+    refused(forward(colored, 3), "features: ")
+    refused(forward(bare, 5), "features: ")
+    refused(forward(colored, 2), "texture: ")
+    refused(forward(bare._replace(base=None, gain=None, texels=None), 2), "surfels: ")
 
 
 WRONG_OPTIONS = {
@@ -205,7 +194,8 @@ WRONG_OPTIONS = {
 @pytest.mark.parametrize("name", WRONG_OPTIONS)
 def test_wrong_options(name):
     for value in WRONG_OPTIONS[name]:
-        refuses(ArgumentError, name, random_scene().render, rasterize, options=Options(**{name: value}))
+        options = Options(**{name: value})
+        refused(lambda options=options: random_scene().render(rasterize, options=options), name)
 
 
 def test_memory_layout_does_not_matter(device, drawn):
@@ -216,8 +206,7 @@ def test_memory_layout_does_not_matter(device, drawn):
     cotangents = random_cotangents(scene, names_of(scene))
     expected |= gradients(rasterize, scene, cotangents)
     result |= gradients(rasterize, strided, cotangents)
-    for name, value in expected.items():
-        assert torch.equal(result[name], value), name
+    require_equal(result, expected)
     half = torch.tensor(0.5, device=device)
     expanded, dense = (replace(scene, opacities=x) for x in (half.expand(N), half.repeat(N)))
     assert torch.equal(expanded.render(rasterize).color, dense.render(rasterize).color)
@@ -227,8 +216,7 @@ def test_inputs_are_left_alone(device):
     scene = textured(random_scene()).to(device)
     copy = scene.map(torch.clone)
     gradients(rasterize, scene, random_cotangents(scene, ("color", "depth")))
-    for name, leaf in scene.leaves().items():
-        assert torch.equal(leaf, copy.leaves()[name])
+    require_equal(scene.leaves(), copy.leaves())
 
 
 def test_camera_changed_before_backward():
@@ -236,7 +224,7 @@ def test_camera_changed_before_backward():
     scene = replace(scene, viewmat=scene.viewmat.clone(), means=scene.means.clone().requires_grad_())
     color = scene.render(rasterize).color
     scene.viewmat[0, 3] += 0.1
-    refuses(RuntimeError, "modified by an inplace operation", color.sum().backward)
+    refused(color.sum().backward, "modified by an inplace operation", RuntimeError)
 
 
 def test_infinitely_far_plane(device):

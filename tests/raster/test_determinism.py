@@ -8,7 +8,7 @@ import torch
 
 from benchmarks.scenes import camera, surfels
 from tests.raster.agreement import gradients, images, names_of, random_cotangents
-from tests.raster.requirements import require_same_bits
+from tests.raster.requirements import require_equal, require_same_bits
 from tests.raster.scenes import Scene, gaussians, random_scene, textured, textured_with_features
 from tests.raster.voxel_scenes import voxel_scene
 from texgs.raster import native
@@ -26,12 +26,6 @@ def everything(scene):
     results["sums"], results["weights"] = splat(image, **scene.geometry())
     cotangents = random_cotangents(scene, names_of(scene))
     return results | {f"gradient of {name}": x for name, x in gradients(rasterize, scene, cotangents).items()}
-
-
-def require_equal(results, expected):
-    """Require the same tensors by name."""
-    for quantity, value in expected.items():
-        assert torch.equal(results[quantity], value), quantity
 
 
 def generated(n=8000, size=200):

@@ -5,7 +5,8 @@ from operator import attrgetter
 import numpy as np
 import torch
 
-from tests.raster.requirements import refuses, require_same_bits
+from tests.raster.requirements import require_same_bits
+from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster.fusion import BLOCK, DepthView, Lattice
@@ -71,19 +72,16 @@ def test_threads_change_nothing():
 
 def test_what_does_not_fit_is_refused():
     (view,) = views(1)
-    lattice = Lattice(BLOCKS, LOW, VOXEL)
-    for error, message, blocks in (
-        (ArgumentError, r"blocks: expected numbers below \(3, 2, 4\), got others", torch.tensor([[0, 2, 0]])),
-        (ShapeError, r"blocks: expected \[N, 3\], got \[3\]", torch.tensor([0, 0, 0])),
-        (ArgumentError, "blocks: expected each one once, got some twice", CHOSEN[[1, 0, 1]]),
-        (ArgumentError, r"blocks: expected whole numbers, got torch\.float32", CHOSEN.float()),
+    lattice, (camera, depth, color) = Lattice(BLOCKS, LOW, VOXEL), (view.camera, view.depth, view.color)
+    for error, blocks in (
+        (ArgumentError, torch.tensor([[0, 2, 0]])),
+        (ShapeError, torch.tensor([0, 0, 0])),
+        (ArgumentError, CHOSEN[[1, 0, 1]]),
+        (ArgumentError, CHOSEN.float()),
     ):
-        refuses(error, message, lattice.add, view, blocks, TRUNCATION)
-    refuses(ArgumentError, "truncation: expected a length above 0", lattice.add, view, CHOSEN, 0.0)
-    camera, depth, color = view.camera, view.depth, view.color
-    message = r"color: expected \[20, 24, 3\], got \[24, 20, 3\]"
-    refuses(ShapeError, message, DepthView, camera, depth, color.transpose(0, 1))
-    refuses(ArgumentError, "color: expected uint8 on cpu, got", DepthView, camera, depth, color.float())
-    elsewhere = "expected a tensor on cpu, got meta; move it"
-    refuses(DeviceError, f"depth: {elsewhere}", DepthView, camera, depth.to("meta"), color)
-    refuses(DeviceError, f"viewmat: {elsewhere}", DepthView, camera.to("meta"), depth, color)
+        refused(lambda blocks=blocks: lattice.add(view, blocks, TRUNCATION), "blocks: ", error)
+    refused(lambda: lattice.add(view, CHOSEN, 0.0), "truncation: ")
+    refused(lambda: DepthView(camera, depth, color.transpose(0, 1)), "color: ", ShapeError)
+    refused(lambda: DepthView(camera, depth, color.float()), "color: ")
+    refused(lambda: DepthView(camera, depth.to("meta"), color), "depth: ", DeviceError)
+    refused(lambda: DepthView(camera.to("meta"), depth, color), "viewmat: ", DeviceError)

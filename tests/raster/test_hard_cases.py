@@ -16,6 +16,7 @@ from tests.raster.agreement import (
     random_cotangents,
     true_images,
 )
+from tests.raster.closed_form import view
 from tests.raster.scenes import HARD_CASES, few, gaussians, textured
 from texgs.core.camera import intrinsics, look_at
 from texgs.raster import reference
@@ -73,28 +74,25 @@ def test_a_surfel_that_ends_just_before_the_camera_is_whole(device, z):
     torch.testing.assert_close(seen.cpu().double(), truth, atol=0.01, rtol=0)
 
 
+def single(given, device):
+    """The same arguments in single precision on a device."""
+    return {name: x.float().to(device) if isinstance(x, torch.Tensor) else x for name, x in given.items()}
+
+
 @pytest.mark.parametrize("apart", [1e-1, 1e-2, 1e-3])
 def test_distortion_of_layers_that_are_close(device, apart):
-    def rendered(rasterize, dtype, device):
-        tensors = {
-            "means": torch.tensor([[0, 0, 3], [0, 0, 3 + apart]]),
-            "quats": torch.tensor([[1.0, 0, 0, 0]] * 2),
-            "scales": torch.full((2, 2), 0.5),
-            "opacities": torch.full((2,), 0.5),
-            "features": torch.ones(2, 1),
-            "viewmat": torch.eye(4),
-            "K": torch.tensor([[40.0, 0, 8], [0, 40, 8], [0, 0, 1]]),
-        }
-        tensors = {name: x.to(device, dtype) for name, x in tensors.items()}
-        means = tensors["means"].requires_grad_()
-        distortion = rasterize(**tensors, width=16, height=16, outputs=("distortion",)).distortion
+    given = view(means=[[0, 0, 3], [0, 0, 3 + apart]], scales=[[0.5, 0.5]] * 2, opacities=[0.5] * 2)
+    given |= {"features": torch.ones(2, 1).double()}
+
+    def rendered(rasterize, given):
+        means = given["means"].detach().requires_grad_()
+        distortion = rasterize(**given | {"means": means}, outputs=("distortion",)).distortion
         (gradient,) = torch.autograd.grad(distortion.sum(), means)
         return distortion.detach().cpu().double(), gradient[:, 2].cpu().double()
 
-    # Their depths themselves are rounded to 2e-7.
-    expected = rendered(reference.rasterize, torch.float64, "cpu")
-    for ours, exact in zip(rendered(rasterize, torch.float32, device), expected, strict=True):
-        torch.testing.assert_close(ours, exact, rtol=3e-6 / apart, atol=0)
+    ours, exact = rendered(rasterize, single(given, device)), rendered(reference.rasterize, given)
+    for one, other in zip(ours, exact, strict=True):
+        torch.testing.assert_close(one, other, rtol=3e-6 / apart, atol=0)  # depths are rounded to 2e-7
 
 
 def check_learning(scene, device, name, compared, options=DEFAULT_OPTIONS):

@@ -12,7 +12,7 @@ from texgs.raster import native
 pytestmark = pytest.mark.subprocess
 
 TESTS = Path(__file__).parents[1]
-KERNELS = ("operations", "losses", "shading", "voxels", "voxel_optimizer", "convolution")
+KERNELS = ("operations", "losses", "shading", "voxels", "voxel_grid", "convolution")
 FILES = [
     *(TESTS / "raster" / f"test_{name}.py" for name in (*KERNELS, "images_and_gradients")),
     *(TESTS / "volume" / f"test_{name}.py" for name in ("caster", "cuts", "lookup")),

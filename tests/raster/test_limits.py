@@ -1,15 +1,20 @@
-"""Large scenes work within bounded memory, and those that cannot fit say how much they would need."""
+"""Large scenes work within bounded memory; a library that does not fit, or what cannot fit, is told."""
 
+import _ctypes
 import math
 import re
+from contextlib import nullcontext
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import torch
 
 from benchmarks.scenes import camera, surfels
+from tests.raster.closed_form import view
 from tests.raster.scenes import Scene, random_scene
-from texgs.core.errors import OutOfMemoryError
+from tests.refusals import refused
+from texgs.core.errors import DeviceError, NativeError, OutOfMemoryError
 from texgs.raster import native
 from texgs.raster.api import rasterize
 from texgs.raster.arguments import MAX_SIDE
@@ -53,8 +58,9 @@ def test_memory_of_a_usual_scene(drawn):
 
 @pytest.mark.parametrize("size", [(1_000_000, 1_000_000), (MAX_SIDE, MAX_SIDE)])
 def test_images_that_cannot_fit(device, size):
+    scene = replace(random_scene(), width=size[0], height=size[1]).to(device)
     with pytest.raises(OutOfMemoryError, match=r"\d+ bytes") as raised:
-        replace(random_scene(), width=size[0], height=size[1]).to(device).render(rasterize)
+        scene.render(rasterize)
     needed = int(re.search(r"(\d+) bytes", str(raised.value))[1])
     assert needed >= 4 * 4 * size[0] * size[1]  # colour and alpha alone
 
@@ -63,21 +69,13 @@ def test_images_that_cannot_fit(device, size):
 @pytest.mark.parametrize("axis", [0, 1], ids=["widest", "highest"])
 def test_the_longest_image(device, axis):
     """Its tiles are the most that the library can count: one more, and the surfel would be nowhere."""
-    size, quarter = [1, 1], MAX_SIDE / 4  # of one standard deviation from the middle to an end
+    size = [1, 1]
     size[axis] = MAX_SIDE
-    scene = replace(
-        random_scene(n=1),
-        means=torch.tensor([[0.0, 0, 1]]),
-        quats=torch.tensor([[1.0, 0, 0, 0]]),
-        scales=torch.tensor([[2 * quarter, 2 * quarter]]),
-        opacities=torch.tensor([0.9]),
-        viewmat=torch.eye(4),
-        K=torch.tensor([[1.0, 0, size[0] / 2], [0, 1, size[1] / 2], [0, 0, 1]]),
-        width=size[0],
-        height=size[1],
-    )
-    alpha = scene.to(device).render(rasterize).alpha.flatten().cpu()
-    expected = 0.9 * math.exp(-0.5)
+    given = view(means=[[0, 0, 1]], scales=[[MAX_SIDE / 2] * 2], opacities=[0.9])  # ends are one sigma away
+    given |= {"K": torch.tensor([[1.0, 0, size[0] / 2], [0, 1, size[1] / 2], [0, 0, 1]])}
+    given = {name: x.float().to(device) for name, x in given.items() if name not in ("width", "height")}
+    shown = rasterize(**given, features=torch.ones(1, 1, device=device), width=size[0], height=size[1])
+    alpha, expected = shown.alpha.flatten().cpu(), 0.9 * math.exp(-0.5)
     assert float(alpha[0]) == pytest.approx(expected, abs=1e-3)
     assert float(alpha[-1]) == pytest.approx(expected, abs=1e-3)
     assert float(alpha.min()) > 0.54
@@ -86,17 +84,38 @@ def test_the_longest_image(device, axis):
 
 def test_surfels_that_cannot_fit():
     many = 10**12  # tensors of no memory: one surfel repeated
+    leaves = {name: x[:1].expand(many, *x.shape[1:]) for name, x in random_scene().leaves().items()}
+    refused(lambda: random_scene().with_leaves(leaves).render(rasterize), r"\d+ bytes", OutOfMemoryError)
 
-    def repeated(*row):
-        return torch.tensor(row).expand(many, len(row))
 
-    scene = random_scene()
-    with pytest.raises(OutOfMemoryError, match=r"\d+ bytes"):
-        replace(
-            scene,
-            means=repeated(0.0, 0, 0),
-            quats=repeated(1.0, 0, 0, 0),
-            scales=repeated(0.1, 0.1),
-            opacities=torch.tensor(0.5).expand(many),
-            features=repeated(1.0, 1, 1),
-        ).render(rasterize)
+@pytest.mark.parametrize(
+    ("content", "device", "named"),
+    [
+        (None, "cpu", r"libtexgs\.so: not found"),
+        (None, "cuda", "install a CUDA compiler"),
+        (b"not a library", "cpu", r"libtexgs\.so: cannot be loaded"),
+        (Path(_ctypes.__file__), "cpu", "no function texgs_abi_version"),  # a library of others
+    ],
+)
+def test_a_library_that_is_not_ours(monkeypatch, tmp_path, content, device, named):
+    path = tmp_path / "libtexgs.so"
+    if content is not None:
+        path.write_bytes(content if isinstance(content, bytes) else content.read_bytes())
+    monkeypatch.setattr(native, "library_path", lambda device_type: path)
+    refused(lambda: native.library.__wrapped__(device), f"{named}.* install texgs again", NativeError)
+
+
+def test_a_function_and_a_device_that_the_library_does_not_have():
+    refused(lambda: native.call("texgs_paint", device=torch.device("cpu")), "texgs_paint", NativeError)
+    refused(lambda: native.library("meta"), "cpu or cuda, got meta", DeviceError)
+
+
+def test_out_of_memory_on_a_gpu_tells_of_what_torch_keeps(monkeypatch):
+    def require(device):
+        return lambda: native.require_memory(2**60, torch.device(device), "images", "choose smaller ones")
+
+    refused(require("cpu"), r"needs \d+ bytes more$", OutOfMemoryError)
+    library = native.library()
+    monkeypatch.setattr(native, "library", lambda device_type: library)
+    monkeypatch.setattr(torch.cuda, "device", lambda device: nullcontext())
+    refused(require("cuda"), r"torch\.cuda\.empty_cache\(\)", OutOfMemoryError)

@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from tests.raster.operations import ON_CPU, OPERATIONS, evaluate, of_operation
-from tests.raster.requirements import refuses, require_same_bits
+from tests.raster.requirements import require_same_bits
+from tests.refusals import refused
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 
 ALL = OPERATIONS | ON_CPU
@@ -70,4 +71,4 @@ def test_a_wrong_argument_is_named(name, argument):
     if argument in operation.constants:
         wrong.append((ArgumentError, f"{argument}: not differentiable here", of.clone().requires_grad_()))
     for error, message, value in wrong:
-        refuses(error, message, operation.native, **given | {argument: value})
+        refused(lambda value=value: operation.native(**given | {argument: value}), message, error)

@@ -104,16 +104,6 @@ def test_gradients_of_textured_surfels():
     torch.autograd.gradcheck(render, tuple(tensors.values()), fast_mode=True)
 
 
-def test_gradients_of_the_camera():
-    tensors = inputs()
-    viewmat, K = CAMERA["viewmat"].clone().requires_grad_(), CAMERA["K"].clone().requires_grad_()
-
-    def render(viewmat, K):
-        return rasterize(viewmat=viewmat, K=K, **SIZE, **tensors, options=SMOOTH).color
-
-    torch.autograd.gradcheck(render, (viewmat, K), fast_mode=True)
-
-
 def test_gradients_of_splat():
     tensors = {name: x for name, x in inputs().items() if name in GEOMETRY and name != "shift"}
     image = torch.rand(HEIGHT, WIDTH, 2, dtype=torch.float64).requires_grad_()

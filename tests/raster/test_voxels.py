@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.raster.requirements import refuses
 from tests.raster.voxel_scenes import LOWER, SPACING, voxel_scene
+from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, unpack_rows, voxel_grid
@@ -215,49 +215,29 @@ def test_points_are_on_their_rays_front_to_back():
     assert all(map(torch.equal, strided, expected))
 
 
-def test_rays_and_marches_that_are_refused():
+def test_what_does_not_fit_is_refused():
     scene = voxel_scene()
-    grid, rays = scene.grid, scene.rays
-    refuses(ShapeError, r"rays: expected \[N, 6\], .*; did you transpose", render_rays, grid, rays.T)
-    refuses(ArgumentError, "rays: expected float32, got float64", render_rays, grid, rays.double())
-    refuses(ArgumentError, "rays: not differentiable", render_rays, grid, rays.clone().requires_grad_())
-    samples = Samples(grid, March(), rays, keep=False)
-    gradient = RowGradient(grid), torch.ones(len(rays), 3)
-    refuses(
-        ArgumentError,
-        "samples: expected those that were kept",
-        samples.add_gradient,
-        gradient[1],
-        None,
-        gradient[0],
-    )
-    refuses(ArgumentError, r"step: expected 0\.1 to 8 spacings", render_rays, grid, rays, March(step=0.01))
-    opaque = March(transmittance_min=1)
-    refuses(ArgumentError, "transmittance_min: expected 0 to 1", render_rays, grid, rays, opaque)
-    refuses(DeviceError, "rows: expected device meta as rays, got cpu", render_rays, grid, rays.to("meta"))
-    refuses(DeviceError, "rays: expected a tensor on cpu", ray_points, grid, rays.to("meta"), March())
-    elsewhere = replace(grid, rows=grid.rows.to("meta"))
-    refuses(DeviceError, "expected tensors on cpu or cuda, got meta", render_rays, elsewhere, rays.to("meta"))
-
-
-def test_gradients_and_weights_that_are_refused():
-    scene = voxel_scene()
-    samples, into, rays = Samples(scene.grid, scene.march, scene.rays), RowGradient(scene.grid), scene.rays
-    other, n = RowGradient(voxel_scene(size=(8, 8, 8)).grid), len(scene.grid.rows)
-    add, mark = samples.add_gradient, samples.mark
-    refuses(
-        ShapeError,
-        r"into: expected the gradient of \[\d+, 32\] rows in 60 blocks, got",
-        add,
-        None,
-        None,
-        other,
-    )
-    elsewhere = RowGradient(scene.grid.to("meta"))
-    refuses(DeviceError, "into: expected device cpu as rows, got meta", add, None, None, elsewhere)
-    refuses(ShapeError, r"color: expected \[300, 3\], got \[299, 3\]", add, rays[1:, :3], None, into)
-    refuses(DeviceError, "color: expected device cpu as rays", add, rays[:, :3].to("meta"), None, into)
-    refuses(ArgumentError, "alpha: expected float32, got float64", add, None, rays[:, 0].double(), into)
-    refuses(ShapeError, r"weights: expected \[\d+\], got \[3\]", mark, torch.zeros(3))
-    refuses(ArgumentError, "weights: expected float32, got float64", mark, torch.zeros(n).double())
-    refuses(ArgumentError, "weights: expected a dense tensor", mark, torch.zeros(2 * n)[::2])
+    grid, rays, into, n = scene.grid, scene.rays, RowGradient(scene.grid), len(scene.grid.rows)
+    away, gone = replace(grid, rows=grid.rows.to("meta")), rays.to("meta")
+    kept, lost = Samples(grid, scene.march, rays), Samples(grid, March(), rays, keep=False)
+    other, elsewhere = RowGradient(voxel_scene(size=(8, 8, 8)).grid), RowGradient(grid.to("meta"))
+    for error, named, call in (
+        (ShapeError, "rays: .*transpose", lambda: render_rays(grid, rays.T)),
+        (ArgumentError, "rays: .*float64", lambda: render_rays(grid, rays.double())),
+        (ArgumentError, "rays: .*differentiable", lambda: render_rays(grid, rays.clone().requires_grad_())),
+        (ArgumentError, "step: ", lambda: render_rays(grid, rays, March(step=0.01))),
+        (ArgumentError, "transmittance_min: ", lambda: render_rays(grid, rays, March(transmittance_min=1))),
+        (DeviceError, "rows: .*meta", lambda: render_rays(grid, gone)),
+        (DeviceError, "rays: .*cpu", lambda: ray_points(grid, gone, March())),
+        (DeviceError, "got meta", lambda: render_rays(away, gone)),
+        (ArgumentError, "samples: ", lambda: lost.add_gradient(torch.ones(len(rays), 3), None, into)),
+        (ShapeError, "into: ", lambda: kept.add_gradient(None, None, other)),
+        (DeviceError, "into: ", lambda: kept.add_gradient(None, None, elsewhere)),
+        (ShapeError, "color: ", lambda: kept.add_gradient(rays[1:, :3], None, into)),
+        (DeviceError, "color: ", lambda: kept.add_gradient(rays[:, :3].to("meta"), None, into)),
+        (ArgumentError, "alpha: ", lambda: kept.add_gradient(None, rays[:, 0].double(), into)),
+        (ShapeError, "weights: ", lambda: kept.mark(torch.zeros(3))),
+        (ArgumentError, "weights: ", lambda: kept.mark(torch.zeros(n).double())),
+        (ArgumentError, "weights: .*dense", lambda: kept.mark(torch.zeros(2 * n)[::2])),
+    ):
+        refused(call, named, error)

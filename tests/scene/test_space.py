@@ -16,7 +16,7 @@ from tests.volume.test_space import ORIENTED, TO_RAS, WRITERS, center_by_itk
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
-from texgs.fields.gaussians.files import write_gaussians
+from texgs.fields.gaussians import write_gaussians
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.raster.reference.shading import harmonics

@@ -14,8 +14,8 @@ from tests.viewer.pages import TOKEN, on_page, origin, page
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
 from texgs.core.errors import ArgumentError
-from texgs.edit.material import MATERIALS
 from texgs.edit.new_look import learn_look
+from texgs.edit.readable import MATERIALS
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.looks import Looks

@@ -10,11 +10,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.volume.march import march
 from tests.volume.scenes import ball, lattice
-from texgs.config.dataset import BasicTF
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.raster import native
+from texgs.volume.basic_tfs import BasicTF, basic_tfs_of
 from texgs.volume.caster import OUTPUTS, Caster, NativeTransfer, NativeView, NativeVolume
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
@@ -26,7 +26,6 @@ from texgs.volume.render import Appearance
 from texgs.volume.slabs import ArraySource
 from texgs.volume.summaries import read_summaries, write_summaries
 from texgs.volume.transfer import TransferFunction, check_disjoint
-from texgs.workflow.stages.settings import basic_tfs_of
 
 CAMERA, SIDE = orbit(25, 15, 2.6, 34, 57, 43), Light("directional", 40, 30)
 INNER = TransferFunction(((0.4, 0.0), (0.6, 0.05), (1.0, 0.2)), ((0.5, 0.1, 0.2, 0.9), (1, 0.4, 0.5, 0.9)))

@@ -8,9 +8,11 @@ import torch
 
 from tests.volume.zarr_files import axes_of, write_image
 from texgs.config.compose import compose
-from texgs.config.dataset import BasicTF, Dataset, Volume
+from texgs.config.dataset import Dataset
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.io import read_json
+from texgs.volume.basic_tfs import BasicTF
+from texgs.volume.settings import VolumeKeys
 from texgs.volume.view_set import read_views
 from texgs.workflow.checks import check_basic_tfs
 from texgs.workflow.execution import ensure
@@ -41,7 +43,7 @@ def image(tmp_path_factory):
 
 
 def config_of(image, folder, tfs, words=SMALL, **volume):
-    keys = Volume(generator=None, file=str(image), **volume)
+    keys = VolumeKeys(generator=None, file=str(image), **volume)
     dataset = Dataset(name="cells", title="cells", volume=keys, basic_tfs=tfs)
     return replace(compose(words), dataset=dataset, results=str(folder))
 

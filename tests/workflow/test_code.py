@@ -155,4 +155,4 @@ def test_what_a_stage_imports_to_do_its_work_counts():
                 used = {name for name in code.imports(function) if code.source(name, code.ROOT)}
                 assert used <= code.code_of([f"texgs.workflow.stages.{stage.stem}"]).keys(), stage
     assert "texgs.fitting.series" in code.code_of(["texgs.workflow.stages.steps"])
-    assert "texgs.workflow.differences" in code.code_of(["texgs.cli.tables"])
+    assert "texgs.report.differences" in code.code_of(["texgs.cli.tables"])

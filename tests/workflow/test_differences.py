@@ -10,7 +10,7 @@ from texgs.config.compose import compose
 from texgs.config.describe import keys, value_at
 from texgs.core.errors import ConfigError
 from texgs.edit.method import methods
-from texgs.workflow.differences import ALL, differences, published, text
+from texgs.report.differences import ALL, differences, published, text
 
 STYLES = "style, style_untextured"
 

@@ -2,17 +2,18 @@
 
 import pytest
 
+from texgs.config.case import Case
 from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.scene.series_file import Series, write_series
 from texgs.workflow.checks import check_edit, require_edit
-from texgs.workflow.edits import edits, files_of_scene
+from texgs.workflow.edits import edits_of, files_of_scene
 from texgs.workflow.stage_table import STAGES
 
 
-def edits_of(*words):
-    return [compose(each).edit for each in edits(words)]
+def edits(*words):
+    return [case.config.edit for case in edits_of(Case(words))]
 
 
 def test_every_edit_of_conf_composes_and_is_named_after_its_file():
@@ -32,12 +33,12 @@ def test_every_edit_of_conf_composes_and_is_named_after_its_file():
     ],
 )
 def test_edits_of_a_run(words, names):
-    assert [edit.name for edit in edits_of(*words)] == names
+    assert [edit.name for edit in edits(*words)] == names
 
 
 def test_words_hold_for_the_edit_and_its_base_and_parts_can_be_given():
     words = ("edit=glass", "edit.base=lobe", "edit.parts=[TF02/lobe]", "edit.name=part")
-    lobe, part = edits_of(*words, "edit.image.iterations=7")
+    lobe, part = edits(*words, "edit.image.iterations=7")
     assert (lobe.name, lobe.method, lobe.base, list(lobe.parts)) == ("lobe", "segment", None, [])
     assert (part.name, part.method, part.base, list(part.parts)) == ("part", "image", "lobe", ["TF02/lobe"])
     assert part.image.iterations == 7
@@ -62,7 +63,7 @@ def test_words_hold_for_the_edit_and_its_base_and_parts_can_be_given():
 )
 def test_a_mistake_in_edits_is_one_sentence(words, message):
     with pytest.raises(ConfigError, match=message):
-        edits_of(*words)
+        edits(*words)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +140,7 @@ def test_a_mistake_in_an_edit_is_one_sentence(edit, word, message):
 
 
 def require(words):
-    require_edit(STAGES[f"edit_{compose(words).edit.method}"], words)
+    require_edit(STAGES[f"edit_{compose(words).edit.method}"], Case(words))
 
 
 def test_what_an_edit_by_hand_starts_from_is_told_at_once(tmp_path):

@@ -158,10 +158,6 @@ def test_models_of_a_comparison_are_those_of_the_last_phases_of_all_recipes():
         ("[{box: [0.5, 0.5]}]", "", r"\.box: expected left, top and side, from 0 to 1, got \[0.5, 0.5\]"),
         ("[{fov_y: 180}]", "", "fov_y: expected less than 180, got 180"),
         ("[{show: volum}]", "", "show: expected one of scene, volume, error, got volum, did you mean volume"),
-        ("[{changes: ['TF03.opacity=1']}]", "", "changes: expected PART.KEY=VALUE with one of TF01"),
-        ("[{changes: ['TF01.opacty=1']}]", "", "got TF01.opacty=1, did you mean opacity"),
-        ("[{changes: [opaque]}]", "", "changes: expected PART.KEY=VALUE with one of"),
-        ("[{edit: gold, changes: ['TF02/lobe.opacity=1']}]", "edits=[gold,lobe]", "TF02, got TF02/"),
         ("[{title: a}, {title: a}]", "", "expected rows with different titles, got 'a' twice"),
         ("[]", "", "expected a picture in a row and a column, got none"),
         ("", "", "edits: expected some to show"),
@@ -180,13 +176,6 @@ def test_a_mistake_is_one_sentence(rows, words, message):
 def test_without_an_edit_the_scene_is_shown_as_it_is_fitted():
     ((_, rows),) = grids("edits=[none]")
     assert [place["scene"] for place in rows["front"] if place["show"] == "scene"] == ["quick/none"]
-
-
-def test_parts_that_an_edit_adds_can_be_changed():
-    changes = "['TF02/lobe.opacity=0.5', 'background=#000000']"
-    words = ("edits=[crimson]", grid(f"[{{edit: crimson, changes: {changes}}}]"))
-    ((_, rows),) = grids(*words)
-    assert rows[""][0]["scene"] == "quick/crimson"
 
 
 def shown():

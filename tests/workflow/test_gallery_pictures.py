@@ -6,7 +6,7 @@ import torch
 
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
-from texgs.config.views import ViewKeys
+from texgs.config.gallery import GalleryCell
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Frame
@@ -15,13 +15,12 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.compared import compare_views
+from texgs.report.gallery import GalleryRenderer
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
-from texgs.workflow.galleries import GalleryCell
-from texgs.workflow.stages.gallery import GalleryRenderer
-from texgs.workflow.stages.settings import FitLabel, OfScene
+from texgs.volume.view_settings import ViewKeys
 
 SIZE = 48
 VIEW = [20.0, 10.0]
@@ -41,11 +40,8 @@ def scene(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def renderer(scene):
-    label = {"name": "quick", "field": "surfels", "seed": 0, "sweep": "none", "variant": "", "device": "cpu"}
-    views, fit = ViewKeys(renderer="cpu", width=8, height=8), FitLabel(**label, changed=False)
-    settings = OfScene(stage="gallery", dataset="sphere", stand_in="", views=views, fit=fit)
     file = write_scene(scene.volume.file.with_name("scene.yaml"), scene)
-    return GalleryRenderer(settings, {"quick/none": file}, SIZE)
+    return GalleryRenderer({"quick/none": file}, ViewKeys().fov_y, SIZE, torch.device("cpu"))
 
 
 def test_a_scene_is_compared_with_the_volume_that_has_its_edits(scene, monkeypatch):
@@ -69,7 +65,7 @@ def cell(show="scene", **changed):
 
 
 def test_a_picture_is_a_frame_of_the_changed_scene(renderer):
-    session = Session.open(renderer._inputs["quick/none"])
+    session = Session.open(renderer._scenes["quick/none"])
     session.set("low", "opacity", 0.5)
     session.set_light(Light("directional", -30.0, 40.0))
     lens = FRAME.lens().square(SIZE)

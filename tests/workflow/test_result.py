@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_bytes, write_json
 from texgs.workflow import result

@@ -2,6 +2,7 @@
 
 import runpy
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import pytest
 
@@ -15,60 +16,17 @@ from texgs.workflow.execution import require_outcome
 from texgs.workflow.stage import Outcome, Rule, read, selected
 from texgs.workflow.stage_table import STAGES, by_name, require_stage
 
-
-def changed(**changes):
-    return replace(STAGE, rule=replace(STAGE.rule, **changes))
+TOYS = Path(__file__).parent  # a folder without results
 
 
-@pytest.mark.parametrize(
-    ("stage", "message"),
-    [
-        (dict, "toy: STAGE: expected a Stage, got type"),
-        (replace(STAGE, name="my stage"), "toy: STAGE: expected letters, digits and _ in its name"),
-        (changed(files=("a.png")), "toy: files of its Rule: expected names with commas"),
-        (replace(STAGE, work=lambda settings, inputs: None), r"toy: work of its Stage: expected <lambda>\("),
-        (changed(folder="{datset}/a"), r"folder of its Rule: expected some of {dataset}, .*, got {datset}"),
-    ],
-)
-def test_a_stage_has_a_verb_files_and_a_folder(stage, message):
-    with pytest.raises(ConfigError, match=message):
-        require_stage("toy", stage)
-    require_stage("toy", STAGE)
+class Untyped:
+    """Works of stages that do not say what their settings are."""
 
+    @staticmethod
+    def bare(settings, inputs, output): ...
 
-@pytest.mark.parametrize(
-    ("stage", "message"),
-    [
-        (replace(STAGE, name="sheet"), "expected stages of different names, got sheet twice"),
-        (changed(target="volume"), "stage projection: target of its Rule: got volume, the name of a rule"),
-        (changed(name="sheet"), "stages projection and sheet: expected a name of its own for each Rule"),
-        (
-            changed(folder="{dataset}/transfer"),
-            "expected a folder of its own for each Rule, got {dataset}/tr",
-        ),
-    ],
-)
-def test_a_stage_takes_no_place_of_another(stage, message):
-    assert list(by_name(STAGES.values())) == list(STAGES)
-    with pytest.raises(ConfigError, match=message):
-        by_name([*STAGES.values(), stage])
-
-
-def test_a_stage_takes_no_verb(monkeypatch, capsys):
-    monkeypatch.setattr(stage_table, "STAGES", {**STAGES, "run": replace(STAGE, name="run")})
-    with pytest.raises(SystemExit):
-        runpy.run_path(main.__file__)
-    assert "STAGE has the name of the verb run; rename it" in capsys.readouterr().err
-
-
-def test_the_settings_of_a_stage_are_a_dataclass():
-    def untold(settings, inputs, output): ...
-
-    def wrong(settings: int, inputs, output): ...
-
-    for work, got in ((untold, "none"), (wrong, "int")):
-        with pytest.raises(ConfigError, match=f"stage projection: work: expected a dataclass .* got {got}"):
-            _ = replace(STAGE, work=work).schema
+    @staticmethod
+    def number(settings: int, inputs, output): ...
 
 
 @dataclass
@@ -78,19 +36,6 @@ class Misspelt:
     width: int = read("views.widths")
 
 
-def test_settings_read_keys_that_there_are():
-    with pytest.raises(ConfigError, match=r"test_stage_table: Misspelt.width: reads .* 'widths'"):
-        selected(Misspelt, compose(()))
-
-
-def test_a_result_has_a_section_of_the_report():
-    with pytest.raises(ConfigError, match="Misplaced: section: no section datas, did you mean data"):
-
-        class Misplaced(Result, section="datas"): ...
-
-    assert "Misplaced" not in Result.kinds
-
-
 @dataclass(frozen=True)
 class Plain:
     """No kind of Result."""
@@ -98,20 +43,56 @@ class Plain:
     mean: float
 
 
+def among_all(**changes):
+    return by_name([*STAGES.values(), replace(STAGE, **changes)])
+
+
+def rule(**changes):
+    return {"rule": replace(STAGE.rule, **changes)}
+
+
 @pytest.mark.parametrize(
-    ("outcome", "message"),
+    ("made", "key"),
     [
-        (None, "stage projection: work: expected an Outcome, got NoneType"),
-        (Outcome(Plain(1)), "work: expected a kind of Result in its Outcome, got Plain"),
-        (Outcome(ProjectionResult(1)), "work: expected the file projection.png in its folder, got none"),
-        (Outcome(ProjectionResult(1), {"b.png": "B"}), "expected the file b.png in its folder, got none"),
+        (lambda: require_stage("toy", dict), "toy: STAGE: .* got type"),
+        (lambda: require_stage("toy", replace(STAGE, name="my stage")), "toy: STAGE: .* name"),
+        (lambda: require_stage("toy", replace(STAGE, **rule(files="a.png"))), "toy: files of its Rule"),
+        (lambda: require_stage("toy", replace(STAGE, work=lambda settings, inputs: None)), "toy: work"),
+        (lambda: require_stage("toy", replace(STAGE, **rule(folder="{datset}/a"))), "got {datset}"),
+        (lambda: among_all(name="sheet"), "sheet twice"),
+        (lambda: among_all(**rule(target="volume")), "stage projection: target of its Rule"),
+        (lambda: among_all(**rule(name="sheet")), "stages projection and sheet: .* name"),
+        (lambda: among_all(**rule(folder="{dataset}/transfer")), "folder .* {dataset}/transfer twice"),
+        (lambda: replace(STAGE, work=Untyped.bare).schema, "stage projection: work: .* got none"),
+        (lambda: replace(STAGE, work=Untyped.number).schema, "stage projection: work: .* got int"),
+        (lambda: selected(Misspelt, compose(())), r"Misspelt\.width: .* 'widths'"),
+        (lambda: type("Misplaced", (Result,), {}, section="datas"), "Misplaced: section"),
+        (lambda: require_outcome(STAGE, None, TOYS), "stage projection: work: .* got NoneType"),
+        (lambda: require_outcome(STAGE, Outcome(Plain(1)), TOYS), "work: .* got Plain"),
+        (lambda: require_outcome(STAGE, Outcome(ProjectionResult(1)), TOYS), r"projection\.png"),
+        (
+            lambda: require_outcome(
+                replace(STAGE, **rule(files=())), Outcome(ProjectionResult(1), {"b.png": "B"}), TOYS
+            ),
+            r"b\.png",
+        ),
     ],
 )
-def test_a_job_tells_and_writes_what_it_has_made(outcome, message, tmp_path):
-    if outcome is not None and outcome.pictures:
-        (tmp_path / "projection.png").touch()
-    with pytest.raises(ConfigError, match=message):
-        require_outcome(STAGE, outcome, tmp_path)
+def test_a_mistake_in_a_stage_is_named(made, key):
+    with pytest.raises(ConfigError, match=key):
+        made()
+
+
+def test_the_stages_that_there_are_have_no_mistakes():
+    require_stage("toy", STAGE)
+    assert list(by_name(STAGES.values())) == list(STAGES)
+
+
+def test_a_stage_takes_no_verb(monkeypatch, capsys):
+    monkeypatch.setattr(stage_table, "STAGES", {**STAGES, "run": replace(STAGE, name="run")})
+    with pytest.raises(SystemExit):
+        runpy.run_path(main.__file__)
+    assert "STAGE has the name of the verb run; rename it" in capsys.readouterr().err
 
 
 def test_a_rule_may_have_several_stages():

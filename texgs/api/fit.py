@@ -16,9 +16,9 @@ from texgs.api.scene import Scene
 from texgs.api.volume import Volume
 from texgs.core.check import torch_device
 from texgs.core.errors import ArgumentError
-from texgs.core.interrupts import interrupts_between_items
 from texgs.core.io import copy_atomic
 from texgs.core.names import SCENE, close, file_name
+from texgs.core.progress import interrupts_between_items
 from texgs.scene.session import Session
 from texgs.volume.summaries import summary_file, write_summaries
 from texgs.volume.transfer import TransferFunction
@@ -116,12 +116,12 @@ def compose_in(
     volume: Volume, functions: Mapping[str, TransferFunction], words: tuple[str, ...], folder: Path
 ) -> Path:
     """Run the stages up to the scene with results in a folder; return the scene's file."""
-    from texgs.workflow.execution import ensure
+    from texgs.workflow.execution import Task, ensure
     from texgs.workflow.stage import made
     from texgs.workflow.stage_table import STAGES, jobs
 
     config = configuration(volume, functions, words, folder)
-    known = {stage.output(each): (stage, each) for stage, each in jobs(config)}
+    known = {stage.output(each): Task(stage, each) for stage, each in jobs(config)}
     ensure(STAGES["compose"], config, known, tell=lambda line: None, warn=warnings.warn)
     return made("compose", config)
 
@@ -131,8 +131,9 @@ def configuration(
 ) -> Config:
     """Return the configuration of a data set that is a volume with basic transfer functions."""
     from texgs.config.compose import recompose
-    from texgs.config.dataset import BasicTF, dataset_of
+    from texgs.config.dataset import dataset_of
     from texgs.config.project import check_name
+    from texgs.volume.basic_tfs import BasicTF
     from texgs.volume.transfer import check_disjoint
 
     check_disjoint(functions)

@@ -13,8 +13,8 @@ from texgs.api.keywords import takes
 from texgs.core.check import torch_device
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
-from texgs.core.interrupts import interrupts_between_items
 from texgs.core.names import check_count
+from texgs.core.progress import interrupts_between_items
 from texgs.scene.copied import write_copy
 from texgs.scene.export_keys import Export
 from texgs.scene.film import Film

@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from texgs import __version__
 from texgs.cli.options import Parser
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.memory import as_out_of_memory
+from texgs.core.memory import as_out_of_memory, collect_rarely, keep_freed_memory, waiting
 from texgs.core.names import close
-from texgs.core.process import collect_rarely, keep_freed_memory, waiting
 
 try:
     from texgs.workflow.stage_table import STAGES

@@ -67,9 +67,9 @@ def run_series(arguments: argparse.Namespace) -> int:
     """
     from texgs.config.compose import compose
     from texgs.core.check import torch_device
+    from texgs.edit.series import make_series
     from texgs.scene.scene_file import read_scene
-    from texgs.workflow.moments import matching
-    from texgs.workflow.series import make_series
+    from texgs.volume.moments import matching
 
     require_only_files(arguments.files)
     with located("--files"):

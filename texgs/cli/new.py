@@ -20,9 +20,10 @@ from texgs.core.io import is_there, write_bytes
 from texgs.core.memory import room_for_volume
 
 if TYPE_CHECKING:
-    from texgs.config.dataset import Dataset, Volume
+    from texgs.config.dataset import Dataset
     from texgs.config.schema import Config
     from texgs.volume.axes import Channel
+    from texgs.volume.settings import VolumeKeys
     from texgs.volume.slabs import Source
 
 LARGEST_SAMPLE = 4  # bytes of one in a prepared volume
@@ -64,9 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Make a data set of the volume, with all its channels, and say what comes next."""
     from texgs.config.project import members, own_folder, shown
+    from texgs.edit.series import moments_of
     from texgs.volume.sources import tells_superior
     from texgs.workflow.locate import series_files
-    from texgs.workflow.series import moments_of
 
     check_options(arguments)
     name = arguments.name or name_of(arguments.file)
@@ -117,17 +118,17 @@ def check_options(arguments: argparse.Namespace) -> None:
         read_tf(path)
 
 
-def array_of(volume: Volume) -> Source | None:
+def array_of(volume: VolumeKeys) -> Source | None:
     """Return the array in a file of arrays; nothing of it is read. None of other formats, and of mistakes."""
+    from texgs.volume.settings import open_field
     from texgs.volume.sources import holds_arrays
-    from texgs.workflow.stages.volume import source
 
     path = Path(volume.file or "")
     if not holds_arrays(path):
         return None
     for channel in (volume.channel or "0", volume.channel):
         with suppress(TexgsError):  # it has no channels; what else is wrong with it is told when it is read
-            return source(replace(volume, channel=channel), path)
+            return open_field(replace(volume, channel=channel), path)
     return None
 
 
@@ -149,7 +150,7 @@ def reduced(config: Config, field: Source, count: int) -> Config:
     return replace(config, dataset=replace(dataset, volume=replace(volume, reduce=factor)))
 
 
-def channels_of(volume: Volume, field: Source | None) -> dict[str, Channel | None]:
+def channels_of(volume: VolumeKeys, field: Source | None) -> dict[str, Channel | None]:
     """Return what the file says of channels by their labels or numbers; of the one to read, by ""."""
     if field is None or volume.channel or len(field.channels) < 2:
         return {"": None if field is None else field.channel}

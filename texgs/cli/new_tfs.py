@@ -13,9 +13,10 @@ from texgs.config.project import NO_NAME, check_name
 from texgs.core.errors import ArgumentError, ConfigError, TexgsError
 
 if TYPE_CHECKING:
-    from texgs.config.dataset import BasicTF, Dataset
+    from texgs.config.dataset import Dataset
     from texgs.config.schema import Config
     from texgs.volume.axes import Channel
+    from texgs.volume.basic_tfs import BasicTF
     from texgs.volume.transfer import TransferFunction
 
 
@@ -55,7 +56,7 @@ def of_each(
 ) -> dict[str, BasicTF]:
     """Return TFs of all channels, named by their labels: one of each, unless a count says otherwise."""
     from texgs.config.dataset import BasicTF
-    from texgs.volume.suggest import COLORS, windowed
+    from texgs.volume.suggest import COLORS, window_function
 
     files = arguments.tf
     if files and len(files) != len(channels):
@@ -64,7 +65,7 @@ def of_each(
         )
     listed, names = {}, tf_names(list(channels))
     for number, (key, channel) in enumerate(channels.items()):
-        has_look = channel and windowed(channel, known[key]["minimum"], known[key]["maximum"])
+        has_look = channel and window_function(channel, known[key]["minimum"], known[key]["maximum"])
         count = arguments.count or (None if has_look else 1)
         basic = basic_tfs(key, known[key], channel, files and files[number : number + 1], count)
         for name, tf in basic.items():

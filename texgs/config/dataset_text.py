@@ -10,9 +10,10 @@ from typing import Any
 import yaml
 
 from texgs.config.compose import compose
-from texgs.config.dataset import BasicTF, Dataset
+from texgs.config.dataset import Dataset
 from texgs.core.errors import ConfigError
 from texgs.core.io import write_bytes
+from texgs.volume.basic_tfs import BasicTF
 
 
 def with_basic_tf(text: str, name: str, points: BasicTF, framed_by: list[str]) -> str:

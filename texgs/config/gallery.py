@@ -1,4 +1,4 @@
-"""The schema of galleries: pictures of a data set's scenes in rows and columns."""
+"""The schema of galleries, pictures of a data set's scenes in rows and columns, and what it comes to."""
 
 from dataclasses import dataclass
 
@@ -64,3 +64,35 @@ class GalleryKeys:
     note: str = key("", "words behind the captions of all pictures, such as what stands in for what")
     size: int = key(400, "width and height of each picture", "pixels", least=16)
     grids: list[GridKeys] = key([], "pictures; default one with a column for each look")
+
+
+@dataclass
+class GalleryCell:
+    """What the configuration says of one picture, see `ShotKeys`."""
+
+    scene: str  # its name among the inputs
+    show: str  # scene, volume, error, or "" for nothing
+    view: list[float]
+    fov_y: float | None
+    box: list[float]
+    pixels: int | None
+    light: list[float]
+    changes: list[str]
+
+
+@dataclass
+class GalleryRow:
+    """Places side by side."""
+
+    title: str
+    pictures: list[GalleryCell]
+
+
+@dataclass
+class Grid:
+    """What one file shows."""
+
+    name: str
+    caption: str
+    columns: list[str]
+    rows: list[GalleryRow]

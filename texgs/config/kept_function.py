@@ -1,22 +1,21 @@
 """A function of a scene, kept as a basic transfer function in the file of the data set of its volume."""
 
 import os
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from texgs.config.compose import recompose
-from texgs.config.dataset import BasicTF
 from texgs.config.dataset_text import require_read, with_basic_tf
 from texgs.config.project import ROOT, check_name, own_folder, shown
 from texgs.core.errors import ArgumentError, ConfigError, located
 from texgs.core.io import read_json, write_bytes
 from texgs.core.names import METRICS
 from texgs.scene.scene import Scene
+from texgs.volume.basic_tfs import BasicTF
 from texgs.volume.framing import frame_of, out_of_frame
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.summaries import read_summaries
-from texgs.volume.transfer import TransferFunction, overlapping, row_text
+from texgs.volume.transfer import TransferFunction, check_disjoint
 
 
 def keep(scene: Scene, name: str) -> str:
@@ -47,7 +46,8 @@ def keep(scene: Scene, name: str) -> str:
             for key, points in basic_tfs.items()
         }
         tfs = {key: tf.scaled(*ends[tf.channel]) for key, tf in tfs.items()} if is_scaled else tfs
-        require_composable(tfs)
+        with located("basic_tfs"):
+            check_disjoint(tfs)
         framing, grid = dataset.framing, open_grid(volume.file)
         far = out_of_frame(grid, tfs[name], frame_of(grid, [tfs[key] for key in framing]))
         text = with_basic_tf(text, name, basic_tfs[name], [] if dataset.framed_by else framing)
@@ -75,13 +75,3 @@ def file_of(volume: Path) -> Path:
             f"{shown(file)}: expected a file that can be written, got a read-only one; allow it"
         )
     return file
-
-
-def require_composable(tfs: Mapping[str, TransferFunction]) -> None:
-    """Require that no two functions of a data set show the same values: their models make one scene."""
-    if pair := overlapping(tfs):
-        one, two = (f"{name} on {row_text(tfs[name].support)}" for name in pair)
-        raise ArgumentError(
-            f"basic_tfs: a scene is composed of functions that do not overlap, but {two} overlaps {one}; cut "
-            "one of them, or leave it to the scene that tries it, where models may overlap"
-        )

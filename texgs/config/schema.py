@@ -5,13 +5,14 @@ that names the key; `texgs views --help` prints this file.
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 from texgs.config.dataset import Dataset, MeshKeys
 from texgs.config.gallery import GalleryKeys
 from texgs.config.recipes import Edit, Fit
-from texgs.config.views import ViewKeys
 from texgs.core.keys import key
 from texgs.models.catalogue import CLIP_BACKBONES
+from texgs.volume.view_settings import ViewKeys
 
 NO_SWEEP = "none"  # name of the sweep without variants
 
@@ -82,6 +83,13 @@ class StandIns:
     taken: str = key("missing", "where data or weights are missing, or always", choices=("missing", "always"))
     datasets: dict[str, str] = key(dict, "data sets by the names of those that they stand in for")
     edits: dict[str, str] = key(dict, "edits by the names of those that they stand in for")
+
+    def of(self, group: Literal["datasets", "edits"], name: str) -> list[str]:
+        """Return what stands in for a name, and for that, one after another."""
+        table, listed = getattr(self, group), [name]
+        while (following := table.get(listed[-1], name)) not in listed:
+            listed.append(following)
+        return listed[1:]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from texgs.core.keys import REQUIRED, key
 from texgs.core.names import require_numbers
 
 ORIGIN = (0.0, 0.0, 0.0)
-FILLED = 0.9  # of the smaller side of an image, by what is framed
+FILLED = 0.9  # share of the smaller side of an image that shows what is framed
 
 
 class Lens(NamedTuple):

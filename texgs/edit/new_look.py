@@ -16,7 +16,7 @@ from texgs.core.keys import ValueMismatch, typed
 from texgs.core.progress import let_stop
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import MethodKeys, methods
-from texgs.edit.readable import raised
+from texgs.edit.readable import raise_opacities
 from texgs.edit.task import Task, edited_by, parts_of
 from texgs.fields.surfels.model import Surfels
 from texgs.scene.parts import NewLook, entry_of, look_of, part_names, with_looks
@@ -99,7 +99,7 @@ def look_task(
 
 def opaque(task: LookTask) -> LookTask:
     """Return the task with opacities in its scene at which the look can be seen, for good."""
-    task = raised(task)
+    task = raise_opacities(task)
     return replace(task, settings=replace(task.settings, opacity="keep"))
 
 

@@ -24,7 +24,7 @@ VISIBLE = 2 / 255  # alpha
 MAGNIFIED = 4  # a quarter of the range of colours has the full colour
 DIVERGING = "bwr"  # 0 is white
 ERROR = Scale(-1 / MAGNIFIED, 1 / MAGNIFIED, DIVERGING)  # red where too bright, blue where too dark
-MARGIN = 1.06  # of what is shown around what is visible
+MARGIN = 1.06  # side of the part that is shown, in sides of what is visible
 KEY = Cell("", words="of the worst channel\nred: too bright\nblue: too dark")
 
 

@@ -15,8 +15,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.lens import Frame
 from texgs.fields import files
 from texgs.fields.field import Field, Look
-from texgs.fields.gaussians.files import write_ply as write_gaussians
-from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
+from texgs.fields.gaussians import Gaussians, JoinedGaussians
+from texgs.fields.gaussians import write_ply as write_gaussians
 from texgs.fields.kinds import Kind, kinds
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.ply_columns import Told, colored, write_columns
@@ -135,7 +135,7 @@ def export_scene(path: Path, scene: Scene, keys: Export) -> Path:
         render = partial(composed.render, edits=edits, look=look, outputs=(field.depth,))
         return _write_fused(path, keys, scene.framed(composed), render, scene.space)
     if isinstance(composed, JoinedGaussians):
-        return write_gaussians(path, composed.edited(edits), facts)
+        return write_gaussians(path, composed.with_edits(edits), facts)
     return _write(path, keys, joined(cast(Composition, composed).parts, edits), scene.space)
 
 

@@ -12,7 +12,7 @@ from torch.nn import functional as F
 from texgs.core.errors import ArgumentError, located
 from texgs.scene.scene import Scene, volume_of
 from texgs.volume.grid import Grid, Triple
-from texgs.volume.nrrd_file import MAKES, open_grid
+from texgs.volume.nrrd_file import REMEDY, open_grid
 
 MEGABYTE = 10**6
 LEVELS = 255  # the largest code of 8 bits
@@ -133,7 +133,7 @@ def extremes(values: np.ndarray) -> tuple[float, float]:
     low, high = (float(end) for end in (np.min(ends), np.max(ends)))
     if not -np.inf < low < high < np.inf:
         raise ArgumentError(
-            f"expected finite samples of two values at least, got {low:g} to {high:g}; {MAKES}"
+            f"expected finite samples of two values at least, got {low:g} to {high:g}; {REMEDY}"
         )
     return low, high
 

@@ -3,16 +3,16 @@
 import shlex
 from collections.abc import Callable
 
-from texgs.config.compose import compose
+from texgs.config.case import Case
 from texgs.config.dataset import Dataset
-from texgs.config.project import Words, members
+from texgs.config.project import members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError, MissingDataError, located
 from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import Kind, kinds, require
 from texgs.fields.surfels.material import require_material
 from texgs.fitting.kinds import fit_specs
-from texgs.workflow.edits import OF_ONE, lineage, looks_of
+from texgs.workflow.edits import OF_ONE, chain_of, looks_of, require_parts
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.stage import Stage
 
@@ -114,18 +114,18 @@ def require_fit(stage: Stage, config: Config) -> None:
     check_fit(config)
 
 
-def require_fits(words: Words) -> None:
+def require_fits(case: Case) -> None:
     """Require several recipes, each without mistakes."""
-    recipes = compose(words).fits
+    recipes = case.config.fits
     if len(recipes) < 2:
         raise ConfigError("fits: expected several recipes to compare, such as fits=[quick,demo]")
     for recipe in recipes:
-        check_fit(compose((*words, f"fit={recipe}")))
+        check_fit(case.but(f"fit={recipe}").config)
 
 
-def require_edit(stage: Stage, words: Words) -> None:
+def require_edit(stage: Stage, case: Case) -> None:
     """Require that the edit is one for this verb, and that what it starts from is there with its parts."""
-    config = compose(words)
+    config = case.config
     own = [name for name, method in methods().items() if method.stage == stage.name]
     expected = own or [name for name, method in methods().items() if method.is_look]
     if config.edit.method not in expected:
@@ -134,13 +134,15 @@ def require_edit(stage: Stage, words: Words) -> None:
             f"(edit={config.edit.name}); choose another edit of conf/edit"
         )
     check_edit(config)
-    if config.edit.base in members("edit") and scene_before(config).is_file():
+    is_there = scene_before(config).is_file()
+    if config.edit.base in members("edit") and is_there:
         return  # it may have been made with other words than those of conf/edit: the parts it has count
-    chain = lineage(words)
-    if config.edit.base is not None and not scene_before(config).is_file():
-        name, before = chain[-2]
-        verb = method_of(compose(before).edit).stage
-        same = shlex.join([word for word in words if not word.startswith(("edit=", *OF_ONE))])
+    chain = chain_of(case)
+    require_parts(chain)
+    if config.edit.base is not None and not is_there:
+        before = chain[-2].config.edit
+        same = shlex.join(case.without("edit", *OF_ONE).words)
         raise MissingDataError(
-            f"edit.base: {name} is not done yet; run texgs {verb} {same} edit={name} first"
+            f"edit.base: {before.name} is not done yet; run texgs {method_of(before).stage} {same} "
+            f"edit={before.name} first"
         )

@@ -1,9 +1,9 @@
 """Digest of the code a stage runs: its module and all modules of texgs that it imports, however deep.
 
 Read from the source without importing it. Comments, docstrings, help texts and layout do not count, so only a
-change that can change a result changes the digest. Of texgs/workflow only stages and `WORK` count. Code that
-calls the native library has the digest of the C++ and CUDA sources in it; a module that reads files of its
-package has these in it.
+change that can change a result changes the digest. Of texgs/workflow only stages count. Code that calls the
+native library has the digest of the C++ and CUDA sources in it; a module that reads files of its package has
+these in it.
 """
 
 import ast
@@ -14,15 +14,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from texgs.core.cache import cache_folder, keep, recall
-from texgs.core.checksum import digest, sha256
+from texgs.core.cache import cache_folder, digest, keep, recall, sha256
 from texgs.core.native_sources import library_sources
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("texgs", "benchmarks")  # the second measures the first, which never imports it
 STAGES = "texgs.workflow.stages."
-ENGINE = "texgs.workflow."  # what else is there decides settings and inputs, which jobs are known by anyway
-WORK = tuple(f"{ENGINE}{name}" for name in ("series", "moments", "differences"))  # but these do what jobs do
+ENGINE = "texgs.workflow."  # all but stages decides on settings and inputs, which identify jobs anyway
 NATIVE = "texgs.raster.native"  # the module that calls the native library
 READS_DATA = b"importlib.resources"  # in modules that do
 DATA = (".css", ".csv", ".html", ".j2", ".js", ".safetensors", ".tex", ".webp", ".yaml")
@@ -127,7 +125,7 @@ def code_of(modules: Iterable[str], root: Path | None = None) -> dict[str, str]:
     waiting = list(modules)
     while waiting:
         name = waiting.pop()
-        is_engine = name.startswith(ENGINE) and not name.startswith((STAGES, *WORK))
+        is_engine = name.startswith(ENGINE) and not name.startswith(STAGES)
         if name in seen or is_engine or (read := essence(name, root)) is None:
             continue
         seen[name], imported = read

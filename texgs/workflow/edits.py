@@ -1,14 +1,14 @@
-"""The edits of an experiment as more words for `compose`; the parts, settings and files of their jobs."""
+"""The edits of an experiment and what they start from; the settings and files of their jobs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from yaml import YAMLError
 
-from texgs.config.compose import compose
-from texgs.config.project import Words, is_scene_file, members
+from texgs.config.case import Case
+from texgs.config.project import is_scene_file, members
 from texgs.config.schema import Config
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.core.names import close
@@ -21,49 +21,41 @@ from texgs.workflow.locate import tf_names
 
 CAPTIONS = {"style": "styled", "instruction": "instructed"}  # keys of a look by what a method follows
 VIEWS = "views."  # before the name of a model, in the names of inputs
-OF_ONE = ("edit.name=", "edit.method=", "edit.base=", "edit.parts=")  # not of what an edit starts from
+OF_ONE = ("edit.name", "edit.method", "edit.base", "edit.parts")  # keys of one edit, not of its base
 
 
-def edits(words: Words) -> list[Words]:
-    """Return the words of each edit of the experiment, those that it starts from before it."""
-    config = compose(words)
+def edits_of(case: Case) -> list[Case]:
+    """Return the edits of an experiment, each after those that it starts from."""
+    config = case.config
     if repeated := [name for name in config.edits if config.edits.count(name) > 1]:
         raise ConfigError(f"edits: expected different names, got {repeated[0]} twice")
     if not config.edits and config.edit.method == NO_METHOD:
         return []
-    by_name: dict[str, Words] = {}
-    for each in [(*words, f"edit={name}") for name in config.edits] or [words]:
-        for name, ancestor in lineage(each):
-            by_name.setdefault(name, ancestor)
+    by_name: dict[str, Case] = {}
+    for each in [case.edited(name) for name in config.edits] or [case]:
+        chain = chain_of(each)
+        require_parts(chain)
+        for one in chain:
+            by_name.setdefault(one.config.edit.name, one)
     return list(by_name.values())
 
 
-def lineage(words: Words) -> list[tuple[str, Words]]:
-    """Return name and words of an edit and of all that it starts from, the first one first.
+def chain_of(case: Case) -> list[Case]:
+    """Return an edit and all that it starts from, the first one first.
 
-    Changed values hold for all of them, but for the name, the kind, the base and the parts.
+    The words of the case hold for all of them, but for the name, the method, the base and the parts.
     """
-    chain: list[tuple[str, Words]] = []
-    following: Words | None = words
-    while following is not None:
-        edit = compose(following).edit
-        if edit.method == NO_METHOD:
-            raise ConfigError(
-                f"edit={edit.name}: expected a method, got none; write `method: NAME` into "
-                f"conf/edit/{edit.name}.yaml, with one of {', '.join(methods())}"
-            )
-        if edit.name in [name for name, _ in chain]:
-            raise ConfigError(f"edit.base: {edit.name} starts from itself; choose another base")
-        chain.insert(0, (edit.name, following))
-        rest = [word for word in words if not word.startswith(OF_ONE)]
-        following = None if edit.base is None or is_made(following) else (*rest, f"edit={edit.base}")
-    require_parts([each for _, each in chain])
+    chain = [case]
+    while (base := chain[0].config.edit.base) is not None and not starts_from_scene(chain[0].config):
+        before = case.without(*OF_ONE).edited(base)
+        if before.config.edit.name in [each.config.edit.name for each in chain]:
+            raise ConfigError(f"edit.base: {base} starts from itself; choose another base")
+        chain.insert(0, before)
     return chain
 
 
-def is_made(words: Words) -> bool:
+def starts_from_scene(config: Config) -> bool:
     """Return whether an edit starts from a scene that is there, and not from another edit of conf/edit."""
-    config = compose(words)
     base, known = config.edit.base, members("edit")
     if is_scene_file(base):
         return True
@@ -77,42 +69,27 @@ def is_made(words: Words) -> bool:
     )
 
 
-def require_parts(chain: Sequence[Words]) -> None:
-    """Require of edits, each of which starts from the one before it, that the parts they change are there."""
-    chained = [compose(words).edit for words in chain]
-    if chained[0].base is not None:  # a scene that is there already, and says so at once
+def require_parts(chain: Sequence[Case]) -> None:
+    """Require of edits, each of which starts from the one before it, methods and the parts they change."""
+    edits = [case.config.edit for case in chain]
+    if unmade := next((edit.name for edit in edits if edit.method == NO_METHOD), None):
+        raise ConfigError(
+            f"edit={unmade}: expected a method, got none; write `method: NAME` into conf/edit/{unmade}.yaml, "
+            f"with one of {', '.join(methods())}"
+        )
+    if edits[0].base is not None:  # a scene that is there, and that says so at once
         return
     try:
-        models = tf_names(compose(chain[0]))
-    except MissingDataError:  # which is told elsewhere
+        models = tf_names(chain[0].config)
+    except MissingDataError:  # the plan says so
         return
     known = list(models)
-    for edit in chained:
+    for edit in edits:
         for part in edit.parts:
             if part not in known:
                 hint = close(part, known)
                 raise ConfigError(f"edit.parts: expected some of {', '.join(known)}, got {part}{hint}")
-        known += added_parts(edit, models)
-
-
-def added_parts(edit: EditKeys, models: Sequence[str]) -> Sequence[str]:
-    """Return the parts that an edit adds to a scene of some models."""
-    return method_of(edit).of(edit).adds(models)
-
-
-def chain(table: Mapping[str, str], name: str) -> list[str]:
-    """Return a name and what stands in for it by a table, one after another."""
-    listed = [name]
-    while (following := table.get(listed[-1], name)) not in listed:
-        listed.append(following)
-    return listed
-
-
-def ancestry(name: str, *words: str) -> list[EditKeys]:
-    """Return an edit of conf/edit and those that it starts from, the first one first, with some words."""
-    edit = compose((*words, f"edit={name}")).edit
-    is_first = edit.base is None or is_scene_file(edit.base) or edit.base not in members("edit")
-    return [edit] if is_first else [*ancestry(edit.base, *words), edit]
+        known += method_of(edit).of(edit).adds(models)
 
 
 def edit_keys(config: Config) -> dict[str, Any]:

@@ -1,22 +1,22 @@
 """The jobs of a run by their folders: what it goes through, what it replaces, and what it lacks."""
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from os.path import normpath
 from pathlib import Path
 from typing import Any
 
+from texgs.config.case import Case
 from texgs.config.project import Words
 from texgs.config.schema import Config
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.io import read_json
 from texgs.core.names import METRICS
 from texgs.report import metrics_files
 from texgs.report.metrics_files import Record, below, read_known
+from texgs.workflow.cases import Cases, LeftOut, cases_of
 from texgs.workflow.checks import check_basic_tfs, check_edit, check_fit
-from texgs.workflow.experiments import LeftOut, Selection, selected
 from texgs.workflow.job import Job
 from texgs.workflow.missing import lacking, missing_weights
 from texgs.workflow.result import damaged, fingerprint, is_complete, stamped
@@ -68,8 +68,9 @@ class Graph:
     def _replaced(self) -> dict[str, bool]:
         return {}
 
-    def add(self, config: Config, checksums: Checksums) -> list[str]:
+    def add(self, case: Case, checksums: Checksums) -> list[str]:
         """Add the jobs of a configuration, which is checked before, and return their folders."""
+        config = case.config
         check_basic_tfs(config.dataset)
         check_fit(config)
         check_edit(config)
@@ -82,7 +83,7 @@ class Graph:
         folders = []
         for stage, each in listed:
             try:
-                job = Job.of(stage, each, checksums)
+                job = Job.of(stage, each, checksums, case.words)
             except MissingDataError as error:
                 job = Job(stage, stage.settings(each), {}, stage.output(each))
                 self.missing.setdefault(str(error), []).append(job.output.as_posix())
@@ -99,19 +100,13 @@ class Graph:
         return folders
 
 
-def graph(by_sweep: Mapping[str, Iterable[Config]], checksums: Checksums) -> Graph:
-    """Return the jobs of some configurations, which are listed by sweep; see `Graph.add`."""
-    made = Graph()
-    for sweep, configs in by_sweep.items():
-        folders = (folder for config in configs for folder in made.add(config, checksums))
-        made.sweeps[sweep] = list(dict.fromkeys(folders))
-    return made
-
-
-def drawn(words: Words, checksums: Checksums) -> tuple[Selection, Graph]:
-    """Return the configurations that some words describe, and their jobs."""
-    selection = selected(words, lacking)
-    return selection, graph(selection.by_sweep, checksums)
+def graph_of(words: Words, checksums: Checksums) -> tuple[Cases, Graph]:
+    """Return the cases that a user's words come to, and their jobs."""
+    cases, graph = cases_of(words, lacking), Graph()
+    for sweep, listed in cases.by_sweep.items():
+        folders = [folder for case in listed for folder in graph.add(case, checksums)]
+        graph.sweeps[sweep] = list(dict.fromkeys(folders))
+    return cases, graph
 
 
 def earlier(

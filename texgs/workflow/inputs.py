@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from texgs.config.compose import compose
+from texgs.config.compose import preset
 from texgs.config.project import is_scene_file, members
 from texgs.config.schema import NO_SWEEP, Config
 from texgs.core.errors import ConfigError, MissingDataError
@@ -152,7 +152,7 @@ def is_changed(fit: Any, later: Sequence[str] = ()) -> bool:
     """
     if fit.name not in members("fit"):
         return True
-    file, ignored = compose((f"fit={fit.name}",)).fit, ("seed", *later)
+    file, ignored = preset("fit", fit.name).fit, ("seed", *later)
     names = (key.name for key in fields(file) if key.name not in ignored)
     return any(getattr(fit, name) != getattr(file, name) for name in names)
 
@@ -169,5 +169,5 @@ def without(table: Any, *names: str) -> dict[str, Any]:
 
 def with_recipe(config: Config, name: str) -> Config:
     """Return the configuration with another recipe's name and field: what decides where its models are."""
-    recipe = compose((f"fit={name}",)).fit
+    recipe = preset("fit", name).fit
     return replace(config, fit=replace(config.fit, name=recipe.name, field=recipe.field))

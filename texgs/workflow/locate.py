@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from texgs.config.dataset import BasicTF, Dataset, Volume
+from texgs.config.dataset import Dataset
 from texgs.config.project import check_name
 from texgs.config.schema import Config
-from texgs.core.cache import cache_folder
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError, located
 from texgs.core.io import is_there
-from texgs.core.names import file_name
-from texgs.workflow.moments import in_time, matching
+from texgs.volume.basic_tfs import BasicTF
+from texgs.volume.moments import in_time, matching
+from texgs.volume.settings import cached_volume
 
 
 def require_volume(dataset: Dataset) -> None:
@@ -67,16 +67,6 @@ def series_files(config: Config) -> list[Path]:
         )
     with located(f"dataset.series of {name}"):
         return [moment.file for moment in in_time(files) if moment.file]
-
-
-def cached_volume(volume: Volume) -> Path:
-    """Return where a volume's file is downloaded to; another checksum, which it needs, is another file."""
-    checksum, name = volume.sha256, file_name("dataset.volume.file", Path(volume.file or "").name)
-    if not checksum or not checksum.isalnum():
-        raise ConfigError(
-            f"dataset.volume.sha256: expected the checksum of {volume.url}, got {checksum or 'none'}"
-        )
-    return cache_folder() / "volumes" / checksum[:12] / name
 
 
 def views_folder(config: Config, tf: str | None = None) -> Path | None:

@@ -13,17 +13,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from texgs.config.compose import compose
 from texgs.config.project import ROOT, folders
 from texgs.config.schema import Config
-from texgs.core.cache import keep, recall
-from texgs.core.checksum import Checksums, digest, of_folders
+from texgs.core.cache import Checksums, checksum_of_folders, digest, keep, recall
 from texgs.core.errors import ConfigError
 from texgs.core.io import write_bytes
-from texgs.workflow.experiments import LeftOut, apart
-from texgs.workflow.graph import drawn, earlier
+from texgs.volume.settings import cached_volume
+from texgs.workflow.cases import LeftOut
+from texgs.workflow.graph import earlier, graph_of
 from texgs.workflow.job import Job, settings_file
-from texgs.workflow.locate import cached_volume
 from texgs.workflow.notes import note_results, note_tables
 from texgs.workflow.stage import Rule, edit_folder, fit_folder
 from texgs.workflow.stage_table import RULES, STAGES, SWEPT
@@ -40,7 +38,7 @@ class Plan:
     tracking: str | None  # URI of the store
     experiment: str  # of the store
     gpu: list[str]  # what GPUs are for: "views", "fit" or both
-    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code, inputs and swept values, by folder
+    jobs: dict[str, dict[str, Any]]  # by folder, see `plain`
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
     wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
@@ -112,7 +110,7 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
     """
     path = Path(".snakemake", "texgs", f"plan-{digest(repr(words))}.json")
     data = os.environ.get("TEXGS_DATA", "")
-    key = digest("\n".join([*words, data, of_folders(ROOT / "texgs", *folders())]))
+    key = digest("\n".join([*words, data, checksum_of_folders(ROOT / "texgs", *folders())]))
     if is_job and (kept := recall(path, key)):
         with suppress(TypeError):  # of a damaged file, it is made again
             return Plan(**kept), []
@@ -124,14 +122,14 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
 def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     """Plan a run, and note in their settings which results are not those of the plan; see `planned`."""
     checksums = Checksums.load()
-    selection, planned = drawn(words, checksums)
-    config, configs = compose(apart(words)[0]), selection.configs
+    cases, graph = graph_of(words, checksums)
+    config, configs = cases.config, cases.configs
     results = Path(config.results).as_posix()  # as the folders of the jobs have it
     if results == ".":
         raise ConfigError("results: expected a folder of its own, got the current one; choose another")
-    others, outdated = earlier(results, planned, checksums)
-    jobs = {folder: plain(job, results) for folder, job in planned.jobs.items()}
-    note_results(planned.jobs.values(), [job["settings"] for job in jobs.values()])
+    others, outdated = earlier(results, graph, checksums)
+    jobs = {folder: plain(job, results) for folder, job in graph.jobs.items()}
+    note_results(graph.jobs.values(), [job["settings"] for job in jobs.values()])
     uses = {"views" for each in configs if each.views.renderer == "gpu"}
     uses |= {"fit" for each in configs if each.device.name == "cuda"}
     plan = Plan(
@@ -140,16 +138,16 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
         config.tracking.experiment,
         sorted(uses),
         jobs,
-        planned.sweeps,
+        graph.sweeps,
         downloads(configs),
         wildcards(configs),
-        left_out({**selection.left_out, **outdated}, results),
+        left_out({**cases.left_out, **outdated}, results),
         others,
-        planned.of_other_settings,
+        graph.of_other_settings,
         note_tables(results, checksums),
     )
     checksums.save()
-    return plan, list(planned.missing)
+    return plan, list(graph.missing)
 
 
 def plain(job: Job, results: str) -> dict[str, Any]:
@@ -161,6 +159,7 @@ def plain(job: Job, results: str) -> dict[str, Any]:
         "code": job.stage.code(job.settings),
         "inputs": {name: path.as_posix() for name, path in job.inputs.items()},
         "swept": dict(job.swept),
+        "command": job.command,
     }
 
 

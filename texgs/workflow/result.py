@@ -19,15 +19,15 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from texgs.core.checksum import Checksums, combined, sha256
+from texgs.core.cache import Checksums, combined_checksum, sha256
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, remove_scratch, write_json
-from texgs.core.names import METRICS, POINTS, SLICES
-from texgs.volume.parts import parts_of
+from texgs.core.names import METRICS
+from texgs.volume.input_files import checksum_of_input
 
 STAMP = ".job.json"
 FILES = ".files.json"
-TIMES = "times.json"  # of single views; like METRICS it differs from one run to the next
+TIMES = "times.json"  # times of single views; like METRICS it differs from one run to the next
 
 
 @contextmanager
@@ -112,7 +112,7 @@ def recover(output: Path) -> None:
     """Finish what a process that was killed while it swapped two results had begun."""
     work, old = work_folder(output), output.with_name(f".{output.name}.old")
     if output.exists() and not output.is_dir():
-        return  # it is none of ours
+        return  # somebody else's
     if not output.exists() or not any(output.iterdir()):
         complete = (folder for folder in (work, old) if (folder / FILES).exists())
         if (folder := next(complete, None)) is not None:
@@ -186,44 +186,15 @@ def require_own(output: Path) -> None:
 def fingerprint(path: Path, checksums: Checksums) -> str:
     """Return the checksum of an input: of the result that it belongs to, with the identity of its job.
 
-    A file from elsewhere counts with its contents. One that is in parts, such as a header and its samples,
-    counts with all of them, a folder with its slices or all files, and the transforms_train.json of views
-    from elsewhere with all images and points beside it.
+    A file from elsewhere counts with its contents, see `checksum_of_input`.
     """
     folder = path.parent
     made_files = recorded(folder)
     is_foreign = path.exists() and path.name not in made_files
     if (folder / FILES).exists() and not is_foreign:
         made = [(name, sha) for name, sha in made_files.items() if name not in (METRICS, TIMES)]
-        return combined([*made, (STAMP, json.dumps(stamped(folder), sort_keys=True))])
-    if path.name.startswith("transforms_"):
-        members = [each for each in folder.rglob("*") if each.suffix in (".json", ".png")]
-        members += [points for points in [folder / POINTS] if points.is_file()]
-        members += images_outside(folder)
-    elif path.is_dir():
-        files = [each for each in path.rglob("*") if each.is_file()]  # chunks and DICOM have any suffix
-        members = [each for each in files if each.suffix.lower() in SLICES] or files
-    elif parts := parts_of(path):
-        return combined((each.name, checksums.of(each)) for each in (path, *parts))
-    else:
-        return checksums.of(path)
-    return combined(
-        (str(each.relative_to(folder) if each.is_relative_to(folder) else each), checksums.of(each))
-        for each in members
-    )
-
-
-def images_outside(folder: Path) -> list[Path]:
-    """Return the images that files of views name and that do not lie below their folder."""
-    images = set[Path]()
-    for file in folder.glob("transforms_*.json"):
-        try:
-            frames = read_json(file)["frames"]
-            images |= {folder / f"{str(frame['file_path']).removesuffix('.png')}.png" for frame in frames}
-        except (ArgumentError, KeyError, TypeError):
-            continue  # the job tells what is wrong with it
-    apart = (image for image in images if not image.resolve().is_relative_to(folder.resolve()))
-    return sorted(image for image in apart if image.is_file())
+        return combined_checksum([*made, (STAMP, json.dumps(stamped(folder), sort_keys=True))])
+    return checksum_of_input(path, checksums)
 
 
 def require_intact(path: Path) -> None:
@@ -238,5 +209,5 @@ def require_intact(path: Path) -> None:
     maker = (stamped(folder) or {}).get("stage", "the stage before")
     raise ArgumentError(
         f"{folder / lost[0]}: missing or damaged since {maker} made it; "
-        "run the same command again, and it is made anew"
+        "run the same command again to repair it"
     )

@@ -1,55 +1,65 @@
 """What stands in for data sets and edits of an experiment that lack data or weights on this machine."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-from texgs.config.schema import StandIns
+from texgs.config.case import Case
+from texgs.config.project import members
+from texgs.config.schema import Config, StandIns
+from texgs.core.errors import ConfigError
+from texgs.core.names import close
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import method_of
 from texgs.models.weights import unusable
-from texgs.workflow.edits import ancestry, chain
+from texgs.workflow.edits import chain_of
 from texgs.workflow.missing import needed
 
-Lacks = Callable[[str], Sequence[str]]  # what something lacks on this machine, by its name
+Lacking = Callable[[Config], Sequence[str]]  # sentences on what a configuration lacks on this machine
 
 
 @dataclass(frozen=True)
-class Taken:
+class Choice:
     """What is taken for a data set or an edit: itself, or what stands in for it."""
 
     what: str  # it is taken for, such as "data set mantle"
-    name: str
-    lacks: Sequence[str] = ()  # sentences on what it stands in for; none where it is taken always
+    taken: str
+    lacks: Sequence[str] = ()  # sentences on what the other one lacks; none where it is always replaced
     caption: str = ""  # a sentence for pictures; empty for itself
 
 
-def data_set(keys: StandIns, name: str, lacks: Lacks) -> Taken:
-    """Return what is taken for a data set, by sentences on what one lacks."""
-    taken, missing = first(keys, keys.datasets, name, lacks)
+def chosen_data_set(keys: StandIns, name: str, lacks: Callable[[str], Sequence[str]]) -> Choice:
+    """Return what is taken for a data set; `lacks` gives sentences on what a data set lacks."""
+    taken, missing = chosen(keys, "datasets", name, lacks)
     end = ", whose data are not on this machine" if missing else ""
     caption = f"`{taken}` stands in for `{name}`{end}." if taken != name else ""
-    return Taken(f"data set {name}", taken, missing, caption)
+    return Choice(f"data set {name}", taken, missing, caption)
 
 
-def edit(keys: StandIns, name: str, words: Iterable[str]) -> Taken:
-    """Return what is taken for an edit, by the weights that it and its bases need with some words."""
+def chosen_edit(keys: StandIns, name: str, case: Case) -> Choice:
+    """Return what is taken for an edit, by the weights that it and what it starts from need."""
 
-    def lacks(each: str) -> list[str]:
-        names = dict.fromkeys(weights for one in ancestry(each, *words) for weights in needed(one))
-        return list(filter(unusable, names))
+    def lacks(other: str) -> list[str]:
+        edits = [each.config.edit for each in chain_of(case.edited(other))]
+        return list(filter(unusable, dict.fromkeys(weights for edit in edits for weights in needed(edit))))
 
-    taken, absent = first(keys, keys.edits, name, lacks)
+    taken, absent = chosen(keys, "edits", name, lacks)
     if taken == name:
-        return Taken(f"edit {name}", name)
+        return Choice(f"edit {name}", name)
     why = [f"this machine cannot use the weights of {' and '.join(absent)}"] if absent else []
-    by = worked_with(ancestry(taken, *words)[-1], ancestry(name, *words)[-1])
-    caption = ", as ".join([f"`{taken}`{by} stands in for `{name}`", *why])
-    return Taken(f"edit {name}", taken, why, f"{caption}.")
+    recipe = recipe_without(case.edited(taken).config.edit, case.edited(name).config.edit)
+    caption = ", as ".join([f"`{taken}`{recipe} stands in for `{name}`", *why])
+    return Choice(f"edit {name}", taken, why, f"{caption}.")
 
 
-def first(keys: StandIns, table: Mapping[str, str], name: str, lacks: Lacks) -> tuple[str, Sequence[str]]:
-    """Return what is taken for a name, and what this lacks; the name itself, where all lack something."""
-    others = chain(table, name)[1:]
+def chosen(
+    keys: StandIns, group: Literal["datasets", "edits"], name: str, lacks: Callable[[str], Sequence[str]]
+) -> tuple[str, Sequence[str]]:
+    """Return the first of a name and its stand-ins that lacks nothing, and what the name itself lacks.
+
+    The name stays where all of them lack something; the last one is taken where stand-ins are always taken.
+    """
+    others = keys.of(group, name)
     if keys.taken == "always" or not others:
         return [name, *others][-1], ()
     missing = lacks(name)
@@ -57,9 +67,18 @@ def first(keys: StandIns, table: Mapping[str, str], name: str, lacks: Lacks) -> 
     return taken, missing if taken != name else ()
 
 
-def worked_with(taken: EditKeys, real: EditKeys) -> str:
-    """Return in brackets what an edit has in place of the weights that another one needs."""
+def recipe_without(taken: EditKeys, other: EditKeys) -> str:
+    """Return in brackets what an edit does in place of the weights that another one needs."""
     keys = method_of(taken).of(taken)
-    words = [word.rpartition(".")[2].partition("=") for word in needed(real).values()]
+    words = [word.rpartition(".")[2].partition("=") for word in needed(other).values()]
     values = [value for key, _, value in words if str(getattr(keys, key, None)) == value]
     return f" ({', '.join(values)})" if values else ""
+
+
+def check_stand_ins(keys: StandIns) -> None:
+    """Require names of files in conf/."""
+    for group, table in (("dataset", keys.datasets), ("edit", keys.edits)):
+        known = members(group) if table else []
+        if unknown := [name for name in (*table, *table.values()) if name not in known]:
+            hint = close(unknown[0], known)
+            raise ConfigError(f"stand_ins.{group}s: expected files of conf/{group}, got {unknown[0]}{hint}")

@@ -1,4 +1,4 @@
-"""Sweeps: the variants of an experiment, as more words for `compose`, and what each of them changes.
+"""Sweeps: the variants of an experiment, and what each of them changes.
 
 A sweep is a file of conf/sweep, or made of keys with several values in Hydra's syntax: `fit.low_pass=2,6`,
 `views.train.frequency=range(2,6)`.
@@ -10,7 +10,7 @@ from dataclasses import fields
 from functools import lru_cache
 from itertools import product
 
-from texgs.config.compose import compose
+from texgs.config.case import Case
 from texgs.config.describe import value_at
 from texgs.config.project import Words
 from texgs.config.schema import NO_SWEEP, Config
@@ -140,26 +140,29 @@ def swept(config: Config) -> dict[str, str]:
     return {key: str(value_at(config, key)) if "." in key else text for key, text in texts.items()}
 
 
-def variants(words: Words) -> list[Words]:
-    """Return the words of each variant of the sweep with each seed; the given ones, where there is none.
+def variants(case: Case) -> list[Case]:
+    """Return each variant of the sweep with each seed; the case itself, where there is no sweep.
 
     Variants that change the views have a folder of their own for them, unless they name one.
     """
-    config = compose(words)
+    config = case.config
     by_variant, sweep = changes(config), config.sweep
     if not by_variant:
-        return [words]
+        return [case]
     check_variants(by_variant)
     check_seeds(config)
-    words = (*words, *edits_of_sweep(config))
+    case = case.but(*edits_of_sweep(config))
     if is_of_edits(config):
-        check_edits(words)
+        check_edits(case)
     return [
-        (
-            *(*words, *listed, *own_views(config, name)),
-            *(f"variant='{name}'", f"fit.seed={seed}", f"edit.seed={edit_seed}"),
+        case.but(
+            *words,
+            *own_views(config, name),
+            f"variant='{name}'",
+            f"fit.seed={seed}",
+            f"edit.seed={edit_seed}",
         )
-        for name, listed in by_variant.items()
+        for name, words in by_variant.items()
         for seed, edit_seed in product(sweep.seeds, sweep.edit_seeds)
     ]
 
@@ -210,14 +213,14 @@ def check_seeds(config: Config) -> None:
             raise ConfigError(f"{key}: expected seeds of a sweep in sweep.{listed}, got {key}={own}")
 
 
-def check_edits(words: Words) -> None:
+def check_edits(case: Case) -> None:
     """Require of each edit of a sweep of edits alone that its variants differ."""
-    config = compose(words)
+    config = case.config
     listed = {key_of(change) for each in changes(config).values() for change in each}
     if len(config.sweep.edit_seeds) > 1 or any(group_of(key) != OF_EDITS for key in listed):
         return
     tables = {key.split(".")[1] for key in listed}
-    for edit in [compose((*words, f"edit={name}")).edit for name in config.edits] or [config.edit]:
+    for edit in [case.edited(name).config.edit for name in config.edits] or [config.edit]:
         if not tables & {edit.method, *(field.name for field in fields(EditKeys))}:
             raise ConfigError(
                 f"sweep {config.sweep.name}: expected to change edit {edit.name}, whose keys are "

@@ -5,13 +5,14 @@ from math import exp, log
 import pytest
 import torch
 
+from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.core.errors import DeviceError
 from texgs.fields.palette.model import PaletteField, PaletteScene
 from texgs.fields.palette.networks import new_networks
 from texgs.fields.palette.rendering import Geometry, blending_weights
 from texgs.fields.part_edit import PartEdit
-from texgs.fitting.palette import cluster_colors
+from texgs.fitting.colors import cluster_colors
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import pack_rows, voxel_grid
 from texgs.raster.voxels import March
@@ -112,5 +113,4 @@ def test_clusters_are_of_hues_and_the_largest_comes_first():
 
 
 def test_palette_fields_are_on_the_cpu():
-    with pytest.raises(DeviceError, match="device: expected cpu, got cuda; palette fields are rendered on"):
-        box().to("cuda")
+    refused(lambda: box().to("cuda"), "cpu, got cuda", DeviceError)

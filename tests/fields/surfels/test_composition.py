@@ -5,8 +5,10 @@ import torch
 from torch.testing import assert_close
 
 from tests.fields.surfels.samples import sample
+from tests.raster.agreement import images
+from tests.raster.requirements import require_equal
+from tests.refusals import refused
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition, Part
@@ -76,8 +78,7 @@ def test_one_model_unedited_is_the_model_bit_for_bit(light):
     model = ball(1)
     alone = model.render(CAMERA, light, outputs=OUTPUTS)
     scene = Composition([model]).render(CAMERA, light, [PartEdit()], outputs=OUTPUTS)
-    for name in ("color", "alpha", *OUTPUTS):
-        assert torch.equal(getattr(scene, name), getattr(alone, name)), name
+    require_equal(images(scene), images(alone))
 
 
 @pytest.mark.parametrize("light", [Light("headlight"), SIDE])
@@ -94,8 +95,7 @@ def test_hiding_is_removing_bit_for_bit():
     edits = [PartEdit(), PartEdit(visible=False), PartEdit()]
     hidden = Composition(models).render(CAMERA, SIDE, edits, outputs=OUTPUTS)
     removed = Composition([models[0], models[2]]).render(CAMERA, SIDE, outputs=OUTPUTS)
-    for name in ("color", "alpha", *OUTPUTS):
-        assert torch.equal(getattr(hidden, name), getattr(removed, name)), name
+    require_equal(images(hidden), images(removed))
 
 
 @pytest.mark.parametrize("opacity", [0.4, 1000.0])
@@ -115,7 +115,7 @@ def test_highlights_have_the_tint_of_their_part():
     gold, blue = (1.0, 0.7, 0.3), (0.0, 0.0, 1.0)
     edits = [PartEdit(specular=3.0, shininess=0.5, tint=gold), PartEdit(specular=2.0, tint=blue)]
     part = Part(model, [first])
-    base, gain = part.look(part.edited(edits), CAMERA, SIDE, "shaded")
+    base, gain = part.shade(part.apply(edits), CAMERA, SIDE, "shaded")
     p = {name: x.double() for name, x in model.parameters.items()}
     k_s, beta = torch.where(first, 0.4, 0.6), torch.where(first, 20.0, 10.0)
     zero, place = torch.zeros(150).double(), CAMERA.position.double()
@@ -170,36 +170,29 @@ def test_discs_are_opaque_within_one_standard_deviation():
 
 
 @pytest.mark.parametrize(
-    ("models", "edits", "message"),
+    ("models", "edits", "named"),
     [
-        ([], None, "models: expected at least one, got none"),
-        ([sample("surfels")], None, "expected stage shading or texture, got surfels"),
-        ([ball(1), Surfels(ball(2).parameters, ShadingModel(2.0))], None, r"one low_pass, got \[2.0, 6.0\]"),
-        ([ball(1)], [PartEdit(), PartEdit()], "edits: expected one for each of 1 models, got 2"),
-        ([ball(1, stage="shading")], [PartEdit(palette=(0, 0, 0))], "palette: expected a model with a te"),
+        ([], None, "models: .*none"),
+        ([sample("surfels")], None, "got surfels"),
+        ([ball(1), Surfels(ball(2).parameters, ShadingModel(2.0))], None, "one low_pass"),
+        ([ball(1)], [PartEdit(), PartEdit()], "edits: .*1 models, got 2"),
+        ([ball(1, stage="shading")], [PartEdit(palette=(0, 0, 0))], "palette: "),
     ],
 )
-def test_what_cannot_be_composed(models, edits, message):
-    with pytest.raises(ArgumentError, match=message):
-        Composition(models).render(CAMERA, SIDE, edits)
+def test_what_cannot_be_composed(models, edits, named):
+    refused(lambda: Composition(models).render(CAMERA, SIDE, edits), named)
 
 
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"palette": (1, 2, 0)}, "palette: expected three numbers from 0 to 1 or #rrggbb"),
-        ({"palette": "#12345g"}, "palette: expected three numbers from 0 to 1 or #rrggbb, got '#12345g'"),
-        ({"opacity": -1}, "opacity: expected a factor from 0 to 1000, got -1"),
-        ({"diffuse": float("nan")}, "diffuse: expected a factor"),
-        ({"specular": True}, "specular: expected a factor"),
-        ({"tint": (1, 2, 0)}, "tint: expected three numbers from 0 to 1 or #rrggbb"),
-        ({"tint": None}, "tint: expected three numbers from 0 to 1 or #rrggbb, got None"),
-        ({"visible": 1}, "visible: expected true or false, got 1"),
-    ],
-)
-def test_edits_out_of_range(values, message):
-    with pytest.raises(ArgumentError, match=message):
-        PartEdit(**values)
+OUT_OF_RANGE = [
+    *({"palette": value} for value in ((1, 2, 0), "#12345g")),
+    *({"tint": value} for value in ((1, 2, 0), None)),
+    *({"opacity": -1}, {"diffuse": float("nan")}, {"specular": True}, {"visible": 1}),
+]
+
+
+@pytest.mark.parametrize("values", OUT_OF_RANGE)
+def test_edits_out_of_range(values):
+    refused(lambda: PartEdit(**values), f"{next(iter(values))}: expected")
 
 
 def test_hexadecimal_colours():

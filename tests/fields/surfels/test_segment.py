@@ -10,6 +10,9 @@ from torch.testing import assert_close
 from tests.fields.rewritten import rewritten
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import CAMERA, OUTPUTS, SIDE, ball
+from tests.raster.agreement import images
+from tests.raster.requirements import require_equal
+from tests.refusals import refused
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.compact import write_compact
@@ -47,8 +50,7 @@ def test_the_same_edit_everywhere_is_the_edit_of_the_model_bit_for_bit(shared, e
     plain = Composition(models).render(CAMERA, SIDE, [edit, PartEdit()], outputs=OUTPUTS)
     scene = Composition(models, [[HALF, TENTH], []])
     edited = scene.render(CAMERA, SIDE, [edit, edit, edit, PartEdit()], outputs=OUTPUTS)
-    for name in ("color", "alpha", *OUTPUTS):
-        assert torch.equal(getattr(edited, name), getattr(plain, name)), name
+    require_equal(images(edited), images(plain))
     if edit == PartEdit():
         assert torch.equal(scene.render(CAMERA, SIDE).color, plain.color)
 
@@ -113,16 +115,15 @@ def test_what_other_programs_read_has_the_edits_of_segments():
 
 
 @pytest.mark.parametrize(
-    ("masks", "edits", "error", "message"),
+    ("mask", "edits", "error", "named"),
     [
-        ([HALF[:9]], None, ShapeError, r"segment: expected \[150\], got \[9\]"),
-        ([HALF.float()], None, ArgumentError, "segment: expected a mask of type bool, got torch.float32"),
-        ([HALF], [PartEdit()], ArgumentError, "one for each of 1 models and 1 segments, got 1"),
+        (HALF[:9], None, ShapeError, r"segment: .*\[9\]"),
+        (HALF.float(), None, ArgumentError, "segment: .* bool"),
+        (HALF, [PartEdit()], ArgumentError, "1 models and 1 segments, got 1"),
     ],
 )
-def test_segments_that_do_not_fit(masks, edits, error, message):
-    with pytest.raises(error, match=message):
-        Composition([ball(1)], [masks]).render(CAMERA, SIDE, edits)
+def test_segments_that_do_not_fit(mask, edits, error, named):
+    refused(lambda: Composition([ball(1)], [[mask]]).render(CAMERA, SIDE, edits), named, error)
 
 
 @pytest.fixture
@@ -173,44 +174,37 @@ def test_a_segment_outlives_an_exchange_of_formats(folder):
 
 @pytest.mark.parametrize("model", [ball(2), ball(1, n=151), sample("texture", 7), sample("shading", 0)])
 def test_a_segment_of_another_model(folder, model):
-    with pytest.raises(ArgumentError, match="expected a segment of this model, got one of another with 150"):
-        read_segment(folder / "half.safetensors", model)
+    refused(lambda: read_segment(folder / "half.safetensors", model), "of another with 150")
     write_model(folder / "model.safetensors", model)
-    with pytest.raises(ArgumentError, match=r"models\.TF01: segments\.shell: .*half\.safetensors"):
-        scene_in(folder, shell=SceneSegment(folder / "half.safetensors")).open()
+    scene = scene_in(folder, shell=SceneSegment(folder / "half.safetensors"))
+    refused(scene.open, r"models\.TF01: segments\.shell: .*half\.safetensors")
 
 
 def test_files_that_are_no_segment(folder):
     for mask in (torch.zeros(150, dtype=torch.bool), HALF.float()):
-        with pytest.raises(ArgumentError, match="expected a mask of type bool that holds a surfel"):
-            write_segment(folder / "x.safetensors", ball(1), mask)
-    assert not (folder / "x.safetensors").exists()
+        refused(lambda mask=mask: write_segment(folder / "x", ball(1), mask), "holds a surfel")
+    assert not (folder / "x").exists()
     for name in ("model.safetensors", "style.safetensors"):
-        with pytest.raises(ArgumentError, match="expected a texgs-segment file, got safetensors of another"):
-            read_segment(folder / name, ball(1))
+        refused(lambda name=name: read_segment(folder / name, ball(1)), f"{name}: .*texgs-segment")
     path = folder / "half.safetensors"
-    rewritten(path, "texgs-segment", {"mask": HALF.float()})
-    with pytest.raises(ArgumentError, match="expected a mask and anchors"):
-        read_segment(path, ball(1))
-    rewritten(path, "texgs-segment", {"mask": HALF, "anchors": torch.full((150, 3), torch.nan)})
-    with pytest.raises(ArgumentError, match="expected a segment of this model"):
-        read_segment(path, ball(1))
+    for tensors in ({"mask": HALF.float()}, {"mask": HALF, "anchors": torch.full((150, 3), torch.nan)}):
+        rewritten(path, "texgs-segment", tensors)
+        refused(lambda: read_segment(path, ball(1)), "a mask and anchors|of this model")
 
 
 @pytest.mark.parametrize(
-    ("segments", "message"),
+    ("segments", "named"),
     [
-        ([1], r"models.TF01.segments: expected a table of keys and values, got \[1\]"),
-        ({"a.b": {"file": "x"}}, "models.TF01.segments: expected a name without / . =, got a.b"),
-        ({"a": {}}, "models.TF01.segments.a.file: expected the path of a segment, got None"),
-        ({"a": {"file": "x", "opasity": 1}}, "segments.a: no such key 'opasity', did you mean opacity?"),
-        ({"a": {"file": "x", "opacity": -1}}, "models.TF01.segments.a.opacity: expected a factor from 0"),
+        ([1], "segments"),
+        ({"a.b": {"file": "x"}}, "segments: .*a.b"),
+        ({"a": {}}, "segments.a.file"),
+        ({"a": {"file": "x", "opasity": 1}}, "segments.a: .*'opasity'"),
+        ({"a": {"file": "x", "opacity": -1}}, "segments.a.opacity"),
     ],
 )
-def test_a_mistake_in_a_segment_is_named_with_its_place(folder, segments, message):
+def test_a_mistake_in_a_segment_is_named_with_its_place(folder, segments, named):
     path = write_scene(folder / "scene.yaml", scene_in(folder))
     values = yaml.safe_load(path.read_text())
     values["models"]["TF01"]["segments"] = segments
     path.write_text(yaml.safe_dump(values))
-    with pytest.raises(ArgumentError, match=message):
-        read_scene(path)
+    refused(lambda: read_scene(path), rf"models\.TF01\.{named}")

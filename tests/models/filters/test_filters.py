@@ -13,7 +13,6 @@ from texgs.core.camera import orbit
 from texgs.models.filters import FILTERS, ProceduralFilters
 from texgs.models.filters.painting import GOLD, tint
 from texgs.models.filters.surface import (
-    PRIMES,
     Surface,
     cell_hash,
     cell_keys,
@@ -120,7 +119,7 @@ def test_tint_keeps_light_and_dark():
 def test_tones_of_more_pixels_than_are_sorted_are_the_same(monkeypatch):
     views = plain_views(color=(0.2, 0.4, 0.9))
     tone = surface_of(views)[0].tone
-    monkeypatch.setattr("texgs.models.filters.surface.MOST_SORTED", len(tone) // 8)
+    monkeypatch.setattr("texgs.models.filters.surface.MOST_SORTED_PIXELS", len(tone) // 8)
     assert_close(surface_of(views)[0].tone, tone, atol=0.01, rtol=0)
 
 
@@ -142,26 +141,13 @@ def test_pattern_size_is_that_of_the_scene_for_any_camera():
     assert size[0] == pytest.approx(size[1], rel=0.05)
 
 
-def test_hash_is_uniform_and_knows_its_seed():
-    cells = torch.cartesian_prod(*[torch.arange(-15, 16, dtype=torch.int32)] * 3)
-    keys = cell_keys(cells)
-    values = cell_hash(keys, 3)
-    assert_close(values.mean(), torch.tensor(0.5), atol=0.01, rtol=0)
-    counts = torch.histc(values, 10, 0, 1) / len(values)
-    assert_close(counts, torch.full((10,), 0.1), atol=0.008, rtol=0)
-    other = cell_hash(keys, 4)
-    assert torch.corrcoef(torch.stack([values, other]))[0, 1].abs() < 0.02
-    shifted = cell_hash(cell_keys(cells + torch.tensor([1, 0, 0], dtype=torch.int32)), 3)
-    assert torch.corrcoef(torch.stack([values, shifted]))[0, 1].abs() < 0.02
-
-
 @pytest.mark.parametrize("seed", [0, 7, 308])
 def test_hash_is_that_of_unsigned_numbers_of_32_bits(seed):
     cells = [(0, 0, 0), (1, -2, 3), (-40, 25, 1000), (12345, -6789, -1)]
     expected = []
     for cell in cells:
         h = seed * 2654435761
-        for place, prime in zip(cell, PRIMES, strict=True):
+        for place, prime in zip(cell, (73856093, 19349663, 83492791), strict=True):  # Teschner et al. 2003
             h ^= place * prime
         h %= 2**32
         h = (h ^ h >> 16) * 0x7FEB352D % 2**32

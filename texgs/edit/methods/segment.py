@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.surfels.model import Surfels
 
-SHOWN = 3  # views of the segment around the object
-POLAR = 20.0  # of these views, degrees
+SHOWN_VIEWS = 3  # views of the segment around the object
+POLAR = 20.0  # polar angle of these views, degrees
 DIMMED = 0.15  # opacity of what is not in the segment, in its picture
 
 
@@ -143,9 +143,9 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
         return of.render(camera.to(task.device), task.scene.light).color.clamp(0, 1)
 
     marked = overlay(shown(model, clicks.camera), lifted.reference, clicks)
-    around = orbit_path(SHOWN, POLAR, task.lens)
+    around = orbit_path(SHOWN_VIEWS, POLAR, task.lens)
     pictures = [marked, shown(dimmed, clicks.camera), *(shown(dimmed, camera) for camera in around)]
-    titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN))]
+    titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN_VIEWS))]
     write_grid(task.output / "edit.png", {"": [image.cpu().numpy() for image in pictures]}, titles)
 
 

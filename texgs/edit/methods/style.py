@@ -90,9 +90,7 @@ class FeatureKeys(StyleKeys):
         without = "nnfm=0" if self.patches else ""
         return {**({"vgg16": without} if self.nnfm > 0 else {}), **super().weights()}
 
-    def stylize(
-        self, styled: StyledParts, name: str, model: Any, views: Sequence[View]
-    ) -> tuple[Any, Losses]:
+    def stylize(self, work: StyleWork, name: str, model: Any, views: Sequence[View]) -> tuple[Any, Losses]:
         """Return a model of this name with the style of its picture, by training views; and the losses."""
         raise NotImplementedError
 
@@ -116,8 +114,8 @@ class FeatureKeys(StyleKeys):
 
 
 @dataclass(frozen=True, eq=False)
-class StyledParts:
-    """What gives parts of a scene the style of pictures, and what becomes of it."""
+class StyleWork:
+    """Pictures on their way onto the parts of a scene, and what there is to tell about it."""
 
     task: Task[Any]
     vgg: Vgg | None
@@ -137,6 +135,7 @@ class StyledParts:
         import torch
 
         from texgs.core.image import write_png
+        from texgs.core.names import style_file
 
         pictures = self.pictures
         first, *others = (picture.image for picture in pictures.values())
@@ -144,7 +143,7 @@ class StyledParts:
             pictures = {"": next(iter(pictures.values()))}
         shown = {}
         for name, picture in pictures.items():
-            file = f"style-{name.replace('/', '-')}.png" if name else "style.png"
+            file = style_file(name)
             write_png(self.task.output / file, picture.image.permute(1, 2, 0))
             shown[file] = f"The style picture{f' of {name}' if name else ''}."
         return shown
@@ -156,16 +155,16 @@ def run(task: Task[FeatureKeys]) -> EditedScene:
     from texgs.models.vgg import Vgg
 
     keys = task.settings
-    styled = StyledParts(task, Vgg.load(device=task.device) if keys.nnfm > 0 else None)
+    work = StyleWork(task, Vgg.load(device=task.device) if keys.nnfm > 0 else None)
 
     def one(name: str, model: Field, views: Sequence[View]) -> Field:
         edited: Field
-        edited, styled.losses[name] = keys.stylize(styled, name, model, views)
+        edited, work.losses[name] = keys.stylize(work, name, model, views)
         return edited
 
     scene = task.each_model(one)
     how = " + ".join(["VGG-16"] * (keys.nnfm > 0) + ["patches"] * (keys.patches > 0))
-    return EditedScene(scene, how, styled.write_pictures(), notes=styled.notes, losses=styled.losses)
+    return EditedScene(scene, how, work.write_pictures(), notes=work.notes, losses=work.losses)
 
 
 def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:

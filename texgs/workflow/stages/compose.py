@@ -6,12 +6,13 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.config.views import Shading
 from texgs.core.names import SCENE
 from texgs.report.results import SceneResult
+from texgs.volume.basic_tfs import basic_tfs_of
+from texgs.volume.view_settings import Shading
 from texgs.workflow.inputs import MODEL, has_scene, models_and_volume
 from texgs.workflow.stage import Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import FitLabel, OfVolume, basic_tfs_of
+from texgs.workflow.stages.settings import FitLabel, OfVolume
 
 if TYPE_CHECKING:
     from texgs.scene.scene import SceneVolume

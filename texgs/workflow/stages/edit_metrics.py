@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.config.views import ViewKeys
 from texgs.edit.method import method_of, methods
 from texgs.report.results import EditMeasures
+from texgs.volume.view_settings import ViewKeys
 from texgs.workflow.edits import edited_scene
 from texgs.workflow.inputs import fitted_scene, view_settings, with_recipe
 from texgs.workflow.stage import EVERY, Config, Outcome, Rule, Stage, made, read

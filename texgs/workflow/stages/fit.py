@@ -27,7 +27,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     It reads `views`, the transforms_train.json; where seeds come from it also `volume`, the volume.nrrd.
     """
     kind, job = fit_specs()[settings.stage], FitJob.of(settings, inputs, output)
-    if kind.settings is None or kind.fit is None:
+    if kind.settings is None:
         raise ArgumentError(f"{kind.name}: expected a kind of field that is fitted in one phase")
     keys = typed(kind.settings, settings.keys)
     fitted = kind.fit(replace(job, settings=keys))
@@ -37,7 +37,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return job.outcome(field, *told, measured=("test", "train"), sizes=field.sizes(), notes=notes)
 
 
-def stage_of(kind: FitSpec[Any]) -> Stage:
+def stage_of(kind: FitSpec) -> Stage:
     """Return the stage of a kind of field that is fitted in one phase."""
     return Stage(
         kind.name,
@@ -51,4 +51,4 @@ def stage_of(kind: FitSpec[Any]) -> Stage:
     )
 
 
-STAGES = [stage_of(kind) for kind in fit_specs().values() if kind.fit is not None]
+STAGES = [stage_of(kind) for kind in fit_specs().values() if kind.function]

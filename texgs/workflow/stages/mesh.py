@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.config.dataset import BasicTF, MeshKeys
+from texgs.config.dataset import MeshKeys
 from texgs.core.errors import ArgumentError
 from texgs.fields.kinds import kinds
 from texgs.report.results import MeshResult
+from texgs.volume.basic_tfs import BasicTF, basic_tfs_of
 from texgs.workflow.inputs import has_volume, last_phase, model_of, prepared_volume, without
 from texgs.workflow.locate import basic_tf
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import OfTF, Recipe, basic_tfs_of
+from texgs.workflow.stages.settings import OfTF, Recipe
 
 if TYPE_CHECKING:
     from texgs.core.camera import Camera

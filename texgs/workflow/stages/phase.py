@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.memory import MIB
-from texgs.fitting.kinds import FitTask
 from texgs.fitting.settings import Phase
+from texgs.fitting.task import FitTask
 from texgs.report.results import FitResult
 from texgs.workflow.stage import Outcome, Rule
 from texgs.workflow.stages.settings import OfTF, Recipe
@@ -72,7 +72,7 @@ class FitJob(FitTask[Recipe]):
 
         fit = Fit(parameters, shading, self.images, phase, self.seed, held)
         seconds = run_to_end(fit, self.output / FOLDER, self.title)
-        fitted = {name: x.detach() for name, x in fit.fitted.items()}
+        fitted = fit.result
         order = z_order_of(fitted["means"])
         ordered = {name: x if is_shared(name, x) else x[order] for name, x in fitted.items()}
         return Surfels(ordered, shading), seconds, fit.losses
@@ -93,7 +93,7 @@ class FitJob(FitTask[Recipe]):
         import torch
 
         from texgs.fitting import checkpoint
-        from texgs.metrics.shown import what_is_lost
+        from texgs.metrics.quality import what_is_lost
         from texgs.volume.images import smaller
 
         camera = smaller(self.views.train[0].camera, self.settings.reduce)

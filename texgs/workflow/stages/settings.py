@@ -5,22 +5,19 @@ The module of a stage adds its own in a dataclass `Settings`. Each field says wh
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.config.dataset import BasicTF
 from texgs.config.recipes import Edit
-from texgs.config.views import ViewKeys
-from texgs.core.errors import ArgumentError
+from texgs.volume.basic_tfs import BasicTF
+from texgs.volume.view_settings import ViewKeys
 from texgs.workflow.edits import edit_keys, looks_of
 from texgs.workflow.inputs import is_changed, shown_tfs, sweep_of_fit, view_settings
 from texgs.workflow.stage import read
 from texgs.workflow.sweep import fit_variant
 
 if TYPE_CHECKING:
-    from texgs.volume.transfer import TransferFunction
+    pass
 
 
 @dataclass(kw_only=True)
@@ -93,49 +90,3 @@ class OfScene(OfDataset):
 
     views: ViewKeys = read(view_settings)
     fit: FitLabel
-
-
-def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) -> dict[str, TransferFunction]:
-    """Return basic TFs in the units of a prepared volume, volume.nrrd with volume.json beside it."""
-    from texgs.volume.summaries import read_summaries
-
-    known, functions = read_summaries(volume), {}
-    for name, each in points.items():
-        if len(known) > 1 and each.channel not in known:
-            raise ArgumentError(
-                f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got {each.channel}"
-            )
-        channel = [*known].index(each.channel) if each.channel in known else 0
-        summary = [*known.values()][channel]
-        bounds = summary["minimum"], summary["maximum"]
-        functions[name] = in_data_values(name, each, tf_values, *bounds, channel)
-    return functions
-
-
-def in_data_values(
-    name: str, points: BasicTF, tf_values: str, low: float, high: float, channel: int = 0
-) -> TransferFunction:
-    """Return a basic TF in the units of the data.
-
-    Args:
-        name: of the TF, for messages.
-        points: of its opacity and colour.
-        tf_values: "data", or "fraction" where the points are on fractions of the data's range.
-        low: smallest value of the data.
-        high: largest value of the data.
-        channel: number of the one that these are of.
-    """
-    from texgs.volume.transfer import TransferFunction
-
-    try:
-        tf = TransferFunction(tuple(points.opacity), tuple(points.color), channel)
-        tf = tf.scaled(low, high) if tf_values == "fraction" else tf
-    except ArgumentError as error:
-        raise ArgumentError(f"basic TF {name}: {error}") from error
-    first, last = tf.support
-    if first >= high or last <= low:
-        raise ArgumentError(
-            f"basic TF {name}: expected a range within the data's [{low:g}, {high:g}], got [{first:g}, "
-            f"{last:g}]; is dataset.tf_values right?"
-        )
-    return tf

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.config.dataset import Volume
 from texgs.core.memory import MIB
 from texgs.core.names import SCENE
 from texgs.core.progress import progress
 from texgs.fields.kinds import kinds
 from texgs.report.results import BELOW, COMPARED, StepsResult
+from texgs.volume.settings import VolumeKeys
 from texgs.workflow.inputs import has_scene, is_series, scene_and_volume, without
 from texgs.workflow.locate import series_files
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
@@ -36,7 +36,7 @@ SHOWN = "Steps of the series"
 class Settings(OfScene):
     """What the stage reads of the configuration."""
 
-    volume: Volume = read(lambda config: without(config.dataset.volume, "obtain"))
+    volume: VolumeKeys = read(lambda config: without(config.dataset.volume, "obtain"))
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -47,9 +47,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     from texgs.core.check import torch_device
     from texgs.core.figures import write_grid
+    from texgs.edit.series import make_series
     from texgs.report.compared import caption
     from texgs.scene.scene_file import read_scene
-    from texgs.workflow.series import make_series
 
     device, is_whole = torch_device(settings.fit.device), not (output / "series.json").exists()
     files = [path for name, path in inputs.items() if name.startswith(STEP)]

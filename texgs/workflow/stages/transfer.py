@@ -4,12 +4,12 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from texgs.config.dataset import BasicTF
 from texgs.core.memory import free_memory
 from texgs.report.results import Result
+from texgs.volume.basic_tfs import BasicTF, basic_tfs_of
 from texgs.workflow.inputs import has_volume, prepared_volume
 from texgs.workflow.stage import Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import OfDataset, basic_tfs_of
+from texgs.workflow.stages.settings import OfDataset
 
 
 @dataclass(frozen=True)

@@ -3,38 +3,28 @@
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
 from statistics import mean, median
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.dataset import BasicTF
-from texgs.config.views import CameraPath, LightKeys, ViewKeys
-from texgs.core.errors import ArgumentError, DeviceError
-from texgs.core.io import write_atomic
-from texgs.core.lens import Lens
+from texgs.core.errors import ArgumentError
 from texgs.core.names import is_number
-from texgs.core.progress import progress
 from texgs.report.results import ViewsResult
+from texgs.volume.basic_tfs import BasicTF, basic_tfs_of
+from texgs.volume.view_settings import ViewKeys, appearance_of, views_of
 from texgs.workflow.inputs import has_volume, prepared_volume, view_settings
 from texgs.workflow.locate import basic_tf
 from texgs.workflow.result import TIMES
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import OfTF, basic_tfs_of
+from texgs.workflow.stages.settings import OfTF
 
 if TYPE_CHECKING:
-    from texgs.core.camera import Camera
-    from texgs.core.light import Light
-    from texgs.volume.caster import Caster
     from texgs.volume.grid import Grid
-    from texgs.volume.render import Appearance, Times, VolumeRenderer
+    from texgs.volume.render import Times, VolumeRenderer
     from texgs.volume.transfer import TransferFunction
-    from texgs.volume.view_set import Split, View
-
-TURNTABLE = 320  # pixels of its longer side
+    from texgs.volume.view_set import View
 
 
 def framed_tfs(config: Config) -> dict[str, BasicTF]:
@@ -74,6 +64,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.volume.framing import frame_of, out_of_frame
     from texgs.volume.nrrd_file import open_grid
     from texgs.volume.render import Times, render_views
+    from texgs.volume.view_files import renderer_for, turntable, vtk_frame_ms, write_geometry
     from texgs.volume.view_set import write_transforms
 
     views, title = settings.views, f"{settings.dataset}/{settings.tf}"
@@ -106,127 +97,6 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         by_vtk = vtk_frame_ms(grid, appearance, tf, shots["test"][: settings.vtk_frames], title)
         result = replace(result, vtk_frame_ms=by_vtk)
     return Outcome(result, {"turntable.png": "One turn around the volume."})
-
-
-def appearance_of(views: ViewKeys) -> Appearance:
-    """Return how the volume looks in views."""
-    from texgs.volume.render import Appearance
-
-    return Appearance(**asdict(views.shading), step=views.step, opacity_unit=views.opacity_unit)
-
-
-def renderer_for(kind: str, grid: Grid, appearance: Appearance, channel: int) -> VolumeRenderer:
-    """Return the caster on the CPU or a GPU, or VTK, which knows one channel."""
-    from texgs.core.check import torch_device
-    from texgs.volume.caster import Caster
-
-    if kind == "vtk":
-        from texgs.volume.vtk_renderer import VtkRenderer
-
-        return VtkRenderer(grid.channel(channel), appearance)
-    return Caster(grid, appearance, torch_device("cuda" if kind == "gpu" else "cpu"))
-
-
-def vtk_frame_ms(
-    grid: Grid, appearance: Appearance, tf: TransferFunction, shot: Sequence[View], title: str
-) -> float | None:
-    """Return the median milliseconds of views that VTK renders; None where it cannot, offscreen."""
-    try:
-        vtk = renderer_for("vtk", grid, appearance, tf.channel)
-    except DeviceError as error:
-        print(f"{title}: VTK's time is not measured: {error}", file=sys.stderr)
-        return None
-    frames = []
-    for view in progress([shot[0], *shot], title=f"{title}: views by VTK", unit="view"):
-        start = time.perf_counter()
-        vtk.render(tf, view.camera, view.light)
-        frames.append(1e3 * (time.perf_counter() - start))
-    return median(frames[1:])  # the first one uploads the volume
-
-
-def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
-    """Return the cameras of one arrangement."""
-    from texgs.volume.cameras import icosphere, orbit_path, spiral
-
-    if path.kind == "icosphere":
-        return icosphere(path.frequency, lens)
-    if path.kind == "spiral":
-        return spiral(path.count, lens)
-    return orbit_path(path.count, path.polar, lens)
-
-
-def views_of(views: ViewKeys, lens: Lens, output: Path) -> dict[Split, list[View]]:
-    """Return cameras, lights and files of the training and the test views, by split; no split is empty."""
-    from texgs.volume.view_set import View
-
-    for name in ("lights", "test_lights"):
-        if not getattr(views, name):
-            raise ArgumentError(f"views.{name}: expected at least one light, got none")
-    splits: dict[Split, tuple[CameraPath, Sequence[LightKeys]]] = {
-        "train": (views.train, views.lights),
-        "test": (views.test, views.test_lights),
-    }
-    if views.relit:
-        splits["relit"] = CameraPath("spiral", count=views.relit), [LightKeys("random")]
-    shots = {}
-    for place, (split, (path, lights)) in enumerate(splits.items()):
-        placed = cameras(path, lens)
-        files = [output / split / f"r_{index:04}.png" for index in range(len(placed))]
-        lit = lights_of(lights, len(placed), views.seed, place)
-        shots[split] = [View(*each) for each in zip(placed, files, lit, strict=True)]
-    return shots
-
-
-def lights_of(lights: Sequence[LightKeys], count: int, *seed: int) -> list[Light]:
-    """Return the lights of so many views, which take turns; random ones are others in each view."""
-    from texgs.core.light import Light, random_lights
-
-    turns = [lights[index % len(lights)] for index in range(count)]
-    drawn = random_lights(count, *seed)
-    return [
-        other if light.kind == "random" else Light(**asdict(light))
-        for light, other in zip(turns, drawn, strict=True)
-    ]
-
-
-def turntable(
-    renderer: VolumeRenderer, tf: TransferFunction, count: int, lens: Lens, output: Path, title: str
-) -> None:
-    """Write turntable.png, an animation of one turn under a headlight of so many frames."""
-    from PIL.Image import fromarray
-
-    from texgs.core.light import HEADLIGHT
-    from texgs.volume.cameras import orbit_path
-    from texgs.volume.contact_sheet import write_animation
-    from texgs.volume.render import render_views
-    from texgs.volume.view_set import View
-
-    scale = min(1.0, TURNTABLE / max(lens.width, lens.height))
-    width, height = (max(1, round(scale * size)) for size in (lens.width, lens.height))
-    around = orbit_path(count, 15.0, lens._replace(width=width, height=height))
-    shot = [
-        View(camera, output / "turntable" / f"r_{index:04}.png", HEADLIGHT)
-        for index, camera in enumerate(around)
-    ]
-    render_views(renderer, tf, shot, f"{title}: turntable")
-    write_animation(output / "turntable.png", [fromarray(view.load().numpy()) for view in shot])
-
-
-def write_geometry(caster: Caster, tf: TransferFunction, shot: list[View], folder: Path, title: str) -> None:
-    """Write depth and normals of views as .npz, the arrays `depth` [H, W] and `normal` [H, W, 3]."""
-    import numpy as np
-
-    for view in progress(shot, title=f"{title}: depth and normals", unit="view"):
-        path = folder / f"{view.path.stem}.npz"
-        if path.exists():
-            continue
-        seen = caster.cast(tf, view.camera, view.light, ("depth", "normal"))
-        planes = {"depth": seen.depth, "normal": seen.normal}
-        arrays = {name: x.cpu().numpy() for name, x in planes.items() if x is not None}
-        write = partial(
-            np.savez_compressed, depth=arrays["depth"], normal=arrays["normal"].astype(np.float16)
-        )
-        write_atomic(path, write)
 
 
 def describe(

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from texgs.config.dataset import Volume
-from texgs.core.errors import ArgumentError
 from texgs.core.memory import GIB, MIB, free_memory
 from texgs.core.progress import progress
 from texgs.report.results import VolumeResult
+from texgs.volume.settings import VolumeKeys, open_field, prepare_fields
 from texgs.workflow.inputs import has_volume, without
-from texgs.workflow.locate import cached_volume, source_file
+from texgs.workflow.locate import source_file
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, plain, read
 from texgs.workflow.stages.settings import OfDataset
 
 if TYPE_CHECKING:
-    from texgs.volume.slabs import Source
-    from texgs.volume.summaries import Summary
+    pass
 
 TOLD = ("dims", "dtype", "spacing", "origin", "minimum", "maximum", "voxels")  # in metrics.json, too
 
@@ -30,7 +27,7 @@ TOLD = ("dims", "dtype", "spacing", "origin", "minimum", "maximum", "voxels")  #
 class Settings(OfDataset):
     """What the stage reads of the configuration."""
 
-    volume: Volume = read(lambda config: without(config.dataset.volume, "obtain"))
+    volume: VolumeKeys = read(lambda config: without(config.dataset.volume, "obtain"))
     channels: list[str] = read("dataset.channels")
 
 
@@ -43,9 +40,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     volume, target = settings.volume, output / "volume.nrrd"
     channels = [replace(volume, channel=channel) for channel in settings.channels] or [volume]
-    fields = [source(channel, inputs.get("source")) for channel in channels]
+    fields = [open_field(channel, inputs.get("source")) for channel in channels]
     shown = partial(progress, title=f"{settings.dataset}: volume", unit="slab")
-    summaries = prepared(volume, fields, target, shown)
+    summaries = prepare_fields(volume, fields, target, shown)
     if fields[0].note:
         sys.stderr.write(f"{settings.dataset}: {fields[0].note}\n")
     write_summaries(target, summaries, settings.channels)
@@ -59,59 +56,6 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             f"dataset.volume.reduce={2 * volume.reduce} makes it smaller\n"
         )
     return Outcome(VolumeResult(**told, volume_mib=size / MIB))
-
-
-def prepared(volume: Volume, fields: Sequence[Source], target: Path, shown: Any = None) -> list[Summary]:
-    """Write the canonical file of the channels of a field as settings say."""
-    from texgs.volume.prepare import prepare_channels
-
-    return prepare_channels(
-        *(fields, target),
-        crop=volume.crop and tuple(volume.crop),  # type: ignore[arg-type]
-        reduce=volume.reduce,
-        method=volume.method,
-        up=volume.up,
-        nan_value=volume.nan_value,
-        progress=shown,
-    )
-
-
-def generated(volume: Volume) -> Source:
-    """Return the field of a generator, at its time where it changes."""
-    from texgs.volume.generate import GENERATORS, RANDOM
-    from texgs.volume.generate_series import SERIES
-    from texgs.volume.slabs import ArraySource
-
-    name, last = str(volume.generator), volume.steps - 1
-    options: dict[str, Any] = {"seed": volume.seed} if name in RANDOM else {}
-    if volume.time > last or (last and name not in SERIES):
-        expected = f"a step from 0 to {last}" if name in SERIES else "steps=1"
-        raise ArgumentError(
-            f"volume: expected {expected} of {name}, got time={volume.time} steps={volume.steps}"
-        )
-    if name in SERIES:
-        options["time"] = volume.time / max(last, 1)
-    return ArraySource({**GENERATORS, **SERIES}[name](volume.size, **options), name)
-
-
-def source(volume: Volume, path: Path | None) -> Source:
-    """Return the field of a file, or that of the generator.
-
-    A file that was downloaded is compared with its checksum.
-    """
-    if path is None:
-        return generated(volume)
-    from texgs.volume.download import require_whole
-    from texgs.volume.sources import open_source
-
-    if volume.url and path == cached_volume(volume):
-        require_whole(path, volume.sha256 or "")
-    given = {"dims": volume.dims, "spacing": volume.spacing, "origin": volume.origin}
-    said: dict[str, Any] = {name: values and tuple(values) for name, values in given.items()}
-    said |= {"dtype": volume.dtype, "endian": volume.endian, "skip": volume.skip}
-    said |= {"series": volume.series, "variable": volume.variable, "column": volume.column}
-    said |= {"image": volume.image, "channel": volume.channel, "time": volume.time}
-    return open_source(path, **said)
 
 
 def inputs(config: Config) -> dict[str, Path]:

@@ -1,0 +1,72 @@
+"""Basic transfer functions as configurations have them, and in the units of a volume."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from texgs.core.errors import ArgumentError
+from texgs.core.keys import key
+
+if TYPE_CHECKING:
+    from texgs.volume.transfer import TransferFunction
+
+
+@dataclass(frozen=True)
+class BasicTF:
+    """A basic transfer function: piecewise linear opacity and colour over one range of values."""
+
+    # OmegaConf takes no integers for list[list[float]]; the points are checked where the TF is made.
+    opacity: list[Any] = key([], "points [value, opacity]; opacity is 0 outside")
+    color: list[Any] = key([], "points [value, r, g, b], linear, 0 to 1")
+    channel: str | None = key(
+        None, "label or number of the channel of these values, from 0, where the data set shows several"
+    )
+
+
+def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) -> dict[str, TransferFunction]:
+    """Return basic TFs in the units of a prepared volume, volume.nrrd with volume.json beside it."""
+    from texgs.volume.summaries import read_summaries
+
+    known, functions = read_summaries(volume), {}
+    for name, each in points.items():
+        if len(known) > 1 and each.channel not in known:
+            raise ArgumentError(
+                f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got {each.channel}"
+            )
+        channel = [*known].index(each.channel) if each.channel in known else 0
+        summary = [*known.values()][channel]
+        bounds = summary["minimum"], summary["maximum"]
+        functions[name] = in_data_values(name, each, tf_values, *bounds, channel)
+    return functions
+
+
+def in_data_values(
+    name: str, points: BasicTF, tf_values: str, low: float, high: float, channel: int = 0
+) -> TransferFunction:
+    """Return a basic TF in the units of the data.
+
+    Args:
+        name: of the TF, for messages.
+        points: of its opacity and colour.
+        tf_values: "data", or "fraction" where the points are on fractions of the data's range.
+        low: smallest value of the data.
+        high: largest value of the data.
+        channel: number of the one that these are of.
+    """
+    from texgs.volume.transfer import TransferFunction
+
+    try:
+        tf = TransferFunction(tuple(points.opacity), tuple(points.color), channel)
+        tf = tf.scaled(low, high) if tf_values == "fraction" else tf
+    except ArgumentError as error:
+        raise ArgumentError(f"basic TF {name}: {error}") from error
+    first, last = tf.support
+    if first >= high or last <= low:
+        raise ArgumentError(
+            f"basic TF {name}: expected a range within the data's [{low:g}, {high:g}], got [{first:g}, "
+            f"{last:g}]; is dataset.tf_values right?"
+        )
+    return tf
