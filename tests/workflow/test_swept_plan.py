@@ -98,14 +98,6 @@ def test_seeds_alone_repeat_the_experiment_and_its_gallery_shows_the_first(plann
     assert {path.split("/")[-3] for path in gallery["inputs"].values()} == {"demo-seeds-s3"}
 
 
-def test_a_run_says_what_it_goes_without(planned):
-    assert planned("").warnings() == []
-    (sentence,) = planned("fits=[demo,quick]", fit="default").warnings()
-    assert sentence.endswith(
-        "fit=default: this experiment lists demo, quick in `fits`; fits=[default] replaces them"
-    )
-
-
 def test_a_gallery_of_a_sweep_of_edits_shows_the_edits_of_its_variants(planned):
     columns = "[{title: small, variant: '64'}, {title: large, variant: '128'}]"
     grid = f"{{name: sizes, rows: [{{edit: gold}}], columns: {columns}}}"
