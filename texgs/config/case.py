@@ -10,9 +10,10 @@ from texgs.edit.method import NO_METHOD
 
 @dataclass(frozen=True)
 class Case:
-    """A data set with a recipe and one edit or none, perhaps as a variant of a sweep with its seeds.
+    """Overrides in Hydra's syntax, such as `dataset=engine` or `fit.seed=3`, and what they compose.
 
-    Its words are overrides in Hydra's syntax, such as `dataset=engine` or `fit.seed=3`.
+    What a run goes through are cases of one data set with one recipe and one edit or none, perhaps as a
+    variant of a sweep with its seeds; on the way there a case may stand for a whole experiment.
     """
 
     words: Words = ()

@@ -2,8 +2,10 @@
 
     words -> experiments of a union -> data sets -> recipes -> variants and seeds of a sweep -> edits
 
-Each step adds words to the cases of the one before it. What lacks data or weights on this machine is replaced
-by what stands in for it, left out, or kept for the plan to stop at, as the experiment says.
+Keys with several values have become a sweep before, see `as_sweep`. Each step gives the cases of the one
+before it more words, and the last word on a key wins; only the experiments of a union start from words of
+their own. What lacks data or weights on this machine is replaced by what stands in for it, left out, or kept
+for the plan to stop at, as the experiment says.
 """
 
 import re
