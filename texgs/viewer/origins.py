@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from math import asin, atan, atan2, degrees
 from pathlib import Path
@@ -36,52 +35,34 @@ def find_upwards(file: Path, name: str) -> Path | None:
     return next((folder / name for folder in folders if (folder / name).is_file()), None)
 
 
-@dataclass(frozen=True)
-class Origin:
-    """What one model was made from."""
-
-    name: str  # of the model
-    file: Path  # of its training views
-
-    @cached_property
-    def images(self) -> list[Image]:
-        """Return its training views."""
-        return read_views(self.file.parent).train
-
-    def nearest(self, camera: Camera) -> Image:
-        """Return the view whose camera looks from nearly the same side."""
-        forward = camera.viewmat[2, :3]
-        return max(self.images, key=lambda each: float(forward @ each.camera.viewmat[2, :3]))
-
-
 class Origins:
     """Views and transfer functions of the models of a scene, as far as they are there."""
 
     def __init__(self, scene: Scene) -> None:
-        self._origins = {each.name: each for each in origins_of(scene)}
+        self._views = views_of(scene)
         self._middle = scene.frame.target if scene.frame else ORIGIN
         self._volume = scene.volume
 
     @property
     def has_views(self) -> bool:
         """Return whether training views are there."""
-        return bool(self._origins)
+        return bool(self._views)
 
     def nearest(self, camera: Camera, scene: Scene) -> Image:
-        """Return the training view that is nearest to a camera; one model of the scene is visible."""
+        """Return the training view that looks most nearly as a camera does; one model is visible."""
         visible = [name for name, entry in scene.models.items() if entry.edit.visible]
-        if len(visible) != 1 or visible[0] not in self._origins:
+        if len(visible) != 1 or visible[0] not in self._views:
             raise ArgumentError(
-                f"Training views show one transfer function each: show {' or '.join(self._origins)} alone "
+                f"Training views show one transfer function each: show {' or '.join(self._views)} alone "
                 f"by the ticks beside names. Visible now: {', '.join(visible) or 'none'}."
             )
-        return self._origins[visible[0]].nearest(camera)
+        forward = camera.viewmat[2, :3]
+        return max(self._views[visible[0]], key=lambda each: float(forward @ each.camera.viewmat[2, :3]))
 
     @cached_property
     def places(self) -> list[dict[str, Any]]:
         """Return the training views as a page goes to them, those with +y up."""
-        origin = next(iter(self._origins.values()), None)
-        images = [] if origin is None else origin.images
+        images = next(iter(self._views.values()), [])
         places = [(index, orbit_of(image.camera, self._middle)) for index, image in enumerate(images)]
         return [{"name": f"view {index}", **place} for index, place in places if place]
 
@@ -112,16 +93,15 @@ def histogram_of(file: Path) -> tuple[tuple[float, float] | None, list[int]]:
     return (low, high), [int(part.sum()) for part in np.array_split(counts, min(BINS, len(counts)))]
 
 
-def origins_of(scene: Scene) -> list[Origin]:
-    """Return what is there of the models of a scene; what is damaged is said in the log."""
-    whole = []
+def views_of(scene: Scene) -> dict[str, list[Image]]:
+    """Return the training views of models by name. Those that are damaged are left out and logged."""
+    whole = {}
     for name, entry in scene.models.items():
         folders = VIEWS if "relight" in kind_of(entry.file).can else VIEWS[::-1]
         found = (find_upwards(entry.file, f"{folder}/transforms_train.json") for folder in folders)
         if file := next(filter(None, found), None):
-            origin = Origin(name, file)
             try:
-                whole.append((origin, origin.images)[0])
+                whole[name] = read_views(file.parent).train
             except TexgsError as error:
                 log.warning("%s", error)
     return whole
