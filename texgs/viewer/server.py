@@ -147,7 +147,7 @@ class Server:
 
     async def file(self, request: web.Request) -> web.StreamResponse:
         """Return a file that was written for a page."""
-        path = self.work.downloads.file(request.match_info["name"])
+        path = self.work.download(request.match_info["name"])
         if path is None:
             raise web.HTTPNotFound
         return web.FileResponse(path)

@@ -6,7 +6,6 @@ import asyncio
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -20,7 +19,7 @@ from texgs.core.progress import let_stop, watched
 from texgs.edit.function_model import FIRST, fit_function, overlap_of
 from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene
-from texgs.viewer.downloads import Downloads
+from texgs.viewer.downloads import write_download
 from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks
 from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
@@ -35,14 +34,6 @@ Job = Segment | Look | Fit | Keep | Export
 Call = Callable[..., object]
 
 
-@dataclass(frozen=True)
-class Watch:
-    """Who is told about a job, and whether it has to stop."""
-
-    tell: Callable[[str, float], None] = lambda title, done: None  # what is done, and the part of it
-    stop: threading.Event = field(default_factory=threading.Event)
-
-
 class Jobs:
     """A thread that works with half of the threads of the machine, as a rule: the others are for frames."""
 
@@ -50,18 +41,29 @@ class Jobs:
         self._all = torch.get_num_threads()
         self._thread = ThreadPoolExecutor(1, "job")
 
-    async def run(self, work: Callable[[], T], watch: Watch, *, is_urgent: bool = False) -> T:
-        """Return what work returns; who watches it is told in this thread about the loops in the other.
+    async def run(
+        self,
+        work: Callable[[], T],
+        tell: Callable[[str, float], object] = lambda title, done: None,
+        stop: threading.Event | None = None,
+        *,
+        is_urgent: bool = False,
+    ) -> T:
+        """Return what work returns.
 
-        Urgent work has all threads: somebody waits for it, and frames may be slower meanwhile.
+        Args:
+            work: runs in the other thread.
+            tell: is called in this thread with the title of a loop of the work, and the part that is done.
+            stop: ends the work at the next step of a loop, by `Stopped`.
+            is_urgent: whether it has all threads: somebody waits for it, and frames may be slower meanwhile.
         """
         loop, threads = asyncio.get_running_loop(), self._all if is_urgent else max(1, self._all // 2)
 
         def step(title: str, done: int, total: int | None) -> None:
-            if watch.stop.is_set():
+            if stop is not None and stop.is_set():
                 raise Stopped(f"{title}: it was cancelled; nothing has changed.")
             if total:
-                loop.call_soon_threadsafe(watch.tell, title, done / total)
+                loop.call_soon_threadsafe(tell, title, done / total)
 
         def watched_work() -> T:
             torch.set_num_threads(threads)
@@ -92,7 +94,8 @@ class Work:
         folder = Path(self._scratch.name)
         self.styles = Styles(folder / "styles", styles)
         self._segmenter, self._looks = Segmenter(device), Looks(self.styles, folder / "looks", device)
-        self.downloads = Downloads(frames, edits, folder / "downloads")
+        self._frames, self._downloads = frames, folder / "downloads"
+        self._downloads.mkdir()
         self._task: asyncio.Task[None] | None = None
         self._page: Page | None = None  # that it is for
         self._stop = threading.Event()
@@ -101,12 +104,16 @@ class Work:
         """Return what clicks select, as a message, after a job of another page; or a look, beside jobs."""
         scene = self._edits.scene
         if isinstance(asked, Mask):
-            return await self._jobs.run(partial(self._segmenter.mask, scene, asked), Watch())
-        return await self._previews.run(partial(self._looks.tried, scene, asked), Watch(), is_urgent=True)
+            return await self._jobs.run(partial(self._segmenter.mask, scene, asked))
+        return await self._previews.run(partial(self._looks.tried, scene, asked), is_urgent=True)
 
     async def thumbnail(self, asked: Look) -> bytes:
         """Return a small picture of the scene with a look, after those that were asked for before."""
-        return await self._thumbnails.run(partial(self._looks.thumbnail, self._edits.scene, asked), Watch())
+        return await self._thumbnails.run(partial(self._looks.thumbnail, self._edits.scene, asked))
+
+    def download(self, name: str) -> Path | None:
+        """Return a file that was written for a page to save, if there is one of this name."""
+        return next((path for path in self._downloads.iterdir() if path.name == name), None)
 
     def begin(self, asked: Job, page: Page) -> None:
         """Begin to make or write something for a page, unless another job is at work."""
@@ -114,7 +121,7 @@ class Work:
             of = " for another page: wait for it" if page is not self._page else ": wait for it, or cancel it"
             raise ArgumentError(f"a job is at work already{of}")
         self._page, self._stop = page, threading.Event()
-        self._task = asyncio.create_task(self._work(asked, page, Watch(page.tell_job, self._stop)))
+        self._task = asyncio.create_task(self._work(asked, page, self._stop))
 
     @property
     def is_at_work(self) -> bool:
@@ -133,14 +140,14 @@ class Work:
             jobs.close()
         self._scratch.cleanup()
 
-    async def _work(self, asked: Job, page: Page, watch: Watch) -> None:
+    async def _work(self, asked: Job, page: Page, stop: threading.Event) -> None:
         """Do a job, and tell its page when it begins, fails and ends."""
         loop = asyncio.get_running_loop()
         page.tell_job("", 0.0)
         failed = False
         try:
             work = partial(self._do, asked, page, loop.call_soon_threadsafe)
-            notice = await self._jobs.run(work, watch, is_urgent=isinstance(asked, Fit))
+            notice = await self._jobs.run(work, page.tell_job, stop, is_urgent=isinstance(asked, Fit))
             page.tell(**notice)
         except Exception as error:  # whatever it is, the server goes on
             page.tell_error(error)
@@ -204,7 +211,9 @@ class Work:
 
     def _export(self, asked: Export, scene: Scene) -> dict[str, str]:
         """Write a file of a scene; return its name, and what there is to say of it."""
-        path, notes = self.downloads.write(scene, asked, Path(self._edits.name).stem)
+        edits = self._edits
+        name, checked = Path(edits.name).stem, edits.checked(scene)
+        path, notes = write_download(self._downloads, scene, asked, name, checked, self._frames.pixels)
         let_stop(path.name)
         words = ", ".join([f"{path.stat().st_size / 2**20:.1f} MiB", *notes])
         return {"text": f"{path.name}: {words}", "name": path.name}
