@@ -173,8 +173,8 @@ class Cancel:
     preview: bool = False  # the preview alone; the job goes on
 
 
-Making = Mask | Segment | Look | Fit | Keep | Export
-Message = View | Pick | Edit | Undo | Redo | Save | Making | Rename | Remove | Cancel
+Job = Segment | Look | Fit | Keep | Export  # takes a while; only one is at work
+Message = View | Pick | Edit | Undo | Redo | Save | Mask | Job | Rename | Remove | Cancel
 MESSAGES: dict[str, type[Message]] = {kind.__name__.lower(): kind for kind in get_args(Message)}
 
 

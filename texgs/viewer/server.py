@@ -14,12 +14,11 @@ from texgs.core.errors import ArgumentError
 from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
-from texgs.viewer import messages
 from texgs.viewer.description import bounds, describe, presets
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Beside, Frames
 from texgs.viewer.guard import guard, headers
-from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Pick, Save, Segment, View, parse
+from texgs.viewer.messages import LARGEST, Cancel, Job, Look, Mask, Message, Pick, Save, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
@@ -90,7 +89,7 @@ class Server:
     async def socket(self, request: web.Request) -> web.StreamResponse:
         """Return one page: what it asks for is done until it is gone."""
         socket = web.WebSocketResponse(
-            max_msg_size=messages.LARGEST, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
+            max_msg_size=LARGEST, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
         )
         await socket.prepare(request)
         if len(self._pages) >= MOST_PAGES:  # a browser tells a page nothing of a refused handshake
@@ -171,7 +170,7 @@ class Server:
             await page.pick(message)
         elif isinstance(message, Mask) or (isinstance(message, Look) and message.preview):
             page.find(message)
-        elif isinstance(message, Segment | Look | Fit | messages.Keep | Export):
+        elif isinstance(message, Job):
             self.work.begin(message, page)
         elif isinstance(message, Cancel):
             if not message.preview:

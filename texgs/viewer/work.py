@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any, TypeVar
 
@@ -22,15 +23,13 @@ from texgs.scene.scene import Scene
 from texgs.viewer.downloads import write_download
 from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks
-from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
+from texgs.viewer.messages import Export, Fit, Job, Keep, Look, Mask, Segment
 from texgs.viewer.page import Page, Stopped
-from texgs.viewer.scratch import scratch_folder
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import Styles
 
 T = TypeVar("T")
-Job = Segment | Look | Fit | Keep | Export
 Call = Callable[..., object]
 
 
@@ -90,7 +89,7 @@ class Work:
     ) -> None:
         self._edits, self._changed, self._device = edits, changed, device
         self._jobs, self._previews, self._thumbnails = Jobs(), Jobs(), Jobs()  # side by side
-        self._scratch = scratch_folder()
+        self._scratch = TemporaryDirectory(prefix="texgs-")
         folder = Path(self._scratch.name)
         self.styles = Styles(folder / "styles", styles)
         self._segmenter, self._looks = Segmenter(device), Looks(self.styles, folder / "looks", device)
