@@ -13,7 +13,7 @@ from texgs.scene.copied import require_files, write_copy
 from texgs.scene.parts import NewLook, part_names, with_looks
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene, scene_path, write_scene
-from texgs.scene.session import SCENE_KEYS, Session, files_of, state_of
+from texgs.scene.session import Session, files_of, state_of
 from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
 
@@ -127,7 +127,7 @@ class SharedEdits:
                 goes_on = step is not None and is_latest and session.undo()
                 try:
                     with session.one_step(asked.title[:LONGEST_TITLE]):
-                        self._edit(asked)
+                        session.change(asked.part, asked.key, asked.value)
                 except Exception:
                     if goes_on:
                         session.redo()
@@ -177,13 +177,3 @@ class SharedEdits:
         except ArgumentError:
             take_back()
             raise
-
-    def _edit(self, edit: Edit) -> None:
-        """Change one value of a part or of the scene."""
-        session, value = self.session, edit.value
-        if not edit.part:
-            session.set_of_scene(edit.key, SCENE_KEYS.get(edit.key) if value is None else value)
-        elif value is None:
-            session.reset(edit.part, edit.key)
-        else:
-            session.set(edit.part, edit.key, value)
