@@ -1,4 +1,4 @@
-"""What Python edits about a scene: values of parts, light, looks, segments; each a step to undo."""
+"""Edits of a scene from Python: values of parts, light, looks, segments. Each can be undone."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Editing:
 
     __slots__ = ("__weakref__", "_count", "_kept", "_scratch", "_viewer", "session")  # a slip is an error
 
-    _part = ""  # values are those of the whole scene
+    _part = ""  # none: values are of the whole scene
     light = Value[Light]('Light: set "headlight", or azimuth and polar angle in degrees.')
     background = Value["tuple[float, float, float]"](
         'Colour behind the scene: set red, green, blue from 0 to 1, or "#rrggbb".'
@@ -203,10 +203,10 @@ class Editing:
         return picture_of(values)
 
     def _new_folder(self, kind: str) -> Path:
-        """Return a folder for files of the scene that is not there yet."""
+        """Return a free path for a folder of the scene's files."""
         self._count += 1
         return Path(self._scratch.name, f"{self._count}-{kind}")
 
     def _new_file(self, kind: str, part: str) -> Path:
-        """Return the file of a new part that is not there yet."""
+        """Return a free path for the file of a new part."""
         return new_part_file("name", Path(self._scratch.name), kind, part)

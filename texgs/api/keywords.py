@@ -1,4 +1,4 @@
-"""Keywords of methods from a dataclass of options, which checks them and says what they are."""
+"""Keywords of methods from the keys of a dataclass, which checks and documents them."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def takes(schema: Any, *places: str, **defaults: Any) -> Callable[[Callable[...,
 
 
 def words_of(hint: Any, each: Field[Any]) -> str:
-    """Return what a key is, with its unit and its choices."""
+    """Return the words about a key, with its unit and choices."""
     choices = ", ".join(choices_of(hint, each))
     parts = (each.metadata["help"], each.metadata["unit"], f"one of {choices}" if choices else "")
     return ", ".join(filter(None, parts))

@@ -1,4 +1,4 @@
-"""Values that Python edits, and one part of a scene, which has those of its edit."""
+"""Values to read and set, and one part of a scene, which has those of its edit."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ T = TypeVar("T")
 
 
 class Edited(Protocol):
-    """What has values to set: a part of a scene, or the scene, which has no name."""
+    """A part of a scene with values, or the whole scene, whose name is empty."""
 
     session: Session
     _part: str
 
 
 class Value(Generic[T]):
-    """A value that is edited: setting it is a step of the history, and None takes it back."""
+    """A value of an edit. Setting it is a step of the history; None takes the edit back."""
 
     def __init__(self, words: str = "") -> None:
         self.__doc__ = words

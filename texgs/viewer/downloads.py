@@ -28,7 +28,7 @@ def write_download(
     checked: str,
     pixels: Callable[[View, Scene], np.ndarray],
 ) -> tuple[Path, list[str]]:
-    """Write a scene as it is shown; return the file, and what is to be told of it.
+    """Write a scene as it is shown, and return the file and notes on it.
 
     Args:
         folder: where to.
