@@ -292,7 +292,7 @@ def test_the_viewer_asks_which_steps_a_page_holds(chromium, scene):
 
 
 def test_series_that_are_too_large_are_refused(scene, tmp_path, monkeypatch):
-    monkeypatch.setattr(standalone, "PAGE_BYTES", len(pack(scene.open())))
+    monkeypatch.setattr(standalone, "LARGEST", len(pack(scene.open())))
     assert scene_page(scene, "x", steps="one").steps.total == COUNT
     with pytest.raises(ArgumentError, match=r"of them; export fewer models or steps$"):
         scene_page(scene, "x")

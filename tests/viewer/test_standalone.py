@@ -468,7 +468,7 @@ def test_a_scene_without_surfels_shows_its_background(chromium, tmp_path):
 
 
 def test_scenes_that_are_too_large_are_refused(scene, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(standalone, "PAGE_BYTES", 0)
+    monkeypatch.setattr(standalone, "LARGEST", 0)
     assert main(["export", str(scene), "--to", str(tmp_path / "s.html")]) == 2
     message = "expected surfels of at most 0 MiB, got 0 MiB for 230 of them; export fewer models"
     assert message in capsys.readouterr().err

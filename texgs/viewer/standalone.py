@@ -29,7 +29,7 @@ from texgs.viewer.origins import Origins
 from texgs.viewer.page_steps import PageSteps, page_steps
 from texgs.viewer.page_volume import PageVolume
 
-PAGE_BYTES = 256 * 2**20  # bytes; browsers hold a text of twice as many
+LARGEST = 256 * 2**20  # bytes; browsers hold a text of twice as many
 TEXEL_CODES = 2**15 - 1  # at most, of a texel on a graphics card
 POSTER_SIDE = 512  # pixels
 POSTER_QUALITY = 80  # of JPEG
@@ -80,9 +80,9 @@ def scene_page(
     if not isinstance(composed, Composition):
         raise ArgumentError("expected a scene of surfels, got another kind; fit surfels for this")
     surfels, moved = pack(composed), page_steps(scene, steps)
-    if (size := len(surfels) + (moved.size if moved else 0)) > PAGE_BYTES:
+    if (size := len(surfels) + (moved.size if moved else 0)) > LARGEST:
         raise ArgumentError(
-            f"expected surfels of at most {PAGE_BYTES >> 20} MiB, got {size >> 20} MiB for "
+            f"expected surfels of at most {LARGEST >> 20} MiB, got {size >> 20} MiB for "
             f"{len(composed)} of them; export fewer models{' or steps' if moved else ''}"
         )
     description = describe(name, scene, composed)
