@@ -8,14 +8,14 @@ import torch
 
 from texgs.core.progress import progress
 from texgs.viewer.page import Stopped
-from texgs.viewer.work import Jobs, Watch
+from texgs.viewer.work import Jobs
 
 
-def run(work, watch=None):
+def run(work, *watch):
     async def both():
         jobs = Jobs()
         try:
-            return await jobs.run(work, watch or Watch())
+            return await jobs.run(work, *watch)
         finally:
             jobs.close()
 
@@ -28,7 +28,7 @@ def test_it_tells_how_far_loops_are():
     def work():
         return sum(progress([1, 2, 3, 4], title="numbers", unit="number"))
 
-    assert run(work, Watch(lambda *news: told.append(news))) == 10
+    assert run(work, lambda *news: told.append(news)) == 10
     assert told == [("numbers", 0.25), ("numbers", 0.5), ("numbers", 0.75), ("numbers", 1.0)]
 
 
@@ -41,7 +41,7 @@ def test_it_stops_after_the_step_that_it_is_at():
             stop.set()
 
     with pytest.raises(Stopped, match="letters: it was cancelled; nothing has changed"):
-        run(work, Watch(stop=stop))
+        run(work, print, stop)
     assert done == ["a"]
 
 

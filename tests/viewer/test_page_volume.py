@@ -4,7 +4,6 @@ import io
 import json
 import zlib
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from tests.viewer.drawn_scenes import scene_of_volume, waves
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.scene.scene_file import read_scene, write_scene
-from texgs.viewer.downloads import Downloads, exports_of
+from texgs.viewer.downloads import exports_of, write_download
 from texgs.viewer.messages import Export, parse
 from texgs.viewer.page_volume import LEVELS, PageVolume, within
 from texgs.volume.grid import Grid
@@ -145,10 +144,9 @@ def test_the_viewer_exports_it_too(source, tmp_path):
     scene = read_scene(source)
     assert "volume" in exports_of(scene)
     assert "volume" not in exports_of(replace(scene, volume=None))
-    downloads = Downloads(None, SimpleNamespace(checked=lambda scene: ""), tmp_path / "files")
-    written = downloads.write(scene, Export("volume", VIEW), "scene")[0].read_text()
-    assert 'id="volume"' in written
-    assert 'id="volume"' not in downloads.write(scene, Export("html", VIEW), "scene")[0].read_text()
+    for kind in ("volume", "html"):
+        written, _ = write_download(tmp_path, scene, Export(kind, VIEW), "page", "", None)
+        assert ('id="volume"' in written.read_text()) is (kind == "volume")
 
 
 def test_the_same_scene_gives_the_same_bytes(source, tmp_path):

@@ -389,7 +389,7 @@ async def test_a_scene_may_have_all_the_functions_that_it_can_hold(browser, clie
 
 @on_page
 async def test_messages_have_a_limit(client, monkeypatch):
-    monkeypatch.setattr("texgs.viewer.messages.LARGEST", 1 << 16)
+    monkeypatch.setattr("texgs.viewer.server.MESSAGE_BYTES", 1 << 16)
     async with page(client) as one:
         await one.socket.send_str("x" * 100_000)
         while (message := await asyncio.wait_for(one.socket.receive(), WAIT)).type == WSMsgType.TEXT:

@@ -1,4 +1,4 @@
-"""Sources from objects of other libraries, which are known by what they can: none of these is imported."""
+"""Sources from objects of other libraries, known by their methods: none of these is imported."""
 
 from collections.abc import Callable, Mapping, Sequence
 from operator import index
@@ -49,7 +49,7 @@ def source_of(
 
 
 def several(name: str, numbers: Any, count: int, kind: Callable[[Any], float] = float) -> Any:
-    """Return a tuple of so many numbers, any or whole ones (by `index`); None where there are none."""
+    """Return a tuple of `count` numbers, whole ones where `kind` is `index`; None of None."""
     try:
         return None if numbers is None else tuple(map(kind, np.reshape(numbers, count).tolist()))
     except (TypeError, ValueError):
@@ -58,7 +58,7 @@ def several(name: str, numbers: Any, count: int, kind: Callable[[Any], float] = 
 
 
 def keys_of_format(keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what only some formats take as these have it, with numbers of Python."""
+    """Return options of formats with the types that readers expect."""
     plain = {key: as_python(value) for key, value in keys.items()}
     if "dims" in plain:
         plain["dims"] = several("dims", plain["dims"], 3, index)
@@ -71,7 +71,7 @@ def keys_of_format(keys: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def of_array(data: Any) -> np.ndarray:
-    """Return samples of anything that is an array; NaN where its mask says that there is none."""
+    """Return the samples of an array-like object, NaN where they are masked."""
     if np.ma.isMaskedArray(data) and np.ma.is_masked(data):
         return np.ma.filled(data.astype(np.result_type(data.dtype, np.float32)), np.nan)
     try:

@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 MB = 1e6
-HEIGHT = 560  # of a page in a cell, pixels
+CELL_HEIGHT = 560  # of a page in a cell, pixels
 
 
 class Page:
-    """What a cell shows of a scene: a page to orbit and edit, and a picture where no page may run.
+    """A scene in a cell: a page to orbit and edit, or a picture where no page may run.
 
     The page is in the notebook itself: it needs no server, no network and no texgs.
 
@@ -27,18 +27,18 @@ class Page:
         height: of the page in the cell, pixels.
     """
 
-    def __init__(self, text: str, poster: bytes, note: str, height: int = HEIGHT) -> None:
+    def __init__(self, text: str, poster: bytes, note: str, height: int = CELL_HEIGHT) -> None:
         self.text, self.poster, self.note, self.height = text, poster, note, height
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
         """Return the page and the picture; a notebook that does not trust pages shows the picture."""
         picture = b64encode(self.poster).decode()
         if self.text:
-            shown = frame_of_page(f'srcdoc="{escape(self.text)}"', self.height)
+            element = frame_of_page(f'srcdoc="{escape(self.text)}"', self.height)
         else:
-            shown = f'<img src="data:image/jpeg;base64,{picture}">'
+            element = f'<img src="data:image/jpeg;base64,{picture}">'
         return {
-            "text/html": f"{shown}<div><small>{escape(self.note)}</small></div>",
+            "text/html": f"{element}<div><small>{escape(self.note)}</small></div>",
             "image/jpeg": picture,
             "text/plain": self.note,
         }
@@ -47,7 +47,7 @@ class Page:
 class LivePage:
     """A frame around the viewer, for a notebook on this machine."""
 
-    def __init__(self, address: str, height: int = HEIGHT) -> None:
+    def __init__(self, address: str, height: int = CELL_HEIGHT) -> None:
         self.address, self.height = address, height
 
     def _repr_html_(self) -> str:
@@ -69,7 +69,7 @@ def picture_of(pixels: np.ndarray) -> Image:
 
 
 def as_python(value: Any) -> Any:
-    """Return numbers and arrays of NumPy as those of Python, also in a list; all else as it is."""
+    """Return numbers and arrays of NumPy as those of Python, also in a list; other values as they are."""
     if isinstance(value, list | tuple):
         return [as_python(each) for each in value]
     return value.tolist() if hasattr(value, "tolist") else value

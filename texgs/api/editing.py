@@ -1,4 +1,4 @@
-"""What Python edits about a scene: values of parts, light, looks, segments; each a step to undo."""
+"""Edits of a scene from Python: values of parts, light, looks, segments. Each can be undone."""
 
 from __future__ import annotations
 
@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import torch
 
-from texgs.api.display import as_python, picture_of
-from texgs.api.part import Part
+from texgs.api.display import picture_of
+from texgs.api.part import Part, Value
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.core.names import new_part_file
 from texgs.core.progress import interrupts_between_items
 from texgs.scene.changes import apply_all
 from texgs.scene.parts import part_names
-from texgs.scene.scene_file import light_of
 from texgs.scene.session import Session
 from texgs.scene.shot import Shot
 
@@ -40,6 +39,13 @@ class Editing:
     """
 
     __slots__ = ("__weakref__", "_count", "_kept", "_scratch", "_viewer", "session")  # a slip is an error
+
+    _part = ""  # none: values are of the whole scene
+    light = Value[Light]('Light: set "headlight", or azimuth and polar angle in degrees.')
+    background = Value["tuple[float, float, float]"](
+        'Colour behind the scene: set red, green, blue from 0 to 1, or "#rrggbb".'
+    )
+    time = Value["int | None"]("Number of the step that is shown, of a scene of a series; None of others.")
 
     def __init__(self, session: Session, *kept: Any) -> None:
         self.session = session
@@ -65,36 +71,6 @@ class Editing:
     def __len__(self) -> int:
         """Return the number of parts."""
         return len(self.parts)
-
-    @property
-    def light(self) -> Light:
-        """The light: set "headlight", or azimuth and polar angle in degrees."""
-        return self.session.scene.light
-
-    @light.setter
-    def light(self, value: Light | str | Sequence[float]) -> None:
-        with self.session.one_step(f"light {value}"):
-            self.session.set_light(light_of(as_python(value)))
-
-    @property
-    def background(self) -> tuple[float, float, float]:
-        """The colour behind the scene: set red, green, blue from 0 to 1, or "#rrggbb"."""
-        return self.session.scene.background
-
-    @background.setter
-    def background(self, value: str | Sequence[float]) -> None:
-        with self.session.one_step(f"background {value}"):
-            self.session.set_background(as_python(value))
-
-    @property
-    def time(self) -> int | None:
-        """The number of the step that is shown, of a scene of a series; None of others."""
-        return self.session.scene.time
-
-    @time.setter
-    def time(self, step: int) -> None:
-        with self.session.one_step(f"time {step}"):
-            self.session.set_of_scene("time", as_python(step))
 
     def edit(self, *words: str) -> Self:
         """Make the changes that words ask for, as `texgs edit` has them, such as "cut=x,0.1"; return self.
@@ -227,10 +203,10 @@ class Editing:
         return picture_of(values)
 
     def _new_folder(self, kind: str) -> Path:
-        """Return a folder for files of the scene that is not there yet."""
+        """Return a free path for a folder of the scene's files."""
         self._count += 1
         return Path(self._scratch.name, f"{self._count}-{kind}")
 
     def _new_file(self, kind: str, part: str) -> Path:
-        """Return the file of a new part that is not there yet."""
+        """Return a free path for the file of a new part."""
         return new_part_file("name", Path(self._scratch.name), kind, part)

@@ -1,4 +1,4 @@
-"""A scene of a volume: what the workflow does for a data set, in this process and without a project."""
+"""A scene of a volume: the workflow of a data set, in this process and without a project."""
 
 from __future__ import annotations
 
@@ -79,14 +79,14 @@ def fit(
     if recipe == NOW and overrides:
         raise ArgumentError(f"overrides: not for the recipe {NOW}; leave them out")
     torch_device(device)
-    shown = named(volume.suggest() if functions is None else functions)
+    tfs = named(volume.suggest() if functions is None else functions)
     kept = TemporaryDirectory(prefix="texgs-") if folder is None else folder
     place = Path(kept.name if isinstance(kept, TemporaryDirectory) else kept)
     if recipe == NOW:
-        file = fit_now_into(volume, shown, size, seed, device, place)
+        file = fit_now_into(volume, tfs, size, seed, device, place)
     else:
         words = (f"fit={recipe}", f"device={device}", f"views.width={size}", f"views.height={size}")
-        file = compose_in(volume, shown, (*words, f"fit.seed={seed}", *overrides), place)
+        file = compose_in(volume, tfs, (*words, f"fit.seed={seed}", *overrides), place)
     return Scene(Session.open(file, device), volume, kept)
 
 
@@ -152,7 +152,7 @@ def configuration(
 
 
 def copied(volume: Volume, folder: Path) -> Path:
-    """Return a copy of the volume in a folder, where later processes find the same one."""
+    """Return a copy of the volume in a folder, for later processes."""
     file = folder / file_name("volume.name", f"{volume.name}.nrrd")
     if not file.exists() and not summary_file(file).exists():
         copy_atomic(volume.file, file)

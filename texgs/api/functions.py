@@ -43,7 +43,7 @@ class Functions(dict[str, TransferFunction]):
 
 
 def named(functions: AnyFunctions) -> dict[str, TransferFunction]:
-    """Return functions by name; those without one are TF01, TF02, ..."""
+    """Return functions by name: TF01, TF02, ... where they have none."""
     if isinstance(functions, TransferFunction):
         functions = [functions]
     if isinstance(functions, str) or not isinstance(functions, Iterable):

@@ -1,16 +1,15 @@
-"""Keywords of methods from a dataclass of options, which checks them and says what they are."""
+"""Keywords of methods from the keys of a dataclass, which checks and documents them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import Field
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from typing import Any, TypeVar
 
 from texgs.api.display import as_python
-from texgs.core.errors import ArgumentError
-from texgs.core.keys import ValueMismatch, choices_of, fields_of, typed
+from texgs.core.keys import choices_of, fields_of, typed_argument
 
 T = TypeVar("T")
 
@@ -44,7 +43,7 @@ def takes(schema: Any, *places: str, **defaults: Any) -> Callable[[Callable[...,
         def called(*arguments: Any, **keywords: Any) -> T:
             given = taken.bind(*arguments, **keywords).arguments
             values = {name: as_python(given.pop(name)) for name in names if name in given}
-            return method(*given.values(), options_of(schema, {**defaults, **values}))
+            return method(*given.values(), typed_argument(schema, {**defaults, **values}))
 
         called.__signature__ = taken  # type: ignore[attr-defined]
         lines = (f"    {name}: {words_of(*fields_of(schema)[name])}." for name in names)
@@ -55,15 +54,7 @@ def takes(schema: Any, *places: str, **defaults: Any) -> Callable[[Callable[...,
 
 
 def words_of(hint: Any, each: Field[Any]) -> str:
-    """Return what a key is, with its unit and its choices."""
+    """Return the words about a key, with its unit and choices."""
     choices = ", ".join(choices_of(hint, each))
     parts = (each.metadata["help"], each.metadata["unit"], f"one of {choices}" if choices else "")
     return ", ".join(filter(None, parts))
-
-
-def options_of(schema: type[T], values: Mapping[str, Any]) -> T:
-    """Return a dataclass of values by name; what is wrong with one is an ArgumentError."""
-    try:
-        return typed(schema, values)
-    except ValueMismatch as error:
-        raise ArgumentError(str(error)) from error

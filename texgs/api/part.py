@@ -1,8 +1,8 @@
-"""One part of a scene, whose values are those of its edit: reading and setting them is all there is to it."""
+"""Values to read and set, and one part of a scene, which has those of its edit."""
 
 from __future__ import annotations
 
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 from texgs.api.display import as_python
 from texgs.fields.part_edit import PartEdit
@@ -12,23 +12,32 @@ from texgs.scene.session import Session
 T = TypeVar("T")
 
 
+class Edited(Protocol):
+    """A part of a scene with values, or the whole scene, whose name is empty."""
+
+    session: Session
+    _part: str
+
+
 class Value(Generic[T]):
-    """A value of a part's edit; None takes it back."""
+    """A value of an edit. Setting it is a step of the history; None takes the edit back."""
+
+    def __init__(self, words: str = "") -> None:
+        self.__doc__ = words
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._key = name
 
-    def __get__(self, part: Part | None, owner: type) -> T:
-        if part is None:
+    def __get__(self, of: Edited | None, owner: type) -> T:
+        if of is None:
             return cast(T, self)
-        return cast(T, getattr(entry_of(part.session.scene, part.name).edit, self._key))
+        scene = of.session.scene
+        return cast(T, getattr(entry_of(scene, of._part).edit if of._part else scene, self._key))
 
-    def __set__(self, part: Part, value: Any) -> None:
-        with part.session.one_step(f"{part.name} {self._key} {'as fitted' if value is None else value}"):
-            if value is None:
-                part.session.reset(part.name, self._key)
-            else:
-                part.session.set(part.name, self._key, as_python(value))
+    def __set__(self, of: Edited, value: Any) -> None:
+        words = (of._part, self._key, "as fitted" if value is None else str(value))
+        with of.session.one_step(" ".join(filter(None, words))):
+            of.session.change(of._part, self._key, as_python(value))
 
 
 class Part:
@@ -37,7 +46,7 @@ class Part:
     Setting a value raises an ArgumentError for one that is out of range or that the model cannot show.
     """
 
-    __slots__ = ("name", "session")  # a slip in the name of a value is an AttributeError
+    __slots__ = ("_part", "session")  # a slip in the name of a value is an AttributeError
 
     visible = Value[bool]()
     palette = Value["tuple[float, float, float] | None"]()  # set red, green, blue from 0 to 1, or "#rrggbb"
@@ -49,8 +58,13 @@ class Part:
     tint = Value["tuple[float, float, float]"]()  # of highlights
 
     def __init__(self, session: Session, name: str) -> None:
-        entry_of(session.scene, name)  # which is there
-        self.session, self.name = session, name
+        entry_of(session.scene, name)  # refuses a name that is not there
+        self.session, self._part = session, name
+
+    @property
+    def name(self) -> str:
+        """Return MODEL or MODEL/SEGMENT."""
+        return self._part
 
     def __repr__(self) -> str:
         """Return the name, and what is edited."""

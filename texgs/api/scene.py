@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pyvista
     from PIL.Image import Image
 
-LARGEST_PAGE = 24.0  # MB of a page that a notebook gets by itself
+PAGE_MEGABYTES = 24.0  # at most, of a page that a notebook gets unasked
 
 
 class Scene(Editing):
@@ -51,8 +51,8 @@ class Scene(Editing):
     def film(self, path: str | Path, film: Film) -> Path:
         """Write a film, .mp4 or .gif, or a folder of pictures, to a path, and return it."""
         shots = film.shots(self.session.scene, self.session.composition)
-        shown = partial(self.session.frame, mode=film.mode, transparent=film.transparent)
-        return film.write(path, (shown(camera, scene=scene) for camera, scene in shots))
+        draw = partial(self.session.frame, mode=film.mode, transparent=film.transparent)
+        return film.write(path, (draw(camera, scene=scene) for camera, scene in shots))
 
     def psnr(self, views: int = 12, width: int = 400) -> float:
         """Return the mean PSNR in dB beside direct volume rendering, over views of the path of test views.
@@ -94,7 +94,7 @@ class Scene(Editing):
     # ---- Notebooks ------------------------------------------------------------
 
     def show(
-        self, *, live: bool = False, largest: float = LARGEST_PAGE, steps: str | int = "all"
+        self, *, live: bool = False, largest: float = PAGE_MEGABYTES, steps: str | int = "all"
     ) -> Page | LivePage:
         """Return what a cell shows: a page that is part of the notebook; or the viewer, live.
 

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from texgs.core.light import Light
 
-SMALL = 320  # pixels of the picture at the end of a cell
+CELL_WIDTH = 320  # pixels, of the picture at the end of a cell
 
 
 class Volume:
@@ -168,10 +168,10 @@ class Volume:
             background: red, green, blue from 0 to 1, or "#rrggbb".
             step: distance of samples along rays, voxels.
         """
-        shown = named(self.suggest() if functions is None else functions)
+        tfs = named(self.suggest() if functions is None else functions)
         caster = Caster(self.grid, replace(Appearance(), step=step))
-        view = Shot(width, height, azimuth=azimuth, polar=polar).camera(frame_of(self.grid, shown.values()))
-        rgba = caster.cast(overlays(shown), view, light_of(as_python(light))).rgba
+        view = Shot(width, height, azimuth=azimuth, polar=polar).camera(frame_of(self.grid, tfs.values()))
+        rgba = caster.cast(overlays(tfs), view, light_of(as_python(light))).rgba
         behind = rgba.new_tensor(color("background", as_python(background)))
         return picture_of(quantized(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))
 
@@ -202,7 +202,7 @@ class Volume:
             "spacing": ", ".join(f"{step:g}" for step in known.spacing),
         }
         cells = "".join(f"<tr><th>{key}</th><td>{escape(value)}</td></tr>" for key, value in rows.items())
-        picture = inline(self.render(width=SMALL), self.name)
+        picture = inline(self.render(width=CELL_WIDTH), self.name)
         return f"<b>{escape(self.name)}</b><div>{picture}<table>{cells}</table></div>"
 
 

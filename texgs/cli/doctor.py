@@ -24,7 +24,7 @@ CUDA_ADVICE = "only needed for a GPU: put nvcc (CUDA 12 or newer) on the PATH an
 
 @dataclass(frozen=True)
 class Finding:
-    """What a probe has found."""
+    """The result of a probe."""
 
     state: Literal["ok", "warning", "missing"]
     found: str
@@ -51,19 +51,19 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def examine(probe: Callable[[], Finding]) -> Finding:
-    """Return what a probe found; one that raises is broken, and the others still have something to say."""
+    """Return what a probe finds. One that raises does not stop the others."""
     try:
         return probe()
     except TexgsError as error:
-        return told(error)
+        return finding_of(error)
     except ImportError as error:
         return Finding("missing", first_line(error), "pip install torch")
     except Exception as error:
         return Finding("missing", f"the probe failed with {type(error).__name__}: {error}", AGAIN, True)
 
 
-def told(error: TexgsError) -> Finding:
-    """Return the finding that an error tells of, in the words `what; what to do`."""
+def finding_of(error: TexgsError) -> Finding:
+    """Return the finding of an error, whose message is `what; what to do`."""
     what, _, advice = str(error).partition("; ")
     return Finding("missing", what, advice)
 
@@ -90,7 +90,7 @@ def python() -> Finding:
 
 
 def packages() -> Finding:
-    """Find out whether the packages that every stage needs are there, in the versions that texgs asks for."""
+    """Find out whether the required packages are there, in versions that texgs asks for."""
     from packaging.requirements import Requirement
 
     lacking = []
@@ -207,7 +207,7 @@ def weights() -> Finding:
     try:
         there = {name: titled(name) for name in CATALOGUE if find(name)}
     except TexgsError as error:
-        return replace(told(error), state="warning")
+        return replace(finding_of(error), state="warning")
     lacking = ", ".join(name for name in CATALOGUE if name not in there)
     where = f"optional: `texgs weights NAME`, or put them into {weights_folder()}, or set TEXGS_WEIGHTS"
     if not there:

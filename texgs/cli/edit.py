@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     session = Session.open(arguments.scene)
     apply_all(session, arguments.overrides)
     with located(arguments.scene):
-        _ = session.composition  # what is wrong with its models is told before anything is written
+        _ = session.composition  # raises what is wrong with its models, before anything is written
     print(session.save(arguments.output))
     return 0
 

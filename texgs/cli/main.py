@@ -98,10 +98,10 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         return overview().parse_args(argv)
     if verb == "run" and words[:1] not in (["-h"], ["--help"]):
         return parser(verb).parse_args(["--", *words])  # its options are those of snakemake
-    return parser(verb).parse_intermixed_args(joined(words))
+    return parser(verb).parse_intermixed_args(join_numbers(words))
 
 
-def joined(words: Sequence[str]) -> list[str]:
+def join_numbers(words: Sequence[str]) -> list[str]:
     """Join options with several negative numbers to one word: argparse takes --view -90,20 for two options.
 
     It knows a single one, of which an option may have several, as --target -1 0 -1.
@@ -144,14 +144,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         end = "goes on with what is not done" if goes_on else "starts again"
         print(f"texgs {verb}: interrupted; the same command {end}", file=sys.stderr)
         return 130
-    except BrokenPipeError:  # as `| head` leaves it; what is still in the buffers goes nowhere
+    except BrokenPipeError:  # by `| head`; the rest of the buffers goes nowhere
         for stream in (sys.stdout, sys.stderr):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
         return 141
 
 
 def open_closed_streams() -> None:
-    """Open a stream that was closed, as by `>&-`, to nowhere: else another file has its number."""
+    """Open closed streams, as after `>&-`, to nowhere: else other files get their numbers."""
     while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(number, True)
         setattr(sys, ("stdin", "stdout", "stderr")[number], os.fdopen(number, "rww"[number], closefd=False))
@@ -159,10 +159,10 @@ def open_closed_streams() -> None:
 
 
 def own_process() -> None:
-    """Set up what holds for the whole process."""
+    """Set up the process."""
     open_closed_streams()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # its run ends as killed
-    for stream in (sys.stdout, sys.stderr):  # what a terminal cannot show is no reason to stop
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C
+    for stream in (sys.stdout, sys.stderr):  # letters that a terminal cannot show are escaped
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     os.environ.update(waiting())

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from texgs.volume.settings import VolumeKeys
     from texgs.volume.slabs import Source
 
-LARGEST_SAMPLE = 4  # bytes of one in a prepared volume
-PROJECT = Path(__file__).parent / "project"  # what a new one has; `gitignore` gets a dot in front
+SAMPLE_BYTES = 4  # at most, in a prepared volume
+PROJECT = Path(__file__).parent / "project"  # files of a new project; `gitignore` gets a dot in front
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_options(arguments)
     name = arguments.name or name_of(arguments.file)
     overrides = [word.removeprefix("dataset.volume.") for word in arguments.overrides]
-    if "up" not in changed(overrides) and tells_superior(arguments.file):
+    if "up" not in keys_in(overrides) and tells_superior(arguments.file):
         overrides.append("up=+z")
     given = configuration(name, arguments.file, overrides)
     given = replace(given, dataset=replace(given.dataset, series=[*map(absolute, arguments.series)]))
@@ -82,12 +82,12 @@ def run(arguments: argparse.Namespace) -> int:
         is_own = (folder / f"{name}.yaml").exists()
         there, do = ("is there", "replace") if is_own else ("is a data set of texgs", "hide")
         raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
-    field, keys = array_of(given.dataset.volume), changed(overrides)
+    field, keys = array_of(given.dataset.volume), keys_in(overrides)
     channels = channels_of(given.dataset.volume, field)
     if len(files) == 1 and len(channels) == 1:
         moments_of(files, given.dataset.volume)  # of a file or folder that has several
     if field and "reduce" not in keys:
-        given = reduced(given, field, len(channels))
+        given = with_room(given, field, len(channels))
         keys += ["reduce"] if given.dataset.volume.reduce > 1 else []
     dataset = with_tfs(given, channels, arguments)
     text = document(dataset, ["file", *keys])
@@ -102,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def check_options(arguments: argparse.Namespace) -> None:
-    """Require options that go together, and files of functions without mistakes, before a volume is read."""
+    """Require options that go together and readable files of functions, before a volume is read."""
     from texgs.volume.tf_files import read_tf
 
     if arguments.count is not None and arguments.count < 1:
@@ -119,7 +119,7 @@ def check_options(arguments: argparse.Namespace) -> None:
 
 
 def array_of(volume: VolumeKeys) -> Source | None:
-    """Return the array in a file of arrays; nothing of it is read. None of other formats, and of mistakes."""
+    """Return the array of a file of arrays, unread; None of other formats and of mistakes."""
     from texgs.volume.settings import open_field
     from texgs.volume.sources import holds_arrays
 
@@ -127,18 +127,18 @@ def array_of(volume: VolumeKeys) -> Source | None:
     if not holds_arrays(path):
         return None
     for channel in (volume.channel or "0", volume.channel):
-        with suppress(TexgsError):  # it has no channels; what else is wrong with it is told when it is read
+        with suppress(TexgsError):  # it has no channels; other mistakes are told on reading
             return open_field(replace(volume, channel=channel), path)
     return None
 
 
-def reduced(config: Config, field: Source, count: int) -> Config:
-    """Return a configuration with which so many channels take half of the free memory at most; tell it."""
+def with_room(config: Config, field: Source, count: int) -> Config:
+    """Return a configuration whose channels take at most half of the free memory; say how."""
     from texgs.volume.prepare import bounds_of
 
     dataset, volume = config.dataset, config.dataset.volume
     samples = prod(end - start for start, end in bounds_of(field.dims, volume.crop))
-    size, factor = count * samples * min(field.dtype.itemsize, LARGEST_SAMPLE), 1
+    size, factor = count * samples * min(field.dtype.itemsize, SAMPLE_BYTES), 1
     room = max(room_for_volume(), 1)
     while size > room * factor**3:
         factor *= 2
@@ -151,7 +151,7 @@ def reduced(config: Config, field: Source, count: int) -> Config:
 
 
 def channels_of(volume: VolumeKeys, field: Source | None) -> dict[str, Channel | None]:
-    """Return what the file says of channels by their labels or numbers; of the one to read, by ""."""
+    """Return the channels of a file by label or number; by "" where one is read."""
     if field is None or volume.channel or len(field.channels) < 2:
         return {"": None if field is None else field.channel}
     keys = [channel.label for channel in field.channels]
@@ -160,23 +160,23 @@ def channels_of(volume: VolumeKeys, field: Source | None) -> dict[str, Channel |
     return dict(zip(keys, field.channels, strict=True))
 
 
-def changed(overrides: list[str]) -> list[str]:
+def keys_in(overrides: list[str]) -> list[str]:
     """Return the names of the keys that were given."""
     return [word.partition("=")[0].lstrip("+").split(".")[0] for word in overrides]
 
 
 def configuration(name: str, file: Path, overrides: list[str]) -> Config:
-    """Return the configuration as it will be with the new data set, but without basic TFs and tracking."""
+    """Return the configuration of the new data set, without basic TFs and tracking."""
     from texgs.config.dataset import dataset_of
 
     words = [f"dataset.volume.{word}" for word in ("generator=null", *overrides)]
     config = compose(("tracking=none", *words))
-    given = {key: getattr(config.dataset.volume, key) for key in changed(overrides)}
+    given = {key: getattr(config.dataset.volume, key) for key in keys_in(overrides)}
     return replace(config, dataset=dataset_of(name, absolute(file), **given))
 
 
 def absolute(file: str | Path) -> str:
-    """Return a path as configurations hold it; its last part may be a pattern."""
+    """Return a path for a configuration; its last part may be a pattern."""
     path = str(Path(file).parent.resolve() / Path(file).name)
     if "${" in path:
         raise ArgumentError(f"{path}: expected a path without ${{, which stands for another key; rename it")

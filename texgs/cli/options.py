@@ -1,4 +1,4 @@
-"""What the command lines of verbs share: how mistakes are told, options with a default, places, cameras."""
+"""Shared parts of the command lines: messages of mistakes, options from keys, places of outputs."""
 
 import argparse
 from collections.abc import Sequence
@@ -14,10 +14,10 @@ T = TypeVar("T")
 
 
 class Parser(argparse.ArgumentParser):
-    """Tells a mistake in one sentence, without the usage."""
+    """Reports a mistake in one sentence, without the usage."""
 
     def error(self, message: str, where: str = "") -> NoReturn:
-        """End with code 2; of an option that is misspelt, hint at the one that is like it."""
+        """End with code 2. A misspelt option gets a hint at the one that is like it."""
         unknown = message.partition("unrecognized arguments: ")[2].partition("=")[0].split()
         is_option = bool(unknown) and unknown[0].startswith("-")
         hint = close(unknown[0], self._option_string_actions) if is_option else ""
@@ -25,9 +25,9 @@ class Parser(argparse.ArgumentParser):
 
 
 def option(parser: argparse.ArgumentParser, name: str, default: Any, words: str, **more: Any) -> None:
-    """Add an option with a default, whose type it has; the default stands behind its help."""
-    shown = f"{words} (%(default)s)".lstrip()
-    parser.add_argument(name, **{"type": type(default), "default": default, "help": shown, **more})
+    """Add an option with the type of its default, which stands behind its help."""
+    words = f"{words} (%(default)s)".lstrip()
+    parser.add_argument(name, **{"type": type(default), "default": default, "help": words, **more})
 
 
 def add_keys(parser: argparse._ActionsContainer, schema: Any, without: Sequence[str] = ()) -> None:
@@ -64,14 +64,14 @@ def option_of(each: Field[Any]) -> str:
 
 
 def help_of(each: Field[Any], default: Any) -> str:
-    """Return what the help says of a key: what it is, its unit and its default."""
+    """Return the help of a key: its words, unit and default."""
     words = ", ".join(filter(None, (each.metadata["help"], each.metadata["unit"])))
     is_value = isinstance(default, int | float | str) and not isinstance(default, bool)
     return words.replace("%", "%%") + (" (%(default)s)" if is_value and default not in ("", REQUIRED) else "")
 
 
 def keys_of(arguments: argparse.Namespace, schema: type[T], **more: Any) -> T:
-    """Return the dataclass of the options that `add_keys` has added, checked; more values by their names.
+    """Return the checked dataclass of the options of `add_keys`, and of more values by name.
 
     Raises:
         ArgumentError: naming the option, what was expected and what there was.
@@ -86,7 +86,7 @@ def keys_of(arguments: argparse.Namespace, schema: type[T], **more: Any) -> T:
 
 
 def require_own_place(output: Path, name: str = "--output") -> None:
-    """Require an output outside of the folders of jobs, which are made anew with all that is in them."""
+    """Require an output outside of the folders of jobs, which are replaced as a whole."""
     for folder in (output, output.parent):
         if (folder / METRICS).exists():
             raise ArgumentError(

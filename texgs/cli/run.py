@@ -39,10 +39,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     def note(_signal: int, _frame: FrameType | None) -> None:
         if interruptions:
-            return  # snakemake is ending; a second exception would stop that half-way
+            return  # a second exception would interrupt the end of snakemake
         interruptions.append(True)
-        logging.getLogger("snakemake.logging").setLevel(logging.CRITICAL)  # jobs that end now have no fault
-        raise KeyboardInterrupt  # snakemake ends its jobs, and then itself as if one had failed
+        logging.getLogger("snakemake.logging").setLevel(logging.CRITICAL)  # jobs that end now have not failed
+        raise KeyboardInterrupt  # snakemake ends its jobs, then itself, as after a failure
 
     before = signal.signal(signal.SIGINT, note)
     try:
@@ -81,7 +81,7 @@ def snakemake(words: Sequence[str]) -> bool:
 
 
 def target_names() -> list[str]:
-    """Return the names of what a run can be asked to make."""
+    """Return the names of targets."""
     from texgs.workflow.stage_table import RULES
 
     own = (each.target for each in RULES.values() if each.target)
@@ -89,7 +89,7 @@ def target_names() -> list[str]:
 
 
 def require_targets(words: Sequence[str]) -> None:
-    """Require that words are targets, which name the results of all data sets, or paths of files."""
+    """Require names of targets or paths of files."""
     names = target_names()
     for word in words:
         if word not in names and "/" not in word:
@@ -98,7 +98,7 @@ def require_targets(words: Sequence[str]) -> None:
 
 
 def require_pairs(words: Sequence[str]) -> None:
-    """Require that none of the words is the key of a choice alone, as in `dataset engine`, `--fit quick`."""
+    """Refuse keys of choices without `=`, as in `dataset engine` or `--fit quick`."""
     from texgs.workflow.plan import GROUPS
 
     for word, after in pairwise((*words, "NAME")):
@@ -107,7 +107,7 @@ def require_pairs(words: Sequence[str]) -> None:
 
 
 def require_free(words: Sequence[str]) -> None:
-    """Require that no option has taken an override for one of its values, as `--set-threads` takes many."""
+    """Refuse an override that an option such as `--set-threads` has taken for a value."""
     from texgs.config.schema import Config
     from texgs.workflow.plan import GROUPS
 
@@ -122,7 +122,7 @@ def require_free(words: Sequence[str]) -> None:
 
 
 def defaults(given: argparse.Namespace) -> list[str]:
-    """Return options that hold where the user says nothing else, such as the Snakefile of texgs.
+    """Return default options, such as the Snakefile of texgs.
 
     A dry run counts jobs by their rules; `--quiet host` lists each.
     """
@@ -133,7 +133,7 @@ def defaults(given: argparse.Namespace) -> list[str]:
 
 
 def profiles_of(given: argparse.Namespace) -> list[str]:
-    """Return the folders with defaults of options: those given, and one of texgs, `local` by default."""
+    """Return the folders of profiles: the given ones, and one of texgs, by default `local`."""
     from texgs.config.project import PROFILES
 
     own = [each for each in dict.fromkeys(given.profile or ()) if each != "none"]

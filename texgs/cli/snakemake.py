@@ -31,7 +31,7 @@ INTERRUPTED = ": interrupted; "  # of `texgs.cli.main`: the end of a run says so
 
 @contextmanager
 def option_errors() -> Iterator[None]:
-    """Make an ArgumentError of options that Snakemake cannot read."""
+    """Raise an ArgumentError for options that Snakemake cannot read."""
     from snakemake.cli import CliException
     from snakemake.exceptions import WorkflowError
 
@@ -72,7 +72,7 @@ def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
 
 
 def execute(options: argparse.Namespace) -> bool:
-    """Do what options say, by default run a workflow on all cores; return whether all went well."""
+    """Run Snakemake with options, by default on all cores; return whether all went well."""
     from snakemake.cli import args_to_api, parse_cores
 
     if options.cores is None and options.jobs is None:
@@ -89,7 +89,7 @@ def place_errors() -> Iterator[None]:
     printed = SnakemakeApi.print_exception
 
     def tell(api: SnakemakeApi, error: Exception) -> None:
-        if isinstance(error, BrokenPipeError):  # as `| head` leaves it
+        if isinstance(error, BrokenPipeError):  # by `| head`
             raise error
         if isinstance(error, OSError) and error.strerror:
             place = error.filename or f"{tempfile.gettempdir()}, the temporary folder"
@@ -116,7 +116,7 @@ class WorkflowRun:
     ) -> None:
         self._workflow, self._plan, self._words, self._start_server = workflow, plan, words, start_server
         self._tracked: dict[str, tracked.Run] = {}
-        self._held: list[object] = []  # which end with this process, however that ends
+        self._held: list[object] = []  # released at the end of this process, however it ends
 
     def begin(self) -> None:
         """Lock the results, begin the tracked runs and start what forks the jobs; end with 2 on an error."""

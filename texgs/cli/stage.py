@@ -16,7 +16,7 @@ from texgs.workflow.stage_table import STAGES
 
 
 class HelpWithKeys(argparse.Action):
-    """List every key of the configuration below the help; read only now, because it takes a moment."""
+    """Prints the help and every key of the configuration, which takes a moment to read."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_rest: object) -> None:
         """Print the help and exit."""

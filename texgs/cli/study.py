@@ -63,8 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"Left out: {entry}", file=sys.stderr)
     questions = questions_of(records, arguments.edits, arguments.seed)
     films = films_of(questions, arguments.size, arguments.frames, torch_device(arguments.device))
-    shown = ballot_page("", questions, films, arguments.size)
-    study = Study(sha256(shown.encode()).hexdigest()[:12], arguments.seed, questions)
+    first = ballot_page("", questions, films, arguments.size)
+    study = Study(sha256(first.encode()).hexdigest()[:12], arguments.seed, questions)
     text = ballot_page(study.study, questions, films, arguments.size)
     write_bytes(page, text.encode())
     write_key(key, study)
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def films_of(questions: list[Question], size: int, frames: int, device: torch.device) -> list[bytes]:
-    """Draw the film of each question, MP4."""
+    """Return the film of each question, MP4."""
     from texgs.scene.scene_file import read_scene
     from texgs.study.ballot_page import write_film
 

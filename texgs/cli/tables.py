@@ -74,7 +74,7 @@ def given_path(word: str) -> Path:
 
 
 def results_of(arguments: argparse.Namespace) -> Path:
-    """Return the folder of results that is given; where it is none or several, results."""
+    """Return the given folder of results, or `results` where there is none or several."""
     folders = [each for each in arguments.metrics if each.is_dir()]
     return folders[0] if len(folders) == len(arguments.metrics) == 1 else Path("results")
 
@@ -88,12 +88,12 @@ def require_there(arguments: argparse.Namespace) -> None:
 
 
 def study_of(arguments: argparse.Namespace) -> Path:
-    """Return the key of the study that is given, else of that of the results."""
+    """Return the given key of a study, or that in the results."""
     return arguments.study or results_of(arguments) / "study" / "key.json"
 
 
 def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[LeftOut]]:
-    """Read the metrics files that are given, or those of a folder, each once; tell of those left out."""
+    """Return the records of the given files or folders, each once, and what is left out."""
     from texgs.report.metrics_files import read_known, require_apart
     from texgs.workflow.graph import current_records
 
@@ -115,7 +115,7 @@ def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[L
 
 
 def given_tables(records: list[Record[Any]], votes: Votes | None) -> dict[str, Table]:
-    """Make the tables that need more than metrics files: votes, and the configuration."""
+    """Return the tables that need more than metrics files: votes and differences."""
     from texgs.report.differences import differences_of
     from texgs.study.votes import study_table
 

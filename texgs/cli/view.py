@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def listen(host: str, port: int | None) -> socket.socket:
-    """Return a socket that listens; on any port where none is asked for and the usual one is taken."""
+    """Return a listening socket, on a free port where none is given and the usual one is taken."""
     if port is not None and not 0 <= port <= 65535:
         raise ArgumentError(f"--port: expected 0 to 65535, got {port}")
     try:
@@ -88,14 +88,14 @@ def listen(host: str, port: int | None) -> socket.socket:
 
 
 def name_of(host: str) -> str:
-    """Return what stands for a host in an address: the machine's name for all of its interfaces."""
+    """Return the name of a host for an address: the machine's, of all interfaces."""
     if host in ("0.0.0.0", "::"):
         return socket.gethostname()
     return f"[{host}]" if ":" in host else host
 
 
 def ask_to_save(edits: SharedEdits) -> None:
-    """Offer to save what would be lost, or say that it is, where nobody can be asked."""
+    """Offer to save unsaved edits, or say that they are lost where nobody can answer."""
     if edits.is_saved:
         return
     if not sys.stdin.isatty():
@@ -115,7 +115,7 @@ def ask_to_save(edits: SharedEdits) -> None:
 
 
 def answer(question: str) -> str:
-    """Return what somebody types; nothing at the end of the input."""
+    """Return what the user types; nothing at the end of the input."""
     try:
         return input(question).strip()
     except EOFError:

@@ -2,6 +2,7 @@
 
 import typing
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from functools import cache
 from itertools import repeat
@@ -9,6 +10,7 @@ from operator import ge, gt, le, lt
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, cast
 
+from texgs.core.errors import ArgumentError, located
 from texgs.core.names import close, is_number
 
 T = TypeVar("T")
@@ -128,6 +130,15 @@ def typed(kind: type[T], values: Mapping[str, Any], key: str = "") -> T:
         if made.get(name, REQUIRED if is_needed else field.default) == REQUIRED:
             raise MissingKey(at, "expected a value, got none")
     return kind(**made)
+
+
+def typed_argument(kind: type[T], values: Mapping[str, Any], key: str = "") -> T:
+    """Return what `typed` does. What is wrong is an ArgumentError that begins with the key."""
+    try:
+        with located(key) if key else nullcontext():
+            return typed(kind, values, key)
+    except ValueMismatch as error:
+        raise ArgumentError(str(error)) from error
 
 
 def mismatch(key: str, expected: str, value: Any) -> ValueMismatch:

@@ -12,7 +12,7 @@ import torch
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError, located
-from texgs.core.keys import ValueMismatch, typed
+from texgs.core.keys import typed_argument
 from texgs.core.progress import let_stop
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import MethodKeys, methods
@@ -64,10 +64,7 @@ def settings_of(method: str, values: Mapping[str, Any]) -> MethodKeys:
     Raises:
         ArgumentError: for an unknown key, or a value of another type or out of range.
     """
-    try:
-        return typed(methods()[method].settings, values, method)
-    except ValueMismatch as error:
-        raise ArgumentError(str(error)) from error
+    return typed_argument(methods()[method].settings, values, method)
 
 
 def look_task(

@@ -4,14 +4,14 @@ import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import yaml
 
 from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading, write_bytes
-from texgs.core.keys import ValueMismatch, typed
+from texgs.core.keys import typed_argument
 from texgs.core.lens import Frame
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.names import SCENE, SCENES, close, is_number, label, named_file, require_name
@@ -24,7 +24,6 @@ from texgs.volume.render import Appearance
 from texgs.volume.space import Space
 from texgs.volume.transfer import TransferFunction
 
-T = TypeVar("T")
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
 OF_SCENE = ("light", "background", "cuts", "frame")
@@ -89,9 +88,9 @@ def _scene(values: Any, folder: Path) -> Scene:
     background = color("background", values.get("background", WHITE))
     light, cuts = light_of(values.get("light", "headlight")), cuts_of(values.get("cuts", {}))
     volume = volume_of(values["volume"], folder) if "volume" in values else None
-    frame = table_of(Frame, values["frame"], "frame") if "frame" in values else None
+    frame = typed_argument(Frame, values["frame"], "frame") if "frame" in values else None
     functions = functions_of(values.get("functions", {}), "functions")
-    space = table_of(Space, values["space"], "space") if "space" in values else None
+    space = typed_argument(Space, values["space"], "space") if "space" in values else None
     scene = Scene(models, light, background, cuts, volume, frame, functions, space=space)
     if "series" not in values:
         return scene
@@ -206,16 +205,7 @@ def light_of(value: Any) -> Light:
 
 def cuts_of(value: Any) -> Cuts:
     """Return the cuts that a value of a scene file stands for."""
-    return table_of(Cuts, value, "cuts")
-
-
-def table_of(kind: type[T], value: Any, where: str) -> T:
-    """Return an instance of a dataclass that a value of a scene file stands for."""
-    try:
-        with located(where):
-            return typed(kind, value, where)
-    except ValueMismatch as error:
-        raise ArgumentError(str(error)) from error
+    return typed_argument(Cuts, value, "cuts")
 
 
 def plain_cuts(cuts: Cuts) -> dict[str, Any]:

@@ -118,6 +118,15 @@ class Session:
         """Take a value of a part's edit back."""
         self.set(part, key, getattr(PartEdit(), key, None))
 
+    def change(self, part: str, key: str, value: Any) -> None:
+        """Set a value of a part, or of the scene where the part is empty. None takes the edit back."""
+        if not part:
+            self.set_of_scene(key, SCENE_KEYS.get(key) if value is None else value)
+        elif value is None:
+            self.reset(part, key)
+        else:
+            self.set(part, key, value)
+
     @locked
     def set_file(self, part: str, key: str, file: Path | None) -> None:
         """Give a part another `file` or `texture`; None: the texels that it was fitted with."""

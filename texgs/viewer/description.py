@@ -1,4 +1,4 @@
-"""What a page has to know of a scene, as JSON: its parts, their edits, and which edits each can show."""
+"""A scene for a page, as JSON: its parts, their edits, and the edits that each can show."""
 
 from contextlib import suppress
 from dataclasses import asdict, fields
@@ -38,14 +38,14 @@ PRESETS = {
     "Grayscale": "gray",
     "X Ray": "binary",
 }
-STOPS = 9
+COLOR_STOPS = 9
 
 
 def presets() -> dict[str, list[list[float]]]:
     """Return points [share of the range, r, g, b] of colour maps by name."""
     from matplotlib import colormaps
 
-    shares = [i / (STOPS - 1) for i in range(STOPS)]
+    shares = [i / (COLOR_STOPS - 1) for i in range(COLOR_STOPS)]
     return {name: [[x, *colormaps[key](x)[:3]] for x in shares] for name, key in PRESETS.items()}
 
 
@@ -56,7 +56,7 @@ def bounds(scene: Scene, composed: Composed) -> dict[str, Any]:
     """
     framed = scene.framed(composed)
     ball = {"center": list(framed.target), "radius": framed.radius}
-    with suppress(TexgsError):  # who looks at the volume is told
+    with suppress(TexgsError):  # the error is told to whoever shows the volume
         if scene.volume is not None:
             grid = open_grid(scene.volume.file)
             return {**ball, "low": grid.aabb[0], "high": grid.aabb[1], "scale": grid.scale}

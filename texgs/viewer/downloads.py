@@ -1,5 +1,6 @@
 """Files of a scene that a page saves: films, and what `texgs export` writes."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import exp, log
 from pathlib import Path
@@ -14,43 +15,39 @@ from texgs.scene.film import Film
 from texgs.scene.scene import Scene
 from texgs.viewer import PAGE_VOLUME
 from texgs.viewer.export import export
-from texgs.viewer.frames import Frames
-from texgs.viewer.messages import Export, Orbit
-from texgs.viewer.shared_edits import SharedEdits
+from texgs.viewer.messages import Export, Orbit, View
 
 FILMS = ("mp4", "gif")
 
 
-class Downloads:
-    """Writes files into a folder of its own."""
+def write_download(
+    folder: Path,
+    scene: Scene,
+    asked: Export,
+    name: str,
+    checked: str,
+    pixels: Callable[[View, Scene], np.ndarray],
+) -> tuple[Path, list[str]]:
+    """Write a scene as it is shown, and return the file and notes on it.
 
-    def __init__(self, frames: Frames, edits: SharedEdits, folder: Path) -> None:
-        self._frames, self._edits, self._folder = frames, edits, folder
-        folder.mkdir()
-
-    def write(self, scene: Scene, asked: Export, name: str) -> tuple[Path, list[str]]:
-        """Write a scene as it is shown; return the file, and what is to be told of it.
-
-        Args:
-            scene: to write.
-            asked: what, and how.
-            name: of the file, without its ending.
-        """
-        require_kind(scene, asked.kind)
-        kind, volume = ("html", PAGE_VOLUME) if asked.kind == "volume" else (asked.kind, None)
-        ending = EXPORTS.get(kind, [f".{kind}"])[0]
-        stem = f"{name}-{kind}" if ending == ".ply" else name  # there are several kinds of these
-        path, words = self._folder / f"{stem}{ending}", self._edits.checked(scene)
-        if kind in FILMS:
-            view, film = replace(asked.view, transparent=False), film_of(asked)
-            frames = (self._frames.pixels(replace(view, camera=each), scene) for each in way_of(asked))
-            return film.write(path, frames, words, title="film"), []
-        keys = export_keys.Export(kind, volume=volume, steps=asked.steps if kind == "html" else "all")
-        return path, export(path, scene, keys, words, name)
-
-    def file(self, name: str) -> Path | None:
-        """Return a file that was written, if there is one of this name."""
-        return next((path for path in self._folder.iterdir() if path.name == name), None)
+    Args:
+        folder: where to.
+        scene: to write.
+        asked: what, and how.
+        name: of the file, without its ending.
+        checked: what `texgs check` has found of the scene.
+        pixels: draws a view of a scene, for films.
+    """
+    require_kind(scene, asked.kind)
+    kind, volume = ("html", PAGE_VOLUME) if asked.kind == "volume" else (asked.kind, None)
+    ending = EXPORTS.get(kind, [f".{kind}"])[0]
+    path = folder / (f"{name}-{kind}{ending}" if ending == ".ply" else f"{name}{ending}")  # kinds share .ply
+    if kind in FILMS:
+        view = replace(asked.view, transparent=False)
+        frames = (pixels(replace(view, camera=each), scene) for each in way_of(asked))
+        return film_of(asked).write(path, frames, checked, title="film"), []
+    keys = export_keys.Export(kind, volume=volume, steps=asked.steps if kind == "html" else "all")
+    return path, export(path, scene, keys, checked, name)
 
 
 def film_of(asked: Export) -> Film:

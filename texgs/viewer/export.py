@@ -11,7 +11,7 @@ from texgs.viewer.standalone import write_page
 
 
 def export(path: Path, scene: Scene, keys: Export, checked: str = "", name: str = "") -> list[str]:
-    """Write a file, and return what is to be told of it, in sentences.
+    """Write a file, and return notes on it, in sentences.
 
     Args:
         path: of the file, whose ending says what it is, where the keys do not.

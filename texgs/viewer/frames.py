@@ -31,14 +31,14 @@ from texgs.scene.session import Session
 from texgs.viewer.messages import View
 from texgs.viewer.origins import Origins, fitted, over
 
-SLOW_FRAME = 0.025  # seconds of a frame above which those of a moving camera have fewer rows and columns
-LEAST_SCALE = 1 / 3  # part of them that stays
+SLOW_FRAME = 0.025  # seconds; slower frames of a moving camera have fewer rows and columns
+LEAST_SCALE = 1 / 3  # of rows and columns
 MOVING_STEPS = {"volume": 0.5}  # voxels between samples of a volume while something moves, by mode
 MOVING_CUT_STEP = 1.0  # the same of faces of cuts
-MOVING = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
-SMALL = 300 * 300  # pixels of a picture that is enlarged on the page, and cheap to send as it is
-ENLARGED = (92, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
-STILL = (95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
+MOVING_JPEG = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
+ENLARGED_PIXELS = 300 * 300  # at most, of a picture that a page enlarges: it is cheap to send in good quality
+ENLARGED_JPEG = (92, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
+STILL_JPEG = (95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 
 
 @dataclass
@@ -52,7 +52,7 @@ class Pace:
         return self.part if moving else 1.0
 
     def took(self, seconds: float, scale: float) -> None:
-        """Take note of a frame; a whole one counts while moving ones are whole too.
+        """Learn from a frame. A whole one counts while moving ones are whole as well.
 
         What is off by less than a fifth changes nothing, so that the sharpness of a drag does not waver.
         """
@@ -62,7 +62,7 @@ class Pace:
 
 
 class Frames:
-    """Renders scenes of a session, or their views, in one thread, in the order they are asked for."""
+    """Renders views of a session's scenes in one thread, in the order of requests."""
 
     def __init__(self, session: Session, beside: "Beside") -> None:
         self._session, self._beside = session, beside
@@ -74,7 +74,7 @@ class Frames:
 
         def work() -> bytes:
             scale, start = pace.scale(view.moving), time.perf_counter()
-            pixels, scores = self._shown(view, scene, scale)
+            pixels, scores = self._draw(view, scene, scale)
             seconds = time.perf_counter() - start
             pace.took(seconds, scale)
             return packed(view, pixels, seconds, scores)
@@ -98,14 +98,14 @@ class Frames:
 
     def pixels(self, view: View, scene: Scene) -> np.ndarray:
         """Return what a view shows [H, W, 3 or 4], uint8."""
-        return self._shown(view, scene, 1.0)[0]
+        return self._draw(view, scene, 1.0)[0]
 
     def close(self) -> None:
-        """End the thread, once the frame that it renders is there."""
+        """End the thread after the frame that it renders."""
         self._thread.shutdown(wait=True, cancel_futures=True)
 
-    def _shown(self, view: View, scene: Scene, scale: float) -> tuple[np.ndarray, dict[str, float]]:
-        """Return what a view shows, with sides of this part of the pixels, and what is measured of it."""
+    def _draw(self, view: View, scene: Scene, scale: float) -> tuple[np.ndarray, dict[str, float]]:
+        """Return what a view shows, with scaled sides, and its scores."""
         if view.mode == "truth" or view.mode == "difference" or view.mode == "wipe":
             return self._beside.frame(view, scene, scale)
         step = MOVING_STEPS.get(view.mode, MOVING_CUT_STEP) if view.moving else None
@@ -116,7 +116,9 @@ class Frames:
 def packed(view: View, pixels: np.ndarray, seconds: float, scores: Mapping[str, float]) -> bytes:
     """Return the length of a header (4 bytes, little-endian), the header (JSON), a JPEG picture."""
     rows, columns, _ = pixels.shape
-    quality, sampling = (ENLARGED if rows * columns <= SMALL else MOVING) if view.moving else STILL
+    quality, sampling = (
+        (ENLARGED_JPEG if rows * columns <= ENLARGED_PIXELS else MOVING_JPEG) if view.moving else STILL_JPEG
+    )
     options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, sampling]
     _, picture = cv2.imencode(".jpg", cv2.cvtColor(pixels[..., :3], cv2.COLOR_RGB2BGR), options)
     header = json.dumps({"id": view.id, "ms": round(1000 * seconds, 1), **scores}).encode()
@@ -131,7 +133,7 @@ class Beside:
 
     @property
     def modes(self) -> list[str]:
-        """Return what there is to show of the session's scene."""
+        """Return the modes of comparison that the session's scene has."""
         if self._session.scene.volume is not None:
             return ["volume", "difference", "wipe"]
         return ["truth", "difference"] if self._origins.has_views else []

@@ -20,7 +20,7 @@ from aiohttp.typedefs import Handler, Middleware
 from texgs.core.errors import ArgumentError, TexgsError
 
 HOST = re.compile(r"[A-Za-z0-9._:\[\]-]+")
-POLICY = (  # not every browser takes the socket for a part of 'self'
+POLICY = (  # for some browsers 'self' does not include the socket
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
     "connect-src 'self' ws://{host}; base-uri 'none'; form-action 'none'"
 )
@@ -35,9 +35,9 @@ PAGE = '<!doctype html><meta http-equiv="refresh" content="0; url={0}"><a href="
 
 
 def guard(token: str, host: str) -> Middleware:
-    """Return a middleware that answers 403 to all without this token, a host of ours, and our own origin.
+    """Return a middleware that answers 403 to requests without this token, our host and our origin.
 
-    What a handler refuses gets 400 and the sentence that says why.
+    Errors of handlers become 400 and their sentence.
 
     The token is the first part of every path, and the host what the server listens on. A site that makes its
     name point to this machine has neither the host nor the origin; a page of another site that opens a socket
@@ -66,7 +66,7 @@ def guard(token: str, host: str) -> Middleware:
 
 
 def headers(is_framed: bool) -> Callable[[web.Request, web.StreamResponse], Awaitable[None]]:
-    """Return what lets no browser keep an answer or take it for something else; errors are answers, too.
+    """Return a handler that adds headers: no browser keeps an answer or takes it for another type.
 
     Pages may be inside of others, such as notebooks, where they are `is_framed`: the token keeps others out.
     """
@@ -100,7 +100,7 @@ def is_own_host(header: str, host: str, names: Collection[str]) -> bool:
 
 
 def is_own_origin(origin: str | None, header: str, required: bool) -> bool:
-    """Return whether a page of this server asks; browsers send no origin with simple requests."""
+    """Return whether a request is from our own page; simple requests of browsers have no origin."""
     if origin is None:
         return not required
     with suppress(ValueError):
@@ -116,13 +116,13 @@ def is_address(name: str) -> bool:
 
 
 def is_loopback(name: str) -> bool:
-    """Return whether a name is one of this machine alone."""
+    """Return whether a name is of the loopback interface."""
     return name.lower() == "localhost" or (is_address(name) and ipaddress.ip_address(name).is_loopback)
 
 
 @contextmanager
 def entry(path: Path, root: str) -> Iterator[str]:
-    """Yield an address under a root, with a new token; meanwhile the file leads there.
+    """Yield an address with a token under a root. The file leads there until the block ends.
 
     After a run that was killed the token is its token: pages that are still open find this run.
     """

@@ -1,4 +1,4 @@
-"""Looks that pages ask for: which edit makes them, previews and thumbnails, and textures on their way."""
+"""Looks for pages: their recipes, previews and thumbnails, and textures on their way."""
 
 import io
 from collections import OrderedDict
@@ -32,15 +32,15 @@ from texgs.viewer.messages import Look
 from texgs.viewer.styles import MOST_PICTURES, Styles
 
 QUICK_SIZE = 352  # pixels of the views along the axes, which the scene fills
-SECONDS_BETWEEN = 2.0  # from one texture on its way that is shown to the next
-MOST_TRIED = len(PICTURES) + 2 * MOST_PICTURES  # looks that are kept: those of all pictures that there may be
-THUMBNAIL = 112  # rows of pixels
+SECONDS_BETWEEN = 2.0  # at least, from one texture on its way to the next
+MOST_TRIED = len(PICTURES) + 2 * MOST_PICTURES  # looks that are kept: one for each picture that there may be
+THUMBNAIL_ROWS = 112
 TryOn = Callable[[str, NewLook], object]  # a part, and its look on its way
-FULL = ("default", "patches")  # recipes for pictures: the first is taken whose weights are here
+FULL_RECIPES = ("default", "patches")  # for pictures: the first one counts whose weights are here
 
 
 class TriedLook:
-    """A look of a scene in files that stay as long as something shows it."""
+    """A look of a scene. Its files stay as long as this object."""
 
     def __init__(self, scene: Scene, learned: LearnedLook, folder: Path) -> None:
         self.scene, self.looks = scene, learned.looks
@@ -57,7 +57,7 @@ class Looks:
     def __init__(self, styles: Styles, scratch: Path, device: torch.device | str = "cpu") -> None:
         self._styles, self._device = styles, torch.device(device)
         self._scratch, self._numbers = scratch, count()  # of folders in it
-        self._tried = OrderedDict[str, TriedLook]()  # by what was asked for
+        self._tried = OrderedDict[str, TriedLook]()  # by request
         self._latest: tuple[Any, LookTask] | None = None  # what opacities depend on, and a task with them
 
     def give(self, session: Session, asked: Look, output: Path, show: TryOn) -> LearnedLook:
@@ -72,7 +72,7 @@ class Looks:
             rmtree(on_their_way, ignore_errors=True)
 
     def tried(self, scene: Scene, asked: Look) -> TriedLook:
-        """Return a look as a page would have it, from the side of its camera if it says so."""
+        """Return a look to try, learned from the side of the request's camera, if it has one."""
         task = self._task(scene, asked, self._new_folder())
         key = repr((task.settings, task.edit.parts, task.side))
         known = self._tried.pop(key, None)
@@ -84,28 +84,28 @@ class Looks:
         return known
 
     def thumbnail(self, scene: Scene, asked: Look) -> bytes:
-        """Return a small view of the scene with a look, from the camera that is asked for, as JPEG."""
+        """Return a small view of the scene with a look from the request's camera, as JPEG."""
         if asked.camera is None:
             raise ArgumentError("camera: expected one to show a thumbnail from, got none")
         tried = self.tried(scene, replace(asked, camera=None))
         shown, file = with_looks(scene, tried.looks), io.BytesIO()
-        camera = asked.camera.camera(THUMBNAIL / asked.camera.height)
+        camera = asked.camera.camera(THUMBNAIL_ROWS / asked.camera.height)
         Image.fromarray(frame(shown.open(self._device), camera, shown)).save(file, "JPEG", quality=90)
         return file.getvalue()
 
     def _new_folder(self) -> Path:
-        """Return a place for files."""
+        """Return a new folder for files."""
         return self._scratch / str(next(self._numbers))
 
     def _task(self, scene: Scene, asked: Look, output: Path) -> LookTask:
-        """Return the task of the look that is asked for, by a recipe whose weights are on this machine."""
+        """Return the task of a look, by a recipe whose weights are on this machine."""
         settings, side = self.recipe_of(asked), asked.camera
         parts = asked.parts or parts_with_surfels(scene)
         seen = (side.azimuth, side.polar) if side and asked.preview else None
         return look_task(scene, settings, parts, output, self._device, seen)
 
     def recipe_of(self, asked: Look) -> MethodKeys:
-        """Return the settings of the edit, the first of some choices that has its weights, or the last."""
+        """Return the settings of the edit: the first choice that has its weights, or the last one."""
         if bool(asked.style) == bool(asked.instruction):
             raise ArgumentError("look: expected a picture or an instruction, got both or none")
         if asked.style:
@@ -113,7 +113,7 @@ class Looks:
                 "style": self._styles.source(asked.style),
                 "start": "sphere" if asked.sphere else None,
             }
-            recipes = ("preview",) if asked.preview else FULL
+            recipes = ("preview",) if asked.preview else FULL_RECIPES
             choices = [settings_of("image", {**picture, "recipe": recipe}) for recipe in recipes]
         else:
             words = {"instruction": asked.instruction}
@@ -128,21 +128,21 @@ class Looks:
         return settings
 
     def _opaque(self, task: LookTask) -> LookTask:
-        """Return the task with opacities for its look; those of the latest scene are not measured again."""
+        """Return the task with opacities for its look, measured once for a scene."""
         depends, latest = (task.scene, task.edit.parts, task.settings.factor), self._latest
-        if latest is None or latest[0] != depends:  # another thread may put another one there
+        if latest is None or latest[0] != depends:  # another thread may replace it
             self._latest = latest = (depends, opaque(task))
         return replace(task, scene=latest[1].scene, settings=replace(task.settings, opacity="keep"))
 
 
 class Throttled:
-    """Parts on their way, of which one is written and shown now and then."""
+    """Writes and shows a part on its way now and then."""
 
     def __init__(self, show: TryOn, folder: Path) -> None:
         self._show, self._folder, self._latest = show, folder, monotonic()
 
     def __call__(self, part: str, look: NewLook, model: Callable[[], Surfels]) -> None:
-        """Show a part, unless one was shown a moment ago."""
+        """Show a part, unless the last one was a moment ago."""
         if monotonic() - self._latest >= SECONDS_BETWEEN:
             file = write_texture(self._folder / part_file("look", part), model())
             self._show(part, replace(look, texture=file))

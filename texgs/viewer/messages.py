@@ -1,4 +1,4 @@
-"""What a page says to its server: messages in JSON, checked before anything uses them."""
+"""Messages of a page to its server, in JSON, checked before anything uses them."""
 
 import json
 from dataclasses import dataclass
@@ -9,9 +9,9 @@ from texgs.core.errors import ArgumentError
 from texgs.core.keys import REQUIRED, ValueMismatch, key, mismatch, typed
 from texgs.scene.shot import Mode
 
-Shown = Literal[Mode, "truth", "difference", "wipe"]  # the volume, the scene's difference from it, or both
-LARGEST = 1 << 22  # bytes of a message; most have a few hundred, 32 functions of ParaView 400,000
-LARGEST_ID = 2**53  # that JavaScript tells from the next number
+PageMode = Literal[Mode, "truth", "difference", "wipe"]  # the volume, the scene's difference from it, or both
+MESSAGE_BYTES = 1 << 22  # at most; most messages have a few hundred, 32 functions of ParaView have 400,000
+LARGEST_ID = 2**53  # JavaScript cannot tell larger ones from the next
 LARGEST_SIDE = 4096  # pixels
 
 
@@ -28,7 +28,7 @@ class Orbit:
     height: int = key(REQUIRED, "of a frame", "pixels", least=1, most=LARGEST_SIDE)
 
     def camera(self, scale: float = 1.0) -> Camera:
-        """Return the camera, with sides of this part of the pixels."""
+        """Return the camera, with scaled sides."""
         width, height = (max(1, round(scale * side)) for side in (self.width, self.height))
         return orbit(self.azimuth, self.polar, self.distance, self.fov_y, width, height, self.target)
 
@@ -39,18 +39,18 @@ class View:
 
     camera: Orbit
     id: int = key(0, "comes back with the frame", least=0, most=LARGEST_ID)
-    mode: Shown = "shaded"
+    mode: PageMode = "shaded"
     gain: float = key(4.0, "of differences", least=1, most=16)
     wipe: float | None = key(None, "share of the width; default: beside it", least=0, most=1)
-    moving: bool = False  # another one follows at once: speed counts more than quality
+    moving: bool = False  # more views follow: speed counts more than quality
     before: bool = False  # the scene as it was opened
-    transparent: bool = False  # without its background; of pictures of the scene or its volume alone
-    only: str = ""  # a model that is shown alone and unedited, to be clicked on
+    transparent: bool = False  # without background; of the scene or its volume alone
+    only: str = ""  # a model to show alone and unedited, for clicks
 
 
 @dataclass(frozen=True)
 class Pick:
-    """Tell which point of the scene a pixel of a view shows."""
+    """Find the point of the scene that a pixel of a view shows."""
 
     view: View
     pixel: tuple[int, int] = key(REQUIRED, "to the right and down", "pixels", least=0, most=LARGEST_SIDE - 1)
@@ -63,7 +63,7 @@ class Edit:
     part: str  # MODEL or MODEL/SEGMENT
     key: str  # of a `PartEdit`; of `SCENE_KEYS` for the scene
     value: Any = None  # as in a scene file; None takes the edit back
-    step: int = 0  # edits of one number in a row are one step of the history, such as those of a slider
+    step: int = 0  # edits in a row with the same number, such as those of a slider, are one step
     title: str = ""  # of the step in the history
 
 
@@ -74,7 +74,7 @@ class Undo:
 
 @dataclass(frozen=True)
 class Redo:
-    """Make the step again that was taken back last."""
+    """Make the last undone step again."""
 
 
 @dataclass(frozen=True)
@@ -82,12 +82,12 @@ class Save:
     """Write the scene file."""
 
     name: str  # of the file, in the folder for saving
-    replace: bool = False  # a file that is there already
+    replace: bool = False  # an existing file
 
 
 @dataclass(frozen=True)
 class Clicked:
-    """Clicks on a view of a model alone: pixels to the right and down, and whether they are on the object."""
+    """Clicks on a view of a model alone: pixels x, y, and whether they are on the object."""
 
     camera: Orbit
     points: tuple[tuple[float, float, bool], ...] = key(
@@ -120,8 +120,8 @@ class Look:
     parts: tuple[str, ...] = key((), "none: all models", items=(0, 1000))
     style: str = ""  # name of a picture; "" with an instruction
     instruction: str = ""  # "" with a picture
-    sphere: bool = False  # the picture is of a lit sphere, and goes onto surfaces by their normals
-    preview: bool = False  # show on this page what it would be like, and change nothing
+    sphere: bool = False  # the picture shows a lit sphere: normals find their colours in it
+    preview: bool = False  # show the look on this page alone, and change nothing
     camera: Orbit | None = None  # of a thumbnail; or the side from which words are previewed, all by default
 
 
@@ -168,18 +168,18 @@ class Remove:
 
 @dataclass(frozen=True)
 class Cancel:
-    """Stop the job that is at work, and show no preview any more."""
+    """Stop the job that is at work, and take the preview off."""
 
     preview: bool = False  # the preview alone; the job goes on
 
 
-Making = Mask | Segment | Look | Fit | Keep | Export
-Message = View | Pick | Edit | Undo | Redo | Save | Making | Rename | Remove | Cancel
+Job = Segment | Look | Fit | Keep | Export  # takes a while; only one is at work
+Message = View | Pick | Edit | Undo | Redo | Save | Mask | Job | Rename | Remove | Cancel
 MESSAGES: dict[str, type[Message]] = {kind.__name__.lower(): kind for kind in get_args(Message)}
 
 
 def parse(text: str | bytes, kind: type[Any] | None = None) -> Any:
-    """Return the message that a text holds, of any kind or of this one.
+    """Return the message in a text, of any kind or of a given one.
 
     Raises:
         ArgumentError: if it is none; says which key, what was expected and what there was.

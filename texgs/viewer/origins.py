@@ -1,8 +1,7 @@
-"""What the models of a scene were made from, where it lies beside them: views and transfer functions."""
+"""What the models of a scene were made from: training views and the histogram of the volume."""
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from math import asin, atan, atan2, degrees
 from pathlib import Path
@@ -24,64 +23,46 @@ from texgs.volume.view_set import View as Image
 from texgs.volume.view_set import read_views
 
 log = logging.getLogger("texgs.viewer")
-NEAR = 5  # folders above a model in which its views are looked for
-VIEWS = "views", f"views{ONE_LIGHT}"
+FOLDERS_ABOVE = 5  # above a model, to look in for its views
+VIEW_FOLDERS = "views", f"views{ONE_LIGHT}"
 BINS = 256  # of a histogram that a page shows, at most
-SAME = 1e-3  # by which elements of two cameras may differ
+CAMERA_TOLERANCE = 1e-3  # elements of two equal cameras may differ by this
 
 
 def find_upwards(file: Path, name: str) -> Path | None:
-    """Return the nearest file of this name relative to the folder of a model or one of those above."""
-    folders = file.resolve().parents[:NEAR]
+    """Return the nearest file of a name in the folder of a model or one above."""
+    folders = file.resolve().parents[:FOLDERS_ABOVE]
     return next((folder / name for folder in folders if (folder / name).is_file()), None)
 
 
-@dataclass(frozen=True)
-class Origin:
-    """What one model was made from."""
-
-    name: str  # of the model
-    file: Path  # of its training views
-
-    @cached_property
-    def images(self) -> list[Image]:
-        """Return its training views."""
-        return read_views(self.file.parent).train
-
-    def nearest(self, camera: Camera) -> Image:
-        """Return the view whose camera looks from nearly the same side."""
-        forward = camera.viewmat[2, :3]
-        return max(self.images, key=lambda each: float(forward @ each.camera.viewmat[2, :3]))
-
-
 class Origins:
-    """Views and transfer functions of the models of a scene, as far as they are there."""
+    """Training views of the models of a scene, and facts of its volume, as far as they are there."""
 
     def __init__(self, scene: Scene) -> None:
-        self._origins = {each.name: each for each in origins_of(scene)}
+        self._views = views_of(scene)
         self._middle = scene.frame.target if scene.frame else ORIGIN
         self._volume = scene.volume
 
     @property
     def has_views(self) -> bool:
         """Return whether training views are there."""
-        return bool(self._origins)
+        return bool(self._views)
 
     def nearest(self, camera: Camera, scene: Scene) -> Image:
-        """Return the training view that is nearest to a camera; one model of the scene is visible."""
+        """Return the training view that looks most nearly as a camera does; one model is visible."""
         visible = [name for name, entry in scene.models.items() if entry.edit.visible]
-        if len(visible) != 1 or visible[0] not in self._origins:
+        if len(visible) != 1 or visible[0] not in self._views:
             raise ArgumentError(
-                f"Training views show one transfer function each: show {' or '.join(self._origins)} alone "
+                f"Training views show one transfer function each: show {' or '.join(self._views)} alone "
                 f"by the ticks beside names. Visible now: {', '.join(visible) or 'none'}."
             )
-        return self._origins[visible[0]].nearest(camera)
+        forward = camera.viewmat[2, :3]
+        return max(self._views[visible[0]], key=lambda each: float(forward @ each.camera.viewmat[2, :3]))
 
     @cached_property
     def places(self) -> list[dict[str, Any]]:
-        """Return the training views as a page goes to them, those with +y up."""
-        origin = next(iter(self._origins.values()), None)
-        images = [] if origin is None else origin.images
+        """Return the places of the training views with +y up, for a page."""
+        images = next(iter(self._views.values()), [])
         places = [(index, orbit_of(image.camera, self._middle)) for index, image in enumerate(images)]
         return [{"name": f"view {index}", **place} for index, place in places if place]
 
@@ -97,7 +78,7 @@ class Origins:
 
 
 def histogram_of(file: Path) -> tuple[tuple[float, float] | None, list[int]]:
-    """Return the range of values and the histogram in a volume.json; none where it is damaged or missing."""
+    """Return the range of values and the histogram in a volume.json; nothing of a damaged or missing one."""
     try:
         summary = read_json(file)
     except TexgsError as error:
@@ -112,16 +93,15 @@ def histogram_of(file: Path) -> tuple[tuple[float, float] | None, list[int]]:
     return (low, high), [int(part.sum()) for part in np.array_split(counts, min(BINS, len(counts)))]
 
 
-def origins_of(scene: Scene) -> list[Origin]:
-    """Return what is there of the models of a scene; what is damaged is said in the log."""
-    whole = []
+def views_of(scene: Scene) -> dict[str, list[Image]]:
+    """Return the training views of models by name. Those that are damaged are left out and logged."""
+    whole = {}
     for name, entry in scene.models.items():
-        folders = VIEWS if "relight" in kind_of(entry.file).can else VIEWS[::-1]
+        folders = VIEW_FOLDERS if "relight" in kind_of(entry.file).can else VIEW_FOLDERS[::-1]
         found = (find_upwards(entry.file, f"{folder}/transforms_train.json") for folder in folders)
         if file := next(filter(None, found), None):
-            origin = Origin(name, file)
             try:
-                whole.append((origin, origin.images)[0])
+                whole[name] = read_views(file.parent).train
             except TexgsError as error:
                 log.warning("%s", error)
     return whole
@@ -135,7 +115,7 @@ def over(image: Image, background: tuple[float, float, float]) -> np.ndarray:
 
 
 def fitted(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Return a picture [H, W, 3] as large as it can be in a frame, its corner's colour around it."""
+    """Return a picture [H, W, 3] that fills a frame, with its corner's colour around it."""
     scale = min(width / pixels.shape[1], height / pixels.shape[0])
     size = [max(1, round(scale * side)) for side in pixels.shape[1::-1]]
     small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
@@ -145,7 +125,7 @@ def fitted(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
 
 
 def orbit_of(camera: Camera, near: Sequence[float]) -> dict[str, Any] | None:
-    """Return where a camera stands on an orbit around what it sees `near` a place; None if +y is not up."""
+    """Return the orbit of a camera around what it sees near a place; None if +y is not up."""
     position, forward = camera.position.tolist(), camera.viewmat[2, :3].tolist()
     distance = sum((to - here) * step for to, here, step in zip(near, position, forward, strict=True))
     if not distance > 0:
@@ -154,6 +134,6 @@ def orbit_of(camera: Camera, near: Sequence[float]) -> dict[str, Any] | None:
     azimuth, polar = degrees(atan2(forward[2], -forward[0])), degrees(asin(max(-1.0, min(1.0, -forward[1]))))
     fov_y = degrees(2 * atan(0.5 * camera.height / float(camera.K[1, 1])))
     again = orbit(azimuth, polar, distance, fov_y, camera.width, camera.height, target)
-    if not again.viewmat.allclose(camera.viewmat, atol=SAME):
+    if not again.viewmat.allclose(camera.viewmat, atol=CAMERA_TOLERANCE):
         return None
     return {"target": target, "azimuth": azimuth, "polar": polar, "distance": distance, "fov_y": fov_y}

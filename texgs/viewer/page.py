@@ -1,4 +1,4 @@
-"""One page that is connected: what it asks for, and what it is told."""
+"""One connected page: its requests, and the messages that wait for it."""
 
 import asyncio
 import json
@@ -17,17 +17,17 @@ from texgs.viewer.messages import Look, Mask, Pick, View
 from texgs.viewer.shared_edits import SharedEdits
 
 log = logging.getLogger("texgs.viewer")
-MOST_NOTICES = 8  # that wait for a page which does not listen
-BEAT = 5.0  # seconds; a page that hears nothing for some of these takes its connection for broken
+MOST_NOTICES = 8  # may wait for a page that does not listen
+BEAT = 5.0  # seconds; a page takes its connection for broken after a few silent ones
 Find = Callable[[Mask | Look], Awaitable[Any]]  # what clicks select as a message, or a `TriedLook`
 
 
 class Stopped(TexgsError):
-    """Somebody has asked to stop."""
+    """The user has cancelled the work."""
 
 
 class Page:
-    """What waits to be sent to a page; of views and scenes only the newest. No two have the same number."""
+    """The messages that wait for a page, of views and scenes only the newest. Its number is its own."""
 
     def __init__(
         self, socket: web.WebSocketResponse, edits: SharedEdits, frames: Frames, found: Find, number: int
@@ -35,15 +35,15 @@ class Page:
         self.number = number
         self._socket, self._edits, self._frames, self._found = socket, edits, frames, found
         self._notices: deque[dict[str, Any]] = deque(maxlen=MOST_NOTICES)
-        self._news: dict[str, dict[str, Any]] = {}  # by type, of each the newest
+        self._news: dict[str, dict[str, Any]] = {}  # the newest message of each type
         self._view: View | None = None
-        self._asked: dict[type[Mask | Look], Mask | Look] = {}  # by type, of each the newest that waits
+        self._asked: dict[type[Mask | Look], Mask | Look] = {}  # the newest of each type
         self._finding: dict[type[Mask | Look], asyncio.Task[None]] = {}
         self._tried: Look | None = None  # the newest preview, until it is taken off
         self._trial: dict[str, NewLook] = {}
-        self._shown_looks = deque[Any](maxlen=2)  # whose files stay: a frame of the last may be on its way
+        self._shown_looks = deque[Any](maxlen=2)  # keeps their files, for frames on their way
         self._pace = Pace()
-        self.answered = 0  # messages that change the scene
+        self.answered = 0  # count of messages that change the scene
         self._wake = asyncio.Event()
 
     def show(self, view: View) -> None:
@@ -52,8 +52,8 @@ class Page:
         self._wake.set()
 
     async def pick(self, asked: Pick) -> None:
-        """Send which point a pixel shows."""
-        point = await self._frames.point_at(asked.view, self.shown(asked.view), asked.pixel)
+        """Send the point that a pixel shows."""
+        point = await self._frames.point_at(asked.view, self.scene_of(asked.view), asked.pixel)
         self._tell_newest({"type": "point", "point": point})
 
     def find(self, asked: Mask | Look) -> None:
@@ -64,16 +64,16 @@ class Page:
         self._wake.set()
 
     def tell_job(self, title: str, done: float | None, failed: bool = False) -> None:
-        """Send how far a job is, in place of what waits; None: it has ended, and may have failed."""
+        """Send the part of a job that is done. None: it has ended or failed."""
         self._tell_newest({"type": "job", "title": title, "done": done, "failed": failed})
 
     def tell_scene(self, message: dict[str, Any]) -> None:
-        """Send what the scene is now, in place of what waits; of that stays what the message does not say."""
+        """Send news of the scene, merged into those that wait."""
         before = self._news.get("scene", {"scene": {}})
         self._tell_newest({**before, **message, "scene": {**before["scene"], **message["scene"]}})
 
     def try_on(self, looks: Mapping[str, NewLook] | None) -> None:
-        """Show parts with new looks on this page alone, beside those before; None: as all pages do."""
+        """Show more parts with new looks, on this page alone. None: take all of them off."""
         if looks is None:
             self._tried = None
         self._trial = {} if looks is None else {**self._trial, **looks}
@@ -85,7 +85,7 @@ class Page:
         self._wake.set()
 
     def tell_error(self, error: Exception, **more: Any) -> None:
-        """Send what went wrong; what is no mistake of the user is logged here with its place as well."""
+        """Send an error. One that is no mistake of the user is logged with its traceback as well."""
         if not isinstance(error, TexgsError):
             log.error("%s", error, exc_info=error)
         text = str(error) if isinstance(error, TexgsError) else f"internal error: {first_line(error)}"
@@ -103,7 +103,7 @@ class Page:
                 task.cancel()
 
     async def beat(self) -> None:
-        """Send a word again and again until the page is gone: its script cannot see pings."""
+        """Send a sign of life until the page is gone: its script cannot see pings."""
         while True:
             await asyncio.sleep(BEAT)
             await self._socket.send_str('{"type": "beat"}')
@@ -122,36 +122,36 @@ class Page:
             view, self._view = self._view, None
             await self._send_frame(view)
 
-    def shown(self, view: View) -> Scene:
+    def scene_of(self, view: View) -> Scene:
         """Return what a view shows on this page."""
-        return self._edits.shown(view, self._trial)
+        return self._edits.scene_of(view, self._trial)
 
     def _tell_newest(self, message: dict[str, Any]) -> None:
         """Send a message in place of one of its type that waits."""
-        self._news.pop(message["type"], None)  # the new one goes behind what others wait
+        self._news.pop(message["type"], None)  # the new one goes to the end of the queue
         self._news[message["type"]] = {**message, "answered": self.answered}
         self._wake.set()
 
     async def _send_frame(self, view: View) -> None:
         """Render a view and send it."""
         try:
-            frame = await self._frames.frame(view, self.shown(view), self._pace)
-        except Exception as error:  # whatever it is, the server goes on
+            frame = await self._frames.frame(view, self.scene_of(view), self._pace)
+        except Exception as error:  # the server survives it
             self.tell_error(error, frame=view.id)
             return
         await self._socket.send_bytes(frame)
 
     async def _find(self, asked: Mask | Look) -> None:
-        """Find what was asked for: it may have to wait for another page, while frames go on."""
+        """Find a mask or a look and send it. Frames go on meanwhile: another page may come first."""
         try:
             found = await self._found(asked)
             if isinstance(asked, Mask):
                 self._tell_newest(found)
             elif asked is self._tried:
                 self._shown_looks.append(found)
-                self._trial = {}  # of parts that are no longer chosen
+                self._trial = {}  # parts of the last preview may not be chosen any more
                 self.try_on(found.looks)
-        except Exception as error:  # whatever it is, the server goes on
+        except Exception as error:  # the server survives it
             self.tell_error(error, **({"mask": asked.id} if isinstance(asked, Mask) else {}))
         finally:
-            self._wake.set()  # another may wait
+            self._wake.set()  # for the next one that waits

@@ -1,4 +1,4 @@
-"""The steps of a series in time as a page carries them: how surfels differ from those that it begins with."""
+"""The steps of a series in time in a page, as differences from the step that it begins with."""
 
 import json
 import zlib
@@ -24,7 +24,7 @@ UNITS |= {"normals": 2**-9}  # of models that have them
 
 @dataclass(frozen=True, eq=False)
 class PageSteps:
-    """Steps of a series, of which a page begins with one."""
+    """Steps of a series in a page, which begins with one of them."""
 
     packed: Mapping[int, str]  # by number, in order; see `pack_steps`
     total: int  # steps of the series

@@ -1,4 +1,4 @@
-"""The volume of a scene as a page carries it: fewer samples, in 8 bits at most, packed."""
+"""The volume of a scene in a page: fewer samples, in 8 bits at most, packed."""
 
 import zlib
 from dataclasses import asdict, dataclass
@@ -16,15 +16,15 @@ from texgs.volume.nrrd_file import REMEDY, open_grid
 
 MEGABYTE = 10**6
 LEVELS = 255  # the largest code of 8 bits
-STEPS = (1, 3, 5, 7)  # between codes, of which the closest is taken
-TURNS = 5.0  # codes that a turn of slopes by a right angle counts as
-STEEP = 0.5  # codes by the sample, from which on a slope has a direction
-PLANES = 24  # that are compared
-TYPICAL = 6  # samples in a byte of a packed one, at first guess
-CLOSE = 0.92  # part of a budget that is used well
+CODE_STEPS = (1, 3, 5, 7)  # between codes; the one that comes closest counts
+TURN_COST = 5.0  # codes; slopes that turn by a right angle count as much
+STEEP_SLOPE = 0.5  # codes a sample; a slope has a direction from here on
+COMPARED_PLANES = 24
+SAMPLES_PER_BYTE = 6  # of packed ones, at first guess
+FILLED_SHARE = 0.92  # of a budget: more is not tried for
 TRIES = 8
-MOST = 2**26  # samples, so many bytes on a graphics card
-LONGEST = 1024  # samples of a side, which all graphics cards hold
+MOST_SAMPLES = 2**26  # each takes a byte on a graphics card
+LONGEST_SIDE = 1024  # samples; all graphics cards hold that
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +67,13 @@ def page_volume(scene: Scene, budget: float) -> PageVolume:
 
 
 def within(grid: Grid, most: float) -> PageVolume:
-    """Return a volume in `most` bytes: few samples in many steps, or more in fewer, whichever is closer."""
+    """Return a volume in `most` bytes, by the step between codes that comes closest to the grid."""
     ends, best, least = extremes(grid.values), None, np.inf
-    for step in STEPS:
+    for step in CODE_STEPS:
         volume = finest(grid, most, ends, step)
         if volume is None:
             continue
-        if step == STEPS[0] and is_finest(volume, grid):
+        if step == CODE_STEPS[0] and is_finest(volume, grid):
             return volume
         if (loss := loss_of(volume, grid)) < least:
             best, least = volume, loss
@@ -83,36 +83,36 @@ def within(grid: Grid, most: float) -> PageVolume:
 
 
 def finest(grid: Grid, most: float, ends: tuple[float, float], step: int) -> PageVolume | None:
-    """Return the finest of few tries in `most` bytes: what a lattice takes is not known before."""
-    share, best = min(1.0, (TYPICAL * step**0.5 * most / prod(grid.dims)) ** (1 / 3)), None
+    """Return the finest volume in `most` bytes that a few tries find: sizes are not known before."""
+    share, best = min(1.0, (SAMPLES_PER_BYTE * step**0.5 * most / prod(grid.dims)) ** (1 / 3)), None
     for _ in range(TRIES):
         volume = reduced(grid, share, ends, step)
         size = len(volume.packed)
         if size <= most and (best is None or size > len(best.packed)):
             best = volume
-        if CLOSE * most <= size <= most or (size < most and is_finest(volume, grid)):
+        if FILLED_SHARE * most <= size <= most or (size < most and is_finest(volume, grid)):
             break
-        share *= ((1 + CLOSE) / 2 * most / size) ** (1 / 3)
+        share *= ((1 + FILLED_SHARE) / 2 * most / size) ** (1 / 3)
     return best
 
 
 def loss_of(volume: PageVolume, grid: Grid) -> float:
-    """Return by how much values of some planes are off, in codes, and by how much their slopes turn.
+    """Return an error in codes over some planes: of values, and of directions of slopes.
 
     Few steps keep values of noise, but make terraces of what is smooth.
     """
     depth, *sides = grid.values.shape
     loss = []
-    for z in np.linspace(0, depth - 1, PLANES).round().astype(int):
+    for z in np.linspace(0, depth - 1, COMPARED_PLANES).round().astype(int):
         made = plane_at(volume.codes, z * (len(volume.codes) - 1) / (depth - 1), sides)
         truth = (grid.values[z].astype(np.float32) - volume.low) * (LEVELS / (volume.high - volume.low))
         slopes, truths = (np.stack(np.gradient(x)) for x in (made, truth))
         lengths = np.linalg.norm(slopes, axis=0) * np.linalg.norm(truths, axis=0)
         turned = 1 - (slopes * truths).sum(axis=0) / np.maximum(lengths, 1e-6)
-        is_steep = np.linalg.norm(truths, axis=0) > STEEP
+        is_steep = np.linalg.norm(truths, axis=0) > STEEP_SLOPE
         loss.append([((made - truth) ** 2).sum(), turned[is_steep].sum(), truth.size, is_steep.sum()])
     squares, turns, count, steep = np.sum(loss, axis=0)
-    return float(np.sqrt(squares / count) + TURNS * turns / max(steep, 1))
+    return float(np.sqrt(squares / count) + TURN_COST * turns / max(steep, 1))
 
 
 def is_finest(volume: PageVolume, grid: Grid) -> bool:
@@ -123,7 +123,7 @@ def is_finest(volume: PageVolume, grid: Grid) -> bool:
 def sizes_of(grid: Grid, share: float) -> tuple[int, ...]:
     """Return the sizes [3] of an array whose sides have a share of a grid's cells; cards hold them."""
     cells = [size - 1 for size in grid.values.shape]
-    most = min(LONGEST / max(grid.values.shape), (MOST / grid.values.size) ** (1 / 3), 1.0)
+    most = min(LONGEST_SIDE / max(grid.values.shape), (MOST_SAMPLES / grid.values.size) ** (1 / 3), 1.0)
     return tuple(max(round(min(share, most) * size), 1) + 1 for size in cells)
 
 

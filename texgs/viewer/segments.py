@@ -52,7 +52,7 @@ class Segmenter:
         return {"type": "mask", "id": asked.id, "picture": picture_of(mask), "by": masks.name}
 
     def segment(self, session: Session, asked: Segment, file: Callable[[], Path]) -> Lifted:
-        """Make a segment of what clicks select, whose file gets the place that is free in the end."""
+        """Make a segment of what clicks select. `file` returns a free path when it is found."""
         on, off = ([[x, y] for x, y, is_on in asked.points if is_on == sign] for sign in (True, False))
         facts = {"camera": asdict(asked.camera), "point": on, "other": off, "outline": asked.outline}
         made = new_segment(
@@ -81,7 +81,7 @@ class Segmenter:
 
 
 def isolated(scene: Scene, name: str) -> Scene:
-    """Return the scene with one of its models, as it is clicked on: with its textures and no other edit."""
+    """Return the scene with one model alone, with its textures and no other edit, to be clicked on."""
     entry_of(scene, name)
     models = {}
     for each, entry in scene.models.items():

@@ -1,4 +1,4 @@
-"""The server of a viewer: what requests ask for, and a WebSocket for each page that is open."""
+"""The server of a viewer. It answers requests, and has a WebSocket for each open page."""
 
 import asyncio
 import secrets
@@ -14,12 +14,11 @@ from texgs.core.errors import ArgumentError
 from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
-from texgs.viewer import messages
 from texgs.viewer.description import bounds, describe, presets
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Beside, Frames
 from texgs.viewer.guard import guard, headers
-from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Pick, Save, Segment, View, parse
+from texgs.viewer.messages import MESSAGE_BYTES, Cancel, Job, Look, Mask, Message, Pick, Save, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
@@ -27,17 +26,17 @@ from texgs.viewer.styles import LARGEST_PICTURE
 from texgs.viewer.work import Work
 
 WEB = Path(__file__).parent / "web"
-SERVED = (".js", ".css", ".svg")
-# Of what a page knows.
-CHANGING = ("name", "background", "light", "cuts", "functions", "time", "tfs", "models")
+SUFFIXES = (".js", ".css", ".svg")
+# What changes of a scene that a page knows.
+CHANGING_KEYS = ("name", "background", "light", "cuts", "functions", "time", "tfs", "models")
 MOST_PAGES = 16
 PATIENCE = 2.0  # seconds for a page to close its connection
-HEARTBEAT = 20.0  # seconds, after which a page that is gone is noticed
+HEARTBEAT = 20.0  # seconds; a page that is gone is noticed after this time
 GOODBYE = b"texgs view has ended. Start it again, and open the address that it prints."
 
 
 class Server:
-    """What the handlers of requests share. The models of the scene are read at once."""
+    """The state that handlers of requests share. The models of the scene are read at once."""
 
     def __init__(
         self,
@@ -46,7 +45,7 @@ class Server:
         styles: Path | None = None,
         session: Session | None = None,
     ) -> None:
-        session = session or Session(opened.scene, device)  # somebody else may edit the scene, too
+        session = session or Session(opened.scene, device)  # shared with whoever edits the scene, too
         self._title, composed = title_of(opened.source), session.composition
         self._bounds, self._device = bounds(opened.scene, composed), device
         self._opened = self._latest = (files_of_models(opened.scene), composed)  # models as they were fitted
@@ -54,7 +53,7 @@ class Server:
         self._origins = Origins(opened.scene)
         self._beside = Beside(session, self._origins)
         self.frames = Frames(session, self._beside)
-        self._changing = asyncio.Lock()  # changes are made in other threads, one after the other
+        self._changing = asyncio.Lock()  # changes run in other threads, in turn
         self.work = Work(self.frames, self.edits, self.tell_all, device, styles)
         self._choices = {
             "styles": self.work.styles.names,
@@ -64,7 +63,7 @@ class Server:
         }
         self._pages: dict[Page, web.WebSocketResponse] = {}
         self._count = 0  # of pages so far
-        self._run = secrets.token_hex(8)  # tells pages that they have met another server
+        self._run = secrets.token_hex(8)  # by which pages notice another server
 
     def application(self, token: str, host: str = "127.0.0.1", *, is_framed: bool = False) -> web.Application:
         """Return the application to serve on a host; the token is the first part of every path.
@@ -88,12 +87,12 @@ class Server:
         return app
 
     async def socket(self, request: web.Request) -> web.StreamResponse:
-        """Return one page: what it asks for is done until it is gone."""
+        """Serve one page until it is gone."""
         socket = web.WebSocketResponse(
-            max_msg_size=messages.LARGEST, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
+            max_msg_size=MESSAGE_BYTES, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
         )
         await socket.prepare(request)
-        if len(self._pages) >= MOST_PAGES:  # a browser tells a page nothing of a refused handshake
+        if len(self._pages) >= MOST_PAGES:  # a page never learns why a handshake was refused
             why = f"{MOST_PAGES} pages of this scene are open, which is the most. Close one: this page waits."
             await socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=why.encode())
             return socket
@@ -117,8 +116,8 @@ class Server:
         return web.FileResponse(WEB / "page.html")
 
     async def module(self, request: web.Request) -> web.StreamResponse:
-        """Return a module or a style sheet of the page, by its name in a list of those that there are."""
-        files = {path.name: path for path in WEB.iterdir() if path.suffix in SERVED}
+        """Return a module or a style sheet of the page by its name."""
+        files = {path.name: path for path in WEB.iterdir() if path.suffix in SUFFIXES}
         path = files.get(request.match_info["name"])
         if path is None:
             raise web.HTTPNotFound
@@ -127,27 +126,27 @@ class Server:
     async def still(self, request: web.Request) -> web.StreamResponse:
         """Return a PNG file of the view in the query on its page, as `texgs render` writes it."""
         view = parse(request.query.get("view", ""), View)
-        scene = self._shown(view, request.query.get("page", ""))
+        scene = self._scene_of(view, request.query.get("page", ""))
         words = await asyncio.to_thread(self.edits.checked, scene)
         png = await self.frames.still(view, scene, words)
         saved = {"Content-Disposition": "attachment"}  # the page gives it a name
         return web.Response(body=png, content_type="image/png", headers=saved)
 
     async def thumbnail(self, request: web.Request) -> web.StreamResponse:
-        """Return a small view of the scene with a picture laid on."""
+        """Return a small view of the scene with the look of a picture."""
         asked = parse(request.query.get("look", ""), Look)
-        picture = await self.work.thumbnail(replace(asked, preview=True))  # never by a full recipe
+        picture = await self.work.thumbnail(replace(asked, preview=True))  # by a quick recipe
         return web.Response(body=picture, content_type="image/jpeg")
 
     async def new_style(self, request: web.Request) -> web.StreamResponse:
-        """Take in a picture of the page's user; return the name that it has from then on."""
+        """Store a picture that the page sends, and return its name."""
         content = await request.read()
         name = await asyncio.to_thread(self.work.styles.add, request.query.get("name", ""), content)
         return web.Response(text=name)
 
     async def file(self, request: web.Request) -> web.StreamResponse:
         """Return a file that was written for a page."""
-        path = self.work.downloads.file(request.match_info["name"])
+        path = self.work.download(request.match_info["name"])
         if path is None:
             raise web.HTTPNotFound
         return web.FileResponse(path)
@@ -159,19 +158,19 @@ class Server:
                 if received.type != WSMsgType.TEXT:
                     raise ArgumentError("message: expected text, got bytes")
                 await self._answer(parse(received.data), page)
-            except Exception as error:  # whatever a page sends, the server goes on
+            except Exception as error:  # the server survives whatever a page sends
                 page.tell_error(error, refused=True)
-                page.tell_scene(self.scene_message())  # it shows what it has asked for already
+                page.tell_scene(self.scene_message())  # takes back what it has shown in advance
 
     async def _answer(self, message: Message, page: Page) -> None:
-        """Do what a message asks for, or begin to."""
+        """Do what a message asks for, or begin it."""
         if isinstance(message, View):
             page.show(message)
         elif isinstance(message, Pick):
             await page.pick(message)
         elif isinstance(message, Mask) or (isinstance(message, Look) and message.preview):
             page.find(message)
-        elif isinstance(message, Segment | Look | Fit | messages.Keep | Export):
+        elif isinstance(message, Job):
             self.work.begin(message, page)
         elif isinstance(message, Cancel):
             if not message.preview:
@@ -195,26 +194,26 @@ class Server:
             each.tell_scene(news)
 
     async def _save(self, message: Save, page: Page) -> None:
-        """Save the scene; where that would replace another file, the page is asked first."""
+        """Save the scene. The page is asked first where this would replace another file."""
         if not message.replace and self.edits.would_replace(message.name):
             page.tell(f"{message.name} is there already.", level="question", name=message.name)
             return
         path = await asyncio.to_thread(self.edits.save, message.name)
         page.tell(f"Saved as {path}")
 
-    def _shown(self, view: View, number: str) -> Scene:
-        """Return what a view shows on the page of a number; on none, what all pages share."""
+    def _scene_of(self, view: View, number: str) -> Scene:
+        """Return what a view shows on the page with a number; without one, what all pages share."""
         page = next((page for page in self._pages if str(page.number) == number), None)
-        return self.edits.shown(view) if page is None else page.shown(view)
+        return self.edits.scene_of(view) if page is None else page.scene_of(view)
 
     def scene_message(self) -> dict[str, Any]:
-        """Return what changes of the scene, and its history, for all pages."""
+        """Return the message with the scene's history and what changes about it."""
         scene = self._describe(self.edits.scene)
-        changing = {key: scene[key] for key in CHANGING}
+        changing = {key: scene[key] for key in CHANGING_KEYS}
         return {"type": "scene", "scene": changing, **self.edits.state()}
 
     def greeting(self) -> dict[str, Any]:
-        """Return the same, for a page that knows nothing yet, with what does not change."""
+        """Return the first message of a page, with what never changes as well."""
         whole = self._describe(self.edits.scene)
         whole["views"] += self._origins.places
         whole["modes"][1:1] = self._beside.modes
@@ -224,7 +223,7 @@ class Server:
         return {**self.scene_message(), "scene": whole, **facts}
 
     def _describe(self, scene: Scene) -> dict[str, Any]:
-        """Return a scene as pages need it; models are read where there are others than before."""
+        """Return a scene as pages need it. Models are read only where they are new."""
         files = files_of_models(scene)
         if files not in (self._opened[0], self._latest[0]):
             self._latest = (files, scene.as_fitted.open(self._device))

@@ -1,4 +1,4 @@
-"""The one scene that all pages edit: what a viewer is started with, its steps, and where it is saved."""
+"""The one scene that all pages edit: where it comes from, its steps, and where it is saved."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from texgs.scene.copied import require_files, write_copy
 from texgs.scene.parts import NewLook, part_names, with_looks
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene, scene_path, write_scene
-from texgs.scene.session import SCENE_KEYS, Session, files_of, state_of
+from texgs.scene.session import Session, files_of, state_of
 from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
 
@@ -26,12 +26,12 @@ class Opened:
     """A scene, and where its edits are saved."""
 
     scene: Scene
-    source: Path  # that it was read from
+    source: Path  # of the scene
     folder: Path
-    name: str  # that a scene file gets unless another one is chosen
-    file: Path | None = None  # of the scene, where edits may be written to it
-    title: str = ""  # by which a page knows the scene; the end of the path by default
-    copies: Path | None = None  # where saving makes a folder with all files; by default only a scene file
+    name: str  # of the scene file to save, by default
+    file: Path | None = None  # the scene file that edits may replace
+    title: str = ""  # on pages; default the end of the path
+    copies: Path | None = None  # folder for copies of all files; default: save a scene file only
 
 
 def open_scene(path: Path, folder: Path | None = None) -> Opened:
@@ -50,7 +50,7 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
 
 
 def title_of(path: Path) -> str:
-    """Return enough of a path to know the scene by."""
+    """Return the end of a path, as a title."""
     return Path(*path.resolve().parts[-4:]).as_posix()
 
 
@@ -62,9 +62,9 @@ class SharedEdits:
         self.name, self._source = opened.name, opened.source
         self._title = opened.title or title_of(opened.source)
         files = [opened.file.resolve()] if opened.file else []
-        self._own = {file: state_of(file) for file in files}  # replaced without a question, while they are so
+        self._own = {file: state_of(file) for file in files}  # may be replaced unasked in this state
         self.original = self._saved = session.scene
-        # Author and number of a step that may go on, and the scene that it has made.
+        # The author and the number of a step that may go on, and its scene.
         self._latest: tuple[tuple[object, ...] | None, Scene] = (None, session.scene)
 
     @property
@@ -73,7 +73,7 @@ class SharedEdits:
         return self.session.scene
 
     def checked(self, scene: Scene) -> str:
-        """Return what `texgs check` has found of the models of a scene, if anything."""
+        """Return the result of `texgs check` for the models of a scene; empty where there is none."""
         return checked(self._source, scene)
 
     @property
@@ -81,7 +81,7 @@ class SharedEdits:
         """Return whether a file holds the scene as it is now."""
         return self.scene == self._saved
 
-    def shown(self, view: View, trial: Mapping[str, NewLook] | None = None) -> Scene:
+    def scene_of(self, view: View, trial: Mapping[str, NewLook] | None = None) -> Scene:
         """Return what a view shows: the scene now, as it was opened, at its step, or one model alone.
 
         The scene as it is now has the looks of a trial, as far as it has such parts.
@@ -95,7 +95,7 @@ class SharedEdits:
         return with_looks(self.scene, {part: looks[part] for part in names if part in looks})
 
     def state(self) -> dict[str, Any]:
-        """Return what pages show of the history, JSON."""
+        """Return the history as pages show it, JSON."""
         return {
             "past": self.session.past,
             "future": self.session.future,
@@ -127,7 +127,7 @@ class SharedEdits:
                 goes_on = step is not None and is_latest and session.undo()
                 try:
                     with session.one_step(asked.title[:LONGEST_TITLE]):
-                        self._edit(asked)
+                        session.change(asked.part, asked.key, asked.value)
                 except Exception:
                     if goes_on:
                         session.redo()
@@ -147,12 +147,12 @@ class SharedEdits:
         return path
 
     def would_replace(self, name: str) -> bool:
-        """Return whether saving replaces a file that is neither opened nor saved here, or has changed."""
+        """Return whether saving would replace a file of others: one that was not opened or saved here."""
         path = self.path_of(name)
         return path.exists() and self._own.get(path.resolve()) != state_of(path.resolve())
 
     def save(self, name: str) -> Path:
-        """Write the scene file in one step, unless what it would name is gone."""
+        """Write the scene file in one step; require all files that it names."""
         path, scene = self.path_of(name), self.scene
         require_files(files_of(scene))
         path = write_copy(path.parent, scene) if self._copies else write_scene(path, scene)
@@ -161,29 +161,19 @@ class SharedEdits:
         return path
 
     def new_file(self, where: str, part: str) -> Path:
-        """Return the file of a new part that is not there yet."""
+        """Return a free path for the file of a new part."""
         return new_part_file(where, self._folder, Path(self.name).stem, part)
 
     def new_folder(self, kind: str) -> Path:
-        """Return a folder for the files of a new look that is not there yet."""
+        """Return a free path for the folder of a new look."""
         stem = Path(self.name).stem
         folders = (self._folder / f"{stem}-{kind}-{number}" for number in count(1))
         return next(folder for folder in folders if not folder.exists())
 
     def _require_step(self, take_back: Callable[[], object]) -> None:
-        """Require that all is there that the scene of a step reads; otherwise take the step back."""
+        """Require all files of the scene; take the step back where one is missing."""
         try:
             require_files(files_of(self.scene))
         except ArgumentError:
             take_back()
             raise
-
-    def _edit(self, edit: Edit) -> None:
-        """Change one value of a part or of the scene."""
-        session, value = self.session, edit.value
-        if not edit.part:
-            session.set_of_scene(edit.key, SCENE_KEYS.get(edit.key) if value is None else value)
-        elif value is None:
-            session.reset(edit.part, edit.key)
-        else:
-            session.set(edit.part, edit.key, value)

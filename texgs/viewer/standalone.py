@@ -30,16 +30,16 @@ from texgs.viewer.page_steps import PageSteps, page_steps
 from texgs.viewer.page_volume import PageVolume
 
 LARGEST = 256 * 2**20  # bytes; browsers hold a text of twice as many
-MOST_STEPS = 2**15 - 1  # of a texel, on a graphics card
-POSTER = 512  # pixels of either side
-QUALITY = 80  # of the poster, a JPEG
+TEXEL_CODES = 2**15 - 1  # at most, of a texel on a graphics card
+POSTER_SIDE = 512  # pixels
+POSTER_QUALITY = 80  # of JPEG
 IMPORT = re.compile(r'^import (\{[^}]*\}) from "\./([\w-]+\.js)";$', re.MULTILINE)
 EXPORT = re.compile(r"^export ((?:async )?(?:function|class|const) (\w+))", re.MULTILINE)
 
 
 @dataclass(frozen=True)
 class ScenePage:
-    """A page, and what is known of it."""
+    """A page and facts of it."""
 
     text: str
     surfels: int
@@ -92,7 +92,7 @@ def scene_page(
     if volume is not None:
         description |= {"volume": volume.describe(scene), "presets": presets()}
         description["transfer"] = Origins(scene).transfer
-        twin = Twin(scene)  # which refuses a volume that cannot be shown as the models
+        twin = Twin(scene)  # refuses a volume that cannot be shown as the models
     picture = poster(scene, composed, description["views"][0], description["fov_y"], twin)
     html = page_of(description, surfels, picture, checked, volume, moved)
     return ScenePage(html, len(composed), picture, moved)
@@ -141,16 +141,16 @@ def poster(
     scene: Scene, composed: Composition, view: dict[str, Any], fov_y: float, twin: Twin | None
 ) -> bytes:
     """Return a view of a scene, see `describe`, as JPEG; cuts have faces where there is a twin."""
-    place = (view["azimuth"], view["polar"], view["distance"], fov_y, POSTER, POSTER)
+    place = (view["azimuth"], view["polar"], view["distance"], fov_y, POSTER_SIDE, POSTER_SIDE)
     camera = orbit(*place, target=view["target"])
-    shown = frame(composed, camera, scene, twin=twin)
+    pixels = frame(composed, camera, scene, twin=twin)
     file = BytesIO()
-    Image.fromarray(shown).save(file, "JPEG", quality=QUALITY, optimize=True)
+    Image.fromarray(pixels).save(file, "JPEG", quality=POSTER_QUALITY, optimize=True)
     return file.getvalue()
 
 
 def digest(text: str) -> str:
-    """Return what a content security policy knows a script or a style by."""
+    """Return the hash of a script or a style for a content security policy."""
     return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
 
 
@@ -179,9 +179,9 @@ def pack(composition: Composition) -> str:
 def require_range(texels: Tensor) -> None:
     """Require texels [T, 3] that 16 bits hold."""
     largest = float(texels.abs().max()) if len(texels) else 0.0
-    if largest > MOST_STEPS * TEXEL_STEP:
+    if largest > TEXEL_CODES * TEXEL_STEP:
         raise ArgumentError(
-            f"texels: expected at most {MOST_STEPS * TEXEL_STEP:g}, got {largest:g}; fit the texture again"
+            f"texels: expected at most {TEXEL_CODES * TEXEL_STEP:g}, got {largest:g}; fit the texture again"
         )
 
 

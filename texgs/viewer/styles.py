@@ -15,7 +15,7 @@ from texgs.models.pictures import PICTURES
 
 LARGEST_PICTURE = 32 * 2**20  # bytes of a picture that a page sends
 MOST_PICTURES = 50  # pictures of a folder, and of pages
-MOST_PIXELS = 50_000_000  # of one: more takes many seconds to read, at each preview again
+MOST_PIXELS = 50_000_000  # of a picture; each preview would take seconds to read more
 
 
 class Styles:
@@ -28,7 +28,7 @@ class Styles:
         self._adding = Lock()  # pages may send several at once
 
     def add(self, name: str, content: bytes) -> str:
-        """Take in a file, with the name that its author gave it; return the name that it has from then on."""
+        """Store a file under a name like that of its author, and return this name."""
         with self._adding:
             if len(self._files) >= MOST_PICTURES:
                 expected = f"expected at most {MOST_PICTURES} pictures"
@@ -48,7 +48,7 @@ class Styles:
 
     @property
     def names(self) -> list[str]:
-        """Return those that all pages offer."""
+        """Return the names that all pages offer."""
         return [*PICTURES, *self._own]
 
     def source(self, name: str) -> str:
@@ -79,7 +79,7 @@ def pictures_in(folder: Path) -> dict[str, Path]:
 
 
 def require_readable(path: Path) -> None:
-    """Require of a picture, if it is one, that it takes a moment to read."""
+    """Require a picture that is quick to read; other files pass."""
     quiet, refused = catch_warnings(action="ignore"), (OSError, Image.DecompressionBombError)
     with suppress(*refused), quiet, Image.open(path, formats=FORMATS) as picture:
         width, height = picture.size
