@@ -121,7 +121,7 @@ def test_results_may_be_written_with_a_slash_at_the_end(planned):
     assert all(job["settings"].startswith("out/.conf/") for job in plan.jobs.values())
 
 
-@pytest.mark.parametrize("value", [None, [], "x", {}, {"jobs": 3}])
+@pytest.mark.parametrize("value", [None, {}, {"jobs": 3}])
 def test_a_damaged_plan_is_made_again_by_the_job_that_reads_it(tmp_path, monkeypatch, value):
     monkeypatch.chdir(tmp_path)
     words = words_of(FITS)
