@@ -1,6 +1,7 @@
 import pytest
 import torch
 
+from tests.refusals import refused
 from texgs.core import memory
 from texgs.core.errors import OutOfMemoryError
 from texgs.edit.objective import Objective, pooled
@@ -38,8 +39,8 @@ def test_terms_are_the_losses_times_their_weights(vgg):
 
 def test_features_larger_than_memory_are_refused(vgg, monkeypatch):
     monkeypatch.setattr(memory, "free_memory", lambda: 2**20)
-    with pytest.raises(OutOfMemoryError, match="features of a style of 300 x 300 pixels"):
-        Objective.of(preset("default"), STYLE.scaled(300), 1, vgg, None)
+    of_style = lambda: Objective.of(preset("default"), STYLE.scaled(300), 1, vgg, None)  # noqa: E731
+    refused(of_style, "features of a style of 300 x 300 pixels", OutOfMemoryError)
 
 
 @pytest.mark.parametrize(("height", "width", "reduce"), [(3, 40, 1), (48, 1, 1), (8, 8, 3)])

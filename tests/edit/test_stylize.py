@@ -5,6 +5,7 @@ import torch
 
 from tests.edit.scenes import ball, plain_style, task, two_steps, views
 from tests.models.networks import random_weights
+from tests.refusals import refused
 from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.methods.image import ImageKeys, run
 from texgs.edit.recipe import PRESETS, preset
@@ -234,9 +235,8 @@ def test_views_that_do_not_show_the_model_change_nothing(vgg, style):
 
 def test_mistakes_are_named_before_any_work(vgg, style):
     cameras, lights = views()
-    shading = {
-        k: x for k, x in ball().parameters.items() if k not in ("texels", "sizes", "offsets", "palette")
-    }
+    texture = {"texels", "sizes", "offsets", "palette"}
+    shading = {name: x for name, x in ball().parameters.items() if name not in texture}
     cases = [
         ({"model": Surfels(shading)}, ArgumentError, "model: expected stage texture, got shading"),
         ({"lights": lights[:2]}, ArgumentError, "expected one for each of some cameras, got 2 for 6"),
@@ -248,14 +248,15 @@ def test_mistakes_are_named_before_any_work(vgg, style):
     ]
     given = {"model": ball(), "cameras": cameras, "lights": lights, "style": style, "recipe": short()}
     for changes, error, message in cases:
-        with pytest.raises(error, match=message):
-            stylize(**{**given, "vgg": vgg, **changes})
+        refused(lambda changes=changes: stylize(**{**given, "vgg": vgg, **changes}), message, error)
 
 
 def test_a_loss_that_is_not_finite_stops_the_edit(style):
     recipe = short(lambda_s=0.0, patches=0.0)
-    with pytest.raises(FitError, match="style: the loss is not finite in iteration 1"):
-        styled(style, recipe, clip=lambda image: image.mean() / 0)
+    infinite = lambda image: image.mean() / 0  # noqa: E731
+    refused(
+        lambda: styled(style, recipe, clip=infinite), "the loss is not finite in iteration 1", FitError
+    )
 
 
 @pytest.mark.parametrize(("recipe", "dtype"), [("paper", torch.float32), ("default", None)])

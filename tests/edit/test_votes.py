@@ -1,6 +1,5 @@
 """Votes of masks against known classes of surfels."""
 
-import pytest
 import torch
 from torch.nn.functional import interpolate
 
@@ -29,20 +28,17 @@ def counted(votes, model, of_class, change=lambda mask, seed: mask):
     return votes.selected(), total
 
 
-@pytest.mark.parametrize("number", [0, 1])
-@pytest.mark.parametrize("change", [lambda mask, seed: mask, noisy])
-def test_opaque_objects_are_told_apart(number, change):
+def test_opaque_objects_are_told_apart():
     model, numbers = two_balls()
-    selected, weights = counted(ContributionVotes(model), model, numbers == number, change)
-    assert overlap(selected, numbers == number, weights) > 0.97
+    selected, weights = counted(ContributionVotes(model), model, numbers == 0, noisy)
+    assert overlap(selected, numbers == 0, weights) > 0.97
 
 
-@pytest.mark.parametrize("change", [lambda mask, seed: mask, noisy])
-def test_a_ball_seen_through_a_shell_is_told_apart_better_than_by_centres(change):
+def test_a_ball_seen_through_a_shell_is_told_apart_better_than_by_centres():
     model, numbers = nested()
-    by_weight, weights = counted(ContributionVotes(model), model, numbers > 0, change)
-    by_centre, _ = counted(CentreVotes(model), model, numbers > 0, change)
-    plain, _ = counted(ContributionVotes(model, rounds=0), model, numbers > 0, change)
+    by_weight, weights = counted(ContributionVotes(model), model, numbers > 0, noisy)
+    by_centre, _ = counted(CentreVotes(model), model, numbers > 0, noisy)
+    plain, _ = counted(ContributionVotes(model, rounds=0), model, numbers > 0, noisy)
     iou = overlap(by_weight, numbers > 0, weights)
     assert iou >= 0.95
     assert iou > overlap(by_centre, numbers > 0, weights) + 0.02
