@@ -45,14 +45,6 @@ def test_the_middle_of_a_part_gets_the_highlights_of_the_material(name):
     assert edit.tint == MATERIALS[name].tint
 
 
-def test_metals_alone_tint_their_highlights():
-    tinted = {name for name, each in MATERIALS.items() if each.tint != PartEdit().tint}
-    assert tinted == {"gold", "silver", "copper"}
-    for metal in ("gold", "copper"):
-        red, green, blue = MATERIALS[metal].tint
-        assert red > green > blue
-
-
 def test_a_part_without_highlights_keeps_none_as_no_factor_makes_them():
     model = ball(1)
     dull = Surfels({**model.parameters, "specular": torch.tensor([-torch.inf])}, model.shading)

@@ -48,14 +48,6 @@ def test_tracking_and_profiles_rerun_nothing(project):
     assert project.planned("--workflow-profile", str(profile), config=("tracking=mlflow",)) == []
 
 
-def test_a_gallery_of_a_sweep_is_one_job(project):
-    words = {"config": ("tracking=none", "experiment=resolution"), "overrides": "datasets=[turbulence]"}
-    planned = project.planned(targets=("galleries",), **words)
-    assert planned.count("gallery") == 1
-    assert planned.count("compose") == 3
-    assert "timing" not in planned
-
-
 def test_views_may_be_given(project, tmp_path):
     other = Project(tmp_path)
     (tmp_path / "data").mkdir()

@@ -1,6 +1,5 @@
 """What the tracking store and the metrics file are told of a job."""
 
-import json
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,7 +14,7 @@ from texgs.workflow.provenance import device, seed
 from texgs.workflow.runs import PARENT
 from texgs.workflow.stage_table import STAGES
 from texgs.workflow.sweep import as_sweep, variants
-from texgs.workflow.tracked import RUNS, Tracking, curves, name, of_workflow, scalars, tags
+from texgs.workflow.tracked import curves, name, scalars, tags
 
 GOLD = ("edit=gold", "edit.text.size=64,128")
 IDENTITY = {"settings": "0123", "code": "4567"}
@@ -76,17 +75,6 @@ def test_edits_by_numbers_and_pictures_of_a_gallery_have_a_metric_each_and_their
         "shown_psnr/polar/error/30°": 20.0,
         "shown_psnr": 25.0,
     }
-
-
-def test_the_workflow_says_which_run_a_job_is_inside_of(tmp_path, monkeypatch):
-    output = tmp_path / "a"
-    assert of_workflow(output) == (Tracking(None, "texgs"), {})
-    monkeypatch.setenv("TEXGS_TRACKING", "sqlite:///x.db")
-    monkeypatch.setenv(RUNS, str(tmp_path / "runs.json"))
-    assert of_workflow(output) == (Tracking("sqlite:///x.db", "texgs"), {})
-    told = {output.as_posix(): {"parent": "abc", "swept": {"fit.seed": "1"}}}
-    (tmp_path / "runs.json").write_text(json.dumps(told))
-    assert of_workflow(output) == (Tracking("sqlite:///x.db", "texgs", "abc"), {"fit.seed": "1"})
 
 
 class Cuda:
