@@ -3,16 +3,14 @@
 import numpy as np
 import pytest
 import torch
-from torch.nn.functional import avg_pool2d, normalize
+from torch.nn.functional import normalize
 
 from tests.edit.scenes import ball
 from tests.fitting.scenes import RADIUS
 from tests.refusals import refused
-from texgs.core.camera import orbit
 from texgs.core.errors import ShapeError
 from texgs.edit.style_start import RIM, color_map, laid_out
-from texgs.fields.surfels.texels import owners, recolored
-from texgs.raster import Texture
+from texgs.fields.surfels.texels import owners
 
 WALL = {  # two parallel surfels with textures of different shapes, the second first in the list
     "means": torch.tensor([[0.1, 0.2, 0.3], [-0.2, 0.1, -0.1]]),
@@ -123,25 +121,6 @@ def flipped(quats):
     """The same planes with their normals to the other side: turned around x by half a turn."""
     w, x, y, z = quats.unbind(1)
     return torch.stack([-x, w, z, -y], 1)
-
-
-def test_a_sphere_is_seen_from_the_front():
-    """Rendered without light from +z, a ball of its size is the picture itself."""
-    model, picture = ball(6000), sphere_picture()
-    shown = recolored(model, laid_out(model.parameters, picture, RADIUS / 60, sphere=True))
-    image = front(shown)
-    inside = (picture != 1).any(0)
-    inside = avg_pool2d(inside[None].float(), 9, 1, 4)[0] > 0.99  # away from the rim
-    assert float((image - picture).abs().mean(0)[inside].mean()) < 0.02
-
-
-def front(model):
-    """The model without light from far away at +z [3, 120, 120], a ball filling it."""
-    camera = orbit(-90, 0, 200, float(np.degrees(2 * np.arctan(RADIUS / 200))), 120, 120)
-    p = model.parameters
-    colors, gain = p["colors"] + p["palette"], torch.ones_like(p["opacities"])
-    texture = Texture(colors, gain, p["texels"], p["sizes"], p["offsets"])
-    return model.rasterized(camera, texture=texture).color.permute(2, 0, 1)
 
 
 @pytest.mark.parametrize("sphere", [False, True])

@@ -5,7 +5,7 @@ from tests.refusals import refused
 from texgs.core import memory
 from texgs.core.errors import OutOfMemoryError
 from texgs.edit.objective import Objective, pooled
-from texgs.edit.recipe import PRESETS, Recipe, preset
+from texgs.edit.recipe import Recipe, preset
 from texgs.edit.sliced_wasserstein import FeatureDistribution, PatchStatistics
 from texgs.edit.style_picture import StylePicture
 from texgs.models.nnfm import StyleFeatures, nnfm
@@ -81,14 +81,6 @@ def test_what_is_not_on_the_object_does_not_count(vgg):
         (gradient,) = torch.autograd.grad(sum(terms.values()), x)
         far = gradient[:, :, 46:].abs().max()  # farther than a filter or a patch reaches from the object
         assert bool(far > 1e-7 * gradient.abs().max()) == (name == "paper")  # below: rounding of convolutions
-
-
-def test_presets_say_what_they_need():
-    needs = {name: (recipe.needs_vgg, recipe.needs_clip) for name, recipe in PRESETS.items()}
-    assert needs["default"] == (True, False)
-    assert needs["patches"] == needs["preview"] == (False, False)
-    assert needs["paper"] == (True, True)
-    assert preset("paper", lambda_s=0.0).needs_vgg is False
 
 
 def test_features_see_a_reduced_image_of_a_large_view():

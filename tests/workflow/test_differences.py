@@ -104,8 +104,6 @@ def test_what_no_key_expresses_is_always_told():
     entries = cells(differences([]))
     assert len(entries) == len(published().others) > 10
     assert all(all(row) for row in entries)
-    told = {"transfer functions", "style pictures", "text prompts", "fields of StyleRF-VolVis"}
-    assert told <= {row[0] for row in entries}
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
 from texgs.models import weights
 from texgs.models.catalogue import CATALOGUE, Single
-from texgs.workflow.cases import LeftOut, cases_of
+from texgs.workflow.cases import cases_of
 from texgs.workflow.edits import edits_of
 from texgs.workflow.missing import lacking
 from texgs.workflow.plan import make, words_of
@@ -211,9 +211,7 @@ def test_what_is_replaced_is_told_with_its_reason(machine):
     told = {each.what: each.why for each in cases_of(("experiment=relighting",), lacking).left_out}
     assert told.keys() == {"data set supernova", "data set five_jets", "edit style_paper"}
     assert told["data set supernova"].endswith("TEXGS_DATA; `turbulence` stands in for it")
-    assert LeftOut("edit style_paper", told["edit style_paper"]).why == (
-        "this machine cannot use the weights of vgg16 and clip-vit-base-patch32; `painted` stands in for it"
-    )
+    assert re.search("vgg16 and clip-vit-base-.*`painted` stands in", told["edit style_paper"])
 
 
 @pytest.mark.parametrize(
