@@ -2,14 +2,12 @@
 
 from dataclasses import replace
 
-import pytest
 import torch
 
 from tests.edit.scenes import ball, on_sphere, sphere_points, task
 from tests.fields.test_sizes import gaussians
 from tests.refusals import refused
-from texgs.edit.keys import EditKeys
-from texgs.edit.methods.image import ImageKeys, run
+from texgs.edit.methods.image import ImageKeys
 from texgs.edit.methods.text import TextKeys
 from texgs.edit.readable import KEPT, LARGEST, READABLE, SHOWS, SIZE, VIEWS, raised, readable_factors
 from texgs.fields.gaussians.files import write_gaussians
@@ -145,27 +143,6 @@ def test_the_factor_is_on_top_of_what_was_edited_and_only_of_parts_that_are_styl
         edited = raised(given).scene
         assert edited.models["shell"].edit == PartEdit(opacity=expected, diffuse=2.0)
         assert edited.models["other"] == scene.models["other"]
-
-
-@pytest.mark.parametrize("recipe", ["preview", "paper"])
-def test_a_style_is_learned_and_shown_at_the_opacity_it_is_given(tmp_path, recipe, monkeypatch):
-    """Recipe `paper` keeps opacities; others raise those of faint parts."""
-    scene, seen = scene_of(tmp_path, shell=ball(opacity=FAINT)), []
-
-    def stylize(model, cameras, lights, picture, given, **options):
-        from texgs.edit.stylize import Stylized
-
-        seen.append(given.opacity)
-        return Stylized(model, given, {}, {})
-
-    monkeypatch.setattr("texgs.edit.stylize.stylize", stylize)
-    monkeypatch.setattr("texgs.models.vgg.Vgg.load", lambda **options: None)
-    monkeypatch.setattr("texgs.models.clip.Clip.load", lambda *options: type("Clip", (), {"name": "none"}))
-    monkeypatch.setattr("texgs.edit.objective.ClipLoss", lambda *options: None)
-    settings = ImageKeys(recipe=recipe)
-    made = run(replace(task(scene, tmp_path), settings=settings, edit=EditKeys("look")))
-    wanted = readable_factors(scene, ["shell"], "cpu")["shell"] if recipe == "preview" else 1.0
-    assert seen == [made.scene.models["shell"].edit.opacity] == [wanted]
 
 
 def test_opacity_is_a_word_or_a_factor():

@@ -8,6 +8,7 @@ from tests.models.networks import random_weights
 from tests.refusals import refused
 from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.methods.image import ImageKeys, run
+from texgs.edit.readable import readable_factors
 from texgs.edit.recipe import PRESETS, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_start import pixel_side, start_colors
@@ -256,20 +257,25 @@ def test_a_loss_that_is_not_finite_stops_the_edit(style):
 
 
 @pytest.mark.parametrize(("recipe", "dtype"), [("paper", torch.float32), ("default", None)])
-def test_the_paper_computes_features_in_single_precision_on_any_machine(tmp_path, monkeypatch, recipe, dtype):
-    """The others in what VGG-16 is fastest with there."""
+def test_the_paper_keeps_opacities_and_computes_features_in_single_precision(
+    tmp_path, monkeypatch, recipe, dtype
+):
+    """The others raise opacities of faint parts, and take what VGG-16 is fastest with on a machine."""
     torch.save(random_weights(last=14), tmp_path / "vgg.pth")
     loaded, seen = Vgg.load(tmp_path / "vgg.pth"), []
+    monkeypatch.setattr(Vgg, "load", lambda device, dtype: seen.append(dtype) or loaded)
 
-    def load(device, dtype):
-        seen.append(dtype)
-        return loaded
+    def stylize(model, cameras, lights, picture, given, **options):
+        seen.append(given.opacity)
+        return Stylized(model, given, {}, {})
 
-    monkeypatch.setattr(Vgg, "load", load)
-    monkeypatch.setattr("texgs.edit.stylize.stylize", lambda *a, **o: Stylized(a[0], a[4], {}, {}))
-    scene = Scene({"ball": SceneModel(write_model(tmp_path / "ball", ball()))})
-    run(replace(task(scene, tmp_path), settings=ImageKeys(recipe=recipe, lambda_s=1.0)))
-    assert seen == [dtype]
+    monkeypatch.setattr("texgs.edit.stylize.stylize", stylize)
+    scene = Scene({"ball": SceneModel(write_model(tmp_path / "ball", ball(opacity=-2.2)))})
+    given = replace(task(scene, tmp_path), settings=ImageKeys(recipe=recipe, lambda_s=1.0))
+    shown = run(given).scene.models["ball"].edit.opacity
+    factor = 1.0 if recipe == "paper" else readable_factors(scene, ["ball"], "cpu")["ball"]
+    assert seen == [dtype, factor]
+    assert shown == factor
 
 
 def test_half_precision_learns_what_single_precision_does(tmp_path, style):

@@ -190,8 +190,11 @@ def squared(observation, colors):
     return (observation.image(colors) - observation.wanted).square().sum()
 
 
-@pytest.mark.parametrize("target", ["colors", "images"])
-@pytest.mark.parametrize(("recipe", "loss"), [(QUICK, squared), (ADAM, image_loss)], ids=["solve", "adam"])
+@pytest.mark.parametrize(
+    ("recipe", "loss", "target"),
+    [(QUICK, squared, "colors"), (ADAM, image_loss, "images")],
+    ids=["solve", "adam"],
+)
 def test_without_texture_each_surfel_learns_one_colour(model, recipe, loss, target):
     """It has a lower loss than the mean of the texels that would fit the edited views."""
     recipe, guidance = replace(recipe, target=target), Returns(stripes)
@@ -304,15 +307,6 @@ def test_top_and_bottom_are_upright():
     assert_close(cameras[4].viewmat[1, :3], torch.tensor([0.0, 0.0, 1.0]), atol=1e-6, rtol=0)
     assert_close(cameras[0].viewmat[1, :3], torch.tensor([0.0, -1.0, 0.0]), atol=1e-6, rtol=0)
     refused(lambda: axis_cameras(orbit(0, 0, 0.5, 40, 8, 8), BOX), "a camera well outside of the scene")
-
-
-@pytest.mark.parametrize(("frequency", "degrees"), [(2, 0.0), (3, 11.64), (4, 0.0)])
-def test_training_views_nearest_to_the_axes(frequency, degrees):
-    """Of 42 and 162 views six are on the axes but for the poles; of 92 the nearest are 11.64 degrees off."""
-    chosen = nearest_to_axes(icosphere(frequency, Lens(4.0, 30.0, 8, 8)), BOX)
-    assert len({id(camera) for camera in chosen}) == 6
-    off = torch.rad2deg(torch.acos((directions(chosen) * AXES).sum(1).clamp(-1, 1)))
-    assert_close(off, torch.full((6,), degrees), atol=0.03, rtol=0)  # float32, and poles are 0.01 degrees off
 
 
 def test_each_view_is_chosen_once_and_the_sum_of_cosines_is_largest():

@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -68,7 +69,8 @@ def test_a_gallery_of_a_sweep_of_edits_shows_the_edits_of_its_variants(planned):
     grid = f"{{name: sizes, rows: [{{edit: gold}}], columns: {columns}}}"
     words = "edit.text.size=64,128 edit.seed=5,6 edits=[gold]"
     plan = planned(f'{words} "gallery.grids=[{grid}]"')
-    (gallery,) = (job for job in plan.jobs.values() if job["stage"] == "gallery")
+    (file,) = plan.target("galleries")
+    gallery = plan.jobs[str(Path(file).parent)]
     assert {path.split("/")[-2] for path in gallery["inputs"].values()} == {"gold-64-s5", "gold-128-s5"}
 
 
