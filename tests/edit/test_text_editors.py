@@ -11,8 +11,8 @@ from torch.testing import assert_close
 from tests.edit.scenes import AnyViews, around, ball
 from tests.models.servers import served
 from tests.models.tiny_pipelines import save_klein, save_sdxl
+from tests.refusals import refused
 from tests.toys.editor import Editor
-from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.edit.keys import EditKeys
 from texgs.edit.methods.in2n import In2nKeys
@@ -128,12 +128,8 @@ def test_what_an_edit_needs_is_known_before_it_runs(folders):
     ["flux2_klein", "someone/editor@main", "ftp://example.org", "", "no/such/folder"],
 )
 def test_what_is_no_editor_is_refused_with_all_that_there_are(guidance):
-    with pytest.raises(ArgumentError) as caught:
-        replace(KEYS, guidance=guidance).check()
-    assert str(caught.value) == (
-        "edit.text.guidance: expected instruct_pix2pix, sdxl-instruct-pix2pix, flux2-klein, qwen-image-edit, "
-        f"OWNER/NAME@REVISION (40 digits), a folder of diffusers, an address or filters, got {guidance!r}"
-    )
+    named = f"edit.text.guidance: expected instruct_pix2pix, .*@REVISION .*, got {guidance!r}"
+    refused(replace(KEYS, guidance=guidance).check, named)
 
 
 def test_weights_of_a_loss_are_no_editor(folders, monkeypatch):

@@ -161,24 +161,12 @@ def test_a_mistake_in_a_sweep_is_one_sentence(words, message):
     ("word", "example"),
     [
         ("dataset.volume.dims=4,5,6", ", as in 'dataset.volume.dims=[4,5,6]'"),
-        *((word, "") for word in ("fit.seed=range(3)", "dataset=engine,fuel")),
+        ("fit.seed=range(3)", ""),
     ],
 )
 def test_a_verb_of_one_stage_names_lists_and_the_verb_that_sweeps(word, example):
-    with pytest.raises(ConfigError) as error:
-        compose((word,))
-    assert str(error.value) == (
-        f"{word}: expected one value, got several; a list stands in brackets{example}, "
-        f"a text with a comma in quotes, and for a sweep there is texgs run {word}"
-    )
-
-
-def test_a_file_with_a_variant_twice_is_named(tmp_path, monkeypatch):
-    (tmp_path / "conf" / "sweep").mkdir(parents=True)
-    (tmp_path / "conf" / "sweep" / "twice.yaml").write_text("name: twice\nvariants:\n  a: []\n  a: []\n")
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError, match=r"conf/sweep/twice\.yaml:4: found duplicate key a"):
-        compose(("sweep=twice",))
+    words = f"{word}: expected one value, .* in brackets{example}, .* there is texgs run {word}"
+    refused(lambda: compose((word,)), re.sub(r"([\[\]()])", r"\\\1", words), ConfigError)
 
 
 def test_kinds_of_views_are_not_the_papers_sweep_over_their_number():
