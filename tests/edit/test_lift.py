@@ -241,6 +241,8 @@ def test_only_the_component_that_holds_the_place_is_kept(balls):
     assert torch.equal(components_at(model, both, middle), is_red)
     assert torch.equal(components_at(model, both, torch.cat([middle, other])), both)
     assert torch.equal(components_at(model, one, torch.zeros(1, 3)), one), "of a single surfel"
+    two = one | (torch.arange(len(is_red)) == len(is_red) - 1)  # one of each ball
+    assert torch.equal(components_at(model, two, means[one]), one)
     red = x[is_red]
     ends = is_red & ((x < red.quantile(0.2)) | (x > red.quantile(0.8)))  # what is between connects nothing
     at = means[is_red & (x == red.min())]

@@ -1,5 +1,7 @@
 """Votes of masks against known classes of surfels."""
 
+from dataclasses import replace
+
 import torch
 from torch.nn.functional import interpolate
 
@@ -83,11 +85,12 @@ def test_centres_vote_as_counted_by_hand():
         for view in range(10):
             votes.add(camera, everywhere & (view < inside))
         assert bool(votes.selected().all()) is expected
-    half = CentreVotes(model, threshold=0.4)
-    away = camera.crop(200, 0, 296, 96)  # sees nothing: votes -1
-    for view in range(10):
-        half.add(camera if view < 5 else away, everywhere)
-    assert not half.selected().any(), "5 of 10 views are no majority"
+    turned = replace(camera, viewmat=torch.diag(torch.tensor([-1.0, 1, -1, 1])) @ camera.viewmat)
+    for away in (camera.crop(200, 0, 296, 96), turned):  # it sees nothing: votes -1
+        half = CentreVotes(model, threshold=0.4)
+        for view in range(10):
+            half.add(camera if view < 5 else away, everywhere)
+        assert not half.selected().any(), "5 of 10 views are no majority"
 
 
 def test_nothing_is_selected_where_masks_are_empty():
