@@ -106,12 +106,9 @@ def test_what_no_key_expresses_is_always_told():
     assert all(all(row) for row in entries)
 
 
-@pytest.mark.parametrize(
-    ("value", "expected"),
-    [(None, "null"), (True, "true"), (1.6e-4, "0.00016"), ((2.0, 0.5), "[2, 0.5]"), ("", '""'), ("a", "a")],
-)
-def test_values_are_written_as_in_files(value, expected):
-    assert text(value) == expected
+def test_values_are_written_as_in_files():
+    assert [text(value) for value in (None, True, 1.6e-4, "")] == ["null", "true", "0.00016", '""']
+    assert text((2.0, 0.5)) == "[2, 0.5]"
 
 
 def test_cells_do_not_break_tables():
