@@ -26,30 +26,12 @@ rule all:
 
 
 onstart:
-    begin()
+    RUN.begin()
 
 
 onsuccess:
-    made = finish("FINISHED")
-    report = f"{RESULTS}/report.html"
-    print("Done:", report if report in made else "what was asked for")
-    scenes = [
-        Path(file).with_name("scene.yaml")
-        for file in PLAN.done("steps") or PLAN.done("compose")
-        if file in made
-    ]
-    if scenes:
-        program = Path(sys.executable).with_name("texgs")
-        print("View:", shlex.join([str(program), "view", str(scenes[0])]))
-    if (PLAN.tracking or "").startswith("sqlite"):
-        print(
-            f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {shlex.quote(PLAN.tracking)}"
-        )
+    RUN.succeed()
 
 
 onerror:
-    finish("FAILED")
-    # When the process ends, because Snakemake has more to print; it goes back to another folder before that.
-    atexit.register(
-        tell_last_words, [Path(log).absolute() for job in workflow.scheduler.failed for log in job.log]
-    )
+    RUN.fail()

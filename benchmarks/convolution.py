@@ -8,7 +8,7 @@ from torch import Tensor
 from benchmarks.report import Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
-from texgs.core.process import keep_freed_memory
+from texgs.core.memory import keep_freed_memory
 from texgs.models.networks import fast_dtype
 from texgs.models.vgg import STYLE_LAYERS, Vgg, by_torch, channels, rectified
 

@@ -20,12 +20,12 @@ from texgs.core.camera import Camera, orbit
 from texgs.core.cuts import Cuts, Plane
 from texgs.fields.surfels.composition import Composition
 from texgs.metrics.quality import psnr
+from texgs.report.compared import chain
 from texgs.scene.cut_view import OPAQUE, cut_view, face_alpha, slab_view
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene
 from texgs.scene.twin import Twin, range_of
 from texgs.workflow.stage import made
-from texgs.workflow.stages.pse import chain
 
 SIZE, COUNT, SEED = 400, 20, 0  # pixels of either side, shots, and seed of these
 FACING, DEEPEST = 55.0, 0.6  # most degrees from normal to camera; most radii from a plane to the centre

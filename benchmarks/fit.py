@@ -13,7 +13,7 @@ from benchmarks.timing import Case, measure
 from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.core.light import Light
-from texgs.core.process import keep_freed_memory
+from texgs.core.memory import keep_freed_memory
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fitting.loop import Fit

@@ -29,14 +29,19 @@ from pathlib import Path
 
 import pandas as pd
 
-from texgs.core.checksum import digest
+from texgs.core.cache import digest
 from texgs.workflow.code import code_of, source
 
 ROOT = Path(__file__).parents[1]
 RESULTS, DOCS = ROOT / "benchmarks" / "results", ROOT / "docs"
 INDEX = RESULTS / "index.csv"
-# Of short names.
-PLACES = ("workflow.stages", "fitting.kinds", "fields.kinds", "edit.methods", "metrics.edits")
+# Of short names; a module may have several methods.
+ROOMS = ("fitting", "fields")
+PLACES = ("workflow.stages", *ROOMS, *(f"{each}.kinds" for each in ROOMS), "edit.methods", "metrics.edits")
+SHARED = {
+    **dict.fromkeys(("arf", "stylerf", "stylesplat"), "texgs.edit.methods.style_baselines"),
+    **dict.fromkeys(("dge", "igs2gs", "in2n"), "texgs.edit.methods.updates"),
+}
 ABOUT = "accuracy.md"  # explains the mark
 LINK = re.compile(r"(\]\((?:[^)\s]*/)?([\w.-]+)\))(?:†|\[†\]\([^)]*\))?")
 
@@ -49,7 +54,9 @@ def index() -> pd.DataFrame:
 def parts(code: str, root: Path | None = None) -> dict[str, str]:
     """Return the digests of the modules that a column `code` leads to; none where a name leads nowhere."""
     root = root or ROOT
-    names = [[f"texgs.{place}.{name}" for place in PLACES] + [name] for name in code.split()]
+    names = [
+        [*(f"texgs.{place}.{name}" for place in PLACES), SHARED.get(name, name)] for name in code.split()
+    ]
     found = [[each for each in some if source(each, root)] for some in names]
     return code_of(chain.from_iterable(found), root) if all(found) else {}
 

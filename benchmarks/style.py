@@ -7,7 +7,7 @@ from benchmarks.scene import model
 from benchmarks.settings import Settings
 from texgs.core.camera import Camera, orbit
 from texgs.core.light import Light
-from texgs.core.process import keep_freed_memory
+from texgs.core.memory import keep_freed_memory
 from texgs.edit.recipe import Recipe, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.stylize import Stylized, stylize

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from texgs.core.process import collect_rarely
+from texgs.core.memory import collect_rarely
 
 FOLDER = Path(__file__).parent
 

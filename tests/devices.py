@@ -2,7 +2,7 @@
 
 import os
 
-from texgs.core.process import waiting
+from texgs.core.memory import waiting
 
 os.environ.update(waiting())  # before torch is imported
 

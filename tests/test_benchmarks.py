@@ -73,10 +73,11 @@ def test_ratios():
 
 def test_speeds_are_scaled_to_what_jobs_took():
     """By one factor, so that all jobs together take as long as they did, and work counts as it did."""
-    speed, truth = Speed(3.0, 10.0, 0.05), Speed(1.5, 5.0, 0.025)
-    work = [(0.04, 100), (0.16, 2000)]
+    speed, truth = Speed(3.0, 10.0, 0.05, "steps"), Speed(1.5, 5.0, 0.025, "steps")
+    work = [({"steps": 100}, 0.04), ({"steps": 2000}, 0.16)]
     some = [Sample(*each, truth.seconds(*each)) for each in work]
-    assert vars(scaled(speed, factor(speed, some))) == pytest.approx(vars(truth))
+    told = scaled(speed, factor(speed, some))
+    assert [told.seconds(*each) for each in work] == pytest.approx([each.seconds for each in some])
     late = [some[0], some[1]._replace(seconds=2 * some[1].seconds)]
     told = scaled(speed, factor(speed, late))
     assert sum(told.seconds(*each) for each in work) == pytest.approx(sum(each.seconds for each in late))

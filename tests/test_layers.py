@@ -106,6 +106,22 @@ def test_imports_point_to_the_left():
     assert not wrong, "\n".join(wrong)
 
 
+def test_stages_import_no_other_stage():
+    """What several share is a library: settings, or a room below the workflow."""
+    stages = {module for module, tree in modules().items() if is_stage(tree)}
+    assert len(stages) > 10
+    wrong = sorted(
+        f"{module} imports {name}" for module, name in arrows(modules()) if {module, name} <= stages
+    )
+    assert not wrong, "\n".join(wrong)
+
+
+def is_stage(tree: ast.Module) -> bool:
+    """Return whether a module defines a stage or several."""
+    targets = [each for node in tree.body if isinstance(node, ast.Assign) for each in node.targets]
+    return any(isinstance(each, ast.Name) and each.id in ("STAGE", "STAGES") for each in targets)
+
+
 def circles(pairs: set[tuple[str, str]]) -> list[str]:
     """Return a line for each circle: a way round, and all files that are in it."""
     graph = networkx.DiGraph(sorted(pairs))

@@ -7,7 +7,7 @@ import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from texgs.core.process import waiting
+from texgs.core.memory import waiting
 
 if TYPE_CHECKING:
     from texgs.api.fit import fit

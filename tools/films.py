@@ -21,7 +21,7 @@ from PIL import Image
 from benchmarks.browser import SOFTWARE, browser_path, viewer
 from benchmarks.command import call
 from benchmarks.results import add
-from texgs.scene.paths import shots_of
+from texgs.scene.film import Film as SceneFilm
 from texgs.scene.scene_file import read_scene
 from texgs.scene.session import Session
 from tools.pictures import DOCS, PROGRAM
@@ -70,7 +70,8 @@ def through_time(path: Path, *files: str) -> None:
         scene = read_scene(file)
         session, steps = Session(scene), len(scene.timeline.steps)
         lens, count = scene.framed().lens().square(SIZE[1] * 4 // 5), EACH * steps
-        shots = shots_of(scene, session.composition, "orbit-time", count, lens, -60.0)
+        film = SceneFilm(what="orbit-time", frames=count, azimuth=-60.0)
+        shots = film.shots(scene, session.composition, lens)
         columns.append([session.frame(camera, scene=shown) for camera, shown in shots])
     frames = [Image.fromarray(np.concatenate(pair, axis=1)) for pair in zip(*columns, strict=True)]
     animate(path, frames, [SHORT] * len(frames))

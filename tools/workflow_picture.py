@@ -14,7 +14,7 @@ from texgs.config.compose import compose
 from texgs.core.camera import orbit
 from texgs.core.figures import as_picture, new_figure
 from texgs.core.io import read_json
-from texgs.report.given_row import plotted
+from texgs.report.given_row import tf_plot
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
 from texgs.volume.basic_tfs import basic_tfs_of
@@ -98,7 +98,7 @@ def representation(folder: Path) -> list[Step]:
     values = nrrd.read(str(volume))[0]
     middle = values[values.shape[0] // 2][::-1]  # +y up
     grey = (255 * (middle - values.min()) / np.ptp(values)).astype(np.uint8)
-    plot = plotted(volume, basic_tfs_of(volume, dataset.basic_tfs, dataset.tf_values))
+    plot = tf_plot(volume, basic_tfs_of(volume, dataset.basic_tfs, dataset.tf_values))
     show = partial(rendered, folder / "scene/demo/compose/scene.yaml", only=TF)
     sheet = contact_sheet(folder / TF / "views/train")
     return [

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from jupyter_client.manager import start_new_kernel
 
-from texgs.core.checksum import sha256
+from texgs.core.cache import sha256
 from texgs.workflow.result import FILES, recorded
 
 SECONDS = 300  # of a cell, on a machine that has much else to do

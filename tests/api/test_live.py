@@ -63,16 +63,26 @@ def test_what_a_page_saves_outlives_the_process(tmp_path, monkeypatch):
     assert {model.file.parent for model in read_scene("mine").models.values()} == {Path("mine")}
 
 
+def by_session(scene):
+    scene.session.set_light(Light("directional", 30, 40))
+
+
+def by_property(scene):
+    scene.light = (30, 40)
+
+
 @pytest.mark.parametrize(
-    ("step", "is_page_first", "past"),
+    ("step", "is_page_first", "light", "past"),
     [
-        ("_push", True, [DRAGGED, LIT]),
-        ("_push", False, ["TF01 opacity 0.5", LIT, DRAGGED]),
-        ("undo", True, [DRAGGED, LIT]),
+        ("_push", True, by_property, [DRAGGED, LIT]),
+        ("_push", False, by_property, ["TF01 opacity 0.5", LIT, DRAGGED]),
+        ("undo", True, by_property, [DRAGGED, LIT]),
+        ("undo", True, by_session, [DRAGGED, ""]),
+        ("_push", False, by_session, ["TF01 opacity 0.5", "", DRAGGED]),
     ],
 )
 def test_neither_thread_loses_what_the_other_edits_meanwhile(
-    tmp_path, monkeypatch, step, is_page_first, past
+    tmp_path, monkeypatch, step, is_page_first, light, past
 ):
     """A page drags a number, each time by an undo and a change, while Python sets the light."""
     file = write_balls(tmp_path)
@@ -80,13 +90,13 @@ def test_neither_thread_loses_what_the_other_edits_meanwhile(
     edits, made = SharedEdits(scene.session, open_scene(file)), getattr(Session, step)
 
     def drag(value):
-        edits.change(Edit("TF01", "opacity", value, step=1), author=1)
+        edits.change(Edit("TF01", "opacity", value, step=1, title=f"TF01 opacity {value}"), author=1)
 
     def by_page():
         drag(0.25)
 
     def by_python():
-        scene.light = (30, 40)
+        light(scene)
 
     drag(0.5)
     first, second = (by_page, by_python) if is_page_first else (by_python, by_page)

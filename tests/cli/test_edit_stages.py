@@ -96,7 +96,7 @@ def test_looks_are_shown_side_by_side(results, capsys, monkeypatch):
     told = json.loads(given.with_name("metrics.json").read_text())["pictures"]["gallery.png"]
     assert "what they were given" in told
     one = "gallery.grids=[{rows: [{edit: gold, changes: ['TF01.opacity=x']}], columns: [{}]}]"
-    assert main(["gallery", *WORDS, *FEW, "edits=[gold]", one]) == 2
+    assert main(["gallery", *WORDS, *FEW, "edits=[gold]", one, "--replace"]) == 2
     message = "TF01.opacity=x: models.TF01.opacity: expected a factor from 0 to 1000, got 'x'"
     assert message in capsys.readouterr().err
 
@@ -139,7 +139,7 @@ def test_a_mistake_leaves_the_earlier_result(results, capsys, monkeypatch, verb,
     monkeypatch.setattr("texgs.models.weights._download", no_network)
     folder = results / "edits" / words[0].removeprefix("edit=")
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
-    assert main([verb, *WORDS, *FEW, *words]) == 2
+    assert main([verb, *WORDS, *FEW, *words, "--replace"]) == 2
     assert message in capsys.readouterr().err
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 

@@ -14,13 +14,11 @@ from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
 from tests.fields.voxels.test_voxels import ball as voxels
 from tests.scene.cloud_files import READERS
-from texgs.cli.export import ENDINGS
 from texgs.cli.main import main
 from texgs.core.cuts import Cuts, Plane
 from texgs.core.errors import ArgumentError
 from texgs.fields.files import open_field
-from texgs.fields.gaussians.files import write_gaussians
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians import Gaussians, write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.compact import read_compact
 from texgs.fields.surfels.model import Surfels
@@ -28,7 +26,8 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texels import bare_colors
 from texgs.fields.surfels.variants import write_texture
-from texgs.fields.voxels.file import write_voxels
+from texgs.fields.voxels import write_voxels
+from texgs.scene.export_keys import ENDINGS
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 
@@ -84,9 +83,9 @@ def test_a_model_of_a_scene_has_its_texture_there(model, tmp_path, kind, capsys)
     scene = write_scene(tmp_path / "styled.yaml", Scene({"A": SceneModel(model, texture=texture)}))
     target = tmp_path / ("a.texgs" if kind == "compact" else "a.ply")
     assert export(scene, target, "--kind", kind) == 2
-    assert "export its models one by one, by --model" in capsys.readouterr().err
+    assert "export its models one by one" in capsys.readouterr().err
     assert export(scene, target, "--kind", kind, "--model", "B") == 2
-    assert "--model: expected one of A, got B" in capsys.readouterr().err
+    assert "model: expected one of A, got B" in capsys.readouterr().err
     assert not target.exists()
     assert export(scene, target, "--kind", kind, "--model", "A") == 0
     if kind == "compact":
@@ -199,20 +198,14 @@ def test_a_grid_makes_no_cloud(scene, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--to", "x.obj"], f"--to: expected a file that ends in {' or '.join(ENDINGS)}, got x.obj"),
-        (["--to", "x.usd"], ".html or .usdc or .usda or .glb or .spz or .vtp, got x.usd"),
-        (["--to", "x.ply", "--kind", "usd"], "--to: expected a file that ends in .usdc or .usda, got x.ply"),
-        (["--to", "x.glb", "--model", "C"], "--model: expected one of A, B, got C"),
-        (["--to", "x.ply", "--kind", "compact"], "--to: expected a file that ends in .texgs, got x.ply"),
-        (["--to", "x.texgs", "--kind", "mesh"], "--to: expected a file that ends in .ply, got x.texgs"),
-        (["--to", "x.texgs"], "--kind compact: expected a model file, got"),
-        (["--to", "x.ply", "--kind", "release"], "--kind release: expected a model file, got"),
-        (["--to", "x.glb", "--voxel", "0.1"], "--voxel: expected --kind mesh, got gltf; leave it out"),
-        (["--to", "x.html", "--views", "12"], "--views: expected --kind mesh or compact, got html; leave it"),
-        (
-            ["--to", "x.ply", "--drop-unseen"],
-            "--drop-unseen: expected --kind compact, got 3dgs; leave it out",
-        ),
+        (["--to", "x.obj"], f"expected a file that ends in {' or '.join(ENDINGS)}, got x.obj"),
+        (["--to", "x.ply", "--kind", "usd"], "expected a file that ends in .usdc or .usda, got x.ply"),
+        (["--to", "x.glb", "--model", "C"], "model: expected one of A, B, got C"),
+        (["--to", "x.texgs"], "kind compact: expected one model, got a scene; export its models one by one"),
+        (["--to", "x.glb", "--voxel", "0.1"], "voxel: expected kind mesh, got gltf; leave it out"),
+        (["--to", "x.html", "--views", "12"], "views: expected kind mesh or compact, got html; leave it"),
+        (["--to", "x.ply", "--volume"], "volume: expected kind html, got 3dgs; leave it out"),
+        (["--to", "x.ply", "--kind", "mesh", "--size", "0"], "--size: expected at least 1, got 0"),
     ],
 )
 def test_a_mistake_writes_nothing(scene, tmp_path, monkeypatch, capsys, words, message):

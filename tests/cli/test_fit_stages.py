@@ -13,7 +13,7 @@ from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import z_order_of
 from texgs.fields.files import open_field
-from texgs.fields.gaussians.model import JoinedGaussians
+from texgs.fields.gaussians import JoinedGaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import read_model
 from texgs.fitting import checkpoint
@@ -86,7 +86,7 @@ def test_harmonics_first_as_in_the_paper(viewed):
 def test_there_are_as_many_seeds_as_the_first_phase_with_iterations_keeps(viewed):
     few = ["fit=demo", "fit.shading.densify.cap=300", "fit.surfels.densify={cap: 350, stop: 0}"]
     for iterations, expected in ((0, 300), (1, 350)):
-        assert main(["surfels", *SPHERE, *few, f"fit.surfels.iterations={iterations}"]) == 0
+        assert main(["surfels", *SPHERE, *few, f"fit.surfels.iterations={iterations}", "--replace"]) == 0
         assert numbers(viewed / "surfels")["primitives"] == expected
 
 
@@ -99,7 +99,7 @@ def test_parts_that_are_missing_are_told_once_after_the_last_phase(viewed, capsy
     assert told.startswith(
         f"sphere/TF01: texture: the model shows {100 * share:.1f} % of what test views show"
     )
-    assert main(["texture", *TINY]) == 0
+    assert main(["texture", *TINY, "--replace"]) == 0
     assert numbers(viewed / "texture")["shown"] > 0.995
     assert "parts are missing" not in capsys.readouterr().err
 
@@ -115,7 +115,7 @@ def test_light_sees_normals_of_their_own_or_those_of_planes(seeded):
     main(["shading", *TINY])
     p = read_model(seeded / "shading" / "model.safetensors").parameters
     assert not torch.equal(p["normals"], p["quats"]), "both have learned"
-    main(["shading", *TINY, "fit.normals=surfel"])
+    main(["shading", *TINY, "fit.normals=surfel", "--replace"])
     assert "normals" not in read_model(seeded / "shading" / "model.safetensors").parameters
 
 
@@ -180,7 +180,7 @@ def test_figure_without_test_views_shows_training_views(fitted, monkeypatch):
 
 def test_a_gpu_that_is_not_there_is_one_sentence(seeded, capsys, monkeypatch):
     monkeypatch.setattr("torch.cuda.is_available", lambda: False)
-    assert main(["shading", *TINY, "device.name=cuda"]) == 2
+    assert main(["shading", *TINY, "device.name=cuda", "--replace"]) == 2
     assert "device=cuda: torch sees no GPU; leave it out to work on the CPU" in capsys.readouterr().err
 
 

@@ -68,7 +68,7 @@ def test_a_view_beside_its_volume(results, tmp_path, monkeypatch, capsys):
     assert main(["render", str(path), *target, *size, "--output", "target.png"]) == 0
     for words, message in (
         (["--mode", "normal"], "--compare: expected --mode shaded, got normal"),
-        (["--gain", "17"], "--gain: expected 1 to 16, got 17"),
+        (["--gain", "17"], "gain: expected 1 to 16, got 17"),
     ):
         assert main(["render", str(path), "--compare", *words]) == 2
         assert message in capsys.readouterr().err

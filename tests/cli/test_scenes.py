@@ -20,7 +20,7 @@ from tests.scene.balls import write_balls
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.core.lens import Frame
-from texgs.fields.gaussians.files import write_gaussians
+from texgs.fields.gaussians import write_gaussians
 from texgs.fields.surfels.compact import read_compact, write_compact
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
@@ -126,7 +126,7 @@ def test_a_transparent_picture_over_the_background_is_the_picture(scene, tmp_pat
         assert np.abs(alpha * clear[..., :3] + (1 - alpha) * behind - whole).max() < 2 / 255
     capsys.readouterr()
     message = refused(capsys, "render", edited, "--transparent", "--caption")
-    assert "expected PNG without --compare and --caption" in message
+    assert "--transparent: expected neither --compare nor --caption" in message
 
 
 @pytest.mark.parametrize("axis", ["x", "-y", "0.3,0.8,-0.5"])
@@ -168,10 +168,8 @@ def test_edits_show_and_are_data(scene, tmp_path):
     ("of", "word", "message"),
     [
         ("scene", "TF03.opacity=1", "expected a model of the scene (TF01, TF02), got TF03"),
-        ("scene", "TF01.opacity=-1", "models.TF01.opacity: expected a factor from 0 to 1000, got -1"),
         ("scene", "TF01.texture=none.safetensors", "expected a file that is there, got none.safetensors"),
         ("scene", "TF01.opacity=[", "expected a number, true, false, r,g,b or #rrggbb"),
-        ("scene", "cut=x,9", "expected a cut through the models, which lie from -"),
         (
             "scene",
             "TF01.style=x.jpg",
@@ -180,7 +178,6 @@ def test_edits_show_and_are_data(scene, tmp_path):
         ("scene", "visible", "expected KEY=VALUE, such as TF01.opacity=0.5"),
         ("dotted", "v1.2/shell.opacity=1", "expected a segment of v1.2 (it has none), got shell"),
         ("dotted", "TF01/shell.opacity=1", "expected a model of the scene (v1.2), got TF01"),
-        ("dotted", "v1.2/shell=none.safetensors", "expected a file that is there, got none.safetensors"),
         ("dotted", "v1.2/=scene.yaml", "expected a file that is there"),
     ],
 )
@@ -195,13 +192,13 @@ def test_a_mistake_in_an_edit_writes_nothing(request, capsys, of, word, message)
     ("words", "message"),
     [
         (["--frames", "0"], "--frames: expected at least 1, got 0"),
-        (["--seconds", "0.01"], "--frames: expected at least 1, got 0.25"),
+        (["--frames", "3", "--seconds", "2"], "frames: expected a number of frames or of seconds, got both"),
         (["--seconds", "2", "--fps", "0"], "--fps: expected more than 0, got 0"),
-        (["--transparent"], "--transparent: expected PNG without --compare and --caption, got "),
+        (["--transparent"], "x.mp4: expected PNG for transparent pictures, got .mp4"),
         (["--path", "orbit", "--output", "x.png"], "x.png: expected one frame, got 72; use .gif, .mp4 or"),
-        (["--radius", "0"], "radius: expected more than 0, got 0"),
-        (["--fov", "0"], "fov_y: expected degrees between 0 and 180, got 0"),
-        (["--height", "-4"], "height: expected at least 1 pixel, got -4"),
+        (["--radius", "0"], "--radius: expected more than 0, got 0"),
+        (["--fov", "0"], "--fov: expected more than 0, got 0"),
+        (["--height", "-4"], "--height: expected at least 1, got -4"),
         (["--frames", "1000000000", "--path", "orbit"], "--frames: expected at most 100000, got 1000000000"),
         (["--width", "300000"], "GiB of memory, but"),
         (["--device", "cuda"], "torch sees no GPU"),
@@ -230,20 +227,11 @@ def test_a_file_of_another_kind_is_refused(scene, tmp_path, capsys, monkeypatch,
     assert message in refused(capsys, verb, scene, *words)
 
 
-def test_a_picture_is_not_replaced_by_a_scene(scene, tmp_path, capsys):
-    picture = tmp_path / "new.png"
-    assert render(scene, picture) == 0
-    before = picture.read_bytes()
-    assert edit(scene, "light=30,40", output=picture) == 2
-    assert f"--output: expected a file that ends in .yaml, got {picture}" in capsys.readouterr().err
-    assert picture.read_bytes() == before
-
-
 def test_only_a_scene_is_replaced_by_an_edited_one(scene, tmp_path, capsys):
-    (tmp_path / "data.yaml").write_text("name: engine\n")
-    message = refused(capsys, "edit", scene, "light=30,40", "--output", tmp_path / "data.yaml")
-    assert message.endswith("data.yaml is a file of another kind, which stays; choose another")
-    assert (tmp_path / "data.yaml").read_text() == "name: engine\n"
+    for name in ("data.yaml", "picture.png"):
+        (file := tmp_path / name).write_text("name: engine\n")
+        assert str(file) in refused(capsys, "edit", scene, "light=30,40", "--output", file)
+        assert file.read_text() == "name: engine\n"
     assert [edit(scene, f"light=30,{polar}") for polar in (40, 50)] == [0, 0]
     assert read_scene(tmp_path / "new.yaml").light.polar == 50
 

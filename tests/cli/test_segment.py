@@ -14,7 +14,7 @@ from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
-from texgs.fitting.texels import textured
+from texgs.fitting.texels import add_texture
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
@@ -96,7 +96,7 @@ def test_a_second_segment_gets_what_the_first_left(scene, tmp_path, capsys):
 def test_what_is_clicked_on_has_the_textures_of_the_scene(tmp_path):
     fitted = two_balls()[0]
     sizes = torch.full((len(fitted), 2), 2, dtype=torch.int32)
-    model = textured(fitted, torch.tensor([0.5, 0.2, 0.5]), sizes)
+    model = add_texture(fitted, torch.tensor([0.5, 0.2, 0.5]), sizes)
     swapped = replace(model, parameters={**model.parameters, "colors": model.parameters["colors"].flip(1)})
     texture = write_texture(tmp_path / "swapped.safetensors", swapped)  # red is blue, and blue is red
     entry = SceneModel(write_model(tmp_path / "model.safetensors", model), texture=texture)

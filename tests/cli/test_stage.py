@@ -1,18 +1,22 @@
 """The verbs of the stages, by hand: what they write, when they do nothing, and what survives a kill."""
 
+import shlex
+
 import numpy as np
 import pytest
 
 from tests.cli.conftest import SPHERE, numbers
 from texgs.cli.main import main
 from texgs.config.compose import compose
+from texgs.core.cache import sha256
 from texgs.core.errors import DeviceError
+from texgs.core.io import read_json
 from texgs.core.light import HEADLIGHT, Light, random_lights
 from texgs.core.names import METRICS
+from texgs.volume import view_files
 from texgs.volume.view_set import read_views
 from texgs.workflow.job import settings_file
 from texgs.workflow.stage_table import STAGES
-from texgs.workflow.stages import views as views_stage
 
 TINY = [*SPHERE, "dataset.volume.size=24", "views.height=32", "views.step=0.5", "views.radius=4.0311"]
 TINY.append("views.relit=0")
@@ -86,12 +90,44 @@ def test_a_volume_that_memory_does_not_hold_is_told(folder, capsys, monkeypatch)
     assert "dataset.volume.reduce=2 makes it smaller" in said
 
 
-def test_another_setting_does_not_mix_with_what_is_there(folder):
-    main(["views", *TINY])
-    (views,) = folder.glob("*/views")
-    main(["views", *TINY, "views.train.kind=orbit", "views.train.count=2"])
-    assert len(list((views / "train").iterdir())) == 2
-    assert len(read_views(views).train) == 2
+def test_results_of_other_settings_are_replaced_on_request_alone(folder, capsys):
+    """A verb that needs the views would render other ones; none of them mixes with what is there."""
+    assert main(["sheet", *TINY]) == 0
+    capsys.readouterr()
+    views = next(folder.glob("*/views"))
+    before = checksums_below(folder)
+    fewer = ["views.train.kind=orbit", "views.train.count=2"]
+    for verb in (["sheet"], ["views", "--force"]):
+        assert main([*verb, *TINY, *fewer]) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err.count("\n") == 1
+        for told in (
+            "/TF01/views ",
+            "views.train.count is 61, not 2",
+            "--replace",
+            f" {TINY[-1]} ",
+            "tf=TF01",
+        ):
+            assert told in said.err
+    assert checksums_below(folder) == before
+    assert main(["sheet", "--replace", *TINY, *fewer]) == 0
+    assert len(list((views / "train").iterdir())) == len(read_views(views).train) == 2
+
+
+def test_a_result_names_the_command_that_does_nothing_but_make_it(folder):
+    """Whatever asked for it: a sheet of all basic TFs needs views of each."""
+    assert main(["sheet", *TINY, "views.seed=3"]) == 0
+    before = checksums_below(folder)
+    commands = [read_json(path)["command"] for path in folder.rglob(METRICS)]
+    assert {command.split()[1] for command in commands} == {"volume", "views", "sheet"}
+    for command in commands:
+        assert main(shlex.split(command)[1:]) == 0
+    assert checksums_below(folder) == before
+
+
+def checksums_below(folder):
+    return {path: sha256(path) for path in folder.rglob("*") if path.is_file() and path.suffix != ".lock"}
 
 
 def test_geometry_of_the_test_views(folder):
@@ -129,7 +165,7 @@ def test_more_test_views_are_under_lights_that_no_training_view_has(folder):
     assert {view.light for view in views.test} == {HEADLIGHT}
     assert [view.light for view in views.relit] == random_lights(4, 0, 2)
     assert not {view.light for view in views.train} & {view.light for view in views.relit}
-    main(["views", *TINY, "views.relit=0", "views.seed=1"])
+    main(["views", *TINY, "views.relit=0", "views.seed=1", "--replace"])
     views = read_views(views.folder)
     assert (views.relit, (views.folder / "relit").exists()) == ([], False)
     assert [view.light for view in views.train] == some_headlights(random_lights(12, 1, 0))
@@ -147,8 +183,8 @@ def test_vtk_renders_some_views_to_compare_times(folder, capsys, monkeypatch, wo
         monkeypatch.setattr(Blank, "render", lambda _self, _tf, camera, _light: shown.append(camera))
         return Blank()
 
-    renderer_for = views_stage.renderer_for
-    monkeypatch.setattr(views_stage, "renderer_for", vtk_or_none)
+    renderer_for = view_files.renderer_for
+    monkeypatch.setattr(view_files, "renderer_for", vtk_or_none)
     assert main(["views", *TINY, "metric.vtk_frames=2"]) == 0
     (views,) = folder.glob("*/views")
     assert len(shown) == 3 * works, "the first one is rendered twice and does not count"
@@ -157,7 +193,7 @@ def test_vtk_renders_some_views_to_compare_times(folder, capsys, monkeypatch, wo
 
 
 def test_empty_views_fail_again_the_same_way(folder, capsys, monkeypatch):
-    monkeypatch.setattr(views_stage, "renderer_for", lambda *_: Blank())
+    monkeypatch.setattr(view_files, "renderer_for", lambda *_: Blank())
     for _ in range(2):
         assert main(["views", *TINY]) == 2
         error = capsys.readouterr().err.splitlines()[-1]
@@ -174,7 +210,7 @@ def test_a_resumed_job_may_have_only_empty_views_left(folder, monkeypatch):
     lost = [views / "train" / "r_0011.png", *(views / "test").iterdir(), views / METRICS]
     for path in lost:
         path.unlink()
-    monkeypatch.setattr(views_stage, "renderer_for", lambda *_: Blank())
+    monkeypatch.setattr(view_files, "renderer_for", lambda *_: Blank())
     assert main(["views", *TINY]) == 0
     assert len(whole["frames_ms"]) == 15 - 1
     resumed = numbers(views)
@@ -194,7 +230,7 @@ def test_a_job_of_the_workflow(folder, capsys):
     assert "expected the settings of a views job" in capsys.readouterr().err
     assert main(["volume", "--settings", settings, "--output", str(output), "dataset=sphere"]) == 2
     assert main(["volume", "--settings", settings, "--output", str(output), "--force"]) == 2
-    assert "no KEY=VALUE or --force" in capsys.readouterr().err
+    assert "expected --settings and --output" in capsys.readouterr().err
     assert main(["volume", *TINY, "--output", str(output)]) == 2
     assert "--input, --output: expected only with --settings" in capsys.readouterr().err
 

@@ -8,7 +8,7 @@ from tests.cli.conftest import hide_weights
 from texgs.cli.doctor import weights as weights_of_this_machine
 from texgs.cli.main import main
 from texgs.config.compose import compose
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import MissingDataError
 from texgs.models import weights
 from texgs.models.catalogue import CATALOGUE

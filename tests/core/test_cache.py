@@ -5,9 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from texgs.core import checksum
-from texgs.core.cache import cache_folder, keep, recall, weights_folder
-from texgs.core.checksum import Checksums, combined, of_folders, sha256
+from texgs.core import cache as checksum
+from texgs.core.cache import (
+    Checksums,
+    cache_folder,
+    checksum_of_folders,
+    combined_checksum,
+    keep,
+    recall,
+    sha256,
+    weights_folder,
+)
 from texgs.core.errors import ArgumentError
 
 
@@ -40,7 +48,7 @@ def test_what_is_kept_is_recalled_for_the_same_key_alone(tmp_path):
 @pytest.fixture(autouse=True)
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("TEXGS_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "cache" / checksum.CACHE
+    return tmp_path / "cache" / checksum.CHECKSUMS_FILE
 
 
 @pytest.fixture
@@ -78,12 +86,12 @@ def test_a_damaged_cache_is_an_empty_one(path, cache, content):
     cache.parent.mkdir()
     cache.write_text(content)
     assert Checksums.load().of(path) == sha256(path)
-    keep(cache, checksum.CACHE, {str(path): "not a list"})
+    keep(cache, checksum.CHECKSUMS_FILE, {str(path): "not a list"})
     assert Checksums.load().of(path) == sha256(path)
 
 
 def test_the_latest_files_are_kept(tmp_path, cache, monkeypatch):
-    monkeypatch.setattr(checksum, "MOST", 2)
+    monkeypatch.setattr(checksum, "MOST_CHECKSUMS", 2)
     checksums = Checksums.load()
     for name in "abc":
         (tmp_path / name).write_text(name)
@@ -100,22 +108,22 @@ def test_a_cache_that_cannot_be_written_costs_time_only(path, cache):
 
 
 def test_combined_knows_names_and_not_their_order():
-    assert combined([("a", "1"), ("b", "2")]) == combined([("b", "2"), ("a", "1")])
-    assert combined([("a", "1"), ("b", "2")]) != combined([("a", "2"), ("b", "1")])
-    assert combined([("a", "1")]) != combined([])
+    assert combined_checksum([("a", "1"), ("b", "2")]) == combined_checksum([("b", "2"), ("a", "1")])
+    assert combined_checksum([("a", "1"), ("b", "2")]) != combined_checksum([("a", "2"), ("b", "1")])
+    assert combined_checksum([("a", "1")]) != combined_checksum([])
 
 
 def test_digests_of_folders_differ_by_contents_and_names_but_not_by_what_python_compiled(tmp_path):
     (tmp_path / "below").mkdir()
     file = tmp_path / "below" / "a.py"
     file.write_text("1")
-    digests = {of_folders(tmp_path)}
+    digests = {checksum_of_folders(tmp_path)}
     (tmp_path / "__pycache__").mkdir()
     (tmp_path / "__pycache__" / "a.pyc").write_text("compiled")
-    digests.add(of_folders(tmp_path))
+    digests.add(checksum_of_folders(tmp_path))
     assert len(digests) == 1
     file.write_text("2")
-    digests.add(of_folders(tmp_path))
+    digests.add(checksum_of_folders(tmp_path))
     file.rename(tmp_path / "b.py")
-    digests.add(of_folders(tmp_path))
+    digests.add(checksum_of_folders(tmp_path))
     assert len(digests) == 3

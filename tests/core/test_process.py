@@ -15,15 +15,13 @@ import torch
 from tests.refusals import refused
 from texgs.core import memory
 from texgs.core.errors import OutOfMemoryError
-from texgs.core.interrupts import interrupts_between_items
 from texgs.core.io import reading_as
-from texgs.core.memory import STATUS
-from texgs.core.process import POLICY, waiting
-from texgs.core.progress import progress
+from texgs.core.memory import POLICY, STATUS, waiting
+from texgs.core.progress import interrupts_between_items, progress
 
 PROGRAM = """
 import os
-from texgs.core.process import waiting
+from texgs.core.memory import waiting
 os.environ.update(waiting())
 import torch
 """
@@ -54,7 +52,7 @@ def test_memory_that_was_freed_is_used_again_without_page_faults():
     code = """
 import resource
 import numpy as np
-from texgs.core.process import keep_freed_memory
+from texgs.core.memory import keep_freed_memory
 if KEEP and not keep_freed_memory():
     print(-1)
 else:
@@ -76,7 +74,7 @@ def test_what_is_in_a_cycle_goes_before_the_libraries_that_it_is_of(tmp_path):
     """HDF5 crashes at its end where a property list of a virtual data set is still there."""
     code = """
 import h5py
-from texgs.core.process import collect_rarely
+from texgs.core.memory import collect_rarely
 collect_rarely()
 layout = h5py.VirtualLayout((4,), "u2")
 layout[:] = h5py.VirtualSource("part.h5", "data", (4,))

@@ -81,7 +81,7 @@ def synchronize(lib: ctypes.CDLL) -> None:
 
 def _call(name: str, *arguments: object, device: torch.device) -> None:
     lib = library()
-    status = native.function(lib, name)(*map(native.plain, arguments), None)
+    status = native.function(lib, name)(*map(native.as_ctypes, arguments), None)
     synchronize(lib)
     native._require_success(status, lib, device)
 

@@ -11,7 +11,7 @@ from texgs.edit.style_picture import StylePicture
 from texgs.edit.task import Task
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
-from texgs.fitting.texels import textured
+from texgs.fitting.texels import add_texture
 from texgs.volume.images import Images
 
 SHELL = 0.4  # radius, world units
@@ -78,7 +78,7 @@ def shell(count=160, texels=5, opacity=3.0, seed=0):
         **raw_material(0.4, 0.6, 0.2, 20, "bounded"),
     }
     sizes = torch.full((count, 2), texels, dtype=torch.int32)
-    model = textured(Surfels(p, ShadingModel(low_pass=6.0)), torch.tensor([0.5, 0.5, 0.3]), sizes)
+    model = add_texture(Surfels(p, ShadingModel(low_pass=6.0)), torch.tensor([0.5, 0.5, 0.3]), sizes)
     noise = torch.randn(model.parameters["texels"].shape, generator=torch.Generator().manual_seed(seed))
     return Surfels({**model.parameters, "texels": 0.03 * noise}, model.shading, {"dataset": "shell"})
 

@@ -14,10 +14,8 @@ from tests.refusals import refused
 from texgs.core.errors import FitError, ShapeError
 from texgs.edit.dataset_update import PhotometricLoss, azimuth, field_views, update_field, update_steps
 from texgs.edit.gaussians import radii
-from texgs.edit.methods.dge import DgeKeys
-from texgs.edit.methods.igs2gs import Igs2gsKeys
-from texgs.edit.methods.in2n import In2nKeys
-from texgs.edit.update_schedule import UpdateSchedule
+from texgs.edit.methods.updates import DgeKeys, Igs2gsKeys, In2nKeys
+from texgs.edit.recipe import UpdateSchedule
 from texgs.edit.voxels import corner
 from texgs.fields.optimizer import Rate
 from texgs.fitting.settings import CommonRates

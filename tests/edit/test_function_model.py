@@ -12,14 +12,14 @@ from tests.scene.test_twin import HIGH, LOW, peak, sphere_volume
 from tests.viewer.pages import on_page
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
-from texgs.edit import function_model
-from texgs.edit.function_model import overlap_of, tried, with_model
-from texgs.fields.gaussians.files import write_gaussians
+from texgs.edit.function_model import fit_function, overlap_of, tried, with_model
+from texgs.fields.gaussians import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.series_file import Series
+from texgs.scene.session import Session
 from texgs.scene.twin import Twin
 
 
@@ -64,19 +64,17 @@ def test_what_cannot_be_fitted(scene_file, capsys, words, message):
     assert not output.exists()
 
 
-def test_a_scene_without_a_volume_has_no_function_to_fit(scene_file):
-    bare = replace(read_scene(scene_file), volume=None)
-    with pytest.raises(
-        ArgumentError, match="volume: expected the volume that the scene was made from, got none"
-    ):
-        next(function_model.models_of(bare, "new"))
-
-
-def test_surfels_join_no_scene_of_other_fields(scene_file, tmp_path):
+def test_scenes_that_no_model_can_join_are_refused(scene_file, tmp_path):
     scene, file = read_scene(scene_file), write_gaussians(tmp_path / "g.safetensors", gaussians(20))
-    other = replace(scene, models={**scene.models, "high": SceneModel(file)})
-    with pytest.raises(ArgumentError, match=r"models\.high: expected surfels, which .* join, got gaussians"):
-        next(function_model.models_of(other, "new"))
+    series = Series(scene_file.with_name("series.json"), ["a", "b"], ["new"])
+    others = {
+        "volume: expected": replace(scene, volume=None),
+        r"models\.high: expected surfels": replace(scene, models={**scene.models, "high": SceneModel(file)}),
+        "new has a model for each step": replace(scene, series=series),
+    }
+    for words, other in others.items():
+        with pytest.raises(ArgumentError, match=words):
+            next(fit_function(Session(other), "new", scene_file.with_name))
 
 
 def test_the_command_line_writes_the_scene_and_one_model(scene_file, capsys):
@@ -112,12 +110,12 @@ async def test_the_viewer_adds_a_first_model_and_then_a_finer_one(browser, clien
 def held(monkeypatch, *before_each):
     """Let the viewer wait for an event before each model that it makes."""
 
-    def models(scene, name, device):
+    def models(*_):
         for event in before_each:
             event.wait(30)
             yield ball(1)
 
-    monkeypatch.setattr("texgs.viewer.work.models_of", models)
+    monkeypatch.setattr("texgs.edit.function_model.models_of", models)
 
 
 async def notice(browser, text):
@@ -131,7 +129,7 @@ async def test_a_model_of_a_function_that_was_changed_is_not_added(browser, clie
     await browser.send(type="fit", function="new")
     await browser.next("job")  # it has begun
     await browser.send(type="edit", part="", key="functions", value={})
-    await browser.past("functions")
+    await browser.past("functions {}")
     changed.set()
     await notice(browser, "new: its function was changed meanwhile; make the model again")
     assert "new" not in client.server_side.edits.scene.models
@@ -147,13 +145,6 @@ async def test_a_first_model_stays_where_the_finer_one_is_cancelled(browser, cli
     await browser.next("trial")
     cancelled.set()
     await notice(browser, "new: the finer model was cancelled; the first one stays.")
-
-
-def test_a_series_has_models_of_all_steps(scene_file):
-    scene = read_scene(scene_file)
-    series = Series(scene_file.with_name("series.json"), ["a", "b"], ["low"])
-    with pytest.raises(ArgumentError, match="low has a model for each step of the series"):
-        tried(replace(scene, series=series), "low")
 
 
 @on_page

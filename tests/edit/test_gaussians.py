@@ -7,10 +7,10 @@ import torch
 from tests.edit.scenes import RADIUS, sphere_points
 from tests.fitting.scenes import cameras
 from texgs.edit.gaussians import HIGHER, stylize_gaussians
-from texgs.edit.methods.stylesplat import StyleSplatKeys
+from texgs.edit.methods.style_baselines import StyleSplatKeys
 from texgs.edit.objective import Objective
 from texgs.edit.style_picture import StylePicture
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians import Gaussians
 from texgs.models.pictures import picture
 
 RECIPE = StyleSplatKeys(nnfm=0.0, patches=1.0).recipe(4, 0, reduce=1, rate=0.01)

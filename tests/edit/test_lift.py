@@ -10,7 +10,7 @@ from texgs.core.errors import ShapeError
 from texgs.core.light import HEADLIGHT
 from texgs.edit.clicks import Clicks, inside_of, is_visible, places_of
 from texgs.edit.lift import components_at, lift, middle_of, view_mask
-from texgs.edit.new_segment import preview
+from texgs.edit.new_segment import clicked_mask, preview
 from texgs.models.masks import GrabCut
 
 SIZE = 120
@@ -220,7 +220,7 @@ def test_the_middle_of_a_mask_is_farthest_from_its_outline():
 def test_a_preview_shows_the_mask_and_the_clicks(balls):
     model, _ = balls
     click = clicks((-0.3, 0.0, 0.25), negative=[(0.3, 0.1, 0.35)])
-    mask, picture = preview(model, click, Alike())
+    mask, picture = (find(model, click, Alike()) for find in (clicked_mask, preview))
     full = model.render(FRONT).color.clamp(0, 1)
     (x0, y0), (x1, y1) = click.points.long().tolist()
     assert mask[y0, x0]

@@ -10,13 +10,13 @@ from tests.fitting.scenes import ball_images, cameras
 from tests.fitting.test_palette import SETTINGS
 from tests.refusals import refused
 from texgs.edit import palette_style
-from texgs.edit.methods.stylerf import StyleRfKeys
+from texgs.edit.methods.style_baselines import StyleRfKeys
 from texgs.edit.objective import Objective
 from texgs.edit.palette_style import PalettePainting, stylize_palette
 from texgs.edit.style_loop import learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.palette.networks import free_color, palette_color
-from texgs.fields.palette.rendering import points_on, shown
+from texgs.fields.palette.rendering import points_on, visible_points
 from texgs.fitting.palette import PaletteFit
 from texgs.models.pictures import picture
 from texgs.raster.voxels import camera_rays
@@ -64,7 +64,7 @@ def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypat
     geometry, parameters = field.geometry, field.parameters
     pixels = camera_rays(camera).flatten(0, 1)
     points = points_on(pixels, geometry, parameters)
-    shows = shown(points, -1.0)
+    shows = visible_points(points, -1.0)
     learned = {name: x.detach().requires_grad_() for name, x in run.free.items()}
     lit = torch.cat([part.light for part in layer])
     color = shows.blend(free_color(points.at, learned, geometry.levels) + lit, len(pixels))
@@ -90,7 +90,7 @@ def test_free_colours_learn_those_of_the_recoloured_palette(field, images):
     error = run.distil(images, 150, "test")
     with torch.no_grad():
         points = points_on(camera_rays(images.cameras[1]).flatten(0, 1), field.geometry, field.parameters)
-        at = shown(points, 1e-3).points.at
+        at = visible_points(points, 1e-3).points.at
         wanted = palette_color(at, recolored.parameters, field.geometry.levels).color
         left = (free_color(at, run.free, field.geometry.levels) - wanted).square().mean().sqrt()
     assert error < 0.05

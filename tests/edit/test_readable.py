@@ -9,8 +9,17 @@ from tests.fields.test_sizes import gaussians
 from tests.refusals import refused
 from texgs.edit.methods.image import ImageKeys
 from texgs.edit.methods.text import TextKeys
-from texgs.edit.readable import KEPT, LARGEST, READABLE, SHOWS, SIZE, VIEWS, raised, readable_factors
-from texgs.fields.gaussians.files import write_gaussians
+from texgs.edit.readable import (
+    KEPT_SHARE,
+    LARGEST_FACTOR,
+    READABLE_ALPHA,
+    SHOWN_SHARE,
+    SIZE,
+    VIEWS,
+    raise_opacities,
+    readable_factors,
+)
+from texgs.fields.gaussians import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
@@ -73,20 +82,24 @@ def alpha_of(scene, factors):
 def test_a_faint_part_becomes_as_opaque_as_is_readable_and_not_more(tmp_path):
     scene = scene_of(tmp_path, shell=ball(opacity=FAINT))
     (factor,) = readable_factors(scene, ["shell"], "cpu").values()
-    assert 1.5 < factor < LARGEST
-    assert alpha_of(scene, {"shell": factor / 1.15}) < READABLE < alpha_of(scene, {"shell": 1.05 * factor})
+    assert 1.5 < factor < LARGEST_FACTOR
+    assert (
+        alpha_of(scene, {"shell": factor / 1.15}) < READABLE_ALPHA < alpha_of(scene, {"shell": 1.05 * factor})
+    )
 
 
 def test_an_opaque_part_stays_as_it_is_and_one_that_never_is_readable_gets_the_largest_factor(tmp_path):
     scene = scene_of(tmp_path, solid=ball(), veil=ball(opacity=-5.0))
     assert readable_factors(scene, ["solid"], "cpu") == {"solid": 1.0}
-    assert readable_factors(scene_of(tmp_path, veil=ball(opacity=-5.0)), ["veil"], "cpu") == {"veil": LARGEST}
+    assert readable_factors(scene_of(tmp_path, veil=ball(opacity=-5.0)), ["veil"], "cpu") == {
+        "veil": LARGEST_FACTOR
+    }
 
 
 def test_a_part_that_was_edited_to_a_high_opacity_gets_no_more_than_there_is(tmp_path):
     scene = scene_of(tmp_path, {"veil": PartEdit(opacity=100.0)}, veil=ball(opacity=-9.0))
     given = replace(task(scene, tmp_path, ["veil"]), settings=ImageKeys(opacity="auto"))
-    assert 100 <= raised(given).scene.models["veil"].edit.opacity <= 1000
+    assert 100 <= raise_opacities(given).scene.models["veil"].edit.opacity <= 1000
 
 
 def test_what_is_inside_keeps_half_of_its_pixels(tmp_path):
@@ -97,15 +110,15 @@ def test_what_is_inside_keeps_half_of_its_pixels(tmp_path):
         name: readable_factors(scene_of(tmp_path, x=each), ["x"], "cpu")["x"] for name, each in shells.items()
     }
     factors = readable_factors(scene, list(scene.models), "cpu")
-    before = (shares(scene, {})[:, 0] > SHOWS).sum()
+    before = (shares(scene, {})[:, 0] > SHOWN_SHARE).sum()
 
     def kept(factors):
-        return float((shares(scene, factors)[:, 0] > SHOWS).sum() / before)
+        return float((shares(scene, factors)[:, 0] > SHOWN_SHARE).sum() / before)
 
-    assert kept(alone) < KEPT
+    assert kept(alone) < KEPT_SHARE
     assert factors["core"] == 1.0
     assert all(1 < factors[name] < alone[name] for name in shells)
-    assert kept(factors) >= KEPT > kept({name: 1.25 * factors[name] for name in shells})
+    assert kept(factors) >= KEPT_SHARE > kept({name: 1.25 * factors[name] for name in shells})
 
 
 def test_models_without_texture_stay_visible_too_and_other_fields_are_refused(tmp_path):
@@ -124,7 +137,7 @@ def test_models_without_texture_stay_visible_too_and_other_fields_are_refused(tm
 
 def test_segments_of_a_model_have_factors_of_their_own(tmp_path, monkeypatch):
     """Its half in front is faint; the other has a mean alpha of 0.87, for its surfels have soft rims."""
-    monkeypatch.setattr("texgs.edit.readable.READABLE", 0.8)
+    monkeypatch.setattr("texgs.edit.readable.READABLE_ALPHA", 0.8)
     model = ball()
     front = model.parameters["means"][:, 2] > 0
     opacities = torch.where(front, FAINT, 4.0)
@@ -140,7 +153,7 @@ def test_the_factor_is_on_top_of_what_was_edited_and_only_of_parts_that_are_styl
     scene = scene_of(tmp_path, edits, shell=ball(opacity=FAINT), other=ball(opacity=FAINT))
     for opacity, expected in (("4", 2.0), ("keep", 0.5)):
         given = replace(task(scene, tmp_path, ["shell"]), settings=ImageKeys(opacity=opacity))
-        edited = raised(given).scene
+        edited = raise_opacities(given).scene
         assert edited.models["shell"].edit == PartEdit(opacity=expected, diffuse=2.0)
         assert edited.models["other"] == scene.models["other"]
 

@@ -25,7 +25,7 @@ from texgs.edit.series import make_series, moments_of
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
-from texgs.fitting import now, series
+from texgs.fitting import casting, series
 from texgs.fitting.now import fit_now
 from texgs.scene.scene import Scene, SceneModel, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
@@ -80,8 +80,8 @@ def followed(fitted, tmp_path_factory):
     begin(folder := tmp_path_factory.mktemp("series"), fitted)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setattr(now, "FREQUENCY", 2)
-        for name, value in {"SIZE": 32, "ROUNDS": 1}.items():
+        patch.setattr(casting, "FREQUENCY", 2)
+        for name, value in {"VIEW_SIZE": 32, "ROUNDS": 1}.items():
             patch.setattr(series, name, value)
         assert main(["series", "scene.yaml", "--files", "step_*.nrrd", "--output", "s"]) == 0
     return folder

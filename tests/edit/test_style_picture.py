@@ -5,7 +5,7 @@ from PIL import Image
 
 from tests.refusals import refused
 from texgs.core.errors import OutOfMemoryError, ShapeError
-from texgs.edit.style_picture import StylePicture, filled, mirrored_crop, read_style
+from texgs.edit.style_picture import StylePicture, fill_outside, mirrored_crop, read_style
 from texgs.models.pictures import PICTURES, picture
 
 
@@ -74,7 +74,7 @@ def test_filling_takes_the_nearest_colour():
     region = torch.zeros(3, 4, dtype=torch.bool)
     region[:, 0] = region[:, 3] = True
     expected = torch.tensor([0.2, 0.2, 0.8, 0.8]).expand(3, 3, 4)
-    assert torch.equal(filled(image, region), expected)
+    assert torch.equal(fill_outside(image, region), expected)
 
 
 def test_a_large_picture_is_reduced(tmp_path):

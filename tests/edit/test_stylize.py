@@ -184,7 +184,9 @@ def test_an_edit_starts_from_its_preview_bit_for_bit(vgg, style, start, opacity)
     def show(result):
         shown.append(result())
 
-    preview = styled(style, preset("preview", start=start), model)
+    recipe = preset("preview", start=start)
+    preview = styled(style, recipe, model)
+    assert (preview.recipe == recipe) is (opacity == 4.0), "or it is adapted"
     for name in ("default", "patches"):
         no_step = preset(name, start=start, rate=0.0, iterations=1)
         styled(style, no_step, model, vgg=vgg, show=show)
@@ -302,3 +304,4 @@ def test_what_only_another_step_shows_learns_from_it(style):
     hidden = upper[surfel]
     assert torch.equal(alone[places][hidden], unmoved[places][hidden]), "no view shows them"
     assert (done != start)[places][hidden].float().mean() > 0.3
+    assert (start != unmoved)[places][hidden].float().mean() > 0.3, "the picture lies where they show"

@@ -15,8 +15,8 @@ from tests.refusals import refused
 from tests.toys.editor import Editor
 from texgs.core.lens import Lens
 from texgs.edit.keys import EditKeys
-from texgs.edit.methods.in2n import In2nKeys
 from texgs.edit.methods.text import METHOD, TextKeys
+from texgs.edit.methods.updates import In2nKeys
 from texgs.fields.surfels.model_file import write_model
 from texgs.models.catalogue import PIPELINES
 from texgs.models.editors import Endpoint, ImagePipeline

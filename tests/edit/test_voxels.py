@@ -8,11 +8,11 @@ import torch
 from tests.edit.scenes import images_of, plain_style
 from tests.fields.voxels.test_voxels import ball
 from tests.fitting.scenes import cameras
-from texgs.edit.methods.arf import ArfKeys
+from texgs.edit.methods.style_baselines import ArfKeys
 from texgs.edit.objective import Objective
 from texgs.edit.style_loop import learn_style
 from texgs.edit.style_picture import StylePicture
-from texgs.edit.voxels import VoxelPainting, moved, object_colors, recolored_images, stylize_voxels
+from texgs.edit.voxels import VoxelPainting, move_colors, object_colors, recolored_images, stylize_voxels
 from texgs.models.pictures import picture
 from texgs.raster.voxel_grid import drop_sh, unpack_rows
 from texgs.raster.voxels import render_view
@@ -27,7 +27,7 @@ B = torch.tensor([0.1, 0.05, 0.15])
 def test_views_are_recoloured_as_the_grid_is():
     field = ball(degree=2)
     field = replace(field, grid=drop_sh(field.grid))
-    recolored = images_of(replace(field, grid=moved(field.grid, A, B, is_exact=True)))
+    recolored = images_of(replace(field, grid=move_colors(field.grid, A, B, is_exact=True)))
     images = recolored_images(images_of(field), A, B, foreground=True)
     assert torch.equal(images.planes[:, 3], recolored.planes[:, 3])
     assert int((images.planes.int() - recolored.planes.int()).abs().max()) <= 2, "rounding of both"
@@ -39,7 +39,7 @@ def test_views_are_recoloured_as_the_grid_is():
 def test_coefficients_are_moved_as_if_they_were_colours():
     grid = ball(degree=1).grid
     _, sh = unpack_rows(grid.rows)
-    _, legacy = unpack_rows(moved(grid, A, B, is_exact=False).rows)
+    _, legacy = unpack_rows(move_colors(grid, A, B, is_exact=False).rows)
     expected = torch.einsum("ij,nkj->nki", A, sh)
     expected[:, 0] += B
     torch.testing.assert_close(legacy, expected, atol=1e-5, rtol=1e-5)

@@ -16,11 +16,11 @@ from tests.fields.voxels.test_voxels import ball
 from tests.refusals import refused
 from texgs.core.errors import TexgsError
 from texgs.fields.files import open_field
-from texgs.fields.gaussians.files import read_gaussians, write_gaussians
-from texgs.fields.palette.file import read_palette, write_palette
+from texgs.fields.gaussians import read_gaussians, write_gaussians
+from texgs.fields.palette.model import read_palette, write_palette
 from texgs.fields.surfels.compact import read_compact, write_compact
 from texgs.fields.surfels.model_file import read_model, write_model
-from texgs.fields.voxels.file import read_voxels, write_voxels
+from texgs.fields.voxels import read_voxels, write_voxels
 
 LOSSLESS = {
     "texgs-model": (surfels, write_model, read_model),

@@ -16,7 +16,7 @@ from tests.real_data import real_data
 from tests.refusals import refused
 from texgs.core.errors import TexgsError
 from texgs.core.ply_file import read_vertices
-from texgs.fields.gaussians import files
+from texgs.fields import gaussians as files
 from texgs.fields.surfels import ply
 
 KINDS = {"surfels": (lambda: surfels("surfels"), ply), "gaussians": (gaussians, files)}

@@ -6,12 +6,12 @@ import torch
 from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import STAGES, sample
 from texgs.core.memory import MIB
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians import Gaussians
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import network_shapes
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.voxels.model import Voxels
+from texgs.fields.voxels import Voxels
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import VoxelGrid
 

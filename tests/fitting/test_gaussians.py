@@ -2,14 +2,13 @@ import pytest
 import torch
 
 from tests.raster.requirements import require_equal
-from texgs.fields.gaussians.model import Baked, Gaussians
+from texgs.fields.gaussians import Baked, Gaussians
 from texgs.fields.splats import screen_box
 from texgs.fitting import checkpoint
-from texgs.fitting.kinds import FitTask
-from texgs.fitting.kinds.gaussians import FIT, GaussianKeys
+from texgs.fitting.gaussians import fit_gaussians, seed_gaussians
 from texgs.fitting.loop import Fit
-from texgs.fitting.seeds import seed_gaussians
-from texgs.fitting.settings import CommonRates, Densify, Seeds
+from texgs.fitting.settings import CommonRates, Densify, GaussianKeys, Seeds
+from texgs.fitting.task import FitTask
 from texgs.raster.shading import Y00
 from texgs.volume.generate import sphere
 from texgs.volume.view_set import ViewSet
@@ -31,8 +30,8 @@ def task_of(folder, **keys):
 
 def test_it_fits_a_ball(tmp_path):
     task = task_of(tmp_path)
-    fitted = FIT.fit(task)
-    seeds = FIT.fit(task_of(tmp_path / "none", iterations=0)).field
+    fitted = fit_gaussians(task)
+    seeds = fit_gaussians(task_of(tmp_path / "none", iterations=0)).field
     assert quality(seeds, task.images) < 19
     assert quality(fitted.field, task.images) > 24
     assert 80 < len(fitted.field) <= 150
@@ -45,21 +44,21 @@ def test_it_fits_a_ball(tmp_path):
     "keys", [{"antialiased": True}, {"alpha": 0.1}, {"sh_degree": 1}, {"dssim": 1.0}, {"sh_degree": 0}]
 )
 def test_keys_reach_the_fit(tmp_path, keys):
-    field = FIT.fit(task_of(tmp_path, iterations=40, sh_every=10, **keys)).field
+    field = fit_gaussians(task_of(tmp_path, iterations=40, sh_every=10, **keys)).field
     assert field.shading == Baked(keys.get("antialiased", False))
     assert field.parameters["sh"].shape[1] == HARMONICS[keys.get("sh_degree", 3)]
-    plain = FIT.fit(task_of(tmp_path / "plain", iterations=40, sh_every=10)).field
+    plain = fit_gaussians(task_of(tmp_path / "plain", iterations=40, sh_every=10)).field
     assert not torch.equal(field.parameters["means"], plain.parameters["means"])
 
 
 def test_an_interrupted_fit_goes_on_to_the_same_bits(tmp_path):
-    whole = FIT.fit(task_of(tmp_path / "whole", iterations=60)).field
+    whole = fit_gaussians(task_of(tmp_path / "whole", iterations=60)).field
     task = task_of(tmp_path / "parts", iterations=60)
     start = seed_gaussians(task.images, task.views, SEEDS, 3, 0)
     half = run(Fit(start, Baked(), task.images, task.settings.phase, 0), 45)
     half.seconds = 1000.0
     checkpoint.save(task.output / checkpoint.FOLDER, half)
-    fitted = FIT.fit(task)
+    fitted = fit_gaussians(task)
     assert fitted.seconds > 1000
     require_equal(fitted.field.parameters, whole.parameters)
 

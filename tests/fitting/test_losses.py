@@ -7,7 +7,7 @@ from torch.testing import assert_close
 from tests.devices import device  # noqa: F401, a fixture
 from tests.fitting.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
 from tests.raster.requirements import require_same_bits
-from texgs.fields.gaussians.model import Baked
+from texgs.fields.gaussians import Baked
 from texgs.fields.splats import Splats, visible_part, zeroth
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, material

@@ -14,7 +14,7 @@ from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT
 from texgs.fitting import now
-from texgs.fitting.ends import ends_of_rays, thickened
+from texgs.fitting.casting import ends_of_rays, thicken
 from texgs.metrics.quality import psnr
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
@@ -73,15 +73,15 @@ def test_surfels_start_where_views_see_something_also_behind_other_layers(small,
 @given(st.floats(0, 0.999), st.floats(0.1, 50))
 def test_thicker_matter_lets_a_power_of_the_light_through(alpha, factor):
     tf = TransferFunction(((0, alpha), (1, 0.5)), ((0, 1, 1, 1),))
-    assert 1 - thickened(tf, factor).opacity[0][1] == pytest.approx((1 - alpha) ** factor, abs=1e-12)
+    assert 1 - thicken(tf, factor).opacity[0][1] == pytest.approx((1 - alpha) ** factor, abs=1e-12)
 
 
 def test_one_of_two_views_has_a_headlight_and_the_others_lights_of_their_own(small, grid, monkeypatch):
     """42 cameras, of which 14 have a headlight; of the others one of two is cast."""
     seen = []
-    refine = now.refined
+    refine = now.fit_further
     watched = lambda model, images, *rest: seen.append(images) or refine(model, images, *rest)  # noqa: E731
-    monkeypatch.setattr(now, "refined", watched)
+    monkeypatch.setattr(now, "fit_further", watched)
     tf = of_range(HIGH, grid)
     assert len(list(now.fit_now(Caster(grid, LOOK), LOOK, tf, LENS, "sphere", soon=False))) == 1
     (images,) = seen

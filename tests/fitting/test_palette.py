@@ -14,7 +14,8 @@ from texgs.fields.palette.networks import base_color, density, palette_color
 from texgs.fields.palette.rendering import points_on, view_harmonics
 from texgs.fitting import checkpoint
 from texgs.fitting.checkpoint import run_to_end
-from texgs.fitting.palette import PaletteFit, base_loss, object_palette
+from texgs.fitting.colors import object_palette
+from texgs.fitting.palette import PaletteFit, base_loss
 from texgs.fitting.ray_settings import Decay, GridStage, HashKeys, PaletteKeys, VoxelKeys
 
 VOXELS = VoxelKeys(

@@ -11,8 +11,8 @@ from tests.real_data import real_data
 from tests.refusals import refused
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.lens import Lens
+from texgs.fitting.casting import cast_views
 from texgs.fitting.hull import hull_points, mean_colors
-from texgs.fitting.now import cast_views
 from texgs.fitting.seeds import box_of, read_points, seed_surfels, surfels_at
 from texgs.fitting.settings import Seeds
 from texgs.volume.cameras import icosphere

@@ -13,8 +13,8 @@ from tests.volume.test_motion import TF, blob
 from texgs.core.camera import orbit
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.light import HEADLIGHT
-from texgs.fitting import now, series
-from texgs.fitting.ends import Points
+from texgs.fitting import casting, series
+from texgs.fitting.casting import RayEnds
 from texgs.fitting.now import fit_now
 from texgs.fitting.series import Follower
 from texgs.metrics import quality
@@ -40,8 +40,8 @@ def key():
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """Steps of a second."""
-    monkeypatch.setattr(now, "FREQUENCY", 2)
-    for name, value in {"SIZE": 48, "ROUNDS": 2}.items():
+    monkeypatch.setattr(casting, "FREQUENCY", 2)
+    for name, value in {"VIEW_SIZE": 48, "ROUNDS": 2}.items():
         monkeypatch.setattr(series, name, value)
 
 
@@ -103,7 +103,7 @@ def test_axes_are_carried_as_matter_is_turned_and_stretched():
         "scales": torch.tensor([[0.02, 0.03]]).log(),
         "normals": torch.tensor([[1.0, 0, 1, 0]]),  # along x
     }
-    carried = series.carried(p, moves)
+    carried = series.carry(p, moves)
     torch.testing.assert_close(carried["means"], p["means"] @ turn.T)
     axes = quats_to_matrices(carried["quats"])[0]
     torch.testing.assert_close(axes[:, 0], torch.tensor([0.0, 1, 0]), atol=1e-5, rtol=0)
@@ -115,16 +115,16 @@ def test_axes_are_carried_as_matter_is_turned_and_stretched():
 
 def test_surfels_that_show_least_are_planted_where_none_are(key):
     model, _ = key
-    flat = {**model.parameters, "colors": model.parameters["colors"] + series.plain_texture(model)}
+    flat = {**model.parameters, "colors": model.parameters["colors"] + series.mean_texture(model)}
     n = len(flat["means"])
     weights = torch.ones(n)
     weights[:7] = 0
     places = torch.cat([flat["means"][50:90], torch.full((300, 3), 0.4) + 0.01 * torch.rand(300, 3)])
-    points = Points(places, torch.tensor([[0.0, 0, 1]]).repeat(340, 1), torch.full((340, 3), 0.5))
-    planted = series.planted(flat, points, weights, 0)
+    points = RayEnds(places, torch.tensor([[0.0, 0, 1]]).repeat(340, 1), torch.full((340, 3), 0.5))
+    planted = series.plant(flat, points, weights, 0)
     changed = (planted["means"] != flat["means"]).any(dim=1)
     assert bool(changed[:7].all())
-    assert int(changed.sum()) == int(series.SHARE * n)
+    assert int(changed.sum()) == int(series.PLANTED_SHARE * n)
     assert bool((planted["means"][changed] > 0.3).all())
     assert planted.keys() == flat.keys()
 

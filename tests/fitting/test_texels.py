@@ -22,14 +22,14 @@ from tests.refusals import refused
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, in_full_light, material, raw_material
 from texgs.fields.surfels.texels import offsets_of
+from texgs.fitting.colors import mean_color
 from texgs.fitting.settings import TextureKeys
 from texgs.fitting.texels import (
     Sight,
-    look,
-    mean_color,
+    add_texture,
+    gather_sight,
     sizes_for_budget,
     sizes_where_seen,
-    textured,
     texturize,
 )
 from texgs.raster.arguments import check_texture
@@ -101,8 +101,8 @@ def test_look_sees_the_size_of_pixels_and_what_is_hidden():
     p["opacities"] = torch.full((20,), 8.0)
     p["means"][0] = torch.tensor([0.0, 50.0, 0.0])  # in no view
     views = cameras()
-    seen = look(
-        textured(Surfels(p, ShadingModel()), torch.zeros(3), torch.ones(20, 2, dtype=torch.int32)),
+    seen = gather_sight(
+        add_texture(Surfels(p, ShadingModel()), torch.zeros(3), torch.ones(20, 2, dtype=torch.int32)),
         ball_images(),
         "",
     )

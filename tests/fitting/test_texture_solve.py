@@ -25,8 +25,8 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, material, raw_material
 from texgs.fields.surfels.texels import owners
 from texgs.fitting.settings import Densify, TextureKeys
-from texgs.fitting.texels import look, sizes_for_budget, textured, texturize, without_offset
-from texgs.fitting.texture_solve import FARTHEST, curvature, refine, share_of, solve, texel_map
+from texgs.fitting.texels import add_texture, gather_sight, sizes_for_budget, texturize, without_offset
+from texgs.fitting.texture_solve import FARTHEST_TEXEL, curvature, refine, share_of, solve, texel_map
 from texgs.raster import Texture, rasterize, reference
 from texgs.raster.losses import l1_dssim
 from texgs.raster.reference import shading
@@ -50,7 +50,7 @@ def plain(images):
 
 @pytest.fixture(scope="module")
 def start(plain):
-    return textured(plain, GREY, sizes_for_budget(plain.parameters["scales"].exp(), 3000))
+    return add_texture(plain, GREY, sizes_for_budget(plain.parameters["scales"].exp(), 3000))
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def squared(model, images):
 
 
 def solved_from(model, images, **keys):
-    return solve(model, images, look(model, images, "").curvature, TextureKeys(**keys), 0, "")
+    return solve(model, images, gather_sight(model, images, "").curvature, TextureKeys(**keys), 0, "")
 
 
 def refined(model, images, iterations, keys=PLAIN, **changes):
@@ -90,7 +90,7 @@ def one_surfel():
     p = {name: x[:1] for name, x in p.items()}
     p |= {"means": torch.zeros(1, 3), "quats": torch.tensor([[0.7, 0.0, 0.7, 0.0]])}
     p |= {"scales": torch.full((1, 2), 0.15).log(), "opacities": torch.tensor([4.0])}
-    model = textured(Surfels(p, ShadingModel()), GREY, torch.tensor([[4, 4]], dtype=torch.int32))
+    model = add_texture(Surfels(p, ShadingModel()), GREY, torch.tensor([[4, 4]], dtype=torch.int32))
     texels = torch.rand(16, 3, generator=torch.Generator().manual_seed(3)) * 0.4 - 0.2
     views = [camera for camera in cameras(8, 32) if abs(float(camera.position[0])) > 0.7]
     known = changed(model, texels=texels)
@@ -135,7 +135,7 @@ def test_curvature_is_that_of_the_dense_matrix_among_other_surfels():
     gains = [model.shading.colors(model.parameters, c, HEADLIGHT).gain.item() for c in images.cameras]
     exact = torch.stack([a.sum(dim=0) * gain for a, gain in zip(A, gains, strict=True)])  # [V, T]
     typical = exact.square().sum(dim=0) / exact.sum(dim=0)
-    ours = curvature(model.parameters["sizes"], look(model, images, "").curvature)[:, 0].double()
+    ours = curvature(model.parameters["sizes"], gather_sight(model, images, "").curvature)[:, 0].double()
     middle = [5, 6, 9, 10]
     assert_close(ours[middle], typical[middle], atol=0, rtol=0.25)  # texels as wide as 1.5 sigma are coarse
     assert_close(ours.sum(), typical.sum(), atol=0, rtol=0.05)
@@ -177,7 +177,7 @@ def test_views_that_the_solver_does_not_see_tell_how_far_to_go(start, images):
 
 def test_texels_that_would_be_worse_are_hardly_followed(start, images):
     """A curvature far too small makes steps far too large."""
-    wild = look(start, images, "").curvature * 1e-3
+    wild = gather_sight(start, images, "").curvature * 1e-3
     kept = solve(start, images, wild, TextureKeys(sweeps=1, ridge=0.0, views=1.0), 0, "")
     assert squared(kept, images) <= 1.0001 * squared(start, images)
 
@@ -321,5 +321,5 @@ def test_lights_from_many_sides_do_not_drive_texels_away(start):
     images = replace(images_of(planes, views), lights=lights)
     solved = solved_from(model, images, sweeps=4)
     texels = solved.parameters["texels"]
-    assert 0 < float(texels.abs().max()) <= FARTHEST
+    assert 0 < float(texels.abs().max()) <= FARTHEST_TEXEL
     assert squared(solved, images) < 0.7 * squared(model, images)

@@ -11,13 +11,13 @@ from tests.refusals import refused
 from texgs.config.compose import compose
 from texgs.core.camera import orbit
 from texgs.core.errors import FitError
-from texgs.fields.voxels.model import Voxels
-from texgs.fields.voxels.rays import AROUND, curve, training_rays, widened
+from texgs.fields.voxels import Voxels
 from texgs.fitting import checkpoint
 from texgs.fitting.checkpoint import run_to_end
 from texgs.fitting.hull import hull_box
 from texgs.fitting.ray_settings import Decay, GridStage, VoxelKeys
-from texgs.fitting.voxels import VoxelFit, grown, hull_grid, refined, seen_voxels
+from texgs.fitting.rays import AROUND, curve, training_rays, widened
+from texgs.fitting.voxels import VoxelFit, dilate, hull_grid, refine_grid, seen_voxels
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays
 from texgs.volume.images import load
@@ -153,7 +153,7 @@ def test_the_hull_holds_the_ball(images):
 
 
 def test_refining_keeps_the_field(fit):
-    finer = refined(fit.grid, torch.ones(fit.grid.size, dtype=torch.bool))
+    finer = refine_grid(fit.grid, torch.ones(fit.grid.size, dtype=torch.bool))
     assert finer.spacing == fit.grid.spacing / 2
     coarse, fine = (grid.rows[grid.links().long()] for grid in (fit.grid, finer))
     # float32 places, times densities of hundreds
@@ -165,7 +165,7 @@ def test_refining_keeps_the_field(fit):
 def test_a_grown_mask():
     mask = torch.rand(9, 10, 11, generator=torch.Generator().manual_seed(0)) < 0.02
     expected = torch.nn.functional.max_pool3d(mask[None].float(), 3, 1, 1)[0] > 0
-    assert torch.equal(grown(mask), expected)
+    assert torch.equal(dilate(mask), expected)
 
 
 def test_seen_voxels_are_near_the_surface(fit, images):

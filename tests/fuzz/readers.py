@@ -45,10 +45,10 @@ from texgs.core.io import read_json, write_json
 from texgs.core.lens import Frame
 from texgs.core.light import Light
 from texgs.edit.style_picture import read_style
-from texgs.fields.gaussians.files import read_gaussians, write_gaussians
-from texgs.fields.gaussians.files import read_ply as read_gaussian_ply
-from texgs.fields.gaussians.files import write_ply as write_gaussian_ply
-from texgs.fields.palette.file import read_palette, write_palette
+from texgs.fields.gaussians import read_gaussians, write_gaussians
+from texgs.fields.gaussians import read_ply as read_gaussian_ply
+from texgs.fields.gaussians import write_ply as write_gaussian_ply
+from texgs.fields.palette.model import read_palette, write_palette
 from texgs.fields.surfels.compact import open_model, write_compact
 from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.ply import read_ply, write_ply

@@ -8,7 +8,7 @@ import torch
 
 from tests.fields.surfels.test_composition import ball
 from tests.models.clips import write_clip
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.lens import Lens
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels

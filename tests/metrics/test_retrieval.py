@@ -102,15 +102,15 @@ def look(follows, **far):
 def test_a_picture_that_is_near_to_all_looks_is_no_answer():
     """`hub` is the nearest of both; less its mean each look is nearest to its own."""
     looks = [look("glass", glass=3.0, dots=5.0, hub=1.0), look("dots", glass=4.0, dots=4.0, hub=1.0)]
-    assert retrieval.named(looks) == [{"place_by_colors": 1, "place_by_pattern": 3}] * 2
+    assert retrieval.places_among(looks) == [{"place_by_colors": 1, "place_by_pattern": 3}] * 2
     third = look("mine.jpg", glass=1.0, dots=1.0, hub=1.0)
     without = ("gold", {})
-    places = retrieval.named([*looks, third, without])
+    places = retrieval.places_among([*looks, third, without])
     assert places[2:] == [{}, {}]
     assert places[0].keys() == places[1].keys() == {"place_by_colors", "place_by_pattern"}
-    assert retrieval.named([*looks, look("glass", other=1.0)])[2] == {}, "compared with other pictures"
-    assert retrieval.named(looks[:1]) == [{}]
-    assert retrieval.named([]) == []
+    assert retrieval.places_among([*looks, look("glass", other=1.0)])[2] == {}, "compared with other pictures"
+    assert retrieval.places_among(looks[:1]) == [{}]
+    assert retrieval.places_among([]) == []
 
 
 def test_an_edited_scene_tells_its_distances_to_all_pictures(scenes, deep, monkeypatch):  # noqa: F811
@@ -127,4 +127,4 @@ def test_an_edited_scene_tells_its_distances_to_all_pictures(scenes, deep, monke
 def test_looks_that_are_alike_have_the_last_place():
     """A method that did the same for every picture would else be the best of all."""
     far = {"far_by_colors": dict.fromkeys("abc", 1.5)}
-    assert retrieval.named([(picture, far) for picture in "abc"]) == [{"place_by_colors": 3}] * 3
+    assert retrieval.places_among([(picture, far) for picture in "abc"]) == [{"place_by_colors": 3}] * 3

@@ -3,8 +3,7 @@
 import pytest
 import torch
 
-from texgs.metrics.quality import compare
-from texgs.metrics.shown import shown_share, what_is_lost
+from texgs.metrics.quality import compare, shown_share, what_is_lost
 from texgs.raster import Render
 
 

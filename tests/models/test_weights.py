@@ -7,7 +7,7 @@ import pytest
 
 from tests.real_data import real_data
 from tests.refusals import refused
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import ArgumentError, MissingDataError
 from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
 from texgs.models.networks import read_tensors

@@ -9,9 +9,9 @@ from torch.nn.functional import normalize
 
 from texgs.core.camera import orbit, orbit_direction
 from texgs.raster import hash_encoding, losses, shading
-from texgs.raster.reference import hash_encoding as hash_definition
 from texgs.raster.reference import losses as loss_definition
 from texgs.raster.reference import shading as shading_definition
+from texgs.raster.reference import voxels as hash_definition
 from texgs.raster.shading import MATERIAL
 
 CAMERA = torch.tensor([0.5, 1.0, 3.0])

@@ -16,8 +16,7 @@ from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.raster import reference
-from texgs.raster.api import rasterize, splat
-from texgs.raster.cuts import cut_range
+from texgs.raster.api import cut_range, rasterize, splat
 from texgs.raster.reference.render import cut_range as true_cut_range
 from texgs.raster.types import Options
 from texgs.raster.voxels import March, render_rays, render_view

@@ -6,7 +6,7 @@ import torch
 from tests.raster.operations import LEVELS, points
 from tests.refusals import refused
 from texgs.raster.hash_encoding import HashLevels, encode
-from texgs.raster.reference import hash_encoding as definition
+from texgs.raster.reference import voxels as definition
 
 
 def looped(point, table, levels):

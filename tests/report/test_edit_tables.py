@@ -2,7 +2,7 @@ import pytest
 
 from tests.report.written import lines, metrics, records, rows, sources
 from texgs.report.edit_tables import image_driven, looks, text_driven, text_driven_frozen
-from texgs.report.results import EditMeasures, EditResult, SceneResult
+from texgs.report.results import EditMeasures, EditResult
 
 OWN = {  # columns by the headings of the paper's files
     "editing_min": "minutes",
@@ -77,32 +77,24 @@ def test_columns_are_in_the_papers_order(tmp_path, make, name, follows):
     assert "RMSE, near" in titles
 
 
-def test_means_are_of_one_size_and_one_recipe_whatever_it_has_adapted_to(tmp_path):
-    for dataset, pixels, how, minutes in (
-        ("a", 512, "VGG-16 + patches", 1.0),
-        ("b", 512, "VGG-16", 3.0),
-        ("c", 800, "VGG-16", 50.0),
-        ("d", 800, "VGG-16", 70.0),
+def test_means_are_of_one_size_device_and_recipe_whatever_it_has_adapted_to(tmp_path):
+    for dataset, pixels, how, minutes, device in (
+        ("a", 512, "VGG-16 + patches", 1.0, "CPU"),
+        ("b", 512, "VGG-16", 3.0, "CPU"),
+        ("c", 512, "VGG-16", 9.0, "GPU"),
+        ("d", 800, "VGG-16", 50.0, "CPU"),
+        ("e", 800, "VGG-16", 70.0, "CPU"),
     ):
-        options = {"follows": "style", "method": "image", "how": how, "pixels": pixels}
+        options = {"follows": "style", "method": "image", "how": how, "pixels": pixels, "device": device}
         edit(tmp_path, "style", {"editing_min": minutes}, dataset=dataset, **options)
     late = EditResult("style", "image", "VGG-16", 6000.0, follows="style", is_compared=True)
-    metrics(tmp_path, "edit_image", late, dataset="e")
+    metrics(tmp_path, "edit_image", late, dataset="f")
     entries = rows(image_driven(records(tmp_path)))
     means = [row for row in entries if row["data set"].startswith("mean") and row["recipe"] == "quick"]
     assert [(row["data set"], row["pixels"], row["method"], row["minutes"]) for row in means] == [
         ("mean of 2", "512x512", "adapts", 2.0),
         ("mean of 2", "800x800", "image: VGG-16", 60.0),
     ], "of an edit that was not measured no size is known"
-
-
-def test_no_mean_is_over_edits_of_different_devices(tmp_path):
-    for dataset, device, minutes in (("a", "CPU", 9.0), ("b", "CPU", 11.0), ("c", "GPU", 1.0)):
-        options = {"follows": "style", "method": "image", "device": device}
-        edit(tmp_path, "style", {"editing_min": minutes}, dataset=dataset, **options)
-    entries = rows(image_driven(records(tmp_path)))
-    means = [row for row in entries if row["data set"].startswith("mean") and row["recipe"] == "quick"]
-    assert [(row["data set"], row["minutes"]) for row in means] == [("mean of 2", 10.0)]
 
 
 def test_each_kind_of_edit_has_its_own_table(tmp_path):
@@ -128,13 +120,10 @@ def test_other_methods_with_frozen_geometry_are_compared_by_themselves(tmp_path)
     edit(tmp_path, "dge", {}, **options, kept=False)
     edit(tmp_path, "dge_frozen", {}, **options, kept=True)
     edit(tmp_path, "text", {}, follows="instruction")
+    edit(tmp_path, "arf", {}, follows="style", field="voxels", method="arf", kept=True)
     free, frozen = (rows(make(records(tmp_path))) for make in (text_driven, text_driven_frozen))
     assert [row["edit"] for row in free if row["recipe"] != "the paper"] == ["dge", "text"]
     assert [row["edit"] for row in frozen] == ["dge_frozen", "text"]
-
-
-def test_pictures_that_keep_geometry_are_not_frozen(tmp_path):
-    edit(tmp_path, "arf", {}, follows="style", field="voxels", method="arf", kept=True)
     assert rows(image_driven(records(tmp_path)))[0]["edit"] == "arf"
 
 
@@ -147,19 +136,6 @@ def test_a_row_leads_to_the_edit_and_its_measures(tmp_path):
     assert sources(table)[0] == paths
     assert (gold["pixels"], gold["CLIP similarity"]) == ("512x512", 0.3)
     assert (late["pixels"], late["mean ms"], late["minutes"]) == (None, None, 0.1)
-    assert "CLIP of the scores: B/32;" in table.caption
-
-
-def test_an_edit_and_its_measures_make_a_row(tmp_path):
-    paths = [metrics(tmp_path, "edit_image", EditResult("glass", "image", "patches", 90.0, follows="style"))]
-    values = VALUES | {"similarity": 0.3, "clip": "B/32", "style_gram": 1.5}
-    measured = EditMeasures("glass", "image", values=values)
-    paths.append(metrics(tmp_path, "edit_metrics", measured))
-    table = looks(records(tmp_path))
-    (row,) = rows(table)
-    assert (row["minutes"], row["mean ms"], row["CLIP similarity"], row["Gram"]) == (1.5, 4.0, 0.3, 1.5)
-    assert row["geometry kept"] == "bit for bit"
-    assert sources(table)[0] == paths
     assert "CLIP of the scores: B/32;" in table.caption
 
 
@@ -210,8 +186,3 @@ def test_looks_of_one_scene_tell_the_place_of_their_picture_among_all(tmp_path):
         metrics(tmp_path, "edit_metrics", EditMeasures(name, "image", 9, 9, VALUES | both), dataset=dataset)
     places = {(row["data set"], row["edit"]): row["place, colours"] for row in rows(looks(records(tmp_path)))}
     assert places == {("a", "glass"): 1, ("a", "dots"): 1, ("b", "glass"): None}
-
-
-def test_without_edits_there_are_no_rows(tmp_path):
-    metrics(tmp_path, "compose", SceneResult(1, 9))
-    assert looks(records(tmp_path)).is_empty

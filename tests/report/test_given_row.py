@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from texgs.core.figures import write_grid
-from texgs.report.given_row import SIDE, given_row, plotted
+from texgs.report.given_row import SIDE, given_row, tf_plot
 from texgs.volume.transfer import TransferFunction
 
 RED = TransferFunction(((0, 0), (1, 0.5), (2, 0.5), (3, 0)), ((0, 1, 0, 0),))
@@ -50,7 +50,7 @@ def test_instructions_are_words_in_short_lines():
 
 
 def test_transfer_functions_come_first_with_their_colours(volume, tmp_path):
-    plot = plotted(volume, {"TF01": RED, "TF02": BLUE})
+    plot = tf_plot(volume, {"TF01": RED, "TF02": BLUE})
     assert plot.shape == (SIDE, SIDE, 3)
     red, blue = (
         (abs(plot.astype(int) - color).max(-1) < 60).sum() for color in ((255, 38, 38), (38, 38, 255))

@@ -7,7 +7,7 @@ from PIL import Image
 from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.metrics.surface import sample
-from texgs.report.mesh_figure import CLAY, drawn, lit, write_mesh_figure
+from texgs.report.mesh_figure import CLAY, render_points, shade, write_mesh_figure
 from texgs.volume.isosurface import isosurface
 
 RADIUS, DISTANCE, FOV, SIZE = 0.3, 2.0, 30.0, 160
@@ -23,7 +23,7 @@ def ball(radius=RADIUS):
 def test_a_ball_is_a_disc_without_holes_that_is_brightest_in_its_middle():
     mesh, camera = ball(), orbit(30, 20, DISTANCE, FOV, SIZE, SIZE)
     points = sample(mesh, 50_000)
-    view = drawn(points, mesh, lit(points, camera), camera)
+    view = render_points(points, mesh, shade(points, camera), camera)
     rim = math.tan(math.asin(RADIUS / DISTANCE)) / math.tan(math.radians(FOV / 2))  # half image heights
     radius = math.sqrt(float(view.alpha.sum()) / math.pi)
     assert 0 < radius - rim * SIZE / 2 < 2, "pixels by which discs reach over the rim"

@@ -1,12 +1,10 @@
 """Metrics files: which are read, what is refused, and what there is no job of."""
 
 import json
-import re
 
 import pytest
 
 from tests.report.written import metrics
-from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.report.metrics_files import LeftOut, below, note, read_known, read_left_out
 from texgs.report.results import FitResult, SceneResult
@@ -25,19 +23,11 @@ def test_what_is_left_out_stands_below_tables_that_would_read_it(tmp_path):
     assert note(entries, ("timing",)) == ""
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ({}, "expected a list of what was left out, got dict"),
-        ([1], "expected entries with what, why and places, got others"),
-        ([{"what": "a"}], "expected entries with what, why and places, got others"),
-        ([{**WOOD, "more": 1}], "expected entries with what, why and places, got others"),
-    ],
-)
-def test_a_file_of_something_else_is_one_sentence(tmp_path, content, message):
+@pytest.mark.parametrize("content", [{}, [1], [{"what": "a"}], [{**WOOD, "more": 1}]])
+def test_a_file_of_something_else_is_named(tmp_path, content):
     path = tmp_path / "missing.json"
     path.write_text(json.dumps(content))
-    with pytest.raises(ArgumentError, match=rf"missing\.json: {message}"):
+    with pytest.raises(ArgumentError, match=r"missing\.json: expected"):
         read_left_out(path)
 
 
@@ -76,27 +66,24 @@ def test_copies_of_tracked_runs_and_jobs_at_work_are_no_results(tmp_path, monkey
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("change", "key"),
     [
-        ({"seed": "x"}, "seed: expected a whole number, got 'x'"),
-        ({"dataset": 3}, "dataset: expected words, got 3"),
-        ({"variant": None}, "variant: expected words, got null"),
-        ({"peak_memory_mib": "much"}, "peak_memory_mib: expected a number, got 'much'"),
-        ({"numbers": [1]}, r"numbers: expected values by name, got \[1\]"),
-        ({"pictures": ["a.png"]}, r"pictures: expected values by name, got \['a.png'\]"),
-        ({"numbers": {"fit_seconds": 1.0, "primitives": "many"}}, "numbers.primitives: .*'many'"),
-        ({"numbers": {"fit_seconds": 1.0, "primitives": 9, "sizes": 3}}, "numbers.sizes: "),
+        ({"seed": "x"}, "seed"),
+        ({"dataset": 3}, "dataset"),
+        ({"variant": None}, "variant"),
+        ({"peak_memory_mib": "much"}, "peak_memory_mib"),
+        ({"numbers": [1]}, "numbers"),
+        ({"pictures": ["a.png"]}, "pictures"),
+        ({"numbers": {"fit_seconds": 1.0, "primitives": "many"}}, "numbers.primitives"),
+        ({"numbers": {"fit_seconds": 1.0, "primitives": 9, "sizes": 3}}, "numbers.sizes"),
         (
             {"result": "EditMeasures", "numbers": {"edit": "a", "method": "b", "style_gram": "x"}},
-            "numbers.style_gram: expected a number, got 'x'",
+            "numbers.style_gram",
         ),
     ],
 )
-@pytest.mark.parametrize("verb", ["tables", "report"])
-def test_a_value_of_another_type_is_one_sentence_with_file_and_key(tmp_path, capsys, verb, change, message):
+def test_a_value_of_another_type_is_an_error_with_file_and_key(tmp_path, change, key):
     path = metrics(tmp_path, "shading", FitResult(60.0, 9), "scan", "TF01")
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
-    assert main([verb, str(path), "--output", str(tmp_path / "out")]) != 0
-    said = capsys.readouterr().err
-    assert re.search(rf"{path.name}: {message}", said), said
-    assert "Traceback" not in said
+    with pytest.raises(ArgumentError, match=rf"{path.name}: {key}: "):
+        read_known([path])

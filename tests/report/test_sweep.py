@@ -77,13 +77,6 @@ def test_a_sweep_of_edits_has_their_measures(tmp_path):
     assert table.frame[SOURCES][0] == first
 
 
-def test_fits_and_edits_of_a_sweep_have_rows_of_their_own(tmp_path):
-    table = sweep(read(run(tmp_path, "a") + edit(tmp_path, "a")), "mine")
-    assert column(table, "edit") == ["-", "style"]
-    assert column(table, "PSNR") == [30.0, None]
-    assert column(table, "minutes") == [3.0, 0.5]
-
-
 def test_the_figure_has_a_panel_for_each_measure_that_differs(tmp_path):
     paths = run(tmp_path, "42", 0, 30.0) + run(tmp_path, "92", 0, 32.0) + run(tmp_path, "92", 1, 33.0)
     width, _ = sweep_figure(read(paths), "mine").size
@@ -104,11 +97,12 @@ def test_the_figure_shows_the_scenes_of_edits(tmp_path):
 
 
 def test_a_variant_with_a_missing_phase_is_not_measured(tmp_path):
-    table = sweep(read(run(tmp_path, "a", phases=("shading",))), "mine")
-    assert column(table, "seeds") == [0]
-    assert set(table.frame.iloc[0, 5:-1]) == {None}, "but for the name and the number of seeds"
-
-
-def test_fits_of_another_sweep_do_not_count(tmp_path):
-    with pytest.raises(ArgumentError, match="sweep mine: no fit or edit of it among the metrics files; run"):
-        sweep(read(run(tmp_path, "a", sweep="other")), "mine")
+    """Nor is a fit of another sweep; an edit has a row of its own."""
+    paths = run(tmp_path, "a", phases=("shading",)) + run(tmp_path, "a", sweep="other") + edit(tmp_path, "a")
+    table = sweep(read(paths), "mine")
+    assert column(table, "seeds") == [0, 1]
+    assert column(table, "edit") == ["-", "style"]
+    assert column(table, "PSNR") == [None, None]
+    assert column(table, "minutes") == [None, 0.5]
+    with pytest.raises(ArgumentError, match="sweep none:"):
+        sweep(read(paths), "none")

@@ -45,19 +45,8 @@ def test_markdown_says_what_was_not_measured():
     assert r"| wood \| stone | not measured |" in TABLE.markdown(), "a bar would begin a cell"
     assert Column("primitives", 0).text(1234567) == "1,234,567"
     assert TABLE.markdown().endswith("\n\nA caption.\n")
-
-
-def test_a_row_is_one_line():
     broken = Table("two\nlines", TABLE.columns, [{"name": "a\nb", "dB": 1.0}], "Heading")
-    assert broken.markdown().splitlines() == [
-        "## Heading",
-        "",
-        "| name | dB |",
-        "| --- | ---: |",
-        "| a b | 1.00 |",
-        "",
-        "two lines",
-    ]
+    assert broken.markdown().splitlines()[4:] == ["| a b | 1.00 |", "", "two lines"]
 
 
 def test_rows_keep_their_files_in_whatever_order_they_come():

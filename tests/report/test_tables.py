@@ -5,7 +5,7 @@ import pytest
 from tests.report.written import lines, metrics, records
 from tests.study.studies import study
 from texgs.cli.main import main
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_json
 from texgs.core.names import METRICS
@@ -20,19 +20,9 @@ from texgs.workflow.stage_table import STAGES
 TABLES = specs()
 
 
-def test_tables_are_in_the_papers_order_and_then_ours():
-    numbers = {table.name: table.number for table in TABLES if table.number}
-    assert numbers == {
-        "datasets": "1",  # and A3
-        "image_driven": "2",
-        "text_driven": "3",
-        "views": "A1",
-        "resolution": "A2",
-        "model_size": "A4",
-        "fitting": "A5",
-        "user_study": "A6",
-    }
-    assert [table.name for table in TABLES][: len(numbers)] == list(numbers)
+def test_tables_of_the_paper_come_first_and_none_twice():
+    numbers = [table.number for table in TABLES]
+    assert all(numbers[: 1 + max(map(numbers.index, filter(None, numbers)))])
     assert len({table.name for table in TABLES}) == len(TABLES)
 
 
@@ -85,12 +75,23 @@ def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
     old.write_text('{"stage": "texture", "dataset": "engine", "numbers": {"surfels": 9}}')
     missing = tmp_path / "missing.json"
     missing.write_text('[{"what": "data set wood", "why": "no file", "places": ["phase"]}]')
-    words = ["tables", str(path), str(old), "--missing", str(missing), "--output", str(tmp_path / "tables")]
+    words = [
+        "tables",
+        str(path),
+        str(path),
+        str(old),
+        "--missing",
+        str(missing),
+        "--output",
+        str(tmp_path / "tables"),
+    ]
     assert main(words) == 0
     expected = {f"{table.name}.{kind}" for table in TABLES for kind in ("csv", "md", "tex")}
     assert {file.name for file in (tmp_path / "tables").iterdir()} == expected | {"tables.tex"}
     said = capsys.readouterr()
-    assert "| scan | quick | shading | 1 | 40.00 |" in said.out
+    assert said.out.count("| scan | quick | shading | 1 | 40.00 |") == 1, (
+        "a file that is named twice counts once"
+    )
     assert "Left out: data set wood: no file." in said.out
     assert "Left out: 1 metrics file: of another version of texgs" in said.err
     assert "## Table 1. Data sets" not in said.out, "tables without rows are not printed"
@@ -113,14 +114,6 @@ def test_tables_of_a_folder_go_there(tmp_path, capsys, monkeypatch):
     assert (tmp_path / "other" / "report.html").is_file()
     assert (tmp_path / "results" / "tables" / "fits.csv").is_file()
     assert not (tmp_path / "results" / "report.html").exists()
-
-
-def test_a_file_that_is_named_twice_counts_once(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    path = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")
-    assert main(["tables", str(path), str(path.relative_to(tmp_path)), "--output", "t"]) == 0
-    assert "| scan | quick | shading | 1 | 40.00 |" in capsys.readouterr().out
-    assert len(Path("t/fits.csv").read_text().splitlines()) == 2
 
 
 def test_the_verb_reads_whole_results_of_a_folder_and_names_others(tmp_path, capsys, monkeypatch):

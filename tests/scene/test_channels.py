@@ -108,9 +108,9 @@ def test_a_page_carries_no_channels_and_has_no_editor_of_functions(scene):
         ArgumentError,
         match="volume: the scene shows several channels, and a page carries one; leave the volume out of ",
     ):
-        page_volume(scene)
+        page_volume(scene, 1.0)
     one = replace(scene, volume=replace(scene.volume, tfs={"C0": scene.volume.tfs["C0"]}))
     assert ("volume" in exports_of(one), "volume" in exports_of(scene)) == (True, False)
     assert Origins(scene).transfer is None
     assert Origins(one).transfer is not None
-    assert page_volume(one).codes.ndim == 3
+    assert page_volume(one, 1.0).codes.ndim == 3

@@ -12,7 +12,7 @@ from tests.scene.cloud_files import EXTENSION, READERS, drawn, glb, read_gltf, r
 from tests.scene.test_export import plain
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT
-from texgs.fields.gaussians.model import Baked
+from texgs.fields.gaussians import Baked
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.metrics.quality import psnr

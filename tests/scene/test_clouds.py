@@ -13,7 +13,7 @@ from tests.scene.test_export import plain
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.light import HEADLIGHT
-from texgs.fields.gaussians.files import write_gaussians
+from texgs.fields.gaussians import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels

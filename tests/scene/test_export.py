@@ -13,7 +13,8 @@ from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texels import mean_texels, owners
-from texgs.scene.export import Export, export_model
+from texgs.scene.export import export_model
+from texgs.scene.export_keys import Export
 from texgs.scene.joined import joined, polydata_of
 
 EDITS = [PartEdit(palette=(0.9, 0.1, 0.4), opacity=0.6), PartEdit(visible=False), PartEdit(opacity=3.0)]
@@ -85,7 +86,7 @@ def test_nothing_visible_is_refused():
 def test_points_are_means_and_mean_colors_of_opaque_surfels(tmp_path):
     model = ball(1)
     p = model.parameters
-    points = vertices(export_model(tmp_path / "points.ply", model, Export("points", 0.6)))
+    points = vertices(export_model(tmp_path / "points.ply", model, Export("points", opacity=0.6)))
     opaque = (torch.sigmoid(p["opacities"]) >= 0.6).nonzero()[:, 0]
     assert 0 < len(opaque) == len(points) < len(model)
     for point, n in zip(points, opaque.tolist(), strict=True):
@@ -98,7 +99,7 @@ def test_points_are_means_and_mean_colors_of_opaque_surfels(tmp_path):
 
 def test_points_before_shading_have_the_constant_harmonic(tmp_path):
     model = sample("surfels", n=9)
-    points = vertices(export_model(tmp_path / "points.ply", model, Export("points", 0.0)))
+    points = vertices(export_model(tmp_path / "points.ply", model, Export("points", opacity=0.0)))
     color = (0.5 + 0.28209479 * model.parameters["sh"][:, 0]).clamp(0, 1) * 255
     got = np.stack([points[name] for name in ("red", "green", "blue")], axis=1)
     assert np.abs(got - color.numpy()).max() <= 0.51
@@ -106,5 +107,5 @@ def test_points_before_shading_have_the_constant_harmonic(tmp_path):
 
 def test_a_scene_without_opaque_surfels_has_no_points(tmp_path):
     with pytest.raises(ArgumentError, match=r"surfels with an opacity of 0\.9999 at least, got 0\.\d+ at"):
-        export_model(tmp_path / "points.ply", ball(1), Export("points", 0.9999))
+        export_model(tmp_path / "points.ply", ball(1), Export("points", opacity=0.9999))
     assert not list(tmp_path.iterdir())

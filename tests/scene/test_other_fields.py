@@ -11,8 +11,7 @@ from tests.fields.voxels.test_voxels import ball as voxels
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.voxels.file import write_voxels
-from texgs.fields.voxels.model import VoxelScene
+from texgs.fields.voxels import VoxelScene, write_voxels
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 from texgs.scene.session import Session

@@ -16,7 +16,7 @@ from tests.volume.test_space import ORIENTED, TO_RAS, WRITERS, center_by_itk
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
-from texgs.fields.gaussians.files import write_gaussians
+from texgs.fields.gaussians import write_gaussians
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.raster.reference.shading import harmonics
@@ -209,7 +209,7 @@ def test_what_knows_no_space_stays_in_the_world_and_says_so(placed_scene, tmp_pa
     )
     assert main(["export", str(file), "--to", str(target), "--space", "file"]) == 2
     assert (
-        "--space: expected --kind points or mesh or vtp or usd or gltf or spz, got 3dgs"
+        "space: expected kind points or mesh or vtp or usd or gltf or spz, got 3dgs"
         in capsys.readouterr().err
     )
     model = scene.models["A"].file

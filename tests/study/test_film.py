@@ -7,7 +7,7 @@ import torch
 
 from tests.fields.voxels.test_voxels import ball
 from texgs.core.lens import Frame
-from texgs.fields.voxels.file import write_voxels
+from texgs.fields.voxels import write_voxels
 from texgs.scene.scene import Scene, SceneModel
 from texgs.study.ballot_page import cell, mosaic, write_film
 

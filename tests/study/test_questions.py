@@ -69,25 +69,22 @@ def test_variants_of_an_edit_have_the_scene_before_them(tmp_path):
 
 
 def test_what_cannot_be_asked_is_told(tmp_path):
-    with pytest.raises(ArgumentError, match="no scenes with a new look among the results; run something"):
-        questions(tmp_path)
+    def refused(key, edits=()):
+        with pytest.raises(ArgumentError, match=key):
+            questions(tmp_path, edits)
+
     job(tmp_path / "core", "edit_segment", EditResult("core", "segment", "grabcut", 1.0))
-    with pytest.raises(ArgumentError, match="no scenes with a new look"):
-        questions(tmp_path)
+    refused("new look")
     edit(tmp_path, "style")
     edit(tmp_path, "text", followed=WORDS)
-    with pytest.raises(ArgumentError, match=r"got only one of each \(engine style, engine text\); run edits"):
-        questions(tmp_path)
-    with pytest.raises(ArgumentError, match="--edits: expected some of style, text, got arf"):
-        questions(tmp_path, ["arf"])
+    refused("engine style, engine text")
+    refused("--edits: .* got arf", ["arf"])
     edit(tmp_path, "arf")
-    with pytest.raises(ArgumentError, match=r"no scene of engine by quick before its edits .* texgs compose"):
-        questions(tmp_path)
+    refused("no scene of engine by quick")
     fit(tmp_path)
     for number in range(25):
         edit(tmp_path, f"style{number}")
-    with pytest.raises(ArgumentError, match="at most 26 scenes in a question, got 27 of engine; choose some"):
-        questions(tmp_path)
+    refused("at most 26")
 
 
 def test_ranks_have_the_papers_names():
@@ -101,23 +98,9 @@ def test_ranks_have_the_papers_names():
 def test_a_key_is_read_as_it_was_written(tmp_path):
     path = write_key(tmp_path / "key.json", study("xyz", "zy"))
     assert read_key(path) == study("xyz", "zy")
+    changed = [study("xyz", "z"), study("xx"), study("xy", follows="music"), study()]
+    files = [write_key(tmp_path / f"{index}.json", each) for index, each in enumerate(changed)]
     path.write_text('{"study": 3}')
-    with pytest.raises(ArgumentError, match=r"key\.json: expected the key of a study, .* texgs study writes"):
-        read_key(path)
-    with pytest.raises(ArgumentError, match=r"none\.json: no such file"):
-        read_key(tmp_path / "none.json")
-
-
-@pytest.mark.parametrize(
-    ("orders", "follows", "message"),
-    [
-        (["xyz", "z"], "style", "question 2: expected 2 to 26 different options .*, got 1 of 1 and style"),
-        (["xx"], "style", "question 1: expected 2 to 26 different options .*, got 1 of 2 and style"),
-        (["xy"], "music", "question 1: .* that follow style or instruction, got 2 of 2 and music"),
-        ([], "style", "expected questions, got none; texgs study writes one"),
-    ],
-)
-def test_a_key_that_was_changed_is_refused(tmp_path, orders, follows, message):
-    path = write_key(tmp_path / "key.json", study(*orders, follows=follows))
-    with pytest.raises(ArgumentError, match=rf"key\.json: {message}"):
-        read_key(path)
+    for file in (*files, path, tmp_path / "none.json"):
+        with pytest.raises(ArgumentError, match=file.name):
+            read_key(file)

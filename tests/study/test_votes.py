@@ -10,7 +10,7 @@ from PIL import Image
 from tests.report.written import lines, rows
 from tests.study.studies import study
 from texgs.study.ballots import Ballot, Votes
-from texgs.study.votes import compared, draw, user_study, write_votes
+from texgs.study.votes import draw, panels_by_kind, user_study, write_votes
 
 STUDY = study("xyz", "zyx")
 BALLOTS = [  # ranks by letter: x is the best, y is mostly second
@@ -97,7 +97,7 @@ def test_the_papers_file_holds_ten_votes_in_each_row_and_column():
 
 
 def test_bars_are_as_long_as_there_are_votes_from_the_best_rank_on():
-    (_, ours), (_, theirs) = compared(Votes(STUDY, BALLOTS))
+    (_, ours), (_, theirs) = panels_by_kind(Votes(STUDY, BALLOTS))
     axes = Figure().subplots()
     draw(axes, "image-driven", ours)
     lengths = [[bar.get_width() for bar in bars] for bars in axes.containers]
@@ -114,7 +114,7 @@ def test_bars_are_as_long_as_there_are_votes_from_the_best_rank_on():
 
 @pytest.mark.parametrize(("votes", "charts"), [(Votes(STUDY, BALLOTS), 2), (None, 2)])
 def test_there_is_a_chart_for_each_group(tmp_path, votes, charts):
-    assert len(compared(votes)) == charts
+    assert len(panels_by_kind(votes)) == charts
     path = write_votes(tmp_path / "votes.png", votes)
     with Image.open(path) as picture:
         assert picture.width == 750

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from texgs.core.keys import key
-from texgs.fields.kinds import Functions, Kind
+from texgs.fields.kinds import Kind
 from texgs.fitting.kinds import FitSpec
 
 
@@ -88,9 +88,14 @@ def write(path, ball):
     return path
 
 
+def compose(fields, segments):
+    """Return the only ball."""
+    return fields[0]
+
+
 def fit(task):
     """The mean colour of what is opaque."""
-    from texgs.fitting.kinds import Fitted
+    from texgs.fitting.task import Fitted
 
     start = time.monotonic()
     planes = task.images.planes.float() / 255
@@ -103,6 +108,6 @@ FIELD = Kind(
     "ball",
     ("texgs-ball",),
     frozenset({"opacity"}),
-    lambda: Functions(read, write, lambda fields, segments: fields[0]),
+    *(f"{__name__}:read", f"{__name__}:write", f"{__name__}:compose"),
 )
-FIT = FitSpec(FIELD, "fit a ball", phases=("ball",), settings=BallKeys, fit=fit)
+FIT = FitSpec("ball", "fit a ball", ("ball",), BallKeys, f"{__name__}:fit")

@@ -2,10 +2,11 @@ import logging
 import os
 import shutil
 
+import mlflow
 import pytest
 from mlflow import MlflowClient
 
-from texgs.workflow.store import SETTINGS, connect
+from texgs.workflow.runs import opened
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -13,15 +14,24 @@ def patience_of_users():
     """Put back what the first use of MLflow sets for the whole process, for other tests."""
     before = dict(os.environ)
     yield
-    for name in SETTINGS.keys() - before.keys():
-        os.environ.pop(name, None)
+    for name in os.environ.keys() - before.keys():
+        if name.startswith("MLFLOW_"):
+            del os.environ[name]
+
+
+@pytest.fixture(autouse=True)
+def no_active_run():
+    """End the runs that a test has left in this process."""
+    yield
+    while mlflow.active_run():
+        mlflow.end_run()
 
 
 @pytest.fixture(scope="session")
 def empty_store(tmp_path_factory):
     """A store without runs; making one takes seconds, so that tests copy it."""
     database = tmp_path_factory.mktemp("store") / "mlflow.db"
-    connect(f"sqlite:///{database}", "elsewhere")
+    opened(f"sqlite:///{database}", "elsewhere")
     return database
 
 

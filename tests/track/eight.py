@@ -17,7 +17,7 @@ N_JOBS, N_METRICS = 8, 20
 
 def job(index, barrier, uri, file):
     barrier.wait()
-    job = {"name": f"job {index}", "tags": {"dataset": f"volume {index}"}, "params": {"fit": {"seed": index}}}
+    job = {"name": f"job {index}", "tags": {"dataset": f"volume {index}"}, "params": {"fit.seed": str(index)}}
     with run(uri, experiment="race", **job) as record:
         for step in range(N_METRICS):
             record.log({"loss": index + step / 100}, step)
@@ -48,7 +48,8 @@ def assert_eight_jobs_lose_nothing(folder, *uris):
     for uri in uris:
         client = MlflowClient(tracking_uri=uri)
         runs = client.search_runs([client.get_experiment_by_name("race").experiment_id])
-        assert sorted(run.data.params["fit.seed"] for run in runs) == [str(index) for index in range(N_JOBS)]
+        seeds = sorted(run.data.params["fit.seed"] for run in runs)
+        assert seeds == [str(index) for index in range(N_JOBS)], seeds
         for each in runs:
             seed = int(each.data.params["fit.seed"])
             assert (each.info.status, each.info.run_name) == ("FINISHED", f"job {seed}")

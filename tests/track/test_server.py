@@ -9,8 +9,7 @@ import urllib.request
 import pytest
 
 from tests.track.eight import assert_eight_jobs_lose_nothing
-from texgs.workflow.runs import begin, run
-from texgs.workflow.store import TrackingError
+from texgs.workflow.runs import TrackingError, begin, run
 
 pytestmark = pytest.mark.subprocess
 

@@ -1,18 +1,14 @@
-"""The file of a store: made once, upgraded, moved, in odd places, or of something else."""
+"""The file of a store: made once, in odd places, or of something else."""
 
 import os
-import shutil
 import sqlite3
 from contextlib import closing
-from pathlib import Path
 
 import pytest
 from mlflow import MlflowClient
-from mlflow.artifacts import download_artifacts
 
 from tests.track.eight import assert_eight_jobs_lose_nothing
-from texgs.workflow.runs import begin, run
-from texgs.workflow.store import TrackingError
+from texgs.workflow.runs import TrackingError, begin, run
 
 pytestmark = pytest.mark.subprocess
 
@@ -51,32 +47,6 @@ def test_other_files_are_refused_and_left_alone(tmp_path):
     with pytest.raises(TrackingError, match=r"the tracking store cannot be used .*Not a directory"):
         begin(f"sqlite:///{text}/below/mlflow.db", **JOB)
     assert (other.read_bytes(), text.read_bytes()) == before
-
-
-def test_a_moved_store_goes_on_beside_its_files(tmp_path, empty_store):
-    """Runs from before the move stay, in an experiment of another name."""
-    old, new = tmp_path / "results", tmp_path / "archive" / "results"
-    old.mkdir()
-    shutil.copy(empty_store, old / "mlflow.db")
-    with run(f"sqlite:///{old}/mlflow.db", **JOB) as first:
-        first.log({"psnr": 30})
-        first.artifact(__file__)
-    shutil.copytree(old, new)
-    shutil.rmtree(old)
-    uri = f"sqlite:///{new}/mlflow.db"
-    for _ in range(2):
-        with run(uri, **JOB) as second:
-            second.artifact(__file__, "tables")
-    assert not old.exists()
-    client = MlflowClient(tracking_uri=uri)
-    place = {"run_id": second.id, "tracking_uri": uri}
-    copy = download_artifacts(artifact_path="tables/test_store.py", **place)
-    assert Path(copy).read_bytes() == Path(__file__).read_bytes()
-    stored = client.get_run(first.id)
-    assert stored.data.metrics == {"psnr": 30}
-    names = {client.get_experiment(each).name for each in (stored.info.experiment_id,)}
-    assert names == {f"texgs {stored.info.experiment_id}, before it was moved"}
-    assert len(client.search_runs([client.get_experiment_by_name("texgs").experiment_id])) == 2
 
 
 def test_a_project_with_quotes_and_a_question_mark_in_its_path(tmp_path, monkeypatch):

@@ -2,7 +2,7 @@
 
 import json
 import zlib
-from base64 import b64decode
+from base64 import b64decode, b64encode
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,11 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene, SceneModel
-from texgs.viewer.standalone import joined_modules
+from texgs.scene.twin import Twin
+from texgs.viewer.description import describe
+from texgs.viewer.page_steps import page_steps
+from texgs.viewer.page_volume import page_volume
+from texgs.viewer.standalone import joined_modules, pack
 
 START = """
 const { WebglRenderer } = modules["webgl.js"];
@@ -91,3 +95,48 @@ def rendered(packed, camera, light, edits, background, mode="shaded", cuts=NO_CU
     """What the rasterizer makes of the numbers in a packed text [H, W, 3], uint8."""
     models = {str(number): SceneModel(Path(), edit) for number, edit in enumerate(edits)}
     return frame(composed_of(packed), camera, Scene(models, light, background, cuts), mode)
+
+
+class Drawing:
+    """A browser that draws a scene, and what texgs renders of it; nothing may go wrong in it.
+
+    Args:
+        chromium: that draws.
+        scene: as it is opened; changes of it are drawn, too.
+        has_volume: whether the page has the scene's volume.
+        is_exact: whether texgs renders the numbers of the page, which are rounded.
+        script: that runs before all others.
+    """
+
+    def __init__(self, chromium, scene, *, has_volume=False, is_exact=False, script="() => {}"):
+        composed, steps = scene.open(), page_steps(scene)
+        self.scene, self._packed, self._is_exact = scene, pack(composed), is_exact
+        self._held = {"held": list(steps.packed)} if steps else {}
+        self._volume = page_volume(scene, 100) if has_volume else None
+        self.page, self.errors = chromium.new_page(), []
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", lambda said: self.errors.append(said.text) if said.type == "error" else None)
+        self.page.evaluate(script)
+        volume = b64encode(self._volume.packed).decode() if self._volume else ""
+        held = steps.packed.values() if steps else ()
+        open_renderer(self.page, self._packed, self.describe(scene), volume, held)
+
+    def describe(self, scene):
+        """The description of a scene of the same models."""
+        described = describe("test", scene, scene.open()) | self._held
+        return described | ({"volume": self._volume.describe(scene)} if self._volume else {})
+
+    def draw(self, scene, camera, mode="shaded", **shown):
+        """What the page draws [H, W, 3], integers."""
+        return drawn(self.page, camera, self.describe(scene), mode, **shown).astype(int)
+
+    def render(self, scene, camera, mode="shaded"):
+        """What texgs renders [H, W, 3], integers."""
+        composed = composed_of(self._packed) if self._is_exact else scene.open()
+        twin = Twin(scene) if self._volume else None
+        return frame(composed, camera, scene, mode, twin).astype(int)
+
+
+def closeness(one, other):
+    """PSNR of two pictures, dB."""
+    return -10 * np.log10(max(np.mean((one / 255.0 - other / 255.0) ** 2), 1e-9))

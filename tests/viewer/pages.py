@@ -27,6 +27,11 @@ class Browser:
         self.socket = socket
 
     async def send(self, **message):
+        """Send a message; edits have a title, as pages give them one."""
+        if message.get("type") == "edit":
+            message = {
+                "title": " ".join(str(message.get(key, "")) for key in ("part", "key", "value")).strip()
+            } | message
         await self.socket.send_str(json.dumps(message))
 
     async def next(self, kind):

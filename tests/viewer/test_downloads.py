@@ -55,7 +55,7 @@ def test_a_film_passes_its_stops_evenly_and_the_short_way():
 async def test_the_scene_is_written_as_it_is_shown(browser, client):
     _, whole = await saved(browser, client, "3dgs")
     await browser.send(type="edit", part="TF02", key="visible", value=False)
-    await browser.past("TF02 visible off")
+    await browser.past("TF02 visible False")
     _, part = await saved(browser, client, "3dgs")
     counts = [len(PlyData.read(io.BytesIO(each))["vertex"]) for each in (whole, part)]
     assert counts[1] == counts[0] // 2

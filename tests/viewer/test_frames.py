@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from texgs.viewer.frames import LEAST, SLOW, Pace
+from texgs.viewer.frames import LEAST_SCALE, SLOW_FRAME, Pace
 
 
 def drag(pace, fixed, per_frame, count=12):
@@ -21,7 +21,7 @@ def test_frames_become_fast_or_as_small_as_they_may(fixed, per_frame):
     pace = Pace()
     assert pace.scale(moving=True) == 1
     last = drag(pace, fixed, per_frame)[-1]
-    assert last <= SLOW / 0.8**2 * (1 + 1e-9) or pace.scale(moving=True) <= LEAST / 0.8
+    assert last <= SLOW_FRAME / 0.8**2 * (1 + 1e-9) or pace.scale(moving=True) <= LEAST_SCALE / 0.8
     before = pace.scale(moving=True)
     drag(pace, fixed, per_frame, count=5)
     assert pace.scale(moving=True) == before, "the sharpness of a drag stays"
@@ -31,7 +31,7 @@ def test_a_frame_at_rest_is_whole_and_changes_nothing_of_a_slow_drag():
     pace = Pace()
     drag(pace, 0.001, 0.2)
     before = pace.scale(moving=True)
-    assert LEAST <= before < 0.6
+    assert LEAST_SCALE <= before < 0.6
     assert pace.scale(moving=False) == 1
     pace.took(0.2, 1.0)
     assert pace.scale(moving=True) == before
@@ -40,6 +40,6 @@ def test_a_frame_at_rest_is_whole_and_changes_nothing_of_a_slow_drag():
 def test_what_becomes_fast_is_whole_again():
     pace = Pace()
     drag(pace, 0.05, 0.2)
-    assert pace.scale(moving=True) <= LEAST / 0.8
+    assert pace.scale(moving=True) <= LEAST_SCALE / 0.8
     drag(pace, 0.001, 0.002)
     assert pace.scale(moving=True) == 1

@@ -15,99 +15,26 @@ from PIL import Image
 from safetensors.numpy import load
 from torch.nn.functional import normalize
 
-from tests.fields.surfels.test_composition import ball
-from tests.scene.test_twin import HIGH, LOOK, LOW
-from tests.viewer.drawing import drawn, open_renderer, unpacked
+from tests.viewer.drawing import closeness, unpacked
+from tests.viewer.drawn_scenes import BEGIN, COUNT, scene_of_series
 from tests.viewer.in_browser import LINK, PLACE, WAIT, expect, served, shown, still
 from tests.viewer.in_browser import opened as opened_viewer
 from texgs.cli.main import main
 from texgs.core.camera import orbit
-from texgs.core.cuts import Cuts, Plane
 from texgs.core.errors import ArgumentError
-from texgs.core.light import Light
-from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.step_file import write_step
-from texgs.fields.surfels.variants import write_texture
 from texgs.scene.frame import frame
-from texgs.scene.scene import Scene, SceneModel, SceneSegment, SceneVolume
-from texgs.scene.scene_file import read_scene, write_scene
-from texgs.scene.segment_file import write_segment
-from texgs.scene.series_file import Series, write_series
+from texgs.scene.scene_file import read_scene
 from texgs.viewer import standalone
 from texgs.viewer.description import describe
 from texgs.viewer.page_steps import UNITS, page_steps
 from texgs.viewer.standalone import pack, scene_page
-from texgs.volume.generate import sphere
-from texgs.volume.prepare import prepare
-from texgs.volume.slabs import ArraySource
 
-COUNT, BEGIN = 5, 2  # steps, and the one that the scene shows
-CAMERA = orbit(20, 10, 3, 40, 96, 80)
 CLOSE = 50.0  # dB: the page rounds surfels and texels
-
-
-def at(model, time):
-    """A model that moves to the right, turns, shrinks, fades and changes its colours."""
-    p, g = dict(model.parameters), torch.Generator().manual_seed(time)
-    p["means"] = p["means"] + p["means"].new_tensor([0.12 * time, 0, 0])
-    for name in ("quats", "normals"):
-        p[name] = normalize(p[name], dim=1) + 0.2 * time * torch.randn(p[name].shape, generator=g)
-    p["scales"] = p["scales"] - 0.1 * time
-    p["opacities"] = p["opacities"] + 0.5 * time
-    p["colors"] = p["colors"] + 0.05 * time
-    return replace(model, parameters=p)
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    """Two models, of which one follows a series; a part of it has a look of its own, with its own colours."""
-    folder = tmp_path_factory.mktemp("series")
-    key, other = ball(1, n=300), ball(2, n=60, middle=0.3)
-    key.parameters["normals"] = key.parameters["quats"].flip(1)  # the other has none of its own
-    styled = replace(key, parameters={**key.parameters, "colors": 0.5 * key.parameters["colors"] + 0.3})
-    above = write_segment(folder / "above.segment", key, key.parameters["means"][:, 1] > 0.2, {})
-    look = write_texture(folder / "look.safetensors", styled)
-    series = Series(folder / "series.json", [f"{number}.nrrd" for number in range(COUNT)], ["A"])
-    for time in range(COUNT):
-        write_step(series.model("A", time), key, at(key, time), {})
-        prepare(ArraySource(sphere(24 + 2 * time), "made"), series.volume(time))
-    write_series(series)
-    models = {
-        "B": SceneModel(write_model(folder / "b.safetensors", other)),
-        "A": SceneModel(
-            write_model(folder / "a.safetensors", key), segments={"above": SceneSegment(above, texture=look)}
-        ),
-    }
-    volume = SceneVolume(series.volume(0), {"A": LOW, "B": HIGH}, LOOK)
-    whole = Scene(models, series=series, volume=volume).at(BEGIN)
-    return read_scene(write_scene(folder / "scene.yaml", whole))
-
-
-@pytest.fixture(scope="module")
-def page(chromium, scene):
-    """A browser that draws the scene at any step; nothing may go wrong in it."""
-    page, errors = chromium.new_page(), []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    steps = page_steps(scene).packed
-    description = describe("test", scene, scene.open()) | {"held": list(steps)}
-    open_renderer(page, pack(scene.open()), description, steps=steps.values())
-    yield page
-    page.close()
-    assert errors == []
-
-
-def closeness(one, other):
-    """PSNR of two pictures, dB."""
-    return -10 * np.log10(max(np.mean((one / 255.0 - other / 255.0) ** 2), 1e-9))
-
-
-def compared(page, seen, mode="shaded"):
-    """PSNR of what the page draws of a scene, and of the frame of it as it is."""
-    composed = seen.open()
-    rendered = frame(composed, CAMERA, seen, mode)
-    assert rendered.std() > 5, "something is seen"
-    return closeness(drawn(page, CAMERA, describe("test", seen, composed), mode), rendered)
+    return scene_of_series(tmp_path_factory.mktemp("series"))
 
 
 # ---- Numbers ----------------------------------------------------------------
@@ -165,47 +92,6 @@ def test_a_scene_without_a_series_has_none_of_it(scene):
 
 def test_the_same_scene_gives_the_same_page(scene):
     assert scene_page(scene, "x").text == scene_page(scene, "x").text
-
-
-# ---- Frames -----------------------------------------------------------------
-
-
-@pytest.mark.parametrize("mode", ["shaded", "normal"])
-def test_each_step_is_that_of_the_rasterizer(page, scene, mode):
-    for time in (4, 0, 1, BEGIN):
-        assert compared(page, scene.at(time), mode) > CLOSE - 6 * (mode == "normal")
-    here, there = (drawn(page, CAMERA, describe("test", scene.at(t), scene.open())) for t in (BEGIN, 4))
-    assert closeness(here, there) < 30, "steps differ"
-
-
-def test_edits_hold_through_time(page, scene):
-    edited = replace(
-        scene,
-        light=Light("directional", 100, 30),
-        cuts=Cuts([Plane([0.0, 1.0, 0.2], 0.2)]),
-        background=(0.2, 0.3, 0.5),
-        volume=None,
-        models={
-            "B": replace(scene.models["B"], edit=PartEdit(opacity=0.4, specular=3.0)),
-            "A": replace(
-                scene.models["A"],
-                edit=PartEdit(palette=(0.9, 0.2, 0.1), opacity=2.0),
-                segments={"above": replace(scene.models["A"].segments["above"], edit=PartEdit(diffuse=1.5))},
-            ),
-        },
-    )
-    for time in (0, 4):
-        assert compared(page, edited.at(time)) > CLOSE - 12, "fragments on a plane but for rounding"
-
-
-def test_textures_stay_on_the_card(page, scene):
-    page.evaluate(
-        "() => { globalThis.made = 0; const gl = renderer._gl, make = gl.createTexture;"
-        " gl.createTexture = () => { made += 1; return make.call(gl); }; }"
-    )
-    for time in (1, 3):
-        drawn(page, CAMERA, describe("test", scene.at(time), scene.open()))
-    assert page.evaluate("made") == 0
 
 
 # ---- The page ---------------------------------------------------------------
@@ -371,7 +257,7 @@ def test_a_damaged_step_is_told_and_the_others_stay(opened, scene, tmp_path):
 def test_steps_are_of_pages_alone(scene, tmp_path, capsys):
     source = str(scene.series.file.with_name("scene.yaml"))
     assert main(["export", source, "--to", str(tmp_path / "x.ply"), "--steps", "one"]) == 2
-    assert "--steps: expected --to a page, .html, got" in capsys.readouterr().err
+    assert "steps: expected kind html, got 3dgs; leave it out" in capsys.readouterr().err
     assert main(["export", source, "--to", str(tmp_path / "x.html"), "--steps", "half"]) == 2
     assert "steps: expected all, one or a number N for each N-th step, got 'half'" in capsys.readouterr().err
 

@@ -3,227 +3,29 @@
 import io
 import json
 import zlib
-from base64 import b64encode
-from dataclasses import asdict, replace
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 from safetensors.numpy import load
 from scipy.ndimage import map_coordinates
 
-from tests.fields.surfels.test_composition import ball
-from tests.scene.balls import ball_models
-from tests.scene.test_twin import HIGH, LOOK, LOW
-from tests.viewer.drawing import drawn, open_renderer, view_of
+from tests.viewer.drawing import closeness
+from tests.viewer.drawn_scenes import scene_of_volume, waves
 from texgs.cli.main import main
-from texgs.core.camera import orbit
-from texgs.core.cuts import Box, Cuts, Plane
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_json
-from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.variants import write_texture
-from texgs.scene.cut_view import beside
-from texgs.scene.frame import frame
-from texgs.scene.scene import Scene, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
-from texgs.scene.twin import Twin, range_of
-from texgs.viewer.description import describe
 from texgs.viewer.downloads import Downloads, exports_of
-from texgs.viewer.frames import shown as shown_beside
 from texgs.viewer.messages import Export, parse
-from texgs.viewer.page_volume import LEVELS, PageVolume, page_volume, within
-from texgs.viewer.standalone import pack
-from texgs.volume.generate import sphere
+from texgs.viewer.page_volume import LEVELS, PageVolume, within
 from texgs.volume.grid import Grid
-from texgs.volume.nrrd_file import open_grid
-from texgs.volume.prepare import prepare
-from texgs.volume.slabs import ArraySource
-from texgs.volume.transfer import TransferFunction, combine
 
-CAMERA = orbit(20, 10, 4, 30, 96, 80)
-FROM_BELOW = orbit(-130, -40, 2.5, 40, 64, 90)
-SIDE = Light("directional", 100, 30)
-CUTS = Cuts([Plane([1.0, 0.2, 0.0], 0.1), Plane([0.0, 1.0, 0.3], 0.2)])
 PLACE = {"azimuth": 20, "polar": 10, "distance": 4, "target": [0, 0, 0], "fov_y": 30}
 VIEW = parse(json.dumps({"type": "view", "camera": {**PLACE, "width": 96, "height": 80}}))
-LEAST = 38.0  # dB; samples are codes of 8 bits, and steps are longer than those of the caster
-WIDE = TransferFunction(((0.1, 0), (0.2, 0.3), (0.9, 0.1)), ((0.1, 0.9, 0.2, 0.1), (0.9, 0.1, 0.9, 0.4)))
-
-
-def volume_of(folder, grid):
-    """A prepared volume with two basic TFs, which are given on the range of its values."""
-    write_json(folder / "volume.json", asdict(prepare(ArraySource(grid, "made"), folder / "volume.nrrd")))
-    tfs = {"low": LOW.scaled(*ends_of(grid)), "high": HIGH.scaled(*ends_of(grid))}
-    return SceneVolume(folder / "volume.nrrd", tfs, LOOK)
-
-
-def ends_of(grid):
-    return float(grid.values.min()), float(grid.values.max())
-
-
-def waves(shape=(30, 26, 34), spacing=(1.0, 1.5, 0.7)):
-    """A lumpy body on a lattice with different spacings."""
-    z, y, x = np.meshgrid(*(np.linspace(-1, 1, size) for size in shape), indexing="ij")
-    values = np.exp(-2 * (x**2 + y**2 + z**2)) + 0.1 * np.sin(5 * x) * np.cos(4 * y) * np.cos(6 * z)
-    return Grid(values.astype(np.float32), spacing, (3.0, -2.0, 10.0))
-
-
-@pytest.fixture(scope="module", params=["sphere", "waves", "flat"])
-def scene(request, tmp_path_factory):
-    """Two balls of surfels beside a volume that they have little to do with."""
-    folder = tmp_path_factory.mktemp(request.param)
-    grids = {
-        "sphere": sphere(40),
-        "waves": waves(),
-        "flat": waves((24, 2, 20), (1, 3, 1)),
-    }
-    models = ball_models(folder, "low", "high")
-    return Scene(models, volume=volume_of(folder, grids[request.param]))
-
-
-@pytest.fixture(scope="module")
-def page(chromium, scene):
-    """A browser that draws the scene with its volume; nothing may go wrong in it."""
-    page, errors = chromium.new_page(), []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-    open_in(page, scene)
-    yield page
-    page.close()
-    assert errors == []
-
-
-def open_in(page, scene):
-    composed, volume = scene.open(), page_volume(scene, 100)
-    page.description = describe("test", scene, composed) | {"volume": volume.describe(scene)}
-    packed = pack(composed)
-    open_renderer(page, packed, page.description, b64encode(volume.packed).decode())
-
-
-def described(page, scene):
-    """The description of another scene of the same models."""
-    composed, volume = scene.open(), page.description["volume"]
-    return describe("test", scene, composed) | {"volume": {**volume, "looks": scene.has_looks}}
-
-
-def closeness(one, other):
-    """PSNR of two pictures, dB."""
-    return -10 * np.log10(max(np.mean((one / 255.0 - other / 255.0) ** 2), 1e-9))
-
-
-def compare(page, scene, camera=CAMERA, mode="volume"):
-    """PSNR of what a page shows and the frame of `texgs render`."""
-    expected = frame(scene.open(), camera, scene, mode, Twin(scene))
-    assert expected.std() > 5, "something is seen"
-    return closeness(drawn(page, camera, described(page, scene), mode), expected)
-
-
-@pytest.mark.parametrize("light", [HEADLIGHT, SIDE], ids=["headlight", "side"])
-@pytest.mark.parametrize("camera", [CAMERA, FROM_BELOW], ids=["above", "below"])
-def test_the_volume_is_that_of_the_caster(page, scene, camera, light):
-    assert compare(page, replace(scene, light=light), camera) > LEAST
-
-
-@pytest.mark.parametrize(
-    "edit",
-    [
-        {"visible": False},
-        {"opacity": 0.3},
-        {"opacity": 5.0, "palette": (0.1, 0.8, 0.2)},
-        {"ambient": 0.2, "diffuse": 1.5, "specular": 3.0, "shininess": 0.3},
-        {"specular": 3.0, "shininess": 0.3, "tint": (1.0, 0.5, 0.1)},
-    ],
-    ids=lambda edit: next(iter(edit)),
-)
-def test_edits_are_those_of_the_twin(page, scene, edit):
-    models = {**scene.models, "low": replace(scene.models["low"], edit=PartEdit(**edit))}
-    assert compare(page, replace(scene, models=models)) > LEAST
-
-
-def test_functions_take_the_place_of_basic_ones_and_may_overlap(page, scene):
-    ends = ends_of(open_grid(scene.volume.file))
-    tried = replace(scene, functions={"high": WIDE.scaled(*ends), "new": HIGH.scaled(*ends)})
-    assert compare(page, tried) > LEAST
-    fitted, same = (drawn(page, CAMERA, described(page, each), "shaded") for each in (scene, tried))
-    assert np.array_equal(fitted, same), "no model was made of them"
-
-
-@pytest.mark.parametrize("faces", ["shaded", "unlit"])
-def test_cuts_without_looks_are_those_of_the_twin(page, scene, faces):
-    for cuts in (replace(CUTS, faces=faces), Cuts(box=Box([-0.3, -0.4, -0.2], [0.2, 0.3, 0.4]), faces=faces)):
-        for mode in ("volume", "shaded"):
-            assert compare(page, replace(scene, cuts=cuts, light=SIDE), mode=mode) > LEAST - 3
-
-
-def test_cuts_leave_materials_that_differ(page, scene):
-    """A volume has one: models with others are seen below faces, as in `texgs render`."""
-    name, entry = next(iter(scene.models.items()))
-    edited = replace(entry, edit=PartEdit(ambient=0.2, diffuse=0.1))
-    cut = replace(scene, models={**scene.models, name: edited}, cuts=CUTS, light=SIDE)
-    of_volume = frame(cut.open(), CAMERA, cut, "volume", Twin(cut))
-    assert closeness(of_volume, frame(cut.open(), CAMERA, cut, "shaded", Twin(cut))) < 35
-    assert compare(page, cut, mode="shaded") > 40
-
-
-def test_cuts_with_looks_have_faces_of_the_volume_over_the_models(page, scene, tmp_path):
-    texture = write_texture(tmp_path / "look.safetensors", ball(1))
-    models = {**scene.models, "low": replace(scene.models["low"], texture=texture)}
-    styled = replace(scene, models=models, cuts=CUTS)
-    page.evaluate("() => { renderer._original.volume.looks = true; renderer._upload(); }")
-    got = compare(page, styled, mode="shaded")
-    page.evaluate("() => { renderer._original.volume.looks = false; renderer._upload(); }")
-    hollow = replace(styled, volume=None)
-    bare = frame(hollow.open(), CAMERA, hollow)
-    faces = frame(styled.open(), CAMERA, styled, twin=Twin(styled))
-    assert got > max(32.0, closeness(bare, faces) + 3), "rims have a quarter of the resolution, and 8 bits"
-
-
-@pytest.mark.parametrize("mode", ["difference", "wipe"])
-def test_scene_and_volume_beside_each_other(page, scene, mode):
-    image, truth = beside(scene.open(), CAMERA, scene, Twin(scene))
-    expected = shown_beside(replace(VIEW, mode=mode, gain=4.0, wipe=0.4), image.color, truth.color)
-    got = drawn(page, CAMERA, described(page, scene), mode, gain=4, wipe=0.4)
-    assert closeness(got, expected) > LEAST - 12 * (mode == "difference"), "differences are enlarged"
-
-
-DEPTH = """([camera, scene, mode, pixel]) => {
-  const view = { ...camera, viewmat: () => camera.viewmat, unproject: (place, depth) => depth };
-  renderer.size = () => [camera.width, camera.height];
-  return renderer.pointAt(view, scene, { mode }, pixel);
-}"""
-
-
-def test_depths_of_the_volume_are_those_of_the_caster(page, scene):
-    """A double click turns around what the mode shows: the volume here, or the models."""
-    volume = Twin(scene)._caster.cast(combine(scene.volume.tfs), CAMERA, HEADLIGHT, ("depth",))
-    models = scene.open().render(CAMERA, HEADLIGHT, scene.edits, outputs=("depth",))
-    row, column = divmod(int(volume.rgba[..., 3].argmax()), CAMERA.width)
-    for mode, expected in (("volume", volume), ("shaded", models)):
-        words = [view_of(CAMERA), described(page, scene), mode, [column, row]]
-        assert page.evaluate(DEPTH, words) == pytest.approx(float(expected.depth[row, column]), abs=5e-3)
-        assert page.evaluate(DEPTH, [*words[:3], [0, 0]]) is None, "the background"
-
-
-def test_a_point_of_a_face_is_of_the_volume(page, scene):
-    """What is behind it may be far away, or nothing."""
-    cut = replace(scene, cuts=CUTS)
-    seen = Twin(cut).render(CAMERA, cut, scene.open().palettes, range_of(CUTS, CAMERA), outputs=("depth",))
-    face = torch.where(range_of(CUTS, CAMERA).face >= 0, seen.alpha, 0.0)
-    row, column = divmod(int(face.argmax()), CAMERA.width)
-    words = [view_of(CAMERA), described(page, cut), "shaded", [column, row]]
-    assert page.evaluate(DEPTH, words) == pytest.approx(float(seen.depth[row, column]), abs=5e-3)
-
-
-def test_moving_pictures_have_longer_steps(page, scene):
-    moving = drawn(page, CAMERA, described(page, scene), "volume", moving=True)
-    still = drawn(page, CAMERA, described(page, scene), "volume")
-    assert 30 < closeness(moving, still) < 80
 
 
 # ---- What is left of a volume -----------------------------------------------
@@ -295,8 +97,7 @@ def test_no_room_is_a_sentence():
 def source(tmp_path_factory):
     """A scene file with a volume, as the workflow makes it."""
     folder = tmp_path_factory.mktemp("whole")
-    models = ball_models(folder, "low", "high")
-    return write_scene(folder / "scene.yaml", Scene(models, volume=volume_of(folder, waves())))
+    return write_scene(folder / "scene.yaml", scene_of_volume(folder, waves()))
 
 
 def test_the_page_works_alone(chromium, source, capsys):
@@ -340,15 +141,14 @@ def settled(page):
     return np.asarray(picture).astype(int)
 
 
-def test_the_viewer_exports_it_too(source):
+def test_the_viewer_exports_it_too(source, tmp_path):
     scene = read_scene(source)
     assert "volume" in exports_of(scene)
     assert "volume" not in exports_of(replace(scene, volume=None))
-    downloads = Downloads(None, SimpleNamespace(checked=lambda scene: ""))
-    written = downloads.write(scene, Export("volume", VIEW), "scene").read_text()
+    downloads = Downloads(None, SimpleNamespace(checked=lambda scene: ""), tmp_path / "files")
+    written = downloads.write(scene, Export("volume", VIEW), "scene")[0].read_text()
     assert 'id="volume"' in written
-    assert 'id="volume"' not in downloads.write(scene, Export("html", VIEW), "scene").read_text()
-    downloads.close()
+    assert 'id="volume"' not in downloads.write(scene, Export("html", VIEW), "scene")[0].read_text()
 
 
 def test_the_same_scene_gives_the_same_bytes(source, tmp_path):
@@ -362,9 +162,7 @@ def test_the_same_scene_gives_the_same_bytes(source, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--to", "x.ply", "--volume"], "--volume: expected --to a page, .html, got x.ply; leave it out"),
-        (["--to", "x.html", "--volume", "0"], "volume: expected a size in MB above 0, got 0"),
-        (["--to", "x.html", "--volume", "nan"], "volume: expected a size in MB above 0, got nan"),
+        (["--to", "x.html", "--volume", "nan"], "--volume: expected a finite number, got nan"),
         (["--to", "x.html", "--volume", "1e-5"], "expected room for at least 2 samples a side, got 10 bytes"),
     ],
 )

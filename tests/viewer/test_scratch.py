@@ -9,10 +9,9 @@ from texgs.viewer.scratch import scratch_folder
 KILLED = """
 import os, signal
 from pathlib import Path
-from texgs.viewer.looks import Looks
-from texgs.viewer.styles import Styles
-looks = Looks(Styles())
-looks._scratch.new("preview", 1).mkdir(parents=True)
+from texgs.viewer.scratch import scratch_folder
+folder = scratch_folder()
+Path(folder.name, "looks").mkdir()
 os.kill(os.getpid(), signal.SIGKILL)
 """
 
@@ -23,7 +22,7 @@ def test_what_a_killed_viewer_has_left_is_removed_by_the_next(tmp_path, monkeypa
     (other := tmp_path / "texgs-view-other-1-x").mkdir()
     alive = scratch_folder()
     subprocess.run([sys.executable, "-c", KILLED])
-    assert len(list(tmp_path.iterdir())) == 4
+    assert len(list(tmp_path.iterdir())) == 3
     with scratch_folder() as path:
         assert {str(each) for each in tmp_path.iterdir()} == {str(other), alive.name, path}
     alive.cleanup()

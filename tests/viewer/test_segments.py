@@ -15,6 +15,7 @@ from tests.edit.lift_scenes import two_balls
 from tests.viewer.pages import on_page
 from texgs.edit.clicks import Clicks
 from texgs.edit.lift import lift
+from texgs.edit.mask_keys import MaskKeys
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
@@ -23,11 +24,11 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment
 from texgs.viewer.messages import Orbit
-from texgs.viewer.segments import SIZE, isolated
+from texgs.viewer.segments import isolated
 from texgs.volume.cameras import icosphere_of
 
 FRONT = Orbit((0.0, 0.0, 0.0), -90, 0, 4.0, 22.0, 120, 120)  # on +z
-VIEWS = 12
+KEYS = MaskKeys(views=12)
 RED, BESIDE = (-0.3, 0.0, 0.0), (0.0, -0.7, 0.0)
 
 
@@ -35,7 +36,7 @@ RED, BESIDE = (-0.3, 0.0, 0.0), (0.0, -0.7, 0.0)
 def small(monkeypatch):
     """Few views and no weights, wherever the tests run."""
     monkeypatch.setattr("texgs.viewer.segments.CHOICES", ("grabcut",))
-    monkeypatch.setattr("texgs.viewer.segments.VIEWS", VIEWS)
+    monkeypatch.setattr("texgs.viewer.segments.VOTING", KEYS)
 
 
 @pytest.fixture
@@ -101,21 +102,6 @@ async def test_an_outline_shows_the_mask_of_what_it_holds_and_makes_a_segment(br
     assert (mask == (red == 0)).float().mean() > 0.97
 
 
-@pytest.mark.parametrize(
-    ("places", "message"),
-    [
-        ([BESIDE, (0.5, -0.7, 0.0), (0.5, -0.6, 0.0)], "outline: expected an object, got none"),
-        ([BESIDE, BESIDE, BESIDE], "outline: expected pixels inside of it, got none"),
-        ([BESIDE, RED, (0.0, 2.0, 0.0)], "outline: expected corners in 120 x 120 pixels, got"),
-        ([BESIDE, RED], "outline: Tuple should have at least 3 items"),
-    ],
-)
-@on_page
-async def test_outlines_that_select_nothing_are_told(browser, places, message):
-    await browser.send(type="mask", model="balls", **outlined(*places))
-    assert message in (await browser.next("notice"))["text"]
-
-
 @on_page
 async def test_clicks_see_a_model_that_was_written_again(browser, scene_file):
     before = await masked(browser)
@@ -151,7 +137,7 @@ async def test_clicks_make_a_segment_that_is_edited_renamed_removed_undone_and_s
     model, red = two_balls()
     mask = read_segment(saved.segments["red"].file, model)
     clicks = Clicks(FRONT.camera(), torch.tensor([at(RED)]), torch.tensor([True]))
-    cameras = icosphere_of(VIEWS, read_scene(scene_file).framed().lens().square(SIZE))
+    cameras = icosphere_of(KEYS.views, read_scene(scene_file).framed().lens().square(KEYS.size))
     assert mask.equal(lift(model, clicks, cameras, GrabCut()).mask)
     assert bool(mask[red == 0].all())
 

@@ -13,7 +13,7 @@ from aiohttp import WSCloseCode, WSMsgType, WSServerHandshakeError
 from PIL import Image
 
 from tests.viewer.pages import TOKEN, WAIT, on_page, origin, page, served
-from tests.viewer.test_messages import CAMERA, VIEW
+from tests.viewer.test_messages import CAMERA, SHOWN, VIEW
 from texgs.cli.main import main
 from texgs.core.cuts import NO_CUTS
 from texgs.core.io import write_json
@@ -140,11 +140,11 @@ async def test_a_still_without_a_view_says_so(browser, client):
 
 @on_page
 async def test_a_pixel_of_a_view_is_a_point_or_nothing(browser):
-    await browser.send(type="pick", view=VIEW, pixel=[32, 24])
+    await browser.send(type="pick", view=SHOWN, pixel=[32, 24])
     point = torch.tensor((await browser.next("point"))["point"])
     place, _ = parse(json.dumps(VIEW)).camera.camera().project(point)
     torch.testing.assert_close(place, torch.tensor([32.5, 24.5]), atol=1e-3, rtol=0)
-    await browser.send(type="pick", view=VIEW, pixel=[0, 0])
+    await browser.send(type="pick", view=SHOWN, pixel=[0, 0])
     assert (await browser.next("point"))["point"] is None
 
 
@@ -163,7 +163,7 @@ async def test_the_newest_camera_wins(browser, client):
 async def test_frames_of_a_moving_camera_are_smaller_where_they_are_slow(browser, client, monkeypatch):
     sizes = []
     for slow, moving in ((1e-9, False), (1e-9, True), (1e-9, False), (1e9, True), (1e9, True)):
-        monkeypatch.setattr("texgs.viewer.frames.SLOW", slow)
+        monkeypatch.setattr("texgs.viewer.frames.SLOW_FRAME", slow)
         await browser.send(**{**VIEW, "moving": moving})
         sizes.append((await browser.next("frame"))[1].shape[:2])
     assert sizes == [(48, 64), (16, 21), (48, 64), (16, 21), (48, 64)]
@@ -203,7 +203,7 @@ async def test_pages_share_edits_and_their_history(browser, client):
         await browser.send(type="edit", part="", key="light", value={"azimuth": 30, "polar": 40})
         await other.send(type="redo")
         await other.send(type="edit", part="", key="background", value=None)
-        news = await browser.past("light azimuth 30°, polar 40°", "background reset")
+        news = await browser.past("light {'azimuth': 30, 'polar': 40}", "background None")
         assert news["scene"]["light"] == {"azimuth": 30, "polar": 40}
 
 
@@ -211,8 +211,15 @@ async def test_pages_share_edits_and_their_history(browser, client):
 async def test_pages_cut_the_scene(browser, client):
     up = {"normal": [0, 2, 0], "offset": 0.5}
     await browser.send(type="edit", part="", key="cuts", value={"planes": [up]}, step=1)
-    await browser.send(type="edit", part="", key="cuts", value={"planes": [up, up], "faces": "unlit"}, step=1)
-    cuts = (await browser.past("cuts 2 planes, unlit"))["scene"]["cuts"]
+    await browser.send(
+        type="edit",
+        part="",
+        key="cuts",
+        value={"planes": [up, up], "faces": "unlit"},
+        step=1,
+        title="two planes",
+    )
+    cuts = (await browser.past("two planes"))["scene"]["cuts"]
     assert cuts == {"planes": 2 * [{"normal": [0, 1, 0], "offset": 0.25}], "box": None, "faces": "unlit"}
     assert isolated(client.server_side.edits.scene, "TF01").cuts == NO_CUTS, "clicks select what is whole"
     await browser.send(type="undo")
@@ -236,10 +243,10 @@ async def test_a_movement_goes_on_from_its_own_step_only(browser, client):
     """Others edit the same session, as Python beside a viewer in a notebook."""
     move = {"type": "edit", "part": "", "key": "background", "step": 7}
     await browser.send(**move, value=[1, 0, 0])
-    await browser.past("background #ff0000")
-    client.server_side.edits._session.set("TF01", "opacity", 0.5)
+    await browser.past("background [1, 0, 0]")
+    client.server_side.edits.session.set("TF01", "opacity", 0.5)
     await browser.send(**move, value=[0, 0, 1])
-    news = await browser.past("background #ff0000", "", "background #0000ff")
+    news = await browser.past("background [1, 0, 0]", "", "background [0, 0, 1]")
     assert news["scene"]["models"][0]["edit"]["opacity"] == 0.5
 
 
@@ -360,7 +367,7 @@ async def test_a_step_to_a_model_that_is_gone_is_refused_and_taken_back(browser,
     edits, models = client.server_side.edits, scene_file.parent
     copy(models / "TF02.safetensors", finer := models / "finer.safetensors")
     entry = replace(edits.scene.models["TF01"], file=finer)
-    edits._session.set_scene(replaced(edits.scene, "TF01", entry))
+    edits.session.set_scene(replaced(edits.scene, "TF01", entry))
     (models / "TF01.safetensors").unlink()
     await browser.send(type="undo")
     assert "TF01.safetensors: no such file, which the scene needs" in (await browser.next("notice"))["text"]

@@ -12,7 +12,7 @@ from tests.volume.vtk_caster import VtkCaster
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import HEADLIGHT, Light
-from texgs.raster.cuts import cut_range
+from texgs.raster.api import cut_range
 from texgs.volume.caster import OUTPUTS, Caster
 from texgs.volume.grid import Grid
 from texgs.volume.render import Appearance, directions

@@ -100,21 +100,6 @@ def test_one_of_several_series_is_chosen(tmp_path):
     np.testing.assert_array_equal(whole(tmp_path, series="0"), sample_values()[:5] + 2)
 
 
-@pytest.mark.parametrize(
-    ("places", "message"),
-    [
-        ([(0, 0, z) for z in (0, 2, 4, 8, 10)], "slices 2 mm apart, got 4 mm; complete the series"),
-        ([(0, 0, z) for z in (0, 2, 4, 7, 9)], "slices 2 mm apart, got 3 mm; complete the series"),
-        ([(0, 0, z) for z in (0, 2, 2, 4, 6)], "slices at different places, got two at one"),
-        ([(0, 0.3 * z, 2.5 * z) for z in range(5)], "correct the tilt of the gantry first"),
-    ],
-)
-def test_slices_that_are_no_lattice_are_refused(tmp_path, places, message):
-    write_series(tmp_path, sample_values()[:5], places)
-    with pytest.raises(ArgumentError, match=message):
-        open_source(tmp_path)
-
-
 def write_steps(folder, tags):
     """Three volumes in one folder and series; tags are functions of step and slice."""
     for step in (2, 0, 1):
@@ -141,37 +126,6 @@ def test_volumes_of_one_series_are_steps_in_time(tmp_path, tags):
     assert open_source(tmp_path).note == "step 0 of 3; dataset.volume.time chooses another"
     with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 2, got 3$"):
         open_source(tmp_path, time=3)
-
-
-def test_one_volume_has_one_step(tmp_path):
-    write_series(tmp_path, sample_values(), AcquisitionNumber=1)
-    assert (open_source(tmp_path).n_steps, open_source(tmp_path).note) == (1, "")
-    with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 0, got 1$"):
-        open_source(tmp_path, time=1)
-
-
-def test_steps_that_lack_slices_or_tags_are_refused(tmp_path):
-    write_steps(tmp_path, {"TemporalPositionIdentifier": lambda step, z: step})
-    path = tmp_path / "21-1.ima"  # slice 3
-    data = pydicom.dcmread(path)
-    path.unlink()
-    message = (
-        "expected a slice of each temporal position at each place, got 3 at 10 mm, 2 at 17.5 mm; complete"
-    )
-    with pytest.raises(ArgumentError, match=message):
-        open_source(tmp_path)
-    del data.TemporalPositionIdentifier
-    data.save_as(path)
-    message = "got two at one, and no temporal position or trigger time or acquisition number in all"
-    with pytest.raises(ArgumentError, match=message):
-        open_source(tmp_path)
-
-
-def test_other_slices_among_them_are_refused(tmp_path):
-    write_series(tmp_path, sample_values()[:4])
-    write_series(tmp_path, sample_values()[:1, :5], [(10, 10, 40)], number=9)
-    with pytest.raises(ArgumentError, match="expected size, spacing and orientation of"):
-        open_source(tmp_path)
 
 
 def test_compressed_slices_are_read(tmp_path):
@@ -265,53 +219,6 @@ def test_series_on_one_lattice_are_steps_in_time(tmp_path, tags, name):
         open_source(tmp_path, series="all", time=3)
     with pytest.raises(ArgumentError, match="or series=all for those alike, as steps in time, of "):
         open_source(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("tags", "message"),
-    [
-        (
-            {"TemporalPositionIdentifier": lambda t: t or ""},
-            "expected a temporal position in each series, all",
-        ),
-        (
-            {"SeriesDescription": lambda t: f"{t // 2}0%"},
-            "expected a percentage in each series, all different",
-        ),
-        ({"SeriesDescription": lambda t: f"{t}0%" if t else "mean"}, "expected a percentage in each series"),
-        (
-            {"SeriesNumber": lambda t: 7},
-            "expected a series number in each series, all different, got 7 .Bone, 5 files",
-        ),
-    ],
-)
-def test_an_order_that_is_not_told_is_refused(tmp_path, tags, message):
-    write_phases(tmp_path, {"SeriesDescription": lambda t: "Bone", **tags})
-    with pytest.raises(ArgumentError, match=message):
-        open_source(tmp_path, series="all")
-
-
-def test_series_of_which_none_are_most_are_refused(tmp_path):
-    write_series(tmp_path, sample_values()[:4], number=1)
-    write_series(tmp_path, sample_values()[:5, :7], number=2, uid=generate_uid())
-    message = "expected series on one lattice, more than on any other, got "
-    with pytest.raises(ArgumentError, match=message):
-        open_source(tmp_path, series="all")
-    for number, rows in ((3, 12), (4, 7)):
-        values = sample_values()[: 4 if rows == 12 else 5, :rows]
-        write_series(tmp_path, values, number=number, uid=generate_uid())
-    with pytest.raises(ArgumentError, match=message):
-        open_source(tmp_path, series="all")
-
-
-def test_a_series_that_lacks_slices_is_refused(tmp_path):
-    write_phases(tmp_path, {"TemporalPositionIdentifier": lambda t: t})
-    (tmp_path / "28-6.ima").unlink()
-    message = (
-        r"expected series as long as \d \(Bone, 5 files, .*\), got 6 \(Bone, 4 files, .*; complete them$"
-    )
-    with pytest.raises(ArgumentError, match=message):
-        open_source(tmp_path, series="all")
 
 
 def test_one_series_alone_has_its_own_steps(tmp_path):

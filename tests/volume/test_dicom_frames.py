@@ -13,7 +13,6 @@ from pydicom.uid import (
     NuclearMedicineImageStorage,
     RTDoseStorage,
     RTStructureSetStorage,
-    UltrasoundMultiFrameImageStorage,
     generate_uid,
 )
 
@@ -135,28 +134,6 @@ def test_steps_in_time_of_frames(tmp_path):
         open_source(path, time=2)
 
 
-@pytest.mark.parametrize(
-    ("frames", "message"),
-    [
-        (
-            [frame(z) for z in (0, 1, 2, 4, 5)],
-            r"frame 2 of e.dcm and frame 3 .*, got 5 mm; complete the series",
-        ),
-        (
-            [frame(z, content={"StackID": str(z > 2)}) for z in range(5)],
-            "one stack of frames, got False, True",
-        ),
-        ([frame(z // 2) for z in range(5)], "expected slices at different places, got two at one"),
-        ([frame(z) for z in range(4)], "expected places of 5 frames, got 4"),
-        ([group() for _ in range(5)], "with its position and orientation, found none"),
-    ],
-)
-def test_frames_that_are_no_lattice_are_refused_with_a_way_out(tmp_path, frames, message):
-    path = write_enhanced(tmp_path / "e.dcm", VALUES, frames)
-    with pytest.raises(ArgumentError, match=rf"e\.dcm: .*{message}.*convert it: dcm2niix$"):
-        open_source(path)
-
-
 PLANE = {
     "ImagePositionPatient": [1, 2, 3],
     "ImageOrientationPatient": list(AXIAL),
@@ -200,33 +177,6 @@ def test_slices_of_nuclear_medicine_are_counted(tmp_path):
     nuclear(path, VALUES, EnergyWindowVector=[1, 1, 1, 2, 2])
     with pytest.raises(ArgumentError, match="places of 5 frames, got EnergyWindowVector, which tells none"):
         open_source(path)
-
-
-@pytest.mark.parametrize("spacing", [{}, {"SpacingBetweenSlices": 2.0}])
-def test_a_film_is_no_volume(tmp_path, spacing):
-    tags = {"FrameTime": 33, "FrameIncrementPointer": 0x00181063, **spacing}
-    data = new_file(VALUES, UltrasoundMultiFrameImageStorage, **tags)
-    data.save_as(tmp_path / "u.dcm", enforce_file_format=True)
-    with pytest.raises(ArgumentError, match="of 5 frames, got FrameTime, which tells none; convert it: dcm"):
-        open_source(tmp_path / "u.dcm")
-
-
-def test_what_is_no_file_of_many_frames_says_what_to_open(tmp_path):
-    (tmp_path / "slices").mkdir()
-    write_series(tmp_path / "slices", VALUES)
-    with pytest.raises(ArgumentError, match="at least 2 slices, got 1; open the folder with all"):
-        open_source(tmp_path / "slices" / "00-3.ima")
-    (tmp_path / "x.dcm").write_text("no slice")
-    with pytest.raises(
-        ArgumentError, match=r"x\.dcm: expected a slice with its position and orientation, found none"
-    ):
-        open_source(tmp_path / "x.dcm")
-    (tmp_path / "DICOMDIR").touch()
-    with pytest.raises(ArgumentError, match="a list of files of DICOM; open the folder"):
-        open_source(tmp_path / "DICOMDIR")
-    (tmp_path / "x.dcm").unlink()
-    with pytest.raises(ArgumentError, match=r"found none in it; open the folder with the slices, in slices$"):
-        open_source(tmp_path)
 
 
 def test_other_objects_beside_slices_are_not_mixed_in(tmp_path):

@@ -43,9 +43,7 @@ def test_one_of_the_axis_is_read_wherever_it_is(tmp_path, place, encoding, name)
 def test_channels_and_layers_have_to_be_chosen(tmp_path, kind):
     words = {"content": "an image of four", "Segment0_Name": "of a left lung"}
     write_nrrd(tmp_path / "v.seg.nrrd", 0, kind, "gzip", **words)
-    with pytest.raises(
-        ArgumentError, match=r"channel: expected one of 0 to 2, as there are 3 components .*none"
-    ):
+    with pytest.raises(ArgumentError, match="channel: expected one of 0 to 2, got none"):
         open_source(tmp_path / "v.seg.nrrd")
     assert_holds(tmp_path / "v.seg.nrrd", VALUES[2], (0.5, 2, 3), channel="2")
     assert open_source(tmp_path / "v.seg.nrrd", channel="2").note == ""
@@ -77,21 +75,5 @@ def test_steps_and_components_of_metaimage(tmp_path, name, is_compressed):
     colours = sitk.GetImageFromArray(np.moveaxis(VALUES, 0, 3).copy(), isVector=True)
     sitk.WriteImage(colours, tmp_path / name, is_compressed)
     np.testing.assert_array_equal(whole(tmp_path / name, channel="1"), VALUES[1])
-    with pytest.raises(ArgumentError, match="as there are 3 components per sample, got none"):
+    with pytest.raises(ArgumentError, match="channel: expected one of 0 to 2, got none"):
         open_source(tmp_path / name)
-
-
-def test_a_step_that_is_not_there_any_more(tmp_path):
-    write_nrrd(tmp_path / "v.nrrd", 3, "time", "raw")
-    content = (tmp_path / "v.nrrd").read_bytes()
-    (tmp_path / "v.nrrd").write_bytes(content[:-1])
-    with pytest.raises(ArgumentError, match="the file is cut off"):
-        open_source(tmp_path / "v.nrrd")
-
-
-def test_two_axes_more_are_refused(tmp_path):
-    nrrd.write(str(tmp_path / "v.nrrd"), np.zeros((2, 2, 3, 3, 3), np.uint8), index_order="C")
-    sitk.WriteImage(sitk.GetImageFromArray(np.zeros((2, 3, 3, 3, 2)), isVector=True), tmp_path / "v.mha")
-    for name in ("v.nrrd", "v.mha"):
-        with pytest.raises(ArgumentError, match=r"expected (3 axes|a scalar volume)"):
-            open_source(tmp_path / name)

@@ -6,7 +6,7 @@ from PIL import Image
 
 from tests.fitting.scenes import HEADLIGHT, cameras, images_of
 from texgs.core.errors import ArgumentError, OutOfMemoryError
-from texgs.volume.images import load, over_white, shrunk, smaller
+from texgs.volume.images import load, over_white, shrink, smaller
 from texgs.volume.view_set import View
 
 
@@ -90,8 +90,8 @@ def test_images_are_shrunk_by_averages_and_the_rest_is_cut():
     camera = cameras(1, size=11)[0]
     planes = torch.rand(4, 11, 11, generator=torch.Generator().manual_seed(0))
     images = images_of([planes], [camera])
-    small = shrunk(images, 2)
+    small = shrink(images, 2)
     blocks = images.planes[0, :, :10, :10].float().reshape(4, 5, 2, 5, 2).mean(dim=(2, 4))
     assert (small.planes[0].float() - blocks).abs().max() <= 0.5
     assert (small.cameras[0].width, small.cameras[0].height) == (5, 5)
-    assert shrunk(images, 0) is images
+    assert shrink(images, 0) is images

@@ -10,7 +10,6 @@ from texgs.volume.isosurface import isosurface, opaque_ranges, surface_of
 from texgs.volume.transfer import TransferFunction
 
 WHITE = [(0.0, 1.0, 1.0, 1.0)]
-NARROW = TransferFunction(((10, 0), (11, 1), (13, 1), (14, 0)), ((10, 1, 0, 0), (14, 0, 0, 1)))
 
 
 def signed_volume(mesh):

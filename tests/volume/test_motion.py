@@ -27,7 +27,7 @@ def blob(center, sizes=(40, 36, 32), width=0.12, scale=1.0):
 
 @pytest.mark.parametrize("most", [96, 24])
 def test_a_ball_that_moved_is_found_along_all_axes(monkeypatch, most):
-    monkeypatch.setattr(motions, "MOST", most)
+    monkeypatch.setattr(motions, "MAX_SIDE", most)
     way = torch.tensor([0.05, -0.03, 0.04])
     moves = motion(blob((0, 0, 0)), blob(way.tolist()), TF)
     shell = 0.15 * torch.nn.functional.normalize(

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.io import netcdf_file
 
-from texgs.core.errors import ArgumentError
 from texgs.volume.sources import open_source
 
 SIZES = {"lat": 4, "r": 5, "lon": 6}
@@ -13,25 +12,19 @@ FIELD = np.random.default_rng(0).normal(size=(4, 5, 6)).astype(np.float32)
 UPRIGHT = FIELD.transpose(1, 0, 2)  # [Z, Y, X]: latitude and longitude are y and x by their units
 
 
-def write_netcdf(path, fields, *, version=2, axes=tuple(SIZES), **more):
+def write_netcdf(path, fields, *, version=2, **more):
     """Write fields over latitude, radius and longitude, with more attributes."""
     with netcdf_file(path, "w", version=version) as file:
-        for name, size in {"time": 2, "step": 1, **SIZES}.items():
-            file.createDimension(name, size)
         for name, size in SIZES.items():
+            file.createDimension(name, size)
             axis = file.createVariable(name, "f8", (name,))
             axis[:], axis.units = np.arange(size), UNITS[name]
         for name, values in fields.items():
-            variable = file.createVariable(name, values.dtype, axes)
+            variable = file.createVariable(name, values.dtype, tuple(SIZES))
             variable[:] = values
             for key, value in more.items():
                 setattr(variable, key, value)
     return path
-
-
-def whole(path, **keys):
-    source = open_source(path, **keys)
-    return source.slices(0, source.dims[2])
 
 
 @pytest.mark.parametrize("version", [1, 2])
@@ -47,19 +40,6 @@ def test_a_variable_of_the_contest(tmp_path, version):
     np.testing.assert_array_equal(source.slices(1, 3), UPRIGHT[1:3])
 
 
-@pytest.mark.parametrize(("dimension", "axis"), [("lon", 2), ("lat", 1), ("r", 0)])
-def test_a_ramp_along_a_dimension_ends_up_along_its_axis(tmp_path, dimension, axis):
-    ramp = np.broadcast_to(np.arange(SIZES[dimension]).reshape(np.roll((-1, 1, 1), axis)), (5, 4, 6))
-    ramp = ramp.transpose(1, 0, 2)
-    path = write_netcdf(tmp_path / "v.nc", {"ramp": ramp.astype(np.float32)})
-    slopes = [np.diff(whole(path), axis=each).max() for each in range(3)]
-    assert slopes == [float(each == axis) for each in range(3)]
-
-
-def test_the_only_variable_with_three_dimensions_needs_no_name(tmp_path):
-    np.testing.assert_array_equal(whole(write_netcdf(tmp_path / "v.nc", {"t": FIELD})), UPRIGHT)
-
-
 @pytest.mark.parametrize("dtype", ["int8", "int16", "int32", "float64"])
 def test_types(tmp_path, dtype):
     """Whole numbers of more than a byte may never have been written, which only a float can say."""
@@ -67,57 +47,6 @@ def test_types(tmp_path, dtype):
     source = open_source(write_netcdf(tmp_path / "v.nc", {"t": values}))
     assert source.dtype == (np.float32 if dtype in ("int16", "int32") else dtype)
     np.testing.assert_array_equal(source.slices(0, 5), values.transpose(1, 0, 2))
-
-
-def test_a_spacing_that_is_given_replaces_that_of_the_file(tmp_path):
-    source = open_source(write_netcdf(tmp_path / "v.nc", {"t": FIELD}), spacing=(7, 8, 9), origin=(1, 2, 3))
-    assert (source.spacing, source.origin) == ((7, 8, 9), (1, 2, 3))
-
-
-@pytest.mark.parametrize("name", ["_FillValue", "missing_value"])
-def test_packed_numbers_are_decoded_and_missing_ones_are_nan(tmp_path, name):
-    stored = np.arange(120, dtype=np.int16).reshape(4, 5, 6)
-    coded = {name: np.int16(7), "scale_factor": 0.5, "add_offset": 100.0}
-    values = whole(write_netcdf(tmp_path / "v.nc", {"t": stored}, **coded)).transpose(1, 0, 2)
-    np.testing.assert_array_equal(values, np.where(stored == 7, np.nan, 100 + 0.5 * stored))
-    expected = FIELD.copy()
-    expected[1, 2, 3] = np.nan
-    path = write_netcdf(tmp_path / "w.nc", {"t": FIELD}, **{name: FIELD[1, 2, 3]})
-    np.testing.assert_array_equal(whole(path), expected.transpose(1, 0, 2))
-
-
-def test_a_step_of_time_is_chosen_and_the_first_one_is_taken_with_a_note(tmp_path):
-    path = write_netcdf(tmp_path / "one.nc", {"t": FIELD[None]}, axes=("step", *SIZES))
-    np.testing.assert_array_equal(whole(path), UPRIGHT)
-    path = write_netcdf(tmp_path / "two.nc", {"t": np.stack([FIELD, -FIELD])}, axes=("time", *SIZES))
-    source = open_source(path)
-    np.testing.assert_array_equal(source.slices(0, 5), UPRIGHT)
-    assert source.note.startswith("step 0 of 2; dataset.volume.time chooses another; units along x, y, z are")
-    assert source.n_steps == 2
-    np.testing.assert_array_equal(whole(path, time=1), -UPRIGHT)
-    with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 1, got 2"):
-        open_source(path, time=2)
-
-
-LONG = "expected an array of real numbers with three axes or more"
-
-
-@pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ({}, rf"variable: {LONG}, got none; choose one of temperature, vx$"),
-        ({"variable": "vy"}, f"{LONG}, got vy; choose one of temperature, vx"),
-        ({"variable": "r"}, f"{LONG}, got r of 5 float64; choose one of temperature, vx"),
-        ({"variable": "vx", "column": 2}, "column: not for this format; leave them out"),
-        ({"variable": "vx", "time": 1}, "time: there is no such axis in lat 4 x r 5 x lon 6; leave it out"),
-        ({"variable": "vx", "channel": "0"}, "channel: there is no such axis in lat 4 x r 5 x lon 6"),
-    ],
-)
-def test_mistakes(tmp_path, keys, message):
-    path = write_netcdf(tmp_path / "v.nc", {"temperature": FIELD, "vx": FIELD})
-    with pytest.raises(ArgumentError, match=message) as caught:
-        open_source(path, **keys)
-    assert str(caught.value).startswith(f"{path}: ")
 
 
 def write_axes(path, places, units, axes=("z", "y", "x"), field=FIELD):
@@ -139,57 +68,11 @@ def test_spacing_and_origin_are_those_of_coordinates_in_the_unit_of_x(tmp_path):
     np.testing.assert_array_equal(source.slices(0, 4), FIELD)
 
 
-def test_axes_whose_coordinates_fall_are_turned(tmp_path):
-    places = (9 - 2 * np.arange(4), 8 - np.arange(5), np.arange(6))
-    source = open_source(write_axes(tmp_path / "v.nc", places, 3 * ["m"]))
-    assert (source.spacing, source.origin) == ((1, 1, 2), (0, 4, 3))
-    np.testing.assert_array_equal(source.slices(0, 4), FIELD[::-1, ::-1])
-    np.testing.assert_array_equal(source.slices(1, 3), FIELD[::-1, ::-1][1:3])
-
-
-def test_axes_with_the_names_x_y_z_are_these(tmp_path):
-    places = [np.arange(n) for n in (6, 5, 4)]
-    path = write_axes(tmp_path / "v.nc", places, 3 * ["m"], ("x", "y", "z"), FIELD.transpose())
-    np.testing.assert_array_equal(whole(path), FIELD)
-
-
-def test_uneven_coordinates_are_refused_unless_a_spacing_is_given(tmp_path):
-    places = ([0, 1, 4, 9], np.arange(5), np.arange(6))
-    path = write_axes(tmp_path / "v.nc", places, 3 * ["m"])
-    with pytest.raises(ArgumentError, match=r"expected even distances along z; resample, or set spacing"):
-        open_source(path)
-    assert open_source(path, spacing=(1, 1, 3)).spacing == (1, 1, 3)
-
-
 def test_units_that_cannot_be_compared_are_told(tmp_path):
     path = write_axes(tmp_path / "v.nc", [np.arange(n) * 3 for n in (4, 5, 6)], ("hPa", "degrees", "degrees"))
     source = open_source(path)
     assert (source.spacing, source.origin, source.space.unit) == ((1, 1, 1), (0, 0, 0), "")
     assert source.note == "units along x, y, z are degrees, degrees, hPa, so that samples are 1 apart"
-
-
-def test_a_format_that_cannot_be_read_is_refused_with_the_command_that_converts_it(tmp_path):
-    (tmp_path / "v.nc").write_bytes(b"CDF\x05" + bytes(2000))
-    with pytest.raises(ArgumentError, match=r"got another one; convert it: nccopy -k nc4 OLD\.nc NEW\.nc"):
-        open_source(tmp_path / "v.nc")
-
-
-@pytest.mark.parametrize("start", [b"\x89HDF\r\n\x1a\n", b"", b"text"])
-def test_other_formats_are_refused(tmp_path, start):
-    (tmp_path / "v.nc").write_bytes(start + bytes(2000))
-    with pytest.raises(
-        ArgumentError, match=r"v\.nc: expected an HDF5 or NetCDF file, got .*; is the file dam"
-    ):
-        open_source(tmp_path / "v.nc")
-
-
-@pytest.mark.parametrize("share", [0.02, 0.1, 0.3, 0.6, 0.97])
-def test_a_file_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path, capfd, share):
-    path = write_netcdf(tmp_path / "v.nc", {"t": FIELD})
-    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
-    with pytest.raises(ArgumentError, match=r"expected an HDF5 or NetCDF file"):
-        open_source(path)
-    assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("told", [{"positive": "down", "units": "m"}, {"units": "hPa"}])

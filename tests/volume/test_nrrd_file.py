@@ -10,7 +10,7 @@ import pyvista
 from tests.volume.volume_files import SPACING, WRITERS, sample_values
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Grid
-from texgs.volume.nrrd_file import ALIGNMENT, WORDS, open_grid, write_header
+from texgs.volume.nrrd_file import ALIGNMENT, NRRD_TYPES, open_grid, write_header
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
 from texgs.volume.space import UNTOLD
@@ -24,7 +24,7 @@ def written(path, dtype):
     return path
 
 
-@pytest.mark.parametrize("dtype", WORDS)
+@pytest.mark.parametrize("dtype", NRRD_TYPES)
 def test_round_trip_is_exact_and_mapped_and_other_readers_agree(tmp_path, dtype):
     path = written(tmp_path / "v.nrrd", dtype)
     grid = open_grid(path)

@@ -13,7 +13,6 @@ from tests.volume.volume_files import sample_values, whole
 from tests.volume.zarr_files import LABELS, add_image, all_axes, axes_of, write_image, zipped
 from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Channel
-from texgs.volume.prepare import prepare
 from texgs.volume.sources import open_source
 
 VALUES = sample_values()  # [11, 12, 13]
@@ -94,16 +93,6 @@ def test_how_a_channel_is_shown_may_be_missing_or_senseless(tmp_path, said):
     path = write_image(tmp_path / "v.zarr", [values], axes_of("czyx"), [(1, 1, 1, 1)], labels=[said, whole])
     assert open_source(path, channel="0").channel == Channel("x")
     assert open_source(path, channel="y").channel == Channel("y", (0, 128 / 255, 1), (10, 90.5))
-
-
-def test_a_step_of_time_is_chosen_and_the_first_one_is_taken_with_a_note(tmp_path):
-    values = all_axes(VALUES, channels=1)[:, 0]
-    path = write_image(tmp_path / "v.zarr", [values], axes_of("tzyx"), [(60, 1, 1, 1)])
-    source = open_source(path)
-    np.testing.assert_array_equal(source.slices(0, 11), VALUES)
-    assert source.note == "step 0 of 2; dataset.volume.time chooses another"
-    with pytest.raises(ArgumentError, match=r"dataset\.volume\.time: expected one of 0 to 1, got 2$"):
-        open_source(path, time=2)
 
 
 @pytest.mark.parametrize("units", [("meter", "millimeter", "micrometer"), ("km", "m", "mm")])
@@ -216,96 +205,6 @@ def test_versions_before_0_4_tell_no_spacing(tmp_path, axes):
     np.testing.assert_array_equal(source.slices(0, 11), VALUES + 120)
 
 
-@pytest.mark.parametrize(
-    "options", [{"chunks": (4, 5, 6)}, {"chunks": (2, 12, 13)}, {"chunks": (4, 6, 7), "shards": (12, 12, 14)}]
-)
-def test_every_chunk_is_read_once_and_no_more_than_a_layer_at_a_time(tmp_path, monkeypatch, options):
-    monkeypatch.setattr("texgs.volume.slabs.SLAB_BYTES", 1)
-    monkeypatch.setattr("texgs.volume.layers.SLAB_BYTES", 1)
-    path = write_image(tmp_path / "v.zarr", [VALUES], axes_of("zyx"), [SCALES[0]], **options)
-    shapes, files = [], []
-    item, get = zarr.Array.__getitem__, LocalStore.get
-
-    def counted(self, at):
-        values = item(self, at)
-        shapes.append(values.shape)
-        return values
-
-    async def told(self, key, prototype, byte_range=None):
-        files.append((key, byte_range))
-        return await get(self, key, prototype, byte_range)
-
-    monkeypatch.setattr(zarr.Array, "__getitem__", counted)
-    monkeypatch.setattr(LocalStore, "get", told)
-    prepare(open_source(path), tmp_path / "v.nrrd", reduce=3)
-    depth = options["chunks"][0]
-    assert [shape[0] for shape in shapes] == [min(depth, 11 - z) for z in range(0, 11, depth)]
-    chunks = [each for each in files if "/c/" in each[0]]
-    assert len(chunks) >= 3
-    assert "shards" in options or len(set(chunks)) == len(chunks)
-
-
-def test_a_folder_that_is_no_zarr_and_a_zip_that_is_none(tmp_path):
-    (tmp_path / "v.zarr").mkdir()
-    with pytest.raises(ArgumentError, match=r"v\.zarr: expected a folder or zip of Zarr, got "):
-        open_source(tmp_path / "v.zarr")
-    (tmp_path / "notes.txt").write_text("text")
-    for content in ({"a/b.txt": "text"}, {}):
-        folder = tmp_path / f"of{len(content)}"
-        folder.mkdir()
-        for name, text in content.items():
-            (folder / name).parent.mkdir()
-            (folder / name).write_text(text)
-        with pytest.raises(ArgumentError, match=r"v\.zip: expected a (folder or )?zip of Zarr, got "):
-            open_source(zipped(folder, tmp_path / "v"))
-    (tmp_path / "w.zip").write_bytes(b"PK\x03\x04 nonsense")
-    with pytest.raises(
-        ArgumentError, match=r"expected a folder or zip of Zarr, got File is not a zip file; is"
-    ):
-        open_source(tmp_path / "w.zip")
-
-
-@pytest.mark.parametrize(
-    ("values", "axes", "message"),
-    [
-        (VALUES[0], "yx", "with three axes or more, got / of 12 x 13 uint16; choose one of another file"),
-        (
-            VALUES + 1j,
-            "zyx",
-            "with three axes or more, got / of 11 x 12 x 13 complex128; choose one of another file",
-        ),
-        (
-            VALUES[:, :, :1],
-            "zyx",
-            "with three axes or more, got / of 11 x 12 x 1 uint16; choose one of another file",
-        ),
-        (
-            VALUES[:0],
-            "zyx",
-            "with three axes or more, got / of 0 x 12 x 13 uint16; choose one of another file",
-        ),
-        (
-            all_axes(VALUES)[0],
-            "qzyx",
-            "expected three axes of space besides time and channel, got q 3 x z 11",
-        ),
-        (VALUES, "zy", "expected a folder or zip of Zarr, got zip"),
-    ],
-)
-def test_images_that_are_no_volume(tmp_path, values, axes, message):
-    path = write_image(tmp_path / "v.zarr", [values], axes_of(axes), [[1.0] * len(axes)])
-    with pytest.raises(ArgumentError, match=message):
-        open_source(path)
-
-
-def test_scales_that_make_no_sense(tmp_path):
-    for scale in ((0, 1, 1), (float("nan"), 1, 1), (1e400, 1, 1)):
-        path = write_image(tmp_path / "v.zarr", [VALUES], axes_of("zyx"), [scale])
-        with pytest.raises(ArgumentError, match=r"spacing: expected three finite numbers above 0, got"):
-            open_source(path)
-    assert open_source(path, spacing=(1, 2, 3), origin=(0, 0, 0)).spacing == (1, 2, 3)
-
-
 @pytest.mark.parametrize("name", ["zarr.json", "s0/zarr.json", "s0/c/0/0/0"])
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.97])
 def test_a_part_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path, capfd, name, share):
@@ -317,20 +216,6 @@ def test_a_part_that_is_cut_off_is_refused_and_the_terminal_stays_clean(tmp_path
     ):
         whole(path)
     assert capfd.readouterr() == ("", "")
-
-
-def test_a_file_with_the_suffix_of_a_folder(tmp_path):
-    (tmp_path / "v.zarr").write_bytes(b"zarr")
-    with pytest.raises(
-        ArgumentError, match=r"unknown suffix '.zarr'; expected .*, or a folder of slices or Zarr"
-    ):
-        open_source(tmp_path / "v.zarr")
-
-
-def test_keys_of_other_formats_are_refused(tmp_path):
-    path = write_image(tmp_path / "v.zarr", [VALUES], axes_of("zyx"), [SCALES[0]])
-    with pytest.raises(ArgumentError, match="series: not for this format; leave them out"):
-        open_source(path, series="1")
 
 
 def test_the_fill_value_of_xarray_in_format_2_is_missing(tmp_path):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from texgs.core.errors import ArgumentError
 from texgs.volume import slabs
 from texgs.volume.grid import Grid
-from texgs.volume.nrrd_file import WORDS, open_grid
+from texgs.volume.nrrd_file import NRRD_TYPES, open_grid
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
 from texgs.volume.sources import open_source
@@ -54,7 +54,7 @@ def jobs(draw):
         length = draw(st.integers(reduce + 1, size))
         start = draw(st.integers(0, size - length))
         crop += [start, start + length]
-    dtype = draw(st.sampled_from(tuple(WORDS)))
+    dtype = draw(st.sampled_from(tuple(NRRD_TYPES)))
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     values = rng.integers(-128, 128, dims[::-1]).astype(dtype)
     values.flat[0], values.flat[-1] = 0, 1
@@ -137,7 +137,7 @@ def test_lattice_range_and_histogram(tmp_path, values):
     assert (summary.dims, summary.dtype, summary.voxels) == ((4, 5, 6), values.dtype.name, 120)
     assert (summary.spacing, summary.origin) == ((1.0, 2.0, 3.0), (-1.0, 0.0, 1.0))
     assert summary.histogram == counts(values)
-    if values.dtype.name in WORDS:
+    if values.dtype.name in NRRD_TYPES:
         assert prepare(source, tmp_path / "v.nrrd") == summary
 
 

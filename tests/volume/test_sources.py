@@ -13,7 +13,6 @@ from texgs.volume.slabs import ArraySource, slab_bounds
 from texgs.volume.sources import open_source
 
 DIMS = (13, 12, 11)
-WORDS = {"dims": DIMS, "dtype": "uint16"}
 
 
 @pytest.mark.parametrize("endian", ["little", "big"])
@@ -35,37 +34,6 @@ def test_slabs_cover_the_range_in_multiples():
     assert slab_bounds(source, 0, 20, multiple=9) == [(0, 9), (9, 18), (18, 20)]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({}, "no header; set dims and dtype, and endian"),
-        ({"dims": DIMS}, "set dtype, and endian"),
-        (
-            {"dims": DIMS, "dtype": "float32"},
-            r"expected 13 x 12 x 11 x 4 \(float32\) = 6864 bytes, found 3432; dtype uint16 would fit",
-        ),
-        (
-            WORDS | {"dims": (13, 12, 10), "skip": 8},
-            r"\(uint16\) \+ 8 skipped = 3128 bytes, found 3432; correct dims, dtype or skip",
-        ),
-        (WORDS | {"dtype": "short int"}, "dtype: expected a name such as uint8 or float32"),
-        (WORDS | {"dims": (13, 12)}, r"dims: expected at least 2 .* got \[13, 12\]"),
-        (WORDS | {"dims": (13, 132, 1)}, "dims: expected at least 2"),
-        (WORDS | {"dims": (-13, -12, 11)}, "dims: expected at least 2"),
-        (WORDS | {"dtype": "complex64"}, "expected integers, floats or bool, got complex64"),
-        (WORDS | {"dtype": "S2"}, "expected integers, floats or bool"),
-        (WORDS | {"spacing": (1, 1, -1)}, "spacing: expected three finite numbers"),
-        (WORDS | {"spacing": (1, 1, float("nan"))}, "spacing: expected three"),
-    ],
-)
-def test_mistakes_in_the_description_of_plain_samples(tmp_path, arguments, message):
-    path = tmp_path / "v.raw"
-    path.write_bytes(sample_values("uint16").tobytes())
-    with pytest.raises(ArgumentError, match=message) as caught:
-        open_source(path, **arguments)
-    assert str(caught.value).startswith(f"{path}: ")
-
-
 def test_plain_file_that_shrinks_while_it_is_read(tmp_path):
     path = tmp_path / "v.raw"
     path.write_bytes(sample_values("uint8").tobytes())
@@ -73,23 +41,6 @@ def test_plain_file_that_shrinks_while_it_is_read(tmp_path):
     path.write_bytes(b"short")
     with pytest.raises(ArgumentError, match="cut off while it was read"):
         source.slices(0, 11)
-
-
-def test_mistakes_in_the_path(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for name in ("v.doc", "v.raw.gz"):
-        Path(name).touch()
-    np.save("v.npy", sample_values())
-    Path("empty").mkdir()
-    for name, dims, message in [
-        ("none.vti", None, f"none.vti: no such file or folder; looked for {tmp_path}/none.vti"),
-        ("v.doc", None, r"unknown suffix '.doc'; expected .raw, .*, .nii.gz, .* or a folder of slices"),
-        ("v.raw.gz", None, r"unknown suffix '.raw.gz'"),
-        ("empty", None, r"expected a folder of DICOM slices or TIFFs \(.tif, .tiff\), found none"),
-        ("v.npy", DIMS, "dims: not for this format; leave them out"),
-    ]:
-        with pytest.raises(ArgumentError, match=message):
-            open_source(name, dims=dims)
 
 
 @pytest.mark.parametrize("name", [*WRITERS, "v.raw", "v.slc"])
@@ -106,16 +57,6 @@ def test_a_file_without_permission_is_one_sentence(tmp_path, monkeypatch, name):
     with pytest.raises(ArgumentError) as caught:
         open_source(path, **arguments)
     assert str(caught.value) == f"{path}: cannot be read (Permission denied)"
-
-
-@pytest.mark.parametrize("function", ["is_dir", "iterdir"])
-def test_a_folder_without_permission_is_one_sentence(tmp_path, monkeypatch, function):
-    def refuse(self):
-        raise PermissionError(13, "Permission denied", str(self))
-
-    monkeypatch.setattr(Path, function, refuse)
-    with pytest.raises(ArgumentError, match=r"cannot be read \(Permission denied\)"):
-        open_source(tmp_path)
 
 
 def test_what_the_other_process_runs_counts_as_code_of_a_job():

@@ -57,43 +57,6 @@ def test_a_single_column_needs_no_number(tmp_path):
     np.testing.assert_array_equal(open_source(path, dims=DIMS).slices(0, 4).ravel(), TABLE[:, 4])
 
 
-@pytest.mark.parametrize(
-    ("lines", "keys", "message"),
-    [
-        (LINES, {"column": 2, "dims": None}, "text has no header; set dims, and column where it has several"),
-        (
-            LINES,
-            {},
-            r"dataset\.volume\.column: expected a number from 1 to 10, got none",
-        ),
-        (LINES, {"column": 11}, "expected a number from 1 to 10, got 11"),
-        (LINES, {"column": 2, "dims": (6, 5)}, r"dims: expected at least 2 .* got \[6, 5\]"),
-        (LINES, {"column": 2, "dtype": "float32", "skip": 4}, "dtype, skip: not for this format; leave them"),
-        (
-            LINES[:-7],
-            {"column": 2},
-            "expected 6 x 5 x 4 = 120 lines, found 113; correct dims, or get the file",
-        ),
-        ([*LINES, LINES[0]], {"column": 2}, "expected 6 x 5 x 4 = 120 lines, found more; correct dims"),
-        (["x T", *LINES[1:]], {"column": 2}, "expected text with a line per sample .* to float: 'T'"),
-        ([], {"column": 2}, "expected text with a line per sample and a number per column, got No columns"),
-    ],
-)
-def test_mistakes(tmp_path, lines, keys, message):
-    path = write_lines(tmp_path / "v.txt", lines, end="\n" if lines else "")
-    with pytest.raises(ArgumentError, match=message) as caught:
-        open_source(path, **{"dims": DIMS, **keys}).slices(0, 4)
-    assert str(caught.value).startswith(f"{path}: ")
-
-
-@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.9, 0.999])
-def test_a_compressed_file_that_is_cut_off_is_refused(tmp_path, share):
-    path = write_lines(tmp_path / "v.txt.gz", LINES)
-    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
-    with pytest.raises(ArgumentError, match=r"v\.txt\.gz: expected text with .* damaged or cut off\?"):
-        open_source(path, dims=DIMS, column=2).slices(0, 4)
-
-
 def test_a_line_that_is_too_short_is_named_by_its_place(tmp_path):
     path = write_lines(tmp_path / "v.txt", [*LINES[:50], "1 2", *LINES[51:]])
     source = open_source(path, dims=DIMS, column=4)

@@ -148,17 +148,6 @@ def test_steps_alone_are_taken_for_slices_and_it_is_said(tmp_path):
     assert "steps of time are taken for slices" in source.note
 
 
-def test_axes_that_are_none_of_a_volume_are_named(tmp_path):
-    tifffile.imwrite(tmp_path / "v.tif", A[:3], imagej=True, metadata={"axes": "CYX"})
-    with pytest.raises(
-        ArgumentError, match=r"expected three axes of space .*, got T 1 x Z 1 x C 3 x Y 12 x X"
-    ):
-        open_source(tmp_path / "v.tif")
-    tifffile.imwrite(tmp_path / "turned.tif", A, metadata={"axes": "XYZ"}, photometric="minisblack")
-    with pytest.raises(ArgumentError, match="expected pages with Y and X, got the axes XYZ"):
-        open_source(tmp_path / "turned.tif")
-
-
 def ome(own: str, images: str) -> dict[str, object]:
     """Arguments of tifffile for a file of an OME-TIFF in several."""
     space = 'xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"'
@@ -217,24 +206,6 @@ def test_an_ome_tiff_in_several_files_is_whole_from_any_of_them_and_from_their_f
         open_source(tmp_path)
 
 
-def test_a_missing_file_of_an_ome_tiff_is_named(tmp_path):
-    split(tmp_path)[1].rename(tmp_path / "away")
-    for path in (tmp_path / "part_0.ome.tif", tmp_path / "part_2.ome.tif", tmp_path):
-        with pytest.raises(
-            ArgumentError, match=r"2 of 6 slices are missing; put part_1.ome.tif of the same OME"
-        ):
-            open_source(path)
-
-
-def test_a_part_of_an_ome_tiff_without_metadata_names_the_file_that_has_them(tmp_path):
-    told = ome("urn:uuid:2", '<BinaryOnly MetadataFile="all.companion.ome" UUID="urn:uuid:1"/>')
-    tifffile.imwrite(tmp_path / "v.ome.tif", A, **told)
-    with pytest.raises(
-        ArgumentError, match=r"got a part of all.companion.ome; open that one, or make one file"
-    ):
-        open_source(tmp_path / "v.ome.tif")
-
-
 def test_what_tifffile_only_warns_of_is_an_error_where_samples_are_lost():
     expected = pytest.raises(ArgumentError, match=r"cut off, tifffile says: MMStack series is missing files")
     with expected, complaints_raised():
@@ -277,39 +248,10 @@ def test_a_folder_with_steps_beside_slices(tmp_path):
     assert open_source(folder).note.startswith("step 0 of 3; dataset.volume.time chooses another; TIFF tells")
 
 
-@pytest.mark.parametrize(
-    ("names", "told"),
-    [
-        (["s0", "s0_mask", "s1", "s1_mask"], "s0.tif and s0_mask.tif"),
-        (["foot_0", "foot_1", "head_0", "head_1"], "foot_0.tif and head_0.tif"),
-        (
-            ["position0_z0", "position0_z1", "position1_z0", "position1_z1"],
-            "position0_z0.tif and position1_z1",
-        ),
-        (["z0_c0", "z0_c1", "z1_c0"], "z0_c0.tif and z1_c0.tif"),  # and no file z1_c1
-        (["z1_t1", "z2_t2", "z3_t3"], "z1_t1.tif and z3_t3.tif"),
-        (["s1", "s01", "s2"], "s.*1.tif and s2.tif"),
-        (["left", "right"], "left.tif and right.tif"),
-    ],
-)
-def test_files_that_are_no_slices_of_one_volume_are_named(tmp_path, names, told):
-    folder = folder_of(tmp_path / "v", dict.fromkeys(names, A[0]))
-    with pytest.raises(
-        ArgumentError, match=rf"{told}.*: expected names that differ by the number of the slice"
-    ):
-        open_source(folder)
-
-
 @pytest.mark.parametrize("name", ["s{}", "s{:03}", "2026-11-30_run12_{:04}", "c{}", "{}", "t{}_2 mm"])
 def test_one_number_counts_slices_whatever_is_around_it(tmp_path, name):
     planes = {name.format(z + 8): plane for z, plane in enumerate(A)}
     assert_holds(folder_of(tmp_path / "v", planes), A)
-
-
-def test_a_gap_in_one_of_the_channels_is_named(tmp_path):
-    planes = {f"z{z}_c{c}": A[z] for z in (0, 1, 3) for c in range(2)}
-    with pytest.raises(ArgumentError, match=r"z1_c0.tif and z3_c0.tif: expected numbers 1 apart"):
-        open_source(folder_of(tmp_path / "v", planes))
 
 
 @pytest.mark.skipif(find_spec("imagecodecs") is None, reason="needs imagecodecs: pip install '.[tiff]'")

@@ -59,12 +59,6 @@ def test_a_rectilinear_grid_has_to_be_even(tmp_path, name):
         open_source(tmp_path / name)
 
 
-def test_a_curved_grid_is_refused(tmp_path):
-    pyvista.RectilinearGrid(*PLACES).cast_to_structured_grid().save(tmp_path / "v.vts")
-    with pytest.raises(ArgumentError, match=r"expected image data .*, got StructuredGrid; resample it"):
-        open_source(tmp_path / "v.vts")
-
-
 def test_a_file_in_pieces_needs_them_all(tmp_path):
     writer = vtkXMLPImageDataWriter()
     writer.SetFileName(str(tmp_path / "v.pvti"))

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import nibabel
 import nrrd
 import numpy as np
@@ -71,6 +72,11 @@ def by_nibabel(kind=nibabel.Nifti1Image) -> Writer:
     return lambda path, values: nibabel.save(kind(values.T, np.diag([*SPACING, 1.0])), path)
 
 
+def by_h5py(path: Path, values: np.ndarray) -> None:
+    with h5py.File(path, "w") as file:
+        file["density"] = values
+
+
 def page_by_page(path: Path, values: np.ndarray) -> None:
     with tifffile.TiffWriter(path) as writer:
         for page in values:
@@ -97,6 +103,7 @@ WRITERS: dict[str, Writer] = {
     "packed.tif": by_tifffile(compression="zlib"),
     "pages.tif": page_by_page,
     "rows.npy": np.save,
+    "array.h5": by_h5py,
     "columns.npy": lambda path, values: np.save(path, np.asfortranarray(values)),
 }
 # Endings of files that a process of its own reads, in half a second or more; `make test` leaves these out.
@@ -105,4 +112,4 @@ NAMES = [
     pytest.param(name, marks=pytest.mark.subprocess) if name.endswith(BY_A_PROCESS) else name
     for name in WRITERS
 ]
-HAS_SPACING = tuple(name for name in WRITERS if not name.endswith((".tif", ".tiff", ".npy")))
+HAS_SPACING = tuple(name for name in WRITERS if not name.endswith((".tif", ".tiff", ".npy", ".h5")))

@@ -46,7 +46,11 @@ class Project:
 
     def texgs(self, verb: str, *words: str) -> subprocess.CompletedProcess[str]:
         """A verb with KEY=VALUE, on the volume and views of TINY unless these say otherwise."""
-        command = [sys.executable, "-P", "-m", "texgs.cli.main", verb, *TINY.split(), *words]
+        return self.typed(verb, *TINY.split(), *words)
+
+    def typed(self, *words: str) -> subprocess.CompletedProcess[str]:
+        """A verb with words and nothing else."""
+        command = [sys.executable, "-P", "-m", "texgs.cli.main", *words]
         run = {"cwd": self.work, "env": self.environment, "text": True, "capture_output": True}
         return subprocess.run(command, check=False, **run)
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.io import write_json
 from texgs.workflow import result
 from texgs.workflow.graph import Graph, earlier

@@ -1,7 +1,9 @@
 """Every rule of the workflow, from the volume to the report, run by Snakemake: once, and after changes."""
 
+import html
 import json
 import re
+import shlex
 import shutil
 from pathlib import Path
 
@@ -157,6 +159,19 @@ def test_a_method_a_field_and_a_stage_of_one_file_each_are_in_tables_and_report(
     refused = project.texgs("edit_image", "dataset=sphere", "fit=ball", "edit=glass", "tracking=none")
     message = "edit glass: expected a fit of surfels, got one of ball, which has no relight, texture"
     assert message in refused.stderr
+
+
+def test_the_commands_below_figures_do_nothing_where_all_is_done(project):
+    commands = re.findall(r"<code>texgs (.*?)</code>", (project.work / "results" / "report.html").read_text())
+    commands = sorted({html.unescape(command) for command in commands})
+    assert {command.split()[0] for command in commands} >= {"sheet", "figure", "pse", "edit_image", "gallery"}
+    before = metrics(project)
+    for command in commands:
+        assert "up to date" in project.typed(*shlex.split(command)).stdout, command
+    assert metrics(project) == before
+    other = project.typed("sheet", "dataset=sphere", "tracking=none")
+    assert (other.returncode, "--replace" in other.stderr) == (2, True)
+    assert metrics(project) == before
 
 
 def test_a_second_time_there_is_nothing_to_do(project):

@@ -14,13 +14,13 @@ from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model_file import write_model
+from texgs.report.compared import compare_views
 from texgs.report.gallery import GalleryRenderer
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
 from texgs.volume.view_settings import ViewKeys
-from texgs.workflow.stages.pse import compared
 
 SIZE = 48
 VIEW = [20.0, 10.0]
@@ -51,7 +51,7 @@ def test_a_scene_is_compared_with_the_volume_that_has_its_edits(scene, monkeypat
     edits = [PartEdit(opacity=0.5), PartEdit(palette=(0, 1, 0))]
     models = {name: SceneModel("x", edit) for name, edit in zip(("low", "high"), edits, strict=True)}
     changed, camera = Scene(models, Light("headlight")), orbit(20, 10, 4, 30, 48, 48)
-    comparison, shown = compared("both", changed, Composition([ball(1), ball(2)]), twin, [camera])
+    comparison, shown = compare_views("both", changed, Composition([ball(1), ball(2)]), twin, [camera])
     assert comparison.psnr > 0
     assert comparison.ssim < 1
     assert set(shown) == {"scene", "volume", "error"}

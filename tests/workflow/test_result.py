@@ -9,7 +9,7 @@ from threading import Event, Thread
 import pytest
 
 from tests.refusals import refused
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.io import read_json, write_bytes, write_json
 from texgs.workflow import result
 from texgs.workflow.notes import note_written

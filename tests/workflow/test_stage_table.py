@@ -3,11 +3,9 @@
 import runpy
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-from tests.refusals import refused
 from tests.toys.projection import STAGE, ProjectionResult
 from texgs.cli import main
 from texgs.config.compose import compose
@@ -15,17 +13,20 @@ from texgs.core.errors import ConfigError
 from texgs.report.results import Result
 from texgs.workflow import stage_table
 from texgs.workflow.execution import require_outcome
-from texgs.workflow.stage import Outcome, read, selected
+from texgs.workflow.stage import Outcome, Rule, read, selected
 from texgs.workflow.stage_table import STAGES, by_name, require_stage
 
-TOYS = Path(__file__).parents[1] / "toys"
+TOYS = Path(__file__).parent  # a folder without results
 
 
-def changed(**changes):
-    return replace(STAGE, rule=replace(STAGE.rule, **changes))
+class Untyped:
+    """Works of stages that do not say what their settings are."""
 
+    @staticmethod
+    def bare(settings, inputs, output): ...
 
-def mistaken(settings: int, inputs, output): ...
+    @staticmethod
+    def number(settings: int, inputs, output): ...
 
 
 @dataclass
@@ -35,56 +36,56 @@ class Misspelt:
     width: int = read("views.widths")
 
 
-def alone(stage):
-    return lambda: require_stage("toy", stage)
+@dataclass(frozen=True)
+class Plain:
+    """No kind of Result."""
+
+    mean: float
 
 
-def beside(stage):
-    return lambda: by_name([*STAGES.values(), stage])
+def among_all(**changes):
+    return by_name([*STAGES.values(), replace(STAGE, **changes)])
 
 
-def done(outcome, *, files=("projection.py",)):
-    """A job that has written its file."""
-    return lambda: require_outcome(changed(files=files), outcome, TOYS)
-
-
-def test_a_stage_may_be_of_ones_own():
-    alone(STAGE)()
-    assert [name for name in beside(STAGE)() if name != STAGE.name] == list(STAGES)
-    done(Outcome(ProjectionResult(1)))()
+def rule(**changes):
+    return {"rule": replace(STAGE.rule, **changes)}
 
 
 @pytest.mark.parametrize(
-    ("call", "named"),
+    ("made", "key"),
     [
-        (alone(dict), "toy: STAGE: expected a Stage, got type"),
-        (alone(replace(STAGE, name="my stage")), "toy: STAGE: expected letters, digits and _ in its name"),
-        (alone(changed(files=("a.png"))), "toy: files of its Rule: expected names with commas"),
-        (alone(replace(STAGE, work=lambda settings: None)), r"toy: work of its Stage: expected <lambda>\("),
-        (alone(changed(folder="{datset}/a")), r"folder of its Rule: expected some of .*, got {datset}"),
-        (beside(replace(STAGE, name="sheet")), "expected stages of different names, got sheet twice"),
-        (beside(changed(target="volume")), "projection: target of its Rule: got volume, the name of a rule"),
+        (lambda: require_stage("toy", dict), "toy: STAGE: .* got type"),
+        (lambda: require_stage("toy", replace(STAGE, name="my stage")), "toy: STAGE: .* name"),
+        (lambda: require_stage("toy", replace(STAGE, **rule(files="a.png"))), "toy: files of its Rule"),
+        (lambda: require_stage("toy", replace(STAGE, work=lambda settings, inputs: None)), "toy: work"),
+        (lambda: require_stage("toy", replace(STAGE, **rule(folder="{datset}/a"))), "got {datset}"),
+        (lambda: among_all(name="sheet"), "sheet twice"),
+        (lambda: among_all(**rule(target="volume")), "stage projection: target of its Rule"),
+        (lambda: among_all(**rule(name="sheet")), "stages projection and sheet: .* name"),
+        (lambda: among_all(**rule(folder="{dataset}/transfer")), "folder .* {dataset}/transfer twice"),
+        (lambda: replace(STAGE, work=Untyped.bare).schema, "stage projection: work: .* got none"),
+        (lambda: replace(STAGE, work=Untyped.number).schema, "stage projection: work: .* got int"),
+        (lambda: selected(Misspelt, compose(())), r"Misspelt\.width: .* 'widths'"),
+        (lambda: type("Misplaced", (Result,), {}, section="datas"), "Misplaced: section"),
+        (lambda: require_outcome(STAGE, None, TOYS), "stage projection: work: .* got NoneType"),
+        (lambda: require_outcome(STAGE, Outcome(Plain(1)), TOYS), "work: .* got Plain"),
+        (lambda: require_outcome(STAGE, Outcome(ProjectionResult(1)), TOYS), r"projection\.png"),
         (
-            beside(changed(name="sheet")),
-            "stages projection and sheet: expected a name of its own",
-        ),
-        (beside(changed(folder="{dataset}/transfer")), "expected a folder of its own for each Rule"),
-        (lambda: replace(STAGE, work=lambda settings: None).schema, "work: expected a dataclass .* got none"),
-        (lambda: replace(STAGE, work=mistaken).schema, "projection: work: expected a dataclass .* got int"),
-        (lambda: selected(Misspelt, compose(())), r"Misspelt.width: reads .* 'widths'"),
-        (lambda: type("Misplaced", (Result,), {}, section="datas"), "Misplaced: section: no section datas"),
-        (done(None), "stage projection: work: expected an Outcome, got NoneType"),
-        (done(Outcome(SimpleNamespace())), "expected a kind of Result in its Outcome, got SimpleNamespace"),
-        (done(Outcome(ProjectionResult(1)), files=("a.png",)), "work: expected the file a.png in its folder"),
-        (
-            done(Outcome(ProjectionResult(1), {"b.png": "B"})),
-            "expected the file b.png in its folder",
+            lambda: require_outcome(
+                replace(STAGE, **rule(files=())), Outcome(ProjectionResult(1), {"b.png": "B"}), TOYS
+            ),
+            r"b\.png",
         ),
     ],
 )
-def test_a_mistake_in_a_stage_is_named(call, named):
-    refused(call, named, ConfigError)
-    assert "Misplaced" not in Result.kinds
+def test_a_mistake_in_a_stage_is_named(made, key):
+    with pytest.raises(ConfigError, match=key):
+        made()
+
+
+def test_the_stages_that_there_are_have_no_mistakes():
+    require_stage("toy", STAGE)
+    assert list(by_name(STAGES.values())) == list(STAGES)
 
 
 def test_a_stage_takes_no_verb(monkeypatch, capsys):
@@ -92,3 +93,8 @@ def test_a_stage_takes_no_verb(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         runpy.run_path(main.__file__)
     assert "STAGE has the name of the verb run; rename it" in capsys.readouterr().err
+
+
+def test_a_rule_may_have_several_stages():
+    assert isinstance(STAGES["surfels"].rule, Rule)
+    assert STAGES["surfels"].rule == STAGES["texture"].rule

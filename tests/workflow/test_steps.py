@@ -14,7 +14,7 @@ from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.fitting import series
 from texgs.report.tables import tables_of
 from texgs.scene.scene_file import read_scene
-from texgs.volume.generate_series import flame
+from texgs.volume.generate import flame
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
@@ -42,7 +42,7 @@ def rings(tmp_path_factory):
         patch.chdir(folder)
         hide_weights(patch, folder)
         patch.setattr("texgs.report.before_after.TURN", 4)
-        for name, value in {"SIZE": 32, "ROUNDS": 1}.items():
+        for name, value in {"VIEW_SIZE": 32, "ROUNDS": 1}.items():
             patch.setattr(series, name, value)
         for words in (["steps", *RINGS], GOLD, ["page", *RINGS]):
             assert main(words) == 0
@@ -95,7 +95,7 @@ def test_a_job_that_was_stopped_goes_on_in_the_middle_of_the_series(rings, tmp_p
         return step(*words, **more)
 
     monkeypatch.setattr(series.Follower, "step", stopped)
-    for name, value in {"SIZE": 32, "ROUNDS": 1}.items():
+    for name, value in {"VIEW_SIZE": 32, "ROUNDS": 1}.items():
         monkeypatch.setattr(series, name, value)
     words = ["steps", *RINGS, "views.shading.diffuse=0.65"]
     assert main(words) == 130

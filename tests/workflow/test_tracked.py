@@ -1,20 +1,22 @@
 """What the tracking store and the metrics file are told of a job."""
 
+import json
 import sys
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from texgs.config.case import Case
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.report.results import Comparison, EditResult, FitResult, GalleryResult, PseResult, Shown, plain
 from texgs.workflow.job import Job
 from texgs.workflow.provenance import device, seed
 from texgs.workflow.runs import PARENT
 from texgs.workflow.stage_table import STAGES
 from texgs.workflow.sweep import as_sweep, variants
-from texgs.workflow.tracked import curves, name, scalars, tags
+from texgs.workflow.tracked import RUNS, Tracking, curves, flatten, name, of_workflow, scalars, tags
 
 GOLD = ("edit=gold", "edit.text.size=64,128")
 IDENTITY = {"settings": "0123", "code": "4567"}
@@ -48,6 +50,19 @@ def test_tags_are_of_what_a_job_is_and_leave_out_what_it_is_not():
     assert not tags(job("volume", ()), IDENTITY, None).keys() & {"tf", "variant", "sweep", "edit", PARENT}
 
 
+def test_nested_parameters_become_dotted_names_and_text():
+    params = {
+        "fit": {"steps": 30000, "rate": {"means": 1.6e-4}, "windows": [1, 2.5, None]},
+        **{"shaded": True, "mask": None, "edits": {}, "volume": Path("a.vti"), "prompt": 'a "blue" one'},
+    }
+    assert flatten(params) == {
+        "fit.steps": "30000",
+        "fit.rate.means": "0.00016",
+        "fit.windows": "[1, 2.5, null]",
+        **{"shaded": "true", "mask": "null", "edits": "{}", "volume": "a.vti", "prompt": 'a "blue" one'},
+    }
+
+
 def test_losses_are_a_curve_over_iterations_and_times_one_over_frames():
     fit = FitResult(1.0, 10, iterations=30, losses=[0.3, 0.2, 0.1])
     assert not list(curves(plain(fit))), "told while it ran"
@@ -75,6 +90,18 @@ def test_edits_by_numbers_and_pictures_of_a_gallery_have_a_metric_each_and_their
         "shown_psnr/polar/error/30°": 20.0,
         "shown_psnr": 25.0,
     }
+
+
+def test_the_workflow_says_which_run_a_job_is_inside_of(tmp_path, monkeypatch):
+    output = tmp_path / "a"
+    assert of_workflow(output) == (Tracking(None, "texgs"), {}, "")
+    monkeypatch.setenv("TEXGS_TRACKING", "sqlite:///x.db")
+    monkeypatch.setenv(RUNS, str(tmp_path / "runs.json"))
+    assert of_workflow(output) == (Tracking("sqlite:///x.db", "texgs"), {}, "")
+    told = {output.as_posix(): {"parent": "abc", "swept": {"fit.seed": "1"}, "command": "texgs views"}}
+    (tmp_path / "runs.json").write_text(json.dumps(told))
+    expected = Tracking("sqlite:///x.db", "texgs", "abc"), {"fit.seed": "1"}, "texgs views"
+    assert of_workflow(output) == expected
 
 
 class Cuda:

@@ -10,7 +10,7 @@ from texgs.api.display import as_python
 from texgs.core.errors import ArgumentError, located
 from texgs.core.names import check_count
 from texgs.volume.grid import ONES, ZEROS, Grid, Triple
-from texgs.volume.layers import labelled
+from texgs.volume.layers import labelled_source
 from texgs.volume.slabs import ArraySource, Source
 from texgs.volume.space import UNTOLD, Space
 
@@ -40,7 +40,7 @@ def source_of(
             advice = "select one of each other, as by .isel(time=0)"
             raise ArgumentError(f"DataArray: expected three dimensions, got {got}; {advice}")
         with located("DataArray"):
-            return labelled("DataArray", data, said)
+            return labelled_source("DataArray", data, said)
     if hasattr(data, "GetFieldData"):  # of VTK
         values, steps, first, space = of_image_data(data)
     else:

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Sequence
 from html import escape
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
-
-from texgs.core.camera import Camera, orbit
-from texgs.core.lens import Frame
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,21 +59,6 @@ def frame_of_page(source: str, height: int) -> str:
     """Return the element that shows a page of `src="..."` or `srcdoc="..."`."""
     style = f"width:100%;height:{height}px;border:0"
     return f'<iframe {source} style="{style}" allowfullscreen></iframe>'
-
-
-def camera_of(
-    framed: Frame,
-    azimuth: float,
-    polar: float,
-    width: int,
-    height: int | None = None,
-    fov_y: float = 30.0,
-    radius: float | None = None,
-    target: Sequence[float] | None = None,
-) -> Camera:
-    """Return the camera that shows all that is framed; distance and target may be others."""
-    height = width if height is None else height
-    return orbit(azimuth, polar, *framed.lens(fov_y, width, height, radius, target))
 
 
 def picture_of(pixels: np.ndarray) -> Image:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Self
@@ -12,24 +11,23 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import torch
 
-from texgs.api.display import as_python, camera_of, picture_of
+from texgs.api.display import as_python, picture_of
 from texgs.api.part import Part
 from texgs.core.errors import ArgumentError
-from texgs.core.interrupts import interrupts_between_items
-from texgs.core.keys import ValueMismatch, typed
 from texgs.core.light import Light
-from texgs.core.names import part_file
+from texgs.core.names import new_part_file
+from texgs.core.progress import interrupts_between_items
 from texgs.scene.changes import apply_all
 from texgs.scene.parts import part_names
 from texgs.scene.scene_file import light_of
 from texgs.scene.session import Session
+from texgs.scene.shot import Shot
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
     from texgs.api.live import Viewer
 
-VOTING = 512  # pixels of views that vote on the surfels of a segment
 PNG_MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I", "I;16")  # of pictures that PNG holds
 
 
@@ -58,7 +56,7 @@ class Editing:
 
     def __getitem__(self, name: str) -> Part:
         """Return a part; another name is an ArgumentError that lists those that there are."""
-        return Part(self.session, str(name), self.one_step)
+        return Part(self.session, str(name))
 
     def __iter__(self) -> Iterator[str]:
         """Yield the names of all parts."""
@@ -75,7 +73,7 @@ class Editing:
 
     @light.setter
     def light(self, value: Light | str | Sequence[float]) -> None:
-        with self.one_step(f"light {value}"):
+        with self.session.one_step(f"light {value}"):
             self.session.set_light(light_of(as_python(value)))
 
     @property
@@ -85,7 +83,7 @@ class Editing:
 
     @background.setter
     def background(self, value: str | Sequence[float]) -> None:
-        with self.one_step(f"background {value}"):
+        with self.session.one_step(f"background {value}"):
             self.session.set_background(as_python(value))
 
     @property
@@ -95,7 +93,7 @@ class Editing:
 
     @time.setter
     def time(self, step: int) -> None:
-        with self.one_step(f"time {step}"):
+        with self.session.one_step(f"time {step}"):
             self.session.set_of_scene("time", as_python(step))
 
     def edit(self, *words: str) -> Self:
@@ -105,33 +103,17 @@ class Editing:
         """
         if not all(isinstance(word, str) for word in words):
             raise ArgumentError(f"words: expected text such as 'light=30,40', got {words!r:.100}")
-        with self.one_step(" ".join(words)):
+        with self.session.one_step(" ".join(words)):
             apply_all(self.session, words)
         return self
 
     def undo(self) -> bool:
         """Take the latest change back; return whether there was one."""
-        done = self.session.undo()
-        self.tell()
-        return done
+        return self.session.undo()
 
     def redo(self) -> bool:
         """Make again what was undone last; return whether there was anything."""
-        done = self.session.redo()
-        self.tell()
-        return done
-
-    @contextmanager
-    def one_step(self, title: str) -> Iterator[None]:
-        """Let all changes within the block be one step with a title, and tell pages that show this scene."""
-        with self.session.one_step(title):
-            yield
-        self.tell()
-
-    def tell(self) -> None:
-        """Tell pages of the viewer that show this scene."""
-        if self._viewer is not None:
-            self._viewer.tell()
+        return self.session.redo()
 
     # ---- Looks and segments -------------------------------------------------
 
@@ -197,50 +179,32 @@ class Editing:
             ArgumentError: if the name is taken, no surfel is there, or weights are missing.
         """
         from texgs.edit.clicks import Clicks
+        from texgs.edit.mask_keys import MaskKeys
         from texgs.edit.new_segment import model_name, new_segment
-        from texgs.models.sam import mask_model
-        from texgs.volume.cameras import icosphere_of
 
         scene, device = self.session.scene, self.session.composition.device
-        part = f"{model_name(scene, model, 'model')}/{name}"
-        framed = scene.framed(self.session.composition)
+        part, framed = f"{model_name(scene, model, 'model')}/{name}", scene.framed(self.session.composition)
         try:
             pixels = torch.tensor(point, dtype=torch.float32, device=device).reshape(-1, 2) + 0.5
         except (TypeError, ValueError, RuntimeError) as error:
             raise ArgumentError(f"point: expected pixel x, y, or several, got {point!r:.100}") from error
-        every = torch.ones(len(pixels), dtype=torch.bool, device=device)
-        clicks = Clicks(camera_of(framed, azimuth, polar, size).to(device), pixels, every)
-        around = [each.to(device) for each in icosphere_of(views, framed.lens().square(VOTING))]
-        file = self._new_folder("segment") / part_file("name", part)
-        facts = {"view": [azimuth, polar], "point": pixels.tolist(), "masks": masks}
-        new_segment(
-            scene, part, clicks, around, mask_model(masks, device), file, facts, title=f"segment {name}"
-        )
-        with self.one_step(f"{part} new"):
-            self.session.add_segment(part, file)
+        camera = Shot(size, azimuth=azimuth, polar=polar).camera(framed).to(device)
+        clicks = Clicks(camera, pixels, torch.ones(len(pixels), dtype=torch.bool, device=device))
+        keys, facts = MaskKeys(masks, views=views), {"view": [azimuth, polar], "point": pixels.tolist()}
+        file, title = partial(self._new_file, "segment", part), f"segment {name}"
+        new_segment(self.session, part, clicks, keys, framed.lens(), file, facts, title=title)
         return self[part]
 
     @interrupts_between_items()
     def _look(self, method: str, values: dict[str, Any], parts: Sequence[str]) -> Self:
         """Give parts a new look by a method of editing with values of its settings."""
-        from texgs.config.recipes import Edit
-        from texgs.edit.method import method_of
-        from texgs.edit.task import edited_by, orbit_task, parts_of
-        from texgs.viewer.looks import looks_of
+        from texgs.edit.new_look import give_look, look_task, settings_of
 
-        before, device = self.session.scene, self.session.composition.device
         if isinstance(parts, str) or not isinstance(parts, Iterable):
-            parts = [parts]
-        try:
-            edit = typed(Edit, {"name": method, "method": method, "parts": [*parts], method: values})
-        except ValueMismatch as error:
-            raise ArgumentError(str(error)) from error
-        method_of(edit).of(edit).check()
-        task = replace(orbit_task(before, edit, self._new_folder(method), device), draws=False)
-        after = edited_by(method_of(edit), task).scene
-        names = parts_of(before, edit.parts)
-        with self.one_step(f"{', '.join(names)} {next(iter(values.values()))}"):
-            self.session.set_looks(looks_of(after, names, before))
+            parts = [str(parts)]
+        scene, device = self.session.scene, self.session.composition.device
+        task = look_task(scene, settings_of(method, values), parts, self._new_folder(method), device)
+        give_look(self.session, task, str(next(iter(values.values()))))
         return self
 
     def _picture(self, picture: Any) -> str:
@@ -249,6 +213,7 @@ class Editing:
             return str(picture)
         image = picture if hasattr(picture, "save") else self._painted(picture)
         file = self._new_folder("picture") / "style.png"
+        file.parent.mkdir()
         (image if image.mode in PNG_MODES else image.convert("RGB")).save(file)
         return str(file)
 
@@ -262,8 +227,10 @@ class Editing:
         return picture_of(values)
 
     def _new_folder(self, kind: str) -> Path:
-        """Return a new folder for files of the scene."""
+        """Return a folder for files of the scene that is not there yet."""
         self._count += 1
-        folder = Path(self._scratch.name, f"{self._count}-{kind}")
-        folder.mkdir()
-        return folder
+        return Path(self._scratch.name, f"{self._count}-{kind}")
+
+    def _new_file(self, kind: str, part: str) -> Path:
+        """Return the file of a new part that is not there yet."""
+        return new_part_file("name", Path(self._scratch.name), kind, part)

@@ -16,9 +16,9 @@ from texgs.api.scene import Scene
 from texgs.api.volume import Volume
 from texgs.core.check import torch_device
 from texgs.core.errors import ArgumentError
-from texgs.core.interrupts import interrupts_between_items
 from texgs.core.io import copy_atomic
 from texgs.core.names import SCENE, close, file_name
+from texgs.core.progress import interrupts_between_items
 from texgs.scene.session import Session
 from texgs.volume.summaries import summary_file, write_summaries
 from texgs.volume.transfer import TransferFunction
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 NOW = "now"
 TEST_VIEWS = 12  # for the numbers of a fit; `Scene.psnr` measures more
-LEAST = 16  # pixels
+LEAST_SIZE = 16  # pixels
 
 
 @interrupts_between_items()
@@ -64,8 +64,8 @@ def fit(
 
     if not isinstance(volume, Volume):
         raise ArgumentError(f"volume: expected a texgs.Volume, got {type(volume).__name__}")
-    if not isinstance(size, Integral) or size < LEAST:
-        raise ArgumentError(f"size: expected a whole number of pixels, at least {LEAST}, got {size!r}")
+    if not isinstance(size, Integral) or size < LEAST_SIZE:
+        raise ArgumentError(f"size: expected a whole number of pixels, at least {LEAST_SIZE}, got {size!r}")
     if not isinstance(seed, Integral) or not 0 <= seed < 2**63:
         raise ArgumentError(f"seed: expected a whole number from 0 on, got {seed!r}")
     recipes = [NOW, *members("fit")]
@@ -94,24 +94,20 @@ def fit_now_into(
     volume: Volume, functions: Mapping[str, TransferFunction], size: int, seed: int, device: str, folder: Path
 ) -> Path:
     """Fit models in memory, and write them and a scene into a folder; return the scene's file."""
+    from texgs.edit.function_model import models_of
     from texgs.fields.surfels.model_file import write_model
-    from texgs.fitting.now import fit_now
     from texgs.scene.scene import Scene as Models
     from texgs.scene.scene import SceneModel, SceneVolume
     from texgs.scene.scene_file import write_scene
-    from texgs.volume.caster import Caster
     from texgs.volume.framing import frame_of
-    from texgs.volume.render import Appearance
 
-    look, frame, models = Appearance(), frame_of(volume.grid, functions.values()), {}
     files = {name: folder / file_name("functions", f"{name}.safetensors") for name in functions}
     if (folder / SCENE).exists():
         warnings.warn(f"{folder} holds a scene, which this replaces; another folder keeps both", stacklevel=3)
-    made_of = SceneVolume(copied(volume, folder), functions, look)
-    caster = Caster(volume.grid, look, device)
+    made_of, frame = SceneVolume(copied(volume, folder), functions), frame_of(volume.grid, functions.values())
+    models = {}
     for name, tf in functions.items():
-        lens = frame.lens(width=size, height=size)
-        (model,) = fit_now(caster, look, tf, lens, name, seed, soon=False)
+        (model,) = models_of(made_of, tf, frame, name, device, size, seed=seed, soon=False)
         models[name] = SceneModel(write_model(files[name], model))
     return write_scene(folder / SCENE, Models(models, volume=made_of, frame=frame, space=volume.grid.world))
 
@@ -120,12 +116,12 @@ def compose_in(
     volume: Volume, functions: Mapping[str, TransferFunction], words: tuple[str, ...], folder: Path
 ) -> Path:
     """Run the stages up to the scene with results in a folder; return the scene's file."""
-    from texgs.workflow.execution import ensure
+    from texgs.workflow.execution import Task, ensure
     from texgs.workflow.stage import made
     from texgs.workflow.stage_table import STAGES, jobs
 
     config = configuration(volume, functions, words, folder)
-    known = {stage.output(each): (stage, each) for stage, each in jobs(config)}
+    known = {stage.output(each): Task(stage, each) for stage, each in jobs(config)}
     ensure(STAGES["compose"], config, known, tell=lambda line: None, warn=warnings.warn)
     return made("compose", config)
 
@@ -135,10 +131,9 @@ def configuration(
 ) -> Config:
     """Return the configuration of a data set that is a volume with basic transfer functions."""
     from texgs.config.compose import recompose
-    from texgs.config.dataset import Dataset
+    from texgs.config.dataset import dataset_of
     from texgs.config.project import check_name
     from texgs.volume.basic_tfs import BasicTF
-    from texgs.volume.settings import VolumeKeys
     from texgs.volume.transfer import check_disjoint
 
     check_disjoint(functions)
@@ -152,8 +147,7 @@ def configuration(
     few = (f"views.test.count={TEST_VIEWS}", f"views.relit={TEST_VIEWS}", "views.turntable=1")
     config = recompose(("tracking=none", "edit=none", *few, "metric.vtk_frames=0", *words))
     basic = {name: BasicTF(**tf.to_dict()) for name, tf in functions.items()}
-    keys = VolumeKeys(generator=None, file=str(copied(volume, folder).resolve()))
-    dataset = Dataset(name=volume.name, title=volume.name, volume=keys, basic_tfs=basic)
+    dataset = dataset_of(volume.name, copied(volume, folder).resolve(), basic)
     return replace(config, dataset=dataset, results=str(folder))
 
 

@@ -43,8 +43,9 @@ class Viewer:
             raise ArgumentError(
                 f"{HOST}: cannot listen there ({error.strerror or 'it takes too long'})"
             ) from error
+        session.changed = self._tell
 
-    def tell(self) -> None:
+    def _tell(self) -> None:
         """Tell all pages what the scene is now."""
         self._loop.call_soon_threadsafe(self._server.tell_all)
 

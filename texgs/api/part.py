@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from typing import Any, Generic, TypeVar, cast
 
 from texgs.api.display import as_python
@@ -26,7 +24,7 @@ class Value(Generic[T]):
         return cast(T, getattr(entry_of(part.session.scene, part.name).edit, self._key))
 
     def __set__(self, part: Part, value: Any) -> None:
-        with part.one_step(f"{part.name} {self._key} {'as fitted' if value is None else value}"):
+        with part.session.one_step(f"{part.name} {self._key} {'as fitted' if value is None else value}"):
             if value is None:
                 part.session.reset(part.name, self._key)
             else:
@@ -39,7 +37,7 @@ class Part:
     Setting a value raises an ArgumentError for one that is out of range or that the model cannot show.
     """
 
-    __slots__ = ("name", "one_step", "session")  # a slip in the name of a value is an AttributeError
+    __slots__ = ("name", "session")  # a slip in the name of a value is an AttributeError
 
     visible = Value[bool]()
     palette = Value["tuple[float, float, float] | None"]()  # set red, green, blue from 0 to 1, or "#rrggbb"
@@ -50,11 +48,9 @@ class Part:
     shininess = Value[float]()
     tint = Value["tuple[float, float, float]"]()  # of highlights
 
-    def __init__(
-        self, session: Session, name: str, one_step: Callable[[str], AbstractContextManager[object]]
-    ) -> None:
+    def __init__(self, session: Session, name: str) -> None:
         entry_of(session.scene, name)  # which is there
-        self.session, self.name, self.one_step = session, name, one_step
+        self.session, self.name = session, name
 
     def __repr__(self) -> str:
         """Return the name, and what is edited."""

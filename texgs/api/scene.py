@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
-from texgs.api.display import MB, LivePage, Page, camera_of, picture_of
+from texgs.api.display import MB, LivePage, Page, picture_of
 from texgs.api.editing import Editing
+from texgs.api.keywords import takes
 from texgs.core.check import torch_device
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
-from texgs.core.interrupts import interrupts_between_items
-from texgs.core.names import EXPORTS, check_count, require_numbers
+from texgs.core.names import check_count
+from texgs.core.progress import interrupts_between_items
 from texgs.scene.copied import write_copy
-from texgs.scene.frame import Mode
-from texgs.scene.scene_file import known
+from texgs.scene.export_keys import Export
+from texgs.scene.film import Film
 from texgs.scene.session import Session
+from texgs.scene.shot import Shot
 
 if TYPE_CHECKING:
     import pyvista
@@ -39,78 +40,19 @@ class Scene(Editing):
 
     # ---- Pictures and films ---------------------------------------------------
 
-    def render(
-        self,
-        azimuth: float = 30.0,
-        polar: float = 20.0,
-        width: int = 800,
-        height: int | None = None,
-        *,
-        mode: Mode = "shaded",
-        fov_y: float = 30.0,
-        radius: float | None = None,
-        target: Sequence[float] | None = None,
-        transparent: bool = False,
-    ) -> Image:
-        """Return a picture, which notebooks show; `numpy.asarray` of it is [H, W, 3], uint8.
-
-        Args:
-            azimuth: of the camera, degrees.
-            polar: of the camera above the horizon, degrees.
-            width: pixels.
-            height: pixels; default the width.
-            mode: shaded, volume, unshaded, normal, depth, alpha, texture, discs, or a factor of the material.
-            fov_y: vertical field of view, degrees.
-            radius: distance from the target, world units; default what shows all that is framed.
-            target: that the camera looks at, world units; default the middle of what is framed.
-            transparent: whether to leave the background out: [H, W, 4].
-        """
-        framed = self.session.scene.framed(self.session.composition)
-        camera = camera_of(framed, azimuth, polar, width, height, fov_y, radius, target)
-        return picture_of(self.session.frame(camera, mode, transparent=transparent))
+    @takes(Shot, "azimuth", "polar", "width", "height")
+    def render(self, shot: Shot) -> Image:
+        """Return a picture, which notebooks show; `numpy.asarray` of it is [H, W, 3 or 4], uint8."""
+        camera = shot.camera(self.session.scene.framed(self.session.composition))
+        return picture_of(self.session.frame(camera, shot.mode, transparent=shot.transparent))
 
     @interrupts_between_items()
-    def film(
-        self,
-        path: str | Path,
-        what: str = "orbit",
-        *,
-        frames: int | None = None,
-        fps: float = 25.0,
-        width: int = 800,
-        height: int | None = None,
-        azimuth: float = 30.0,
-        polar: float = 20.0,
-        mode: Mode = "shaded",
-    ) -> Path:
-        """Write a film, .mp4 or .gif, or a folder of pictures, and return its path.
-
-        Args:
-            path: of the film.
-            what: moves: "orbit", "test" (the path of test views), "light", "cut" (the last plane), "time" or
-                "orbit-time".
-            frames: how many; default 72 where the camera turns, "test" 181, 61 for the others.
-            fps: frames per second.
-            width: pixels.
-            height: pixels; default the width.
-            azimuth: of the first frame, degrees.
-            polar: degrees.
-            mode: as for `render`.
-        """
-        from texgs.core.movie import write_frames
-        from texgs.core.progress import progress
-        from texgs.scene.paths import PATHS, shots_of
-
-        if what not in PATHS:
-            raise ArgumentError(f"what: expected one of {', '.join(PATHS)}, got {what}")
-        scene, composed = self.session.scene, self.session.composition
-        count = PATHS[what] if frames is None else frames
-        check_count("frames", count)
-        require_numbers(fps=fps)
-        lens = scene.framed(composed).lens(width=width, height=width if height is None else height)
-        shots = shots_of(scene, composed, what, count, lens, azimuth, polar)
-        bar = progress(shots, count, title=Path(path).name, unit="frame")
-        return write_frames(path, (self.session.frame(camera, mode, shown) for camera, shown in bar), fps)
+    @takes(Film, "what", what="orbit")
+    def film(self, path: str | Path, film: Film) -> Path:
+        """Write a film, .mp4 or .gif, or a folder of pictures, to a path, and return it."""
+        shots = film.shots(self.session.scene, self.session.composition)
+        shown = partial(self.session.frame, mode=film.mode, transparent=film.transparent)
+        return film.write(path, (shown(camera, scene=scene) for camera, scene in shots))
 
     def psnr(self, views: int = 12, width: int = 400) -> float:
         """Return the mean PSNR in dB beside direct volume rendering, over views of the path of test views.
@@ -118,14 +60,14 @@ class Scene(Editing):
         Both have the scene's light and edits, without cuts. Looks and segments are not of the volume: they
         count as differences.
         """
-        from texgs.metrics.quality import compare
+        from texgs.report.compared import mean_scores
         from texgs.volume.cameras import spiral
 
         check_count("views", views, least=2)
         scene = replace(self.session.scene, cuts=NO_CUTS)
         lens = scene.framed(self.session.composition).lens(width=width, height=width)
         pairs = (self.session.beside(camera, scene) for camera in spiral(views, lens, "views"))
-        return fmean(compare(*pair)["psnr"] for pair in pairs)
+        return mean_scores(pairs)["psnr"]
 
     # ---- Files --------------------------------------------------------------
 
@@ -136,40 +78,18 @@ class Scene(Editing):
         """
         return write_copy(folder, self.session.scene)
 
-    def export(self, path: str | Path, kind: str | None = None, **options: Any) -> Path:
-        """Write a file for other programs, and return its path; see `texgs export --help`.
-
-        Args:
-            path: its ending says what: .html, .ply, .usdc, .usda, .glb, .spz, .vtp.
-            kind: what, where an ending has several; default 3dgs for .ply.
-            **options: of `texgs.scene.export.Export`; of .html, `steps`, see `show`, and `volume`, MB of the
-                page for the volume.
+    @takes(Export, "kind")
+    def export(self, path: str | Path, keys: Export) -> Path:
+        """Write a file for other programs, and return its path; its ending says what it is.
 
         Raises:
-            ArgumentError: if the ending is unknown or another kind's, an option is, or the scene cannot be
-                written so.
+            ArgumentError: if the ending is unknown or another kind's, an option does not count for the kind,
+                or the scene cannot be written so.
         """
-        from texgs.scene.export import OF_MODELS, Export, export_scene, taken
-        from texgs.viewer.page_volume import page_volume
-        from texgs.viewer.standalone import write_page
+        from texgs.viewer.export import export
 
-        path, scene = Path(path), self.session.scene
-        able = {key: endings for key, endings in EXPORTS.items() if key not in OF_MODELS}
-        if kind and kind not in able:
-            raise ArgumentError(f"kind: expected one of {', '.join(able)}, got {kind}")
-        chosen = kind or next((key for key, endings in able.items() if path.suffix in endings), "")
-        if path.suffix not in able.get(chosen, ()):
-            endings = dict.fromkeys(ending for each in able.values() for ending in each)
-            expected = " or ".join(able.get(chosen, endings))
-            raise ArgumentError(f"path: expected a file that ends in {expected}, got {path}")
-        takes = ["steps", "volume"] if chosen == "html" else taken(chosen)
-        known(options, takes, f"options of {chosen}")
-        if chosen == "html":
-            size = options.pop("volume", None)
-            volume = None if size is None else page_volume(scene, size)
-            write_page(path, scene, path.stem, volume=volume, **options)
-            return path
-        return export_scene(path, scene, Export(chosen, **options))
+        export(Path(path), self.session.scene, keys)
+        return Path(path)
 
     # ---- Notebooks ------------------------------------------------------------
 

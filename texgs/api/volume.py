@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from texgs.api.arrays import keys_of_format, several, source_of
-from texgs.api.display import as_python, camera_of, inline, picture_of
+from texgs.api.display import as_python, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
 from texgs.config.project import check_name, name_of
 from texgs.core.errors import ArgumentError, ConfigError
@@ -23,6 +23,7 @@ from texgs.fields.part_edit import color
 from texgs.scene.frame import quantized
 from texgs.scene.scene import WHITE
 from texgs.scene.scene_file import light_of
+from texgs.scene.shot import Shot
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.nrrd_file import open_grid
@@ -169,7 +170,7 @@ class Volume:
         """
         shown = named(self.suggest() if functions is None else functions)
         caster = Caster(self.grid, replace(Appearance(), step=step))
-        view = camera_of(frame_of(self.grid, shown.values()), azimuth, polar, width, height)
+        view = Shot(width, height, azimuth=azimuth, polar=polar).camera(frame_of(self.grid, shown.values()))
         rgba = caster.cast(overlays(shown), view, light_of(as_python(light))).rgba
         behind = rgba.new_tensor(color("background", as_python(background)))
         return picture_of(quantized(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))

@@ -4,7 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from texgs.cli.options import add_device, add_lens, lens_of, option, require_own_place
+from texgs.cli.options import add_device, add_keys, keys_of, option, require_own_place
+from texgs.core.lens import LensKeys
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", type=Path, help=words)
     option(parser, "--views", 64, "number of views, each with a light and edits of its own; 19 or more")
     option(parser, "--seed", 0, "of what they show")
-    add_lens(parser, "pixels", "pixels; default the width")
+    add_keys(parser, LensKeys)
     parser.set_defaults(width=400)
     add_device(parser)
 
@@ -39,6 +40,11 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"{arguments.scene}: its cuts are left out, as their faces show the volume", file=sys.stderr)
     with located(arguments.scene):
         composition, twin = scene.open(device), Twin(scene, device)
-    seen = lens_of(arguments, scene.framed(composition)), arguments.views, arguments.seed, output
+    seen = (
+        keys_of(arguments, LensKeys).lens(scene.framed(composition)),
+        arguments.views,
+        arguments.seed,
+        output,
+    )
     print(check(scene, composition, twin, *seen).sentence, output, sep="\n")
     return 0

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from texgs.cli.main import main as texgs
-from texgs.core.process import collect_rarely
+from texgs.core.memory import collect_rarely
 
 ADDRESS = "TEXGS_FORK_SERVER"  # environment variable: the server's name among the abstract sockets
 LIBRARIES = (
@@ -39,7 +39,7 @@ LIBRARIES = (
     "PIL.Image",
     "scipy.spatial",
 )
-TRACKING = ("mlflow", "mlflow.store.tracking.sqlalchemy_store")
+TRACKING = ("mlflow", "mlflow.store.tracking.sqlalchemy_store", "git")  # which MLflow asks for the commit
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # a pool of threads would not outlive a fork
 PR_SET_PDEATHSIG = 1  # of prctl: the signal that a process gets when its parent ends
 

@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from texgs import __version__
 from texgs.cli.options import Parser
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.memory import as_out_of_memory
+from texgs.core.memory import as_out_of_memory, collect_rarely, keep_freed_memory, waiting
 from texgs.core.names import close
-from texgs.core.process import collect_rarely, keep_freed_memory, waiting
 
 try:
     from texgs.workflow.stage_table import STAGES
@@ -28,9 +27,7 @@ NUMBERS = re.compile(rf"(?!{NUMBER.pattern})-[\d.][-\d.,eE]*")  # such as -90,20
 # Verbs in the module of another have `add_VERB_arguments` and `run_VERB` there; those of stages share one.
 SHARED = {
     "init": "new",
-    "segment": "edit",
-    "model": "edit",
-    "series": "edit",
+    "series": "model",
     "report": "tables",
     "votes": "study",
     "download": "weights",

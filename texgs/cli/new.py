@@ -167,16 +167,12 @@ def changed(overrides: list[str]) -> list[str]:
 
 def configuration(name: str, file: Path, overrides: list[str]) -> Config:
     """Return the configuration as it will be with the new data set, but without basic TFs and tracking."""
-    from texgs.config.dataset import Dataset
-    from texgs.volume.settings import VolumeKeys
+    from texgs.config.dataset import dataset_of
 
-    path = absolute(file)
     words = [f"dataset.volume.{word}" for word in ("generator=null", *overrides)]
     config = compose(("tracking=none", *words))
     given = {key: getattr(config.dataset.volume, key) for key in changed(overrides)}
-    return replace(
-        config, dataset=Dataset(name=name, title=name, volume=VolumeKeys(**{**given, "file": path}))
-    )
+    return replace(config, dataset=dataset_of(name, absolute(file), **given))
 
 
 def absolute(file: str | Path) -> str:

@@ -56,7 +56,7 @@ def of_each(
 ) -> dict[str, BasicTF]:
     """Return TFs of all channels, named by their labels: one of each, unless a count says otherwise."""
     from texgs.config.dataset import BasicTF
-    from texgs.volume.suggest import COLORS, windowed
+    from texgs.volume.suggest import COLORS, window_function
 
     files = arguments.tf
     if files and len(files) != len(channels):
@@ -65,7 +65,7 @@ def of_each(
         )
     listed, names = {}, tf_names(list(channels))
     for number, (key, channel) in enumerate(channels.items()):
-        has_look = channel and windowed(channel, known[key]["minimum"], known[key]["maximum"])
+        has_look = channel and window_function(channel, known[key]["minimum"], known[key]["maximum"])
         count = arguments.count or (None if has_look else 1)
         basic = basic_tfs(key, known[key], channel, files and files[number : number + 1], count)
         for name, tf in basic.items():

@@ -2,14 +2,15 @@
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import MISSING, Field, is_dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar, cast, get_args, get_origin
 
 from texgs.core.errors import ArgumentError
-from texgs.core.lens import Frame, Lens
+from texgs.core.keys import REQUIRED, ValueMismatch, choices_of, fields_of, typed, without_none
 from texgs.core.names import METRICS, close
 
-LENS = Lens()
+T = TypeVar("T")
 
 
 class Parser(argparse.ArgumentParser):
@@ -27,6 +28,61 @@ def option(parser: argparse.ArgumentParser, name: str, default: Any, words: str,
     """Add an option with a default, whose type it has; the default stands behind its help."""
     shown = f"{words} (%(default)s)".lstrip()
     parser.add_argument(name, **{"type": type(default), "default": default, "help": shown, **more})
+
+
+def add_keys(parser: argparse._ActionsContainer, schema: Any, without: Sequence[str] = ()) -> None:
+    """Add an option for each `key` of a dataclass, which `keys_of` gives back.
+
+    Args:
+        parser: of the verb, or a group of it.
+        schema: the dataclass; its fields that are no keys, or are dataclasses, become no options.
+        without: names of keys that become none either.
+    """
+    for name, (hint, each) in fields_of(schema).items():
+        kind = without_none(hint)
+        if "help" not in each.metadata or name in without or is_dataclass(kind):
+            continue
+        default = each.default if each.default_factory is MISSING else each.default_factory()
+        more: dict[str, Any] = {"default": default, "required": default == REQUIRED}
+        if kind is bool:
+            more["action"] = argparse.BooleanOptionalAction if default else "store_true"
+        else:
+            choices = ",".join(choices_of(hint, each))
+            more["metavar"] = f"{{{choices}}}" if choices else option_of(each)[2:].upper()
+        if get_origin(kind) in (list, tuple):
+            parts = get_args(kind)
+            is_any = get_origin(kind) is list or parts[-1] is ...
+            more |= (
+                {"nargs": "*"} if is_any else {"nargs": len(parts), "metavar": tuple("XYZW"[: len(parts)])}
+            )
+        parser.add_argument(option_of(each), dest=name, help=help_of(each, default), **more)
+
+
+def option_of(each: Field[Any]) -> str:
+    """Return the option of a key."""
+    return f"--{each.metadata['option'] or each.name.replace('_', '-')}"
+
+
+def help_of(each: Field[Any], default: Any) -> str:
+    """Return what the help says of a key: what it is, its unit and its default."""
+    words = ", ".join(filter(None, (each.metadata["help"], each.metadata["unit"])))
+    is_value = isinstance(default, int | float | str) and not isinstance(default, bool)
+    return words.replace("%", "%%") + (" (%(default)s)" if is_value and default not in ("", REQUIRED) else "")
+
+
+def keys_of(arguments: argparse.Namespace, schema: type[T], **more: Any) -> T:
+    """Return the dataclass of the options that `add_keys` has added, checked; more values by their names.
+
+    Raises:
+        ArgumentError: naming the option, what was expected and what there was.
+    """
+    known = fields_of(cast(Any, schema))
+    given = {name: getattr(arguments, name) for name in known if hasattr(arguments, name)}
+    try:
+        return typed(schema, given | more)
+    except ValueMismatch as error:
+        field = known[error.key.partition(".")[0]][1]
+        raise ArgumentError(f"{option_of(field)}: {error.problem}") from error
 
 
 def require_own_place(output: Path, name: str = "--output") -> None:
@@ -50,24 +106,3 @@ def require_only_files(files: Sequence[str]) -> None:
 def add_device(parser: argparse.ArgumentParser) -> None:
     """Add where to compute."""
     option(parser, "--device", "cpu", "", choices=("cpu", "cuda"))
-
-
-def add_lens(parser: argparse.ArgumentParser, width: str, height: str) -> None:
-    """Add the size of pictures, in these words, and where the camera looks, from how far and how wide."""
-    option(parser, "--width", LENS.width, width)
-    parser.add_argument("--height", type=int, help=height)
-    frames = "what is centred on 90 %% of the picture; paper: cameras 4.0311 from the origin"
-    option(parser, "--frame", "scene", frames, choices=("scene", "paper"))
-    target = "what the camera looks at, world units; default the middle of the frame"
-    parser.add_argument("--target", type=float, nargs=3, metavar=("X", "Y", "Z"), help=target)
-    parser.add_argument("--radius", type=float, help="distance from it, world units; default by the frame")
-    option(parser, "--fov", LENS.fov_y, "vertical field of view, degrees")
-
-
-def lens_of(arguments: argparse.Namespace, framed: Frame) -> Lens:
-    """Return what `add_lens` has added; pictures are square and show all that is framed by default."""
-    size = arguments.width, arguments.width if arguments.height is None else arguments.height
-    radius, target = arguments.radius, arguments.target
-    if arguments.frame != "paper":
-        return framed.lens(arguments.fov, *size, radius, target)
-    return Lens(LENS.radius if radius is None else radius, arguments.fov, *size, target or LENS.target)

@@ -7,25 +7,18 @@ options and targets of snakemake, such as --dry-run or results/report.html.
 
 import argparse
 import logging
-import os
 import re
-import shlex
 import signal
 import sys
-import tempfile
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import fields
-from functools import partialmethod
 from itertools import pairwise
 from pathlib import Path
 from types import FrameType
 
-from texgs.cli.options import Parser
 from texgs.core.errors import ArgumentError
 from texgs.core.names import close
 
-INTERRUPTED = ": interrupted; "  # of `texgs.cli.main`: the end of a run says so by itself
 # Hydra's words: key=value, +key=value to add a key, ~key to take one away. Paths of targets have a slash.
 WORD = re.compile(r"(\+{0,2}[A-Za-z_][\w.@-]*=.*|~[A-Za-z_][\w.@-]*(=.*)?)", re.DOTALL)
 
@@ -63,71 +56,28 @@ def run(arguments: argparse.Namespace) -> int:
 
 def snakemake(words: Sequence[str]) -> bool:
     """Run the workflow of texgs in this process; return whether it ended well."""
-    try:
-        from snakemake.cli import CliException, args_to_api, get_argument_parser, parse_args, parse_cores
-        from snakemake.common import argparse as theirs
-        from snakemake.exceptions import WorkflowError
+    from texgs.cli.snakemake import execute, option_errors, overrides, parser_of
 
-        theirs.ArgumentParser.error = Parser.error
-        sys.argv[:1] = ["snakemake"]  # what these parsers are of
-        given, unknown = get_argument_parser().parse_known_intermixed_args(list(words))
+    with option_errors():
+        parser = parser_of()
+        given, unknown = parser.parse_known_intermixed_args(list(words))
         require_pairs([word for word in words if word in (*given.targets, *unknown)])
+        if unknown:
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}")
         require_free([word for word in words if word not in (*given.targets, *(given.config or ()))])
-        require_targets(given.targets)
         chosen = [word for word in given.targets if WORD.fullmatch(word)]
-        rest = [word for word in words if word not in chosen]
-        sys.argv = ["snakemake", *rest]  # the Snakefile looks there
-        if not unknown and {*(given.profile or ())} == {profile := os.environ.get("SNAKEMAKE_PROFILE")}:
-            theirs.ArgumentParser.error = partialmethod(Parser.error, where=f"SNAKEMAKE_PROFILE={profile}: ")
-        end = [*rest, "--"].index("--")
-        parser, options = parse_args([*defaults(given), *rest[:end], *profile_of(given), *rest[end:]])
-    except RuntimeError as error:  # it looks for its own configuration in the user's home
-        raise ArgumentError(f"HOME: snakemake needs a home folder ({error}); set HOME to one") from error
-    except (CliException, WorkflowError) as error:
-        raise ArgumentError(f"{str(error).rstrip('. ')}; see snakemake --help") from error
+        targets = [word for word in given.targets if word not in chosen]
+        require_targets(targets)
+        rest = [word for word in words if word != "--"]
+        for word in given.targets:
+            rest.remove(word)
+        if profiles := profiles_of(given):
+            print(f"Using profile {' and '.join(profiles)} for options that are not given", file=sys.stderr)
+        options = parser_of(profiles).parse_args([*defaults(given), *rest])
+    options.targets = targets
     options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
-    if options.cores is None and options.jobs is None:
-        options.cores = parse_cores("all")
-    with told_errors(given.targets):
-        return bool(args_to_api(options, parser))
-
-
-@contextmanager
-def told_errors(targets: Sequence[str] = ()) -> Iterator[None]:
-    """Raise one sentence for a place that snakemake cannot use, or a target that it does not know.
-
-    It would print the one with a traceback, the other without the targets that there are.
-    """
-    from snakemake.api import SnakemakeApi
-    from snakemake.exceptions import MissingRuleException
-
-    printed = SnakemakeApi.print_exception
-
-    def note(api: SnakemakeApi, error: Exception) -> None:
-        unknown = targets if isinstance(error, MissingRuleException) else ()
-        for target in (each for each in unknown if f" {each} " in str(error)):
-            raise ArgumentError(no_target(target)) from error
-        if isinstance(error, BrokenPipeError):  # as `| head` leaves it
-            raise error
-        if isinstance(error, OSError) and error.strerror:
-            place = error.filename or f"{tempfile.gettempdir()}, the temporary folder"
-            raise ArgumentError(
-                f"{place}: the run cannot work there ({error.strerror}); make room, or choose another folder"
-            ) from error
-        printed(api, error)
-
-    SnakemakeApi.print_exception = note
-    try:
-        yield
-    finally:
-        SnakemakeApi.print_exception = printed
-
-
-def no_target(word: str) -> str:
-    """Return that a word is no target, with the name that is most like it, or all of them."""
-    names = target_names()
-    hint = close(word, names) or f"; expected {', '.join(names)} or a file that the run makes"
-    return f"{word}: no such target{hint}"
+    sys.argv = ["snakemake", *rest]  # the Snakefile looks there
+    return execute(options)
 
 
 def target_names() -> list[str]:
@@ -139,12 +89,12 @@ def target_names() -> list[str]:
 
 
 def require_targets(words: Sequence[str]) -> None:
-    """Require that no word is a rule for one result: a target names those of all data sets."""
-    from texgs.workflow.stage_table import RULES
-
+    """Require that words are targets, which name the results of all data sets, or paths of files."""
+    names = target_names()
     for word in words:
-        if word in ("download", *RULES) and word not in target_names():
-            raise ArgumentError(no_target(word))
+        if word not in names and "/" not in word:
+            hint = close(word, names) or f"; expected {', '.join(names)} or the path of a file of the run"
+            raise ArgumentError(f"{word}: no such target{hint}")
 
 
 def require_pairs(words: Sequence[str]) -> None:
@@ -164,8 +114,8 @@ def require_free(words: Sequence[str]) -> None:
     keys = {*GROUPS, *(each.name for each in fields(Config))}
     for word in filter(WORD.fullmatch, words):
         key, _, value = word.lstrip("+~").partition("=")
-        is_of_rule = key in GROUPS and value.isdecimal()  # threads, such as edit=2
-        if key.partition(".")[0] in keys and not is_of_rule:
+        is_threads = value.isdecimal() and "." not in key  # of a rule, such as edit=2
+        if key.partition(".")[0] in keys and not is_threads:
             raise ArgumentError(
                 f"{word}: the option before takes it for a value of its own; put {word} first"
             )
@@ -182,47 +132,17 @@ def defaults(given: argparse.Namespace) -> list[str]:
     return [*quiet, "--snakefile", str(SNAKEFILE)]
 
 
-def profile_of(given: argparse.Namespace) -> list[str]:
-    """Return the option for a profile of texgs: the local one, or that of which only the name is given."""
+def profiles_of(given: argparse.Namespace) -> list[str]:
+    """Return the folders with defaults of options: those given, and one of texgs, `local` by default."""
     from texgs.config.project import PROFILES
 
-    option, name = "--workflow-profile", given.workflow_profile
-    if name is None:
-        return [] if given.profile else [option, str(PROFILES / "local")]
-    if name == "none" or Path(name).exists():
-        return []
-    if not (PROFILES / name).is_dir():
+    own = [each for each in dict.fromkeys(given.profile or ()) if each != "none"]
+    name = given.workflow_profile
+    if name == "none" or (name is None and given.profile):
+        return own
+    if name is not None and Path(name).exists():
+        return [*own, name]
+    if not (folder := PROFILES / (name or "local")).is_dir():
         known = ", ".join(sorted(each.name for each in PROFILES.iterdir()))
-        raise ArgumentError(f"{option}: expected {known} or a folder, got {name}")
-    return [option, str(PROFILES / name)]
-
-
-def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
-    """Return the words as one entry of snakemake's `--config`, which reads values as YAML."""
-    import yaml
-    from snakemake.cli import parse_config
-
-    try:
-        parse_config(config)
-    except ValueError as error:
-        given = " ".join(config)
-        raise ArgumentError(f"--config: expected KEY=VALUE, such as fit=quick, got {given}") from error
-    if not words:
-        return []
-    if any(entry.startswith("overrides=") for entry in config):
-        raise ArgumentError('--config overrides="...": give its words to texgs run itself')
-    text = yaml.safe_dump(shlex.join(words), default_style='"', allow_unicode=True, width=10**9)
-    return [f"overrides= {text.strip()} "]  # in spaces: snakemake strips quotes from the ends
-
-
-def tell_last_words(logs: Iterable[Path]) -> None:
-    """Print the last line of each log on stderr, but of jobs that were interrupted; the same one once."""
-    for line in dict.fromkeys(filter(None, map(last_line, logs))):
-        print(line, file=sys.stderr)
-
-
-def last_line(log: Path) -> str:
-    """Return the last line with text of a log; empty where there is none, or the job was interrupted."""
-    text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
-    line = text.rstrip().rpartition("\n")[2]
-    return "" if INTERRUPTED in line else line
+        raise ArgumentError(f"--workflow-profile: expected {known} or a folder, got {name}")
+    return [*own, str(folder)]

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from texgs.config.case import Case
 from texgs.config.compose import compose
+from texgs.core.cache import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.workflow.checks import check_basic_tfs, require_edit, require_fit, require_fits
-from texgs.workflow.execution import ensure, makers
+from texgs.workflow.execution import Task, makers, perform, with_makers
 from texgs.workflow.job import Job
 from texgs.workflow.locate import tf_names
 from texgs.workflow.stage_table import STAGES
@@ -35,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "overrides", nargs="*", metavar="KEY=VALUE", help="such as dataset=engine tf=TF01 views.width=400"
     )
     parser.add_argument("--force", action="store_true", help="do it again, even if nothing has changed")
+    parser.add_argument("--replace", action="store_true", help="replace results of other settings")
     job = parser.add_argument_group(
         "one job, as the workflow runs it (no KEY=VALUE then)",
         "TEXGS_TRACKING and TEXGS_EXPERIMENT say where the run is recorded; by default it is not.",
@@ -64,8 +66,13 @@ def run(arguments: argparse.Namespace) -> int:
     if stage.name == "comparison":
         require_fits(case)
     known = makers(case)
-    for each in [replace(config, tf=name) for name in tf_names(config)] if stage.per_tf else [config]:
-        ensure(stage, each, known, force=arguments.force)
+    configs = [replace(config, tf=name) for name in tf_names(config)] if stage.per_tf else [config]
+    tasks = [task for each in configs for task in with_makers(Task(stage, each, case.words), known)]
+    checksums = Checksums.load()
+    for task in () if arguments.replace else tasks:
+        task.job(checksums).require_same_settings(config.results)
+    for task in tasks:
+        perform(task, force=arguments.force and task.stage is stage)
     return 0
 
 
@@ -76,8 +83,8 @@ def run_settings(arguments: argparse.Namespace) -> int:
     from texgs.workflow.execution import execute
     from texgs.workflow.tracked import of_workflow
 
-    if arguments.overrides or arguments.force or arguments.output is None:
-        raise ArgumentError("a job: expected --settings and --output, no KEY=VALUE or --force; see --help")
+    if arguments.overrides or arguments.force or arguments.replace or arguments.output is None:
+        raise ArgumentError("a job: expected --settings and --output, nothing but --input beside; see --help")
     try:
         settings = yaml.load(arguments.settings.read_bytes(), yaml.CSafeLoader)
     except (OSError, yaml.YAMLError) as error:
@@ -87,7 +94,7 @@ def run_settings(arguments: argparse.Namespace) -> int:
             f"{arguments.settings}: expected the settings of a {arguments.verb} job, got others"
         )
     inputs = {name: Path(path) for name, _, path in (word.partition("=") for word in arguments.input)}
-    tracking, swept = of_workflow(arguments.output)
+    tracking, swept, command = of_workflow(arguments.output)
     stage, plain = STAGES[arguments.verb], {str(key): value for key, value in settings.items()}
-    execute(Job(stage, plain, inputs, arguments.output, swept=swept), tracking)
+    execute(Job(stage, plain, inputs, arguments.output, swept=swept, command=command), tracking)
     return 0

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from texgs.study.questions import Question
 
-LEAST, MOST = 64, 1024  # pixels of a clip
+SMALLEST, LARGEST = 64, 1024  # sides of a clip, pixels
 KEY, PAGE = "key.json", "ballot.html"
 
 
@@ -51,8 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise ArgumentError(
             f"{key}: there is a study already, whose ballots need it; choose another --output, or remove it"
         )
-    if not LEAST <= arguments.size <= MOST:
-        raise ArgumentError(f"--size: expected {LEAST} to {MOST} pixels, got {arguments.size}")
+    if not SMALLEST <= arguments.size <= LARGEST:
+        raise ArgumentError(f"--size: expected {SMALLEST} to {LARGEST} pixels, got {arguments.size}")
     if arguments.frames < 1:
         raise ArgumentError(f"--frames: expected at least 1, got {arguments.frames}")
     if not arguments.results.is_dir():

@@ -56,13 +56,13 @@ def run_report(arguments: argparse.Namespace) -> int:
     from texgs.report.html import write_report
     from texgs.report.metrics_files import read_left_out
     from texgs.study.ballots import votes_beside
-    from texgs.study.votes import shown
+    from texgs.study.votes import votes_figure
 
     require_there(arguments)
     records, old = records_of(arguments)
     left_out, votes = [*read_left_out(arguments.missing), *old], votes_beside(study_of(arguments))
     given = given_tables(records, votes)
-    more = {} if given["user_study"].is_empty else {"study": [shown(votes)]}
+    more = {} if given["user_study"].is_empty else {"study": [votes_figure(votes)]}
     output = arguments.output or results_of(arguments) / "report.html"
     print(write_report(output, records, left_out, given, more))
     return 0
@@ -93,29 +93,25 @@ def study_of(arguments: argparse.Namespace) -> Path:
 
 
 def records_of(arguments: argparse.Namespace) -> tuple[list[Record[Any]], list[LeftOut]]:
-    """Read the metrics files that are given, or those of a folder; tell of those that are left out."""
-    from texgs.core.checksum import Checksums
-    from texgs.report.metrics_files import LeftOut, read_known, require_apart
-    from texgs.workflow.graph import Graph, earlier
+    """Read the metrics files that are given, or those of a folder, each once; tell of those left out."""
+    from texgs.report.metrics_files import read_known, require_apart
+    from texgs.workflow.graph import current_records
 
-    paths, left_out = list[Path](), list[LeftOut]()
-    for each in arguments.metrics or [Path("results")]:
-        if each.is_file():
-            paths.append(each)
-            continue
-        if arguments.metrics and not each.is_dir():
-            raise ArgumentError(f"{each}: expected a metrics file or a folder of results, got none")
-        files, outdated = earlier(str(each), Graph(), Checksums.load())
-        paths += map(Path, files)
-        left_out += [LeftOut(entry.what, entry.why, places) for entry, places in outdated.items()]
-    if not paths:
-        where = ", ".join(map(str, arguments.metrics)) or "results"
+    given = arguments.metrics or [Path("results")]
+    records, left_out = read_known(each for each in given if each.is_file())
+    for folder in (each for each in given if not each.is_file()):
+        if arguments.metrics and not folder.is_dir():
+            raise ArgumentError(f"{folder}: expected a metrics file or a folder of results, got none")
+        found, others = current_records(folder)
+        records, left_out = [*records, *found], [*left_out, *others]
+    if not records:
         raise ArgumentError(
-            f"no whole results below {where}; run something first, such as texgs run dataset=engine"
+            f"no whole results below {', '.join(map(str, given))}; run something first, such as "
+            "texgs run dataset=engine"
         )
-    records, others = read_known({path.resolve(): path for path in reversed(paths)}.values())  # each once
+    records = [*{record.path.resolve(): record for record in reversed(records)}.values()][::-1]
     require_apart(records)
-    return records, [*left_out, *others]
+    return records, left_out
 
 
 def given_tables(records: list[Record[Any]], votes: Votes | None) -> dict[str, Table]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from texgs.config.project import LONGEST, Words, check_name, folders, is_scene_file
+from texgs.config.project import LONGEST_NAME, Words, check_name, folders, is_scene_file
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.core.keys import mismatch, typed
@@ -18,7 +18,7 @@ from texgs.fields.kinds import kinds
 from texgs.volume.view_settings import LightKeys
 
 ONE_LIGHT = "-one-light"  # end of the names of folders of views for fields that cannot be relit
-NAMED = ("dataset", "fit", "edit")  # groups whose files have names, which folders of results get
+NAMED_GROUPS = ("dataset", "fit", "edit")  # groups whose files have names, which folders of results get
 
 
 def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> Config:
@@ -49,19 +49,19 @@ def preset(group: str, name: str) -> Config:
 @lru_cache(maxsize=1024)
 def _composed(overrides: Words, places: tuple[Path, ...], _data_folder: str | None) -> Config:
     from texgs.config.composition import composition
-    from texgs.config.mistakes import told
+    from texgs.config.mistakes import translated
 
     if not places[-1].is_dir():
         raise ConfigError(f"{places[-1]}: no configuration there; install texgs again")
-    with told():
-        config = lit(typed(Config, composition(overrides, places)))
+    with translated():
+        config = with_lights_of_field(typed(Config, composition(overrides, places)))
     check_names(config)
     check_basic_tfs(config)
     check_chosen(overrides, config)
     return config
 
 
-def lit(config: Config) -> Config:
+def with_lights_of_field(config: Config) -> Config:
     """Return a configuration whose views have headlights for random lights where its field cannot be relit.
 
     Such views have a folder of their own, for an experiment may have fits of both kinds.
@@ -88,8 +88,8 @@ def check_names(config: Config) -> None:
         ("views.name", config.views.name, "views(-.*)?", "views or views-..."),
         ("sweep.name", config.sweep.name, r"[A-Za-z0-9_-]*", "letters, digits, _ or -"),
         (
-            *("variant", config.variant, rf"([A-Za-z0-9_-][A-Za-z0-9_.-]{{,{LONGEST - 1}}})?"),
-            f"at most {LONGEST} letters, digits, _, - or .",
+            *("variant", config.variant, rf"([A-Za-z0-9_-][A-Za-z0-9_.-]{{,{LONGEST_NAME - 1}}})?"),
+            f"at most {LONGEST_NAME} letters, digits, _, - or .",
         ),
     ):
         if not re.fullmatch(pattern, value):
@@ -112,14 +112,10 @@ def check_basic_tfs(config: Config) -> None:
 
 def check_chosen(overrides: Words, config: Config) -> None:
     """Require of chosen files that they have their own names: results would go to the folder of another."""
-    for group in NAMED:
+    for group in NAMED_GROUPS:
         chosen = [word.partition("=")[2].strip("'\"") for word in overrides if word.startswith(f"{group}=")]
         if any(re.match(rf"[+]*{group}\.name=", word) for word in overrides) or not chosen:
             continue
-        if chosen[-1].startswith("["):
-            raise ConfigError(
-                f"{group}: expected one name, got {chosen[-1]}; several go to {group}s={chosen[-1]}"
-            )
         if (name := getattr(config, group).name) != chosen[-1]:
             raise ConfigError(
                 f"{group}={chosen[-1]}: expected `name: {chosen[-1]}` in its file, got {name}; "

@@ -2,7 +2,8 @@
 
 Hydra reads the overrides, finds the files and puts them into their order. What it makes of their values, a
 configuration with a node for each, takes 0.1 s, and a run has hundreds: here they are merged as they are, and
-references to other keys, `${dataset.image}` or `${.name}` for a neighbour, are replaced.
+references to other keys, `${dataset.image}` or `${.name}` for a neighbour, are replaced. For this, this file
+alone imports `hydra._internal`; tests/config/test_compose.py compares it with Hydra for all files of conf/.
 """
 
 import os
@@ -34,9 +35,15 @@ from texgs.core.errors import ConfigError
 from texgs.core.keys import UnknownKey, mismatch
 
 Places = tuple[Path, ...]
-ALONE = ("dataset", "views", "fit", "edit", "sweep")  # groups whose files a run combines with each other
+SEPARATE_GROUPS = (
+    "dataset",
+    "views",
+    "fit",
+    "edit",
+    "sweep",
+)  # whose files a run combines
 REFERENCE = re.compile(r"(?<!\\)\$\{(\.*)([\w.-]+)\}")
-DEEPEST = 20  # references that refer to another one
+MOST_REFERENCES = 20  # references that refer to another one
 
 
 class Repository(ConfigRepository):
@@ -56,54 +63,54 @@ class Repository(ConfigRepository):
             return super().load_config(config_path)
         except MISTAKES as error:
             paths = (place / f"{config_path}.yaml" for place in self.places)
-            problem = next((misread(path) for path in paths if path.is_file()), None)
-            if problem is None:
+            path = next((each for each in paths if each.is_file()), None)
+            if path is None:
                 raise
-            raise ConfigError(problem) from error
+            raise misread(path, error) from error
 
 
 @lru_cache(maxsize=16)
-def files_of(places: Places, _changed: tuple[int, ...]) -> CachingConfigRepository:
+def repository_of(places: Places, _changed: tuple[int, ...]) -> CachingConfigRepository:
     """Return the files of some folders as they are since their last change."""
     return CachingConfigRepository(Repository(places))
 
 
 @lru_cache(maxsize=4096)
-def listed(files: CachingConfigRepository, name: str, choices: Words = ()) -> list[tuple[str, str]]:
+def defaults_of(files: CachingConfigRepository, name: str, choices: Words = ()) -> list[tuple[str, str]]:
     """Return names and packages of the files of a configuration, in the order that Hydra gives them."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # a recipe or an edit by itself needs no _self_
         own = create_defaults_list(
-            files, name, [*map(parsed, choices)], prepend_hydra=False, skip_missing=True
+            files, name, [*map(override_of, choices)], prepend_hydra=False, skip_missing=True
         )
     return [(each.config_path or "", each.package or "") for each in own.defaults]
 
 
-def chosen(files: CachingConfigRepository, choices: Words) -> list[tuple[str, str]]:
+def files_of_choices(files: CachingConfigRepository, choices: Words) -> list[tuple[str, str]]:
     """Return names and packages of the files that some words choose, those that count most at the end.
 
     What a data set, a recipe or an edit consists of does not depend on other choices, unless its files
     override them: a run, which needs all combinations, lists each once.
     """
-    plain = listed(files, "config")
+    plain = defaults_of(files, "config")
     alone: dict[str, list[tuple[str, str]]] = {}
     dependent: Words = ()
     for word in choices:
-        group = parsed(word).key_or_group
-        if group in ALONE and parsed(word).type is OverrideType.CHANGE:
-            own = listed(files, "config", (word,))
-            if apart(own, group) == apart(plain, group):
+        group = override_of(word).key_or_group
+        if group in SEPARATE_GROUPS and override_of(word).type is OverrideType.CHANGE:
+            own = defaults_of(files, "config", (word,))
+            if without_group(own, group) == without_group(plain, group):
                 alone[group] = [each for each in own if each[1] == group]
                 continue
         dependent = (*dependent, word)
-    together = listed(files, "config", dependent)
+    together = defaults_of(files, "config", dependent)
     for group, own in alone.items():
         at = next(index for index, (_, package) in enumerate(together) if package == group)
-        together = [*together[:at], *own, *apart(together[at:], group)]
+        together = [*together[:at], *own, *without_group(together[at:], group)]
     return together
 
 
-def apart(listing: list[tuple[str, str]], group: str) -> list[tuple[str, str]]:
+def without_group(listing: list[tuple[str, str]], group: str) -> list[tuple[str, str]]:
     """Return the files that are not of a group."""
     return [each for each in listing if each[1] != group]
 
@@ -123,21 +130,22 @@ def values_of(files: CachingConfigRepository, name: str, package: str) -> dict[s
 def composition(words: Words, places: Places) -> dict[str, Any]:
     """Return the values of all keys; of files with the same name, that of the first place counts."""
     paths = (path for place in places for path in sorted(place.rglob("*.yaml")))
-    files = files_of(places, tuple(path.stat().st_mtime_ns for path in paths if path.is_file()))
+    files = repository_of(places, tuple(path.stat().st_mtime_ns for path in paths if path.is_file()))
     choices: Words = ()
     for word in words:
-        override = parsed(word)
+        override = override_of(word)
         if override.is_sweep_override():
             raise ConfigError(several_values(word))
         if files.group_exists(override.key_or_group) and not isinstance(override.value(), dict):
+            require_name(override)
             choices = (*choices, word)
     values = deepcopy(defaults())
     values["data_folder"] = os.environ.get("TEXGS_DATA", values["data_folder"])
-    for name, package in chosen(files, choices):
+    for name, package in files_of_choices(files, choices):
         merge(values, values_of(files, name, package))
     for word in words:
         if word not in choices:
-            apply(values, parsed(word))
+            apply(values, override_of(word))
     return resolve(values)
 
 
@@ -145,6 +153,18 @@ def composition(words: Words, places: Places) -> dict[str, Any]:
 def defaults() -> dict[str, Any]:
     """Return the values of the schema."""
     return asdict(Config())
+
+
+def require_name(override: Override) -> None:
+    """Require of the choice of a group that it is the name of a file, not a list or another value."""
+    group, value = override.key_or_group, override.value()
+    if isinstance(value, list):
+        hint = f"; several go to {group}s" if f"{group}s" in Config.__dataclass_fields__ else ""
+        raise ConfigError(f"{group}: expected one name, got a list{hint}")
+    if not isinstance(value, str | None):
+        raise ConfigError(
+            f"{group}: expected the name of a file of conf/, such as dataset=engine, got {value}"
+        )
 
 
 def merge(table: dict[str, Any], later: Mapping[str, Any]) -> None:
@@ -157,7 +177,7 @@ def merge(table: dict[str, Any], later: Mapping[str, Any]) -> None:
 
 
 @cache
-def parsed(word: str) -> Override:
+def override_of(word: str) -> Override:
     """Return a word as Hydra reads it; OverrideParseException for a word that is none."""
     return _parser().parse_overrides([word])[0]
 
@@ -170,7 +190,7 @@ def _parser() -> OverridesParser:
 def has_several(word: str) -> bool:
     """Return whether a word gives its key several values."""
     try:
-        return bool(parsed(word).is_sweep_override())
+        return bool(override_of(word).is_sweep_override())
     except HydraException:  # which `compose` tells
         return False
 
@@ -181,13 +201,14 @@ def several(word: str) -> list[str]:
     That is true instead of Hydra's True, and 100000 instead of 1e5 where an integer is expected.
     """
     enumerable = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
-    if not has_several(word) or parsed(word).value_type not in enumerable:
+    if not has_several(word) or override_of(word).value_type not in enumerable:
         raise ConfigError(
             f"{word}: expected several values, such as fit.low_pass=2,6 or fit.seed=range(3); "
             "a list stands in brackets, a text with a comma in quotes"
         )
     texts = [
-        text.lower() if text in ("True", "False") else text for text in parsed(word).sweep_string_iterator()
+        text.lower() if text in ("True", "False") else text
+        for text in override_of(word).sweep_string_iterator()
     ]
     key = word.partition("=")[0].lstrip("+")
     is_whole = any(entry.name == key and "float" not in entry.type for entry in keys())
@@ -250,7 +271,7 @@ def resolve(values: dict[str, Any]) -> dict[str, Any]:
     if any("${" in REFERENCE.sub("", text) for _, _, _, text in texts):
         return cast(dict[str, Any], OmegaConf.to_container(OmegaConf.create(values), resolve=True))
     for table, name, path, text in texts:
-        table[name] = _value(values, text, path, DEEPEST)
+        table[name] = _value(values, text, path, MOST_REFERENCES)
     return values
 
 

@@ -1,6 +1,8 @@
 """The schema of conf/dataset: a volume with its basic transfer functions, and of the meshes of these."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from texgs.core.keys import REQUIRED, key
@@ -74,6 +76,14 @@ class Dataset:
     def number_of(self, tf: BasicTF) -> int:
         """Return the number of a basic TF's channel among those that are prepared."""
         return 0 if tf.channel is None else self.channels.index(tf.channel)
+
+
+def dataset_of(
+    name: str, file: str | Path, basic_tfs: Mapping[str, BasicTF] | None = None, **volume: Any
+) -> Dataset:
+    """Return the data set of one volume file, which is read as `VolumeKeys` say."""
+    keys = VolumeKeys(**{**volume, "file": str(file)})
+    return Dataset(name=name, title=name, volume=keys, basic_tfs=dict(basic_tfs or {}))
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """A function of a scene, kept as a basic transfer function in the file of the data set of its volume."""
 
 import os
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from texgs.volume.basic_tfs import BasicTF
 from texgs.volume.framing import frame_of, out_of_frame
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.summaries import read_summaries
-from texgs.volume.transfer import TransferFunction, overlapping, row_text
+from texgs.volume.transfer import TransferFunction, check_disjoint
 
 
 def keep(scene: Scene, name: str) -> str:
@@ -47,7 +46,8 @@ def keep(scene: Scene, name: str) -> str:
             for key, points in basic_tfs.items()
         }
         tfs = {key: tf.scaled(*ends[tf.channel]) for key, tf in tfs.items()} if is_scaled else tfs
-        require_composable(tfs)
+        with located("basic_tfs"):
+            check_disjoint(tfs)
         framing, grid = dataset.framing, open_grid(volume.file)
         far = out_of_frame(grid, tfs[name], frame_of(grid, [tfs[key] for key in framing]))
         text = with_basic_tf(text, name, basic_tfs[name], [] if dataset.framed_by else framing)
@@ -75,13 +75,3 @@ def file_of(volume: Path) -> Path:
             f"{shown(file)}: expected a file that can be written, got a read-only one; allow it"
         )
     return file
-
-
-def require_composable(tfs: Mapping[str, TransferFunction]) -> None:
-    """Require that no two functions of a data set show the same values: their models make one scene."""
-    if pair := overlapping(tfs):
-        one, two = (f"{name} on {row_text(tfs[name].support)}" for name in pair)
-        raise ArgumentError(
-            f"basic_tfs: a scene is composed of functions that do not overlap, but {two} overlaps {one}; cut "
-            "one of them, or leave it to the scene that tries it, where models may overlap"
-        )

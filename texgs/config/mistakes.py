@@ -9,7 +9,6 @@ from typing import Any
 
 import yaml
 from hydra.errors import HydraException, MissingConfigException, OverrideParseException
-from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from texgs.config.describe import keys
@@ -31,10 +30,11 @@ MISTAKES = (
     *(HydraException, OmegaConfBaseException, yaml.YAMLError),
     *(ArithmeticError, OSError, RecursionError, TypeError, ValueError),
 )
+LONGEST_TEXT = 200  # characters of what Hydra or OmegaConf says
 
 
 @contextmanager
-def told() -> Iterator[None]:
+def translated() -> Iterator[None]:
     """Make one ConfigError of what Hydra, OmegaConf and `typed` raise."""
     try:
         yield
@@ -50,30 +50,30 @@ def told() -> Iterator[None]:
 
 
 def sentence(error: Exception) -> str:
-    """Return what is wrong, from an exception of Hydra or OmegaConf; files that cannot be read: `misread`."""
-    named = re.search(r"\b[Ii]n '([^']+)'", str(error))
-    files = [folder / f"{named[1]}.yaml" for folder in folders()] if named and named[1] != "config" else []
-    where = next((f"{shown(path)}: " for path in files if path.is_file()), "")
+    """Return what is wrong, from an exception of Hydra or OmegaConf."""
     if isinstance(error, MissingConfigException) and error.missing_cfg_file:
+        where = re.match(r"In '(?!config')[^']+': ", str(error))
         group, _, name = error.missing_cfg_file.partition("/")
         known = members(group)
         hint = close(name, known) or ("; an address goes to tracking.uri" if group == "tracking" else "")
         hint = hint or f"; one of your own is a file, conf/{group}/{name}.yaml"
-        return f"{where}{group}: expected one of {', '.join(known)}, got {name}{hint}"
+        return f"{where[0] if where else ''}{group}: expected one of {', '.join(known)}, got {name}{hint}"
     if isinstance(error, OverrideParseException):
         return (
-            f"{shortened(error.override)}: expected key=value; a value with commas, brackets, ', ! or = "
+            f"{one_line(error.override)}: expected key=value; a value with commas, brackets, ', ! or = "
             "needs quotes inside those of the shell, such as 'edit.text.instruction=\"make it gold!\"'"
         )
-    if isinstance(error, TypeError) or "group override" in str(error):
-        return "a group: expected the name of a file of conf/, such as dataset=engine, got something else"
-    if isinstance(error, RecursionError):
-        return "an override: expected fewer brackets, got more than can be read"
-    if missing := re.match(r"Could not override '([^']+)'", str(error)):
-        return no_such_key(missing[1])
-    text = next((line for line in lines(error) if not line.startswith("In '")), type(error).__name__)
+    return one_line(error)
+
+
+def misread(path: Path, error: Exception) -> ConfigError:
+    """Return that a file cannot be read, with the line that YAML names, or the key that OmegaConf does."""
+    mark = getattr(error, "problem_mark", None)
     key = getattr(error, "full_key", None)
-    return where + shortened(f"{key}: {text[0].lower()}{text[1:]}" if key else text)
+    where = f"{shown(path)}{f':{mark.line + 1}' if mark else ''}: {f'{key}: ' if key else ''}"
+    if isinstance(error, UnicodeDecodeError):
+        return ConfigError(f"{where}expected text in UTF-8; save it as UTF-8")
+    return ConfigError(f"{where}{getattr(error, 'problem', None) or one_line(error)}")
 
 
 def no_such_key(name: str) -> str:
@@ -88,83 +88,31 @@ def no_such_key(name: str) -> str:
 def origin(key: str, value: Any) -> str:
     """Return the file and line that a wrong value is from, in front of a sentence; empty for an override."""
     group, *below = key.split(".")
+    groups = [each.name for each in dataclasses.fields(Config)]
     for path in (path for folder in folders() for path in sorted(folder.rglob("*.yaml")) if path.is_file()):
-        node = node_at(path, below if package(path) == group else [group, *below])
+        is_of_group = path.parent.name in groups  # whose files leave its name out
+        if is_of_group and path.parent.name != group:
+            continue
+        try:
+            node = yaml.compose(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
+        except (yaml.YAMLError, UnicodeDecodeError, RecursionError):
+            continue
+        for name in below if is_of_group else (group, *below):
+            node = children(node).get(name)
         if node is not None and str(yaml.SafeLoader("").construct_document(node)) == str(value):
             return f"{shown(path)}:{node.start_mark.line + 1}: "
     return ""
 
 
-def misread(path: Path) -> str | None:
-    """Return what is wrong with a file that cannot be read, else None."""
-    data = path.read_bytes()
-    try:
-        text = data.decode()
-        root = yaml.compose(text, yaml.SafeLoader)
-        if root is not None and not isinstance(root, yaml.MappingNode):
-            kind = "a list" if isinstance(root, yaml.SequenceNode) else "a single value"
-            return (
-                f"{shown(path)}:1: {package(path) or 'configuration'}: expected keys with values, got {kind}"
-            )
-        OmegaConf.create(text)
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        return f"{shown(path)}:{line}: expected UTF-8, got byte 0x{data[error.start]:02x}; save it as UTF-8"
-    except yaml.reader.ReaderError as error:
-        line = text[: error.position].count("\n") + 1
-        return f"{shown(path)}:{line}: expected text, got the character #x{error.character:04x}"
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        return f"{shown(path)}:{mark.line + 1 if mark else 1}: {error.problem or error.context}"
-    except RecursionError:
-        return f"{shown(path)}: expected fewer brackets, got more than can be read"
-    except Exception as error:  # of OmegaConf or int(), about one value
-        return f"{shown(path)}:{deepest(root).start_mark.line + 1}: {shortened(lines(error)[0])}"
-    return None
-
-
-def deepest(node: yaml.Node) -> yaml.Node:
-    """Return the smallest part of a document that OmegaConf does not take."""
-    for _, child in children(node):
-        try:
-            OmegaConf.create([yaml.SafeLoader("").construct_document(child)])
-        except Exception:  # what it raises has been told
-            return deepest(child)
-    return node
-
-
-def node_at(path: Path, parts: list[str]) -> yaml.Node | None:
-    """Return the part of a file below some keys; None where it has none, or cannot be read."""
-    try:
-        node = yaml.compose(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError):
-        return None
-    for part in parts:
-        node = dict(children(node)).get(part) if node else None
-    return node
-
-
-def children(node: yaml.Node) -> list[tuple[str, yaml.Node]]:
+def children(node: yaml.Node | None) -> dict[str, yaml.Node]:
     """Return the values of a mapping by their keys, of a list by their numbers."""
     if isinstance(node, yaml.MappingNode):
-        return [(str(key.value), value) for key, value in node.value]
+        return {str(key.value): value for key, value in node.value}
     items = node.value if isinstance(node, yaml.SequenceNode) else []
-    return [(str(index), value) for index, value in enumerate(items)]
+    return {str(index): value for index, value in enumerate(items)}
 
 
-def package(path: Path) -> str:
-    """Return the key below which the schema has the keys of a file: the group of its folder, or none."""
-    group = path.parent.name
-    return group if group in (field.name for field in dataclasses.fields(Config)) else ""
-
-
-def lines(error: Exception) -> list[str]:
-    """Return the lines of an exception, or of the one behind it, that say something."""
-    texts = (str(error.__cause__ or ""), str(error))
-    return [line.strip() for text in texts for line in text.splitlines() if line.strip()]
-
-
-def shortened(value: Any) -> str:
-    """Return a value as text, cut where it is too long for a sentence."""
-    text = str(value)
-    return text if len(text) <= 200 else f"{text[:60]}... ({len(text)} characters)"
+def one_line(error: object) -> str:
+    """Return what an exception says in one line, cut where it is too long for a sentence."""
+    text = " ".join(str(error).partition("\n    full_key: ")[0].split()) or type(error).__name__
+    return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}... ({len(text)} characters)"

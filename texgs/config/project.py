@@ -18,9 +18,9 @@ PROFILES = ROOT / "workflow" / "profiles"
 
 # Folders below `results`.
 RESERVED = ("volume", "transfer", "gallery", "logs", "mlartifacts", "tables", "scene", "study")
-LONGEST = 100  # characters of a name: it becomes that of files and folders
+LONGEST_NAME = 100  # characters of a name: it becomes that of files and folders
 NO_NAME = re.compile(r"[^A-Za-z0-9_]+")  # what a name of a data set or of a TF cannot have
-NO_TEXT = re.compile("null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNORECASE)  # to YAML or Hydra
+NOT_TEXT = re.compile("null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNORECASE)  # to YAML or Hydra
 
 
 def own_folder() -> Path:
@@ -64,11 +64,11 @@ def check_name(key: str, name: str) -> None:
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
         raise ConfigError(str(mismatch(key, "a letter and then letters, digits, _ or -", name)))
-    if len(name) > LONGEST:
+    if len(name) > LONGEST_NAME:
         raise ConfigError(
-            f"{key}: expected at most {LONGEST} characters, got {len(name)}; choose a shorter one"
+            f"{key}: expected at most {LONGEST_NAME} characters, got {len(name)}; choose a shorter one"
         )
-    if NO_TEXT.fullmatch(name):
+    if NOT_TEXT.fullmatch(name):
         raise ConfigError(
             f"{key}: {name} is a word that YAML or Hydra does not read as text; choose another name"
         )

@@ -1,13 +1,18 @@
-"""Folders outside the project that a user can choose, and files of what was worked out once."""
+"""What is kept outside the project: its folders, values that were worked out once, and checksums of files."""
 
+import hashlib
 import json
 import os
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
+
+CHECKSUMS_FILE = "checksums.json"  # in the cache folder
+MOST_CHECKSUMS = 20_000  # of the latest files
 
 
 def cache_folder() -> Path:
@@ -41,3 +46,78 @@ def keep(path: Path, key: str, value: Any) -> None:
     """Write a value that JSON can hold and the key of all it depends on, where that can be written."""
     with suppress(ArgumentError, OSError):
         write_bytes(path, json.dumps({"key": key, "value": value}).encode())
+
+
+def sha256(path: str | Path) -> str:
+    """Return the checksum of a file's contents as they are now."""
+    try:
+        with Path(path).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def digest(text: str) -> str:
+    """Return the first 12 hexadecimal digits of the SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def combined_checksum(parts: Iterable[tuple[str, str]]) -> str:
+    """Return one checksum of several names with their checksums, in any order."""
+    return hashlib.sha256(json.dumps(sorted(parts)).encode()).hexdigest()
+
+
+def checksum_of_folders(*folders: Path) -> str:
+    """Return one checksum of the names and contents of all files below folders, without compiled Python."""
+    return combined_checksum(
+        (f"{index} {path.relative_to(folder).as_posix()}", sha256(path))
+        for index, folder in enumerate(folders)
+        for path in folder.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    )
+
+
+class Checksums:
+    """Checksums of files that are not read again while their size and time stay the same.
+
+    A file that was changed behind the back of both is noticed only by `sha256`.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[str, list[int | str]] = {}
+        self._is_new = False
+
+    @classmethod
+    def load(cls) -> "Checksums":
+        """Return what earlier processes have computed, from the cache folder."""
+        checksums = cls()
+        known = recall(cache_folder() / CHECKSUMS_FILE, CHECKSUMS_FILE)
+        checksums._known = known if isinstance(known, dict) else {}
+        return checksums
+
+    def save(self) -> None:
+        """Keep them for later processes; where the cache cannot be written, they will compute them again."""
+        if self._is_new:
+            self._known = dict(list(self._known.items())[-MOST_CHECKSUMS:])
+            keep(cache_folder() / CHECKSUMS_FILE, CHECKSUMS_FILE, self._known)
+            self._is_new = False
+
+    def of(self, path: Path) -> str:
+        """Return the checksum of a file."""
+        try:
+            status = path.stat()
+        except OSError as error:
+            raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
+        key, state = str(path.absolute()), [status.st_size, status.st_mtime_ns]
+        known = self._known.get(key)
+        if isinstance(known, list) and known[:2] == state and len(known) == 3:
+            return str(known[2])
+        digest = sha256(path)
+        self._known[key] = [*state, digest]
+        self._is_new = True
+        return digest
+
+    def forget(self, path: Path) -> None:
+        """Compute the checksum of a file again the next time."""
+        if self._known.pop(str(path.absolute()), None) is not None:
+            self._is_new = True

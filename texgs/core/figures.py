@@ -27,7 +27,7 @@ LINE = 0.15  # inches of each further line of a title
 LARGE, MEDIUM, SMALL = 11, 9, 8  # points
 LETTER = 0.6  # mean width of a letter, of its size
 CENTERED: dict[str, Any] = {"ha": "center", "va": "center"}
-THRESHOLD = 0.02  # of the brightest value
+THRESHOLD = 0.02  # difference from the background, as a share of the brightest value
 MARGIN = 4  # pixels
 
 

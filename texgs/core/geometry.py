@@ -1,4 +1,4 @@
-"""Rotations of quaternions, and an order of points that keeps neighbours in space near in memory."""
+"""Rotations of quaternions, nearest points, and an order that keeps neighbours in space near in memory."""
 
 import torch
 from torch import Tensor
@@ -6,7 +6,7 @@ from torch.nn.functional import normalize
 
 from texgs.core.errors import ShapeError
 
-BITS = 10  # of each coordinate in a box: cells of a thousandth of its sides
+BITS = 10  # bits of each coordinate in a box: cells of a thousandth of its sides
 
 
 def quats_to_matrices(quats: Tensor) -> Tensor:
@@ -28,6 +28,19 @@ def facing(normals: Tensor) -> Tensor:
     turned = torch.stack([1 + z, -y, x, torch.zeros_like(z)], dim=1)
     around_x = normals.new_tensor([0.0, 1.0, 0.0, 0.0])  # half a turn, as all ways to -z are equally short
     return normalize(torch.where((1 + z < 1e-6)[:, None], around_x, turned), dim=1)
+
+
+def nearest(points: Tensor, places: Tensor, count: int | None = None) -> tuple[Tensor, Tensor]:
+    """Return distances, float64, and indices of the point [N, 3] nearest to each place [M, 3], both [M].
+
+    Given a count, of so many points [M, count], the nearest first. The results are on the CPU.
+    """
+    from scipy.spatial import cKDTree
+
+    tree, where = (x.detach().cpu().numpy() for x in (points, places))
+    found = cKDTree(tree).query(where, k=1 if count is None else range(1, count + 1))
+    distances, indices = map(torch.from_numpy, found)
+    return distances, indices
 
 
 def z_order(cells: Tensor) -> Tensor:

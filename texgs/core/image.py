@@ -19,7 +19,7 @@ from texgs.core.memory import require_memory
 # Pillow opens more: some formats by other programs, which a file should not be able to start.
 FORMATS = ("PNG", "JPEG", "WEBP", "GIF", "TIFF", "BMP", "PPM", "JPEG2000", "AVIF", "TGA")
 FAST = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE)
-BYTES = 32  # of memory for a pixel: as it is stored, in RGBA, and as floats
+BYTES = 32  # bytes of memory for a pixel: as it is stored, in RGBA, and as floats
 
 
 @contextmanager

@@ -4,9 +4,10 @@ import typing
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from functools import cache
+from itertools import repeat
 from operator import ge, gt, le, lt
 from types import NoneType, UnionType
-from typing import Any, TypeVar, cast
+from typing import Any, Literal, TypeVar, cast
 
 from texgs.core.names import close, is_number
 
@@ -49,14 +50,31 @@ class Bounds:
 
 
 def key(
-    default: Any, help: str, unit: str = "", *, choices: tuple[str, ...] = (), **bounds: float | None
+    default: Any,
+    help: str,
+    unit: str = "",
+    *,
+    choices: tuple[str, ...] = (),
+    items: tuple[int, int] | None = None,
+    option: str = "",
+    **bounds: float | None,
 ) -> Any:
     """Return a dataclass field that `--help` and the checks can read.
 
     A class as default gives each its own instance, and a list its own copy. Numbers have the unit and bounds
     by the names of `Bounds`: least, most, above, below.
+
+    Args:
+        default: value, `REQUIRED` for none.
+        help: what it is, in a few words.
+        unit: of its numbers.
+        choices: that it is one of.
+        items: of a list: how many at least and at most.
+        option: its name on a command line, where that differs from the field's.
+        **bounds: of its numbers, however deep in lists.
     """
-    metadata = {"help": help, "unit": unit, "choices": choices, "bounds": Bounds(**bounds)}
+    metadata: dict[str, Any] = {"help": help, "unit": unit, "choices": choices, "bounds": Bounds(**bounds)}
+    metadata |= {"items": items, "option": option}
     if isinstance(default, type):
         return field(default_factory=default, metadata=metadata)
     if isinstance(default, list):
@@ -78,7 +96,7 @@ class ValueMismatch(ValueError):
 
     def __init__(self, key: str, problem: str, value: Any = None) -> None:
         super().__init__(f"{key}: {problem}" if key else problem)
-        self.key, self.value = key, value
+        self.key, self.problem, self.value = key, problem, value
 
 
 class UnknownKey(ValueMismatch):
@@ -92,13 +110,13 @@ class MissingKey(ValueMismatch):
 def typed(kind: type[T], values: Mapping[str, Any], key: str = "") -> T:
     """Return an instance of a dataclass, its parts too, from plain values by the names of its fields.
 
-    The dataclass is of lists, tables with any names, further dataclasses, and single values. Fields that are
-    not given get their defaults. Messages, of a ValueMismatch, put the key in front of the names.
+    The dataclass is of lists, tuples, tables with any names, further dataclasses, and single values. Fields
+    that are not given get their defaults. Messages, of a ValueMismatch, put the key in front of the names.
     """
-    known = _fields(cast(Any, kind))
+    known = fields_of(cast(Any, kind))
     made = {}
     for name, value in _table(values, key).items():
-        at = f"{key}.{name}" if key else name
+        at = f"{key}.{name:.{LONGEST}}" if key else f"{name:.{LONGEST}}"
         if name not in known:
             raise UnknownKey(at, f"no such key{close(name, known)}", value)
         hint, field = known[name]
@@ -127,7 +145,7 @@ def mismatch(key: str, expected: str, value: Any) -> ValueMismatch:
 
 
 @cache
-def _fields(kind: Any) -> dict[str, tuple[Any, Field[Any]]]:
+def fields_of(kind: Any) -> dict[str, tuple[Any, Field[Any]]]:
     """Return the types and fields of a dataclass by name."""
     hints = typing.get_type_hints(kind)
     return {field.name: (hints[field.name], field) for field in fields(kind) if field.init}
@@ -142,17 +160,24 @@ def _table(value: Any, key: str) -> dict[str, Any]:
 
 def _value(hint: Any, value: Any, key: str) -> Any:
     """Return a value as the type that is asked for; tables and lists as copies."""
-    if isinstance(hint, UnionType):
-        inner = next(each for each in hint.__args__ if each is not NoneType)
+    if (inner := without_none(hint)) is not hint:
         return None if value is None else _value(inner, value, key)
     if is_dataclass(hint):
         return value if isinstance(value, hint) else typed(hint, value, key)  # type: ignore[arg-type]
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     is_list = isinstance(value, Sequence) and not isinstance(value, str)
-    if origin is list and not is_list:
+    if origin in (list, tuple) and not is_list:
         raise mismatch(key, f"a list, [{value}]" if isinstance(value, str) else "a list", value)
     if origin is list or (hint is Any and is_list):
         return [_value((*arguments, Any)[0], each, f"{key}.{index}") for index, each in enumerate(value)]
+    if origin is tuple:
+        if arguments[-1] is not ... and len(value) != len(arguments):
+            raise ValueMismatch(key, f"expected {len(arguments)} values, got {len(value)}", value)
+        hints = repeat(arguments[0]) if arguments[-1] is ... else arguments
+        pairs = zip(hints, value, strict=False)
+        return tuple(_value(each, item, f"{key}.{index}") for index, (each, item) in enumerate(pairs))
+    if origin is Literal:
+        return _chosen(arguments, value, key)
     if origin is dict or (hint is Any and isinstance(value, Mapping)):
         inner = arguments[1] if arguments else Any
         return {name: _value(inner, each, f"{key}.{name}") for name, each in _table(value, key).items()}
@@ -161,6 +186,19 @@ def _value(hint: Any, value: Any, key: str) -> Any:
     if value is None or isinstance(value, str | int | float):
         return value
     raise mismatch(key, "text, a number, a list or keys with values", value)
+
+
+def choices_of(hint: Any, field: Field[Any]) -> tuple[str, ...]:
+    """Return what a key is one of; nothing where any value will do."""
+    is_literal = typing.get_origin(without_none(hint)) is Literal
+    return typing.get_args(without_none(hint)) if is_literal else field.metadata.get("choices", ())
+
+
+def without_none(hint: Any) -> Any:
+    """Return the type of what may also be None; any other type as it is."""
+    if isinstance(hint, UnionType) or typing.get_origin(hint) is typing.Union:
+        return next(each for each in typing.get_args(hint) if each is not NoneType)
+    return hint
 
 
 def _single(hint: type, value: Any, key: str) -> Any:
@@ -181,12 +219,22 @@ def _single(hint: type, value: Any, key: str) -> Any:
     raise mismatch(key, EXPECTED[hint], value)
 
 
+def _chosen(choices: Sequence[str], value: Any, key: str) -> str:
+    """Return a value that is one of the choices."""
+    if value not in choices:
+        got = f"{value!s:.{LONGEST}}{close(value, choices)}"
+        raise ValueMismatch(key, f"expected one of {', '.join(choices)}, got {got}", value)
+    return str(value)
+
+
 def _check(field: Field[Any], value: Any, given: Any, key: str) -> None:
     """Require a value that its field allows; `given` is what it was made of."""
     choices, bounds = field.metadata.get("choices"), field.metadata.get("bounds")
-    if choices and value is not None and value not in choices:
-        problem = f"expected one of {', '.join(choices)}, got {value:.{LONGEST}}{close(value, choices)}"
-        raise ValueMismatch(key, problem, given)
+    if choices and value is not None:
+        _chosen(choices, value, key)
+    items = field.metadata.get("items")
+    if items and value is not None and not items[0] <= len(value) <= items[1]:
+        raise ValueMismatch(key, f"expected {items[0]} to {items[1]} values, got {len(value)}", given)
     for number in numbers(value) if bounds else ():
         if bounds and (expected := bounds.complaint(number)):
             problem = str(mismatch("", expected, number))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isqrt, radians, sqrt, tan
-from typing import NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 from texgs.core.cuts import FAR
 from texgs.core.errors import ArgumentError
@@ -11,7 +11,7 @@ from texgs.core.keys import REQUIRED, key
 from texgs.core.names import require_numbers
 
 ORIGIN = (0.0, 0.0, 0.0)
-FILLED = 0.9  # of the smaller side of an image, by what is framed
+FILLED = 0.9  # share of the smaller side of an image that shows what is framed
 
 
 class Lens(NamedTuple):
@@ -59,6 +59,29 @@ class Frame:
         tangent = FILLED * tan(radians(0.5 * fov_y)) * min(1.0, max(width, 1) / max(height, 1))
         distance = self.radius * sqrt(1 + tangent**-2) if radius is None else radius
         return Lens(distance, fov_y, width, height, self.target if target is None else target)
+
+
+@dataclass(frozen=True)
+class LensKeys:
+    """Size of pictures, and where the camera looks, from how far and how wide."""
+
+    width: int = key(800, "of pictures", "pixels", least=1)
+    height: int | None = key(None, "of pictures; default the width", "pixels", least=1)
+    fov_y: float = key(30.0, "vertical field of view", "degrees", above=0, below=180, option="fov")
+    radius: float | None = key(None, "distance from the target; default by the frame", "world units", above=0)
+    target: tuple[float, float, float] | None = key(
+        None, "what the camera looks at; default the middle of the frame", "world units", least=-FAR, most=FAR
+    )
+    frame: Literal["scene", "paper"] = key(
+        "scene", "what is centred on 90 % of the picture; paper: cameras 4.0311 from the origin"
+    )
+
+    def lens(self, framed: Frame) -> Lens:
+        """Return the lens that shows what is framed, unless a distance or a target says otherwise."""
+        size = self.width, self.width if self.height is None else self.height
+        if self.frame == "scene":
+            return framed.lens(self.fov_y, *size, self.radius, self.target)
+        return Lens(self.radius or Lens().radius, self.fov_y, *size, self.target or ORIGIN)
 
 
 def frequency_of(count: int, where: str = "views") -> int:

@@ -1,5 +1,9 @@
-"""How much memory this process has needed and may still have."""
+"""What this process has of the machine: memory that it needed, may have and gives back; and its threads."""
 
+import atexit
+import ctypes
+import gc
+import os
 import re
 import sys
 from collections.abc import Iterator
@@ -15,7 +19,16 @@ CONTAINERS = (  # for versions 2 and 1 of cgroups: the line that names a group, 
     (r"^\d+:(?:.*,)?memory(?:,.*)?:/(.*)$", "memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
 )
 MIB, GIB = 1 << 20, 1 << 30
-SMALL = 64 << 20  # bytes that are there without asking
+SMALL_BYTES = 64 << 20  # bytes that need no question
+# How threads wait. A fit has thousands of loops a second of less than a millisecond. To wake a thread
+# that sleeps takes as long as many of them, above all on virtual machines; one that spins on takes a core
+# from others. So they spin for some tens of microseconds and then sleep. docs/accuracy.md has the gain.
+POLICY = {
+    "OMP_WAIT_POLICY": "passive",  # of every OpenMP: sleep
+    "GOMP_SPINCOUNT": "1000",  # of GCC's, which torch has on Linux: look so often before that
+}
+NEW_OBJECTS = 50_000  # objects made before the garbage collector looks at them
+GLIBC_OPTIONS = {-1: 1 << 30, -4: 0}  # M_TRIM_THRESHOLD; M_MMAP_MAX: map no block by itself
 
 
 def peak_memory() -> int:
@@ -81,7 +94,7 @@ def require_memory(n_bytes: int, what: str, advice: str) -> None:
 
     Linux hands out more memory than there is, and ends a process that uses it.
     """
-    if n_bytes <= SMALL:
+    if n_bytes <= SMALL_BYTES:
         return
     free = free_memory()
     if n_bytes > free:
@@ -119,3 +132,36 @@ def is_out_of_memory(error: BaseException) -> bool:
         or type(error).__name__ == "OutOfMemoryError"
         or (isinstance(error, RuntimeError) and "can't allocate memory" in str(error))
     )
+
+
+def waiting() -> dict[str, str]:
+    """Return environment variables that OpenMP reads as torch is imported; what the user has set stays."""
+    own = {name: os.environ[name] for name in POLICY if name in os.environ}
+    return own or dict(POLICY)
+
+
+def collect_rarely() -> None:
+    """Let the garbage collector look only where many objects are new, and once at the end of this process.
+
+    Large libraries make millions of objects that stay. By default the collector goes through them again and
+    again during imports, and more than once at the end: a third of the time of a short command. For programs,
+    not for libraries to call.
+    """
+    gc.set_threshold(NEW_OBJECTS)
+    atexit.register(gc.freeze)
+    atexit.register(gc.collect)  # before that: HDF5 crashes where it has to close what is in a cycle itself
+
+
+def keep_freed_memory() -> bool:
+    """Let the C library keep what this process frees for its next request, instead of handing it back.
+
+    A training step asks for the same images again and again; pages that were handed back are zeroed by the
+    kernel each time, which takes as long as rendering. For programs, not for libraries to call: it holds for
+    the whole process. Return whether it does; only glibc can be told.
+    """
+    os.environ.setdefault("THP_MEM_ALLOC_ENABLE", "1")  # torch: large pages, where it was not used before
+    try:
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError, TypeError):
+        return False
+    return all(mallopt(option, size) for option, size in GLIBC_OPTIONS.items())

@@ -19,7 +19,8 @@ EXPORTS = {  # endings of what `texgs export` writes, by its kind
     **{"compact": (".texgs",), "html": (".html",)},
     **{"usd": (".usdc", ".usda"), "gltf": (".glb",), "spz": (".spz",), "vtp": (".vtp",)},
 }
-SCENE, METRICS = "scene.yaml", "metrics.json"  # as jobs write them
+SCENE, METRICS, PAGE = "scene.yaml", "metrics.json", "scene.html"  # as jobs write them
+STYLE = "style"  # how the names of pictures begin that looks follow
 POINTS = "points3d.ply"  # where fits start, in a folder of views
 SLICES = (".tif", ".tiff")  # suffixes of the files in a folder of slices
 LARGEST = 10**300  # there are whole numbers that no float can hold
@@ -60,6 +61,11 @@ def file_name(where: str, name: str) -> str:
             f"at its start, of at most {LONGEST_FILE} bytes; got {name[: LONGEST + 1]!r}"
         )
     return name
+
+
+def style_file(part: str = "") -> str:
+    """Return the name of the picture that a look follows; of one of its parts, where each has its own."""
+    return f"{STYLE}-{part.replace('/', '-')}.png" if part else f"{STYLE}.png"
 
 
 def part_file(where: str, *names: str) -> str:

@@ -12,18 +12,15 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading
 
-LONGEST_HEADER = 1 << 16  # bytes
+MAX_HEADER_BYTES = 1 << 16
 MAGIC = b"ply"
 PROPERTY = re.compile(rb"^property[ \t]+\S+[ \t]+(\w+)", re.MULTILINE)
 END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
 Order = Literal["", "<", ">"]
 ORDERS: dict[str, Order] = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-TYPES = {
-    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2"},
-    **{"int": "i4", "uint": "u4", "float": "f4", "double": "f8"},
-    **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2"},
-    **{"int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8"},
-}
+TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
+TYPES |= {"float": "f4", "double": "f8"}
+TYPES |= {np.dtype(code).name: code for code in TYPES.values()}
 
 
 @dataclass(frozen=True)
@@ -125,4 +122,4 @@ def properties(path: Path) -> set[str]:
 def _header(path: Path) -> bytes:
     """Return the start of a file, in which the header of a PLY file is."""
     with path.open("rb") as file:
-        return file.read(LONGEST_HEADER)
+        return file.read(MAX_HEADER_BYTES)

@@ -1,5 +1,6 @@
-"""Progress of a long loop: a bar on a terminal, a plain line now and then in a log file, and its curves."""
+"""Progress of a long loop: a bar on a terminal or lines in a log file, its curves, Ctrl-C between items."""
 
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
@@ -7,7 +8,9 @@ from contextvars import ContextVar
 from importlib.util import find_spec
 from io import StringIO
 from operator import length_hint
+from threading import current_thread, main_thread
 from time import monotonic
+from types import FrameType
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -37,6 +40,12 @@ def watched(watch: Watch) -> AbstractContextManager[None]:
     raises ends the loop.
     """
     return _within(_watch, watch)
+
+
+def let_stop(title: str) -> None:
+    """Let who watches the loops of this thread end the work here, before it changes what others see."""
+    if watch := _watch.get():
+        watch(title, 0, None)
 
 
 def curve_logger(log: LogPoint | None) -> AbstractContextManager[None]:
@@ -157,3 +166,33 @@ def _duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60:02d} s"
     return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+@contextmanager
+def interrupts_between_items() -> Iterator[None]:
+    """Let Ctrl-C wait for the next item of a loop that shows its progress, or for the end of the block.
+
+    Elsewhere it may come in the middle of an import, and no process can import the rest of a package that it
+    has imported by half. A second Ctrl-C comes at once. Only the main thread gets any.
+    """
+    before, asked = signal.getsignal(signal.SIGINT), list[int]()
+    if not callable(before) or current_thread() is not main_thread():
+        yield
+        return
+
+    def note(number: int, frame: FrameType | None) -> None:
+        asked.append(number)
+        if len(asked) > 1:
+            before(number, frame)
+
+    def end(*_: object) -> None:
+        if asked:
+            raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        with watched(end):
+            yield
+            end()
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -16,8 +16,8 @@ from texgs.core.errors import ConfigError
 def specifications(package: str, attribute: str) -> dict[str, Any]:
     """Return what the modules of a package define under one name, by the names of the specifications.
 
-    The modules are imported, so they must stay light: what they run imports the rest when it is called. A
-    module without the name, such as METHOD, is a helper of others.
+    It is one specification or a tuple of some. The modules are imported, so they must stay light: what they
+    run imports the rest when it is called. A module without the name, such as METHOD, is a helper of others.
 
     Raises:
         ConfigError: naming the module that cannot be imported, or whose specification has none or another's
@@ -26,23 +26,28 @@ def specifications(package: str, attribute: str) -> dict[str, Any]:
     defined, modules = dict[str, Any](), dict[str, str]()
     for entry in pkgutil.iter_modules(import_module(package).__path__):
         module = f"{package}.{entry.name}"
-        specification = getattr(imported(module), attribute, None)
-        if specification is None:
-            continue
-        name = getattr(specification, "name", None)
-        if not isinstance(name, str):
-            got = type(specification).__name__
-            raise ConfigError(f"{module}: {attribute}: expected a specification with a name, got {got}")
-        if name in defined:
-            raise ConfigError(
-                f"{modules[name]} and {module}: expected {attribute} of different names, got {name} twice; "
-                "rename yours"
-            )
-        defined[name], modules[name] = specification, module
-    return defined
+        found = getattr(import_specification(module), attribute, ())
+        for specification in found if isinstance(found, tuple) else (found,):
+            name = getattr(specification, "name", None)
+            if not isinstance(name, str):
+                got = type(specification).__name__
+                raise ConfigError(f"{module}: {attribute}: expected a specification with a name, got {got}")
+            if name in defined:
+                raise ConfigError(
+                    f"{modules[name]} and {module}: expected {attribute} of different names, got {name} "
+                    "twice; rename yours"
+                )
+            defined[name], modules[name] = specification, module
+    return dict(sorted(defined.items()))
 
 
-def imported(name: str) -> ModuleType:
+def named(name: str) -> Any:
+    """Return what a module defines, by a name such as "texgs.fields.voxels:read_voxels"."""
+    module, _, attribute = name.partition(":")
+    return getattr(import_specification(module), attribute)
+
+
+def import_specification(name: str) -> ModuleType:
     """Import a module; what is wrong with it becomes one sentence."""
     try:
         return import_module(name)

@@ -14,8 +14,8 @@ from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.raster import Texture
 
-VIEWS = 6  # that tell how translucent a scene is
-SEEN = 0.02  # of alpha: less is not looked at
+VIEWS = 6  # views that tell how translucent a scene is
+SEEN_ALPHA = 0.02  # pixels with less alpha are not looked at
 MARGIN, MULTIPLE = 4, 8  # pixels around what is seen, and what sides of the part are a multiple of
 
 
@@ -68,7 +68,7 @@ def around(model: Surfels, camera: Camera) -> Camera:
 
 def visible_part(alpha: Tensor) -> tuple[slice, slice]:
     """Return rows and columns of the smallest part of alpha [h, w] with all that is seen, and a margin."""
-    seen = alpha > SEEN
+    seen = alpha > SEEN_ALPHA
     return visible_range(seen.any(dim=1)), visible_range(seen.any(dim=0))
 
 

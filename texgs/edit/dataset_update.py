@@ -16,7 +16,7 @@ from texgs.core.errors import ArgumentError, FitError
 from texgs.core.progress import progress
 from texgs.edit.objective import LOSS_SCALE
 from texgs.edit.observations import edit_views
-from texgs.edit.update_schedule import UpdateSchedule
+from texgs.edit.recipe import UpdateSchedule
 from texgs.fields.field import Field
 from texgs.models.guidance import EditViews, Guidance, require_edited
 from texgs.models.instruction import require_instruction
@@ -150,7 +150,7 @@ class Updated:
     losses: list[float] = field(default_factory=list)  # in each iteration
     edited: set[int] = field(default_factory=set)
     count: int = 0  # edits of single views
-    seconds: float = 0.0  # that these took
+    seconds: float = 0.0  # the time of all edits
 
     @torch.no_grad()
     def edit(self, ids: Sequence[int], level: float) -> None:

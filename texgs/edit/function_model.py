@@ -1,42 +1,94 @@
 """A model of a transfer function that a scene tries on its volume, in place of the function."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import torch
 
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Frame
+from texgs.core.progress import let_stop
 from texgs.fields.files import kind_of
 from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.model_file import write_model
 from texgs.fitting.now import fit_now
-from texgs.scene.scene import Scene, SceneModel, volume_of
+from texgs.scene.scene import Scene, SceneModel, SceneVolume, volume_of
+from texgs.scene.session import Session
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.transfer import TransferFunction, overlapping
 
 SIZE = 400  # pixels of either side of the views
+FIRST, FINER = "model", "finer model"  # in titles of steps
 
 
-def models_of(
-    scene: Scene, name: str, device: torch.device | str = "cpu", size: int = SIZE
-) -> Iterator[Surfels]:
-    """Yield a first model of a function that a scene tries, then a finer one.
+def fit_function(
+    session: Session,
+    name: str,
+    file: Callable[[], Path],
+    device: torch.device | str = "cpu",
+    size: int = SIZE,
+    *,
+    soon: bool = True,
+) -> Iterator[str]:
+    """Put a first model in the place of a function that the scene tries, then a finer one in its place.
 
-    Views show all of what the function shows, as the other models' views show theirs.
+    Views show all of what the function shows, as the other models' views show theirs. Each model is a step of
+    the session; yield its name, FIRST or FINER.
+
+    Args:
+        session: whose scene tries the function; it may be edited meanwhile.
+        name: of the function, which becomes that of the model.
+        file: returns the target of a model, once that is fitted.
+        device: to fit on.
+        size: of the views, pixels.
+        soon: put the first model there, too; else the finer one alone.
 
     Raises:
         ArgumentError: if the scene tries no such function, names no volume or has other fields than surfels,
-            or nothing is to be seen.
+            nothing is to be seen, or what is replaced was changed meanwhile.
     """
+    scene, given = session.scene, None
     volume, tf = volume_of(scene), tried(scene, name)
     for other, entry in scene.models.items():
         if (kind := kind_of(entry.file).name) != "surfels":
             raise ArgumentError(f"models.{other}: expected surfels, which a new model can join, got {kind}")
-    grid, look = open_grid(volume.file), volume.appearance
-    lens = frame_of(grid, [tf]).lens(width=size, height=size)
-    yield from fit_now(Caster(grid, look, device), look, tf, lens, name)
+    frame = frame_of(open_grid(volume.file), [tf])
+    models = models_of(volume, tf, frame, name, device, size)
+    for model in models if soon else [*models][-1:]:
+        let_stop(name)
+        what = FINER if given else FIRST
+        with session.one_step(f"{name} {what}"):
+            require_unchanged(session.scene, name, tf, given)
+            given = write_model(file(), model)
+            session.set_scene(with_model(session.scene, name, given, tf))
+        yield what
+
+
+def models_of(
+    volume: SceneVolume,
+    tf: TransferFunction,
+    frame: Frame,
+    name: str,
+    device: torch.device | str = "cpu",
+    size: int = SIZE,
+    **options: Any,
+) -> Iterator[Surfels]:
+    """Yield models of what a function shows of a volume in views of a frame; for options see `fit_now`."""
+    caster = Caster(open_grid(volume.file), volume.appearance, device)
+    lens = frame.lens(width=size, height=size)
+    return fit_now(caster, volume.appearance, tf, lens, name, **options)
+
+
+def require_unchanged(scene: Scene, name: str, tf: TransferFunction, given: Path | None) -> None:
+    """Require that a scene still has the function, or the model in a file, whose place a model is to take."""
+    entry = scene.models.get(name)
+    if scene.functions.get(name) != tf if given is None else entry is None or entry.file != given:
+        was = "first model" if given else "function"
+        raise ArgumentError(f"{name}: its {was} was changed meanwhile; make the model again")
 
 
 def tried(scene: Scene, name: str) -> TransferFunction:

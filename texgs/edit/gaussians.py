@@ -14,7 +14,7 @@ from texgs.edit.objective import Objective
 from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import Losses, Painting, learn_style
 from texgs.edit.style_picture import StylePicture
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians import Gaussians
 from texgs.fields.optimizer import Optimizer
 from texgs.fields.splats import GEOMETRY, join, split
 from texgs.fitting.loop import extent, rates
@@ -25,7 +25,7 @@ from texgs.volume.images import Images
 HIGHER = 1 / 20  # rate of the higher harmonics in styles, against that of the zeroth
 PRUNE_EVERY = 100  # iterations
 LEAST_OPACITY, LARGEST_SCALE, LARGEST_RADIUS = 0.005, 0.1, 5.0  # scale in extents; radius in pixels
-SIGMAS = 3.0  # of a Gaussian that its radius on screen has
+SIGMAS = 3.0  # standard deviations of a Gaussian in its radius on screen
 
 
 def stylize_gaussians(

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.geometry import nearest
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.progress import progress
 from texgs.edit.clicks import FAINT, TOLERANCE, Clicks, extent, is_visible, places_of
@@ -18,11 +19,13 @@ from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
 
-WHOLE = 0.9  # share of a model, from which a segment may be more than what was meant
-CERTAIN = 0.8  # share of votes from which surfels stand in for clicks that a view does not see
+WHOLE_SHARE = 0.9  # share of a model, from which a segment may be more than what was meant
+CERTAIN_SHARE = 0.8  # share of votes from which surfels stand in for clicks that a view does not see
 AGREEMENT = 0.5  # least overlap of a mask with what other views say, or the mask model lost the object
-TOUCH = 2.0  # standard deviations of two surfels together, within which they touch
-PIECE = 0.1  # of the largest piece of what an outline selects, from which one is looked for in other views
+TOUCH_SIGMAS = 2.0  # standard deviations of two surfels together, within which they touch
+PIECE_SHARE = (
+    0.1  # of the largest piece of what an outline selects, from which one is looked for in other views
+)
 NEIGHBOURS = 16  # surfels that one is compared with to connect them
 Find = Callable[[Clicks], Tensor]  # the mask [H, W] of a view
 
@@ -41,7 +44,7 @@ class Lifted:
         """Return how many views it rests on, in words; and whether it holds almost the whole model."""
         views = f"masks of {self.used} of {self.used + self.left_out} views"
         share = float(self.mask.float().mean())
-        if share < WHOLE:
+        if share < WHOLE_SHARE:
             return views
         return f"{views} hold {share:.0%} of the model; if that is too much, click beside the object as well"
 
@@ -140,7 +143,7 @@ def _mask(
     seen = is_visible(pixels, depths, shown.median, TOLERANCE * extent(so_far.model))  # type: ignore[arg-type]
     points, positive = pixels[seen], positive[seen]
     if not bool(positive.any()):
-        inner = middle_of((is_object > CERTAIN * alpha) & (alpha > 0.5))
+        inner = middle_of((is_object > CERTAIN_SHARE * alpha) & (alpha > 0.5))
         if inner is None:
             return None
         points = torch.cat([points, points.new_tensor([inner])])
@@ -158,7 +161,7 @@ def with_middles(clicks: Clicks, mask: Tensor) -> Clicks:
 
     numbers, count = label(mask.cpu().numpy())
     pieces = [torch.from_numpy(numbers == 1 + index) for index in range(count)]
-    least = PIECE * max((int(piece.sum()) for piece in pieces), default=0)
+    least = PIECE_SHARE * max((int(piece.sum()) for piece in pieces), default=0)
     middles = clicks.points.new_tensor([middle_of(piece) for piece in pieces if int(piece.sum()) >= least])
     positive = torch.cat([clicks.positive, clicks.positive.new_ones(len(middles))])
     return replace(clicks, points=torch.cat([clicks.points, middles]), positive=positive)
@@ -184,19 +187,18 @@ def components_at(model: Surfels, mask: Tensor, places: Tensor) -> Tensor:
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
 
     chosen = mask.nonzero()[:, 0]
-    means = model.parameters["means"][chosen].detach().cpu().numpy()
-    reach = TOUCH * model.parameters["scales"][chosen].detach().exp().amax(dim=1).cpu().numpy()
-    tree, count = cKDTree(means), len(means)
-    distances, others = tree.query(means, k=range(1, min(NEIGHBOURS, count - 1) + 2))
+    means, count = model.parameters["means"][chosen], len(chosen)
+    reach = TOUCH_SIGMAS * model.parameters["scales"][chosen].detach().exp().amax(dim=1).cpu().numpy()
+    found = nearest(means, means, min(NEIGHBOURS, count - 1) + 1)
+    distances, others = (x.numpy() for x in found)
     rows = np.repeat(np.arange(count), others.shape[1])
     touches = distances.ravel() <= reach[rows] + reach[np.minimum(others.ravel(), count - 1)]
     edges = (np.ones(int(touches.sum())), (rows[touches], others.ravel()[touches]))
     _, component = connected_components(coo_array(edges, shape=(count, count)), directed=False)
-    _, nearest = tree.query(places.detach().cpu().numpy())
-    kept = torch.from_numpy(np.isin(component, component[nearest])).to(mask.device)
+    _, clicked = nearest(means, places)
+    kept = torch.from_numpy(np.isin(component, component[clicked.numpy()])).to(mask.device)
     result = torch.zeros_like(mask)
     result[chosen[kept]] = True
     return result

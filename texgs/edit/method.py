@@ -116,14 +116,14 @@ class Method(Generic[Settings]):
         """Return whether it can edit a kind of field."""
         return (not self.fields or kind in self.fields) and self.needs <= kinds()[kind].can
 
-    def of(self, edit: Any, look: str | None = None) -> Settings:
+    def of(self, edit: Any, followed: str | None = None) -> Settings:
         """Return its settings among those of an edit: the schema's `Edit`, or its node in a configuration.
 
-        A look is what it follows, where that is not what its settings say.
+        `followed` is the picture or the instruction, where that is not what its settings say.
         """
         values = getattr(edit, self.name)
         settings: Any = values if isinstance(values, self.settings) else typed(self.settings, values)
-        return settings if look is None else replace(settings, **{self.follows: look})
+        return settings if followed is None else replace(settings, **{self.follows: followed})
 
 
 def methods() -> dict[str, Method[Any]]:

@@ -1,7 +1,8 @@
 """A new segment of a scene, from clicks on a view of one of its models; and how a mask looks before that."""
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,15 +11,20 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
+from texgs.core.names import require_name
+from texgs.core.progress import let_stop
 from texgs.edit.clicks import Clicks, places_of
 from texgs.edit.lift import Lifted, lift, view_mask
-from texgs.edit.votes import Vote
+from texgs.edit.mask_keys import MaskKeys
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
+from texgs.models.sam import mask_model
 from texgs.scene.parts import require_new, split
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
+from texgs.volume.cameras import icosphere_of
 
 MASKED, COVER = (1.0, 0.1, 0.1), 0.6  # colour over what is masked, and its opacity
 POSITIVE, NEGATIVE = (0.0, 0.7, 0.0), (0.0, 0.0, 0.9)  # of clicks
@@ -26,46 +32,63 @@ RADIUS = 0.008  # of clicks, of the longer side
 
 
 class Segmented(NamedTuple):
-    """A scene with a new segment, and what that was found in."""
+    """The model that a new segment was found in, and what it rests on."""
 
-    scene: Scene
     model: Surfels
     lifted: Lifted
 
 
 def new_segment(
-    scene: Scene,
+    session: Session,
     part: str,
     clicks: Clicks,
-    cameras: Sequence[Camera],
-    masks: MaskModel,
-    file: Path,
+    keys: MaskKeys,
+    lens: Lens,
+    file: Callable[[], Path],
     facts: Mapping[str, Any],
     *,
-    vote: Vote = "contribution",
+    cameras: Sequence[Camera] = (),
+    masks: MaskModel | None = None,
     threshold: float | None = None,
-    connected: bool = False,
     title: str = "segment",
 ) -> Segmented:
-    """Find a segment of a model by clicks, write its file, and add it to the scene.
+    """Find a segment of a model by clicks, write its file, and add it to the scene in one step.
 
-    MODEL/SEGMENT is a new name, and clicks are on a view of the model as `clicked_model` has it; for what
-    else finds the segment, see `lift`. The file tells the facts that the segment comes from, JSON.
+    Args:
+        session: whose scene has the model; it may be edited meanwhile.
+        part: MODEL/SEGMENT, a new name.
+        clicks: on a view of the model as `clicked_model` has it, and the device to compute on.
+        keys: how masks are found and become surfels.
+        lens: of the views that vote, but for their size.
+        file: returns the target, once the segment is found.
+        facts: what was clicked on, JSON, which the file says with the keys.
+        cameras: of the views that vote; default those that the keys say.
+        masks: finds the object in a view; default what the keys name.
+        threshold: of the votes, see `lift`.
+        title: of the progress bar.
     """
+    scene, device = session.scene, clicks.points.device
     require_new(scene, part)
-    model = clicked_model(scene, split(scene, part)[0], clicks.points.device)
+    name, segment = split(scene, part)
+    require_name(segment, "segment")
+    model = clicked_model(scene, name, device)
+    around = cameras or icosphere_of(keys.views, lens.square(keys.size))
     lifted = lift(
-        *(model, clicks, cameras, masks),
+        model,
+        clicks,
+        [camera.to(device) for camera in around],
+        masks or mask_model(keys.masks, device),
         light=scene.light,
-        vote=vote,
+        vote=keys.vote,  # type: ignore[arg-type]
         threshold=threshold,
-        connected=connected,
+        connected=keys.connected,
         title=title,
     )
+    let_stop(title)
     sys.stderr.write(f"{part}: {lifted.basis}\n")
-    session = Session(scene)
-    session.make_segment(part, lifted.mask, file, facts)
-    return Segmented(session.scene, model, lifted)
+    with session.one_step(f"{part} new"):
+        session.make_segment(part, lifted.mask, file(), {**asdict(keys), **facts})
+    return Segmented(model, lifted)
 
 
 def clicked_model(scene: Scene, name: str, device: torch.device) -> Surfels:
@@ -85,18 +108,20 @@ def model_name(scene: Scene, name: str | None, where: str) -> str:
     return str(name)
 
 
-@torch.no_grad()
-def preview(
-    model: Surfels, clicks: Clicks, masks: MaskModel, light: Light = HEADLIGHT
-) -> tuple[Tensor, Tensor]:
-    """Return the mask [H, W] bool of a view from clicks on it, and a picture [H, W, 3] of both.
+def clicked_mask(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light = HEADLIGHT) -> Tensor:
+    """Return the mask [H, W] bool of a view from clicks on it.
 
     A mask model that remembers images answers the second click on a view at once.
     """
     places_of(model, clicks)  # they have to be on the model
-    mask = view_mask(model, clicks, masks, light)
-    image = model.render(clicks.camera, light).color.clamp(0, 1)
-    return mask, overlay(image, mask, clicks)
+    return view_mask(model, clicks, masks, light)
+
+
+@torch.no_grad()
+def preview(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light = HEADLIGHT) -> Tensor:
+    """Return a picture [H, W, 3] of the view that is clicked on, with its mask and the clicks."""
+    mask = clicked_mask(model, clicks, masks, light)
+    return overlay(model.render(clicks.camera, light).color.clamp(0, 1), mask, clicks)
 
 
 def overlay(image: Tensor, mask: Tensor, clicks: Clicks) -> Tensor:

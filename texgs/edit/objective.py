@@ -21,9 +21,9 @@ from texgs.models.vgg import STYLE_LAYERS, Vgg
 FeatureTerm = Callable[[Tensor], Tensor]  # image [H, W, 3] in [0, 1] to a loss []
 FINE_LAYERS = ("relu1_2", "relu2_2")  # whose distributions are compared beside that of the style's layers
 STRIDE = 4  # pixels between the positions of the features that NNFM compares
-ON_OBJECT = 0.5  # of alpha, from which a feature or a patch counts
+ON_OBJECT = 0.5  # alpha from which a feature or a patch counts
 STYLE_FEATURES = 1100  # bytes of memory for the features of a pixel
-LOSS_SCALE = 4096.0  # while it goes backwards: gradients of a mean over features would underflow in float16
+LOSS_SCALE = 4096.0  # factor on losses going backwards: gradients of means would underflow in float16
 
 
 class ClipLoss:

@@ -19,9 +19,9 @@ from texgs.raster import Render, Texture
 from texgs.raster.losses import depth_to_normal, planar
 
 MARGIN = 11  # pixels around content: a window of SSIM
-SOFT = 0.05  # alpha below which colours are rather those of the neighbourhood
+SOFT_ALPHA = 0.05  # alpha below which colours are rather those of the neighbourhood
 NEAR, FAR = 9, 65  # pixels, windows of that neighbourhood
-FEW = 0.02  # mean alpha of a window below which it rather has the colour of the larger one
+FEW_ALPHA = 0.02  # mean alpha of a window below which it rather has the colour of the larger one
 Target = Literal["colors", "images"]
 
 
@@ -74,7 +74,7 @@ def render_views(
     return edit_views(renders, cameras, None, None)
 
 
-def joined(parts: Sequence[EditViews]) -> EditViews:
+def join_views(parts: Sequence[EditViews]) -> EditViews:
     """Return views of several models as if they were of one scene."""
     if len(parts) == 1:
         return parts[0]
@@ -205,7 +205,7 @@ def straight_colors(image: Tensor, alpha: Tensor) -> Tensor:
     own = (image - (1 - alpha[..., None])).clamp_min(0).minimum(alpha[..., None])  # premultiplied
     overall = own.sum(dim=(0, 1)) / alpha.sum().clamp_min(1e-6)
     around = _mean(own, alpha, NEAR, _mean(own, alpha, FAR, overall))
-    return ((own + SOFT * around) / (alpha[..., None] + SOFT)).clamp(0, 1)
+    return ((own + SOFT_ALPHA * around) / (alpha[..., None] + SOFT_ALPHA)).clamp(0, 1)
 
 
 def _mean(own: Tensor, alpha: Tensor, window: int, beyond: Tensor) -> Tensor:
@@ -215,4 +215,4 @@ def _mean(own: Tensor, alpha: Tensor, window: int, beyond: Tensor) -> Tensor:
         sums = pad(planes, (window // 2 + 1, window // 2)).cumsum(dim=-1, dtype=torch.float64)
         planes = ((sums[..., window:] - sums[..., :-window]) / window).to(planes).mT
     *color, cover = planes
-    return (torch.stack(color, dim=-1) + FEW * beyond) / (cover[..., None] + FEW)
+    return (torch.stack(color, dim=-1) + FEW_ALPHA * beyond) / (cover[..., None] + FEW_ALPHA)

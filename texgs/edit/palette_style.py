@@ -19,19 +19,19 @@ from texgs.edit.style_loop import Losses, Painting, Terms, image_variation, lear
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import free_color, light, new_networks, palette_color
-from texgs.fields.palette.rendering import RAYS, Shown, points_on, shown, view_harmonics
-from texgs.fields.voxels.rays import training_rays
-from texgs.fitting.palette import cluster_colors
+from texgs.fields.palette.rendering import RAYS, Shown, points_on, view_harmonics, visible_points
+from texgs.fitting.colors import cluster_colors
+from texgs.fitting.rays import training_rays
 from texgs.metrics.retrieval import LUMINANCE
 from texgs.models.vgg import Vgg
 from texgs.raster.voxels import camera_rays
 from texgs.volume.images import Images
 
-CLUSTERS = 4  # of the colours of a style, the largest of which is its dominant one
+CLUSTERS = 4  # clusters of a style's colours; the largest is its dominant one
 DRAWN, RUN = 4096, 2  # rays a step of the distillation, and neighbours among them
 RATE, LAST_RATE = 1e-2, 7e-5  # of Adam in the distillation
 BETAS = (0.9, 0.99)
-LEAST_WEIGHT = 1e-3  # of points that learn
+LEAST_WEIGHT = 1e-3  # weight of points that learn
 
 
 def stylize_palette(
@@ -121,7 +121,7 @@ class PalettePainting:
             drawn, _ = rays.draw(DRAWN, RUN, self.generator)
             with torch.no_grad():
                 points = points_on(drawn, self.recolored.geometry, self.recolored.parameters)
-                at = shown(points, LEAST_WEIGHT).points.at
+                at = visible_points(points, LEAST_WEIGHT).points.at
                 wanted = palette_color(at, self.recolored.parameters, self.levels).color
             loss = (free_color(at, self.free, self.levels) - wanted).square().mean()
             loss.backward()
@@ -180,7 +180,7 @@ class PalettePainting:
             shares = palette_color(points.at, parameters, self.levels).shares if colors > 1 else None
             for index, piece in enumerate(pieces):
                 own = points if shares is None else points.take(shares.argmax(1) == index)
-                shows = shown(own, LEAST_WEIGHT)
+                shows = visible_points(own, LEAST_WEIGHT)
                 lit = light(shows.points.features, harmonics[shows.points.ray], parameters)
                 piece.append(Layer(shows, lit, len(rays)))
         return pieces

@@ -1,4 +1,4 @@
-"""How opaque parts are while and after they get a new look, so that a person can read it.
+"""What a new look changes of a scene beside textures: opacity, so that a person can read it, and highlights.
 
 Where a part is translucent, a pixel shows several of its layers, whose colours average to grey. More opacity
 brings the front layer out. It also hides what is inside, of which enough has to stay visible.
@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.method import MethodKeys
-from texgs.fields.part_edit import MOST, PartEdit
+from texgs.fields.part_edit import MOST_FACTOR, PartEdit
 
 if TYPE_CHECKING:
     import torch
@@ -23,15 +23,17 @@ if TYPE_CHECKING:
     from texgs.core.camera import Camera
     from texgs.edit.task import Task
     from texgs.fields.surfels.composition import Composition
+    from texgs.fields.surfels.model import Surfels
     from texgs.scene.scene import Scene
 
-READABLE = 0.9  # mean alpha of a part from which its pattern is plain
-LARGEST = 16.0  # of a factor: beyond, next to nothing changes
-KEPT = 0.5  # share of its pixels that every part keeps
-SHOWS = 0.1  # share of a pixel's colour from which the pixel shows a part
-VIEWS, SIZE = 6, 100  # that tell, and pixels of their sides
-STEPS = 5  # of a bisection
-CHANNELS = 32  # that are rasterized at once
+AnyTask = TypeVar("AnyTask", bound="Task[Any]")
+READABLE_ALPHA = 0.9  # mean alpha of a part from which its pattern is plain
+LARGEST_FACTOR = 16.0  # beyond this factor next to nothing changes
+KEPT_SHARE = 0.5  # share of its pixels that every part keeps
+SHOWN_SHARE = 0.1  # share of a pixel's colour from which the pixel shows a part
+VIEWS, SIZE = 6, 100  # views that are looked at, and pixels of their sides
+BISECTIONS = 5  # halvings of the interval that has a share
+CHANNELS = 32  # channels that are rasterized at once
 
 
 @dataclass(frozen=True)
@@ -60,15 +62,15 @@ class OpacityKeys(MethodKeys):
             factor = float(said)
         except ValueError:
             factor = -1.0
-        if not 0 < factor <= MOST:
+        if not 0 < factor <= MOST_FACTOR:
             raise ArgumentError(
-                f"{self.node}.opacity: expected keep, auto or a factor above 0, up to {MOST:g}; "
+                f"{self.node}.opacity: expected keep, auto or a factor above 0, up to {MOST_FACTOR:g}; "
                 f"got {said!r:.60}"
             )
         return factor
 
 
-def raised(task: Task[Any]) -> Task[Any]:
+def raise_opacities(task: AnyTask) -> AnyTask:
     """Return the task with the opacities in its scene that the look of its parts asks for."""
     from texgs.edit.task import parts_of
     from texgs.scene.parts import entry_of, replaced
@@ -78,7 +80,7 @@ def raised(task: Task[Any]) -> Task[Any]:
     given = dict.fromkeys(parts, factor) if factor else readable_factors(scene, parts, task.device)
     for part, each in given.items():
         entry = entry_of(scene, part)
-        edit = replace(entry.edit, opacity=min(each * entry.edit.opacity, MOST))
+        edit = replace(entry.edit, opacity=min(each * entry.edit.opacity, MOST_FACTOR))
         scene = replaced(scene, part, replace(entry, edit=edit))
     return replace(task, scene=scene)
 
@@ -86,23 +88,23 @@ def raised(task: Task[Any]) -> Task[Any]:
 def readable_factors(scene: Scene, parts: Sequence[str], device: torch.device | str) -> dict[str, float]:
     """Return the factor on the opacity of each of some parts that makes patterns on them readable.
 
-    It brings the mean alpha of the part alone to `READABLE` and is at least 1. Where this would take half of
-    its pixels from a part that shows now, all factors come down together, on a logarithmic scale.
+    It brings the mean alpha of the part alone to `READABLE_ALPHA` and is at least 1. Where this would take
+    half of its pixels from a part that shows now, all factors come down together, on a logarithmic scale.
     """
-    sight = Sight.of(scene, device)
+    sight = PartVisibility.of(scene, device)
     wanted = {part: sight.readable(part) for part in parts}
     before = sight.pixels({})
 
     def is_visible(share: float) -> bool:
         shown = sight.pixels({part: factor**share for part, factor in wanted.items()})
-        return bool((shown >= KEPT * before).all())
+        return bool((shown >= KEPT_SHARE * before).all())
 
     share = largest(is_visible) if max(wanted.values()) > 1 else 0.0
     return {part: two_digits(factor**share) for part, factor in wanted.items()}
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class PartVisibility:
     """What a few views around a scene show of each part."""
 
     composed: Composition
@@ -111,7 +113,7 @@ class Sight:
     cameras: Sequence[Camera]
 
     @classmethod
-    def of(cls, scene: Scene, device: torch.device | str) -> Sight:
+    def of(cls, scene: Scene, device: torch.device | str) -> PartVisibility:
         """Return that of a scene of surfels, framed as its pictures are."""
         import torch
 
@@ -133,27 +135,27 @@ class Sight:
         return cls(composed, edits, marks, [camera.to(device) for camera in cameras])
 
     def readable(self, part: str) -> float:
-        """Return the factor from 1 to `LARGEST` that makes a part alone as opaque as is readable."""
+        """Return the factor from 1 to `LARGEST_FACTOR` that makes a part alone as opaque as is readable."""
         from texgs.edit.canvas import weighted_mean
 
         alone = {name: replace(edit, visible=name == part) for name, edit in self.edits.items()}
 
         def is_readable(share: float) -> bool:
-            opacity = min(LARGEST ** (1 - share) * alone[part].opacity, MOST)
+            opacity = min(LARGEST_FACTOR ** (1 - share) * alone[part].opacity, MOST_FACTOR)
             shares = self.shares({**alone, part: replace(alone[part], opacity=opacity)})
-            return weighted_mean(each.sum(-1) for each in shares) >= READABLE
+            return weighted_mean(each.sum(-1) for each in shares) >= READABLE_ALPHA
 
-        return float(LARGEST ** (1 - largest(is_readable)))
+        return float(LARGEST_FACTOR ** (1 - largest(is_readable)))
 
     def pixels(self, factors: Mapping[str, float]) -> Tensor:
         """Return how many pixels show each part [P] with factors on some opacities."""
         import torch
 
         edits = {
-            name: replace(edit, opacity=min(factors.get(name, 1.0) * edit.opacity, MOST))
+            name: replace(edit, opacity=min(factors.get(name, 1.0) * edit.opacity, MOST_FACTOR))
             for name, edit in self.edits.items()
         }
-        return torch.stack([(each > SHOWS).sum(dim=(0, 1)) for each in self.shares(edits)]).sum(0)
+        return torch.stack([(each > SHOWN_SHARE).sum(dim=(0, 1)) for each in self.shares(edits)]).sum(0)
 
     def shares(self, edits: Mapping[str, PartEdit]) -> Iterator[Tensor]:
         """Yield of each view what share of its pixels each part makes up [H, W, P]."""
@@ -183,7 +185,7 @@ def largest(holds: Callable[[float], bool]) -> float:
     if holds(1.0):
         return 1.0
     low, step = 0.0, 0.5
-    for _ in range(STEPS):
+    for _ in range(BISECTIONS):
         low += step * holds(low + step)
         step /= 2
     return low
@@ -193,3 +195,55 @@ def two_digits(factor: float) -> float:
     """Return a factor of at least 1 rounded down to two digits, as a person would write it."""
     unit = 10.0 ** (floor(log10(factor)) - 1)
     return round(floor(factor / unit + 1e-9) * unit, 1)
+
+
+# -- highlights ---
+
+
+class Highlights(NamedTuple):
+    """Highlights that a material has."""
+
+    specular: float  # k_s
+    shininess: float  # beta
+    tint: tuple[float, float, float] = PartEdit.tint
+
+
+# By the names of the vocabulary. Tints of metals are what these reflect straight on, linear and at most 1
+# (Akenine-Moeller et al. 2018, Real-Time Rendering, table 9.2).
+MATERIALS = {
+    "gold": Highlights(0.9, 20, (1.0, 0.782, 0.344)),
+    "silver": Highlights(0.9, 25, (0.972, 0.960, 0.915)),
+    "copper": Highlights(0.8, 18, (0.955, 0.638, 0.538)),
+    "wood": Highlights(0.1, 8),
+    "marble": Highlights(0.3, 30),
+    "glass": Highlights(0.9, 60),
+}
+
+
+def highlights_of(instruction: str, model: Surfels, surfels: Tensor | None = None) -> dict[str, Any]:
+    """Return the values of a `PartEdit` that give a part the highlights of the material that is named.
+
+    The factors bring the medians of the part's own k_s and beta, as fitted, to those of the material.
+
+    Args:
+        instruction: such as "make it gold"; one that says anything else, too, changes nothing: {}.
+        model: relightable.
+        surfels: [N] bool, those of the part; all by default.
+    """
+    from texgs.fields.surfels.shading import material
+    from texgs.models.instruction import understand
+
+    try:
+        named = MATERIALS.get(understand(instruction)[0])
+    except ArgumentError:  # what a diffusion model may understand
+        named = None
+    if named is None:
+        return {}
+    own = material(model.parameters, model.shading.material)  # [N] or [1]
+    edit: dict[str, Any] = {"tint": named.tint}
+    for name in ("specular", "shininess"):
+        values = own[name] if surfels is None or len(own[name]) == 1 else own[name][surfels]
+        wanted, fitted = getattr(named, name), float(values.median())
+        if fitted:  # else no factor reaches it
+            edit[name] = min(wanted / fitted, MOST_FACTOR)
+    return edit

@@ -1,5 +1,6 @@
-"""How to stylise: the numbers of one image-driven edit, and the sets of them that have names."""
+"""The numbers of an image-driven edit, the sets of them that have names, and rounds of edits of views."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Self
 
@@ -103,3 +104,25 @@ PRESETS = {
 def preset(name: str, **changes: Any) -> Recipe:
     """Return a recipe of `PRESETS` by name, with some of its numbers changed."""
     return replace(PRESETS[name], **changes)
+
+
+@dataclass(frozen=True)
+class UpdateSchedule:
+    """Rounds of edits, and the iterations after each.
+
+    A round edits some views, `group` of them together before each of its first iterations, until all of
+    them are edited.
+    """
+
+    rounds: int
+    period: int  # iterations of a round
+    views: int | None = None  # edited in a round; None: all
+    group: int = 1  # edited together
+    order: Literal["next", "random"] = "next"  # going on where the last round ended, or drawn at random
+    learned: Literal["all", "newest", "round"] = "all"  # views: any, the one just edited, or the round's
+    levels: Sequence[tuple[float, float]] = ((1.0, 1.0),)  # from and to, by round; the last holds on
+
+    @property
+    def iterations(self) -> int:
+        """Return how many all rounds have."""
+        return self.rounds * self.period

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from texgs.core.checksum import Checksums, digest
+from texgs.core.cache import Checksums, digest
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import read_json, write_json
 from texgs.core.keys import typed

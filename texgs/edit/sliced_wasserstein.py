@@ -14,7 +14,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core import check
-from texgs.models.nnfm import drawn
+from texgs.models.nnfm import draw_features
 
 SIDE = 7  # of a patch, pixels
 LEVELS = 3  # full resolution, a half, a quarter
@@ -84,7 +84,7 @@ class FeatureDistribution:
         The seed is of the directions, and of the draw of 16,384 features where there are more.
         """
         generator = torch.Generator().manual_seed(seed)
-        rows = drawn(features.detach(), region, STYLE_MOST, generator)
+        rows = draw_features(features.detach(), region, STYLE_MOST, generator)
         directions = random_directions(rows.shape[1], generator).to(rows)
         values = directions @ rows.T
         return cls(directions.unflatten(0, (BANKS, FILTERS)), kept_quantiles(values), values.var(1).mean())
@@ -97,7 +97,7 @@ class FeatureDistribution:
         their count. The seed is of the draw of 2,048 features where there are more.
         """
         check.shape("features", features, "C h w", C=self.directions.shape[2])
-        rows = drawn(features, where, MOST_FEATURES, torch.Generator().manual_seed(seed))
+        rows = draw_features(features, where, MOST_FEATURES, torch.Generator().manual_seed(seed))
         if not len(rows):
             return features.sum().float() * 0
         bank %= BANKS

@@ -53,7 +53,7 @@ class StylePicture:
         cls(image, region)
         rows, columns = (region.any(dim=d).nonzero()[:, 0] for d in (1, 0))
         box = (slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1))
-        return cls(filled(image[:, *box], region[box]), region[box])
+        return cls(fill_outside(image[:, *box], region[box]), region[box])
 
     @property
     def mean(self) -> Tensor:
@@ -101,7 +101,7 @@ def read_style(path: str | Path, find: Find | None = None) -> StylePicture:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with open_picture(path, "a picture") as picture:
-                small = reduced(picture)
+                small = shrink_picture(picture)
     except ArgumentError as error:
         if isinstance(error.__cause__, Image.DecompressionBombError):
             raise ArgumentError(
@@ -118,7 +118,7 @@ def read_style(path: str | Path, find: Find | None = None) -> StylePicture:
         return StylePicture.of(pixels[:3].contiguous(), None if bool(visible.all()) else visible)
 
 
-def reduced(picture: Image.Image) -> Image.Image:
+def shrink_picture(picture: Image.Image) -> Image.Image:
     """Return a picture upright, as RGBA, with 2,048 pixels along its longer side at most.
 
     One so narrow that its shorter side would hold no pattern then keeps more.
@@ -137,7 +137,7 @@ def reduced(picture: Image.Image) -> Image.Image:
     return ImageOps.exif_transpose(small)
 
 
-def filled(image: Tensor, region: Tensor) -> Tensor:
+def fill_outside(image: Tensor, region: Tensor) -> Tensor:
     """Return the image [3, h, w]; pixels outside the region [h, w] have the colour of the nearest in it."""
     from scipy.ndimage import distance_transform_edt
 

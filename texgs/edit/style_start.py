@@ -17,13 +17,13 @@ from texgs.edit.style_picture import StylePicture
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import EXTENT, bare_colors, owners
 
-LEAST = 1e-10  # added to the eigenvalues of covariances
+LEAST_VARIANCE = 1e-10  # added to the eigenvalues of covariances
 CELLS = (0.25, 0.5, 1.0)  # sides of cells that may share a chunk, in longer sides of the picture
 ALIKE = 0.8  # cosine between the normal of a surfel and the mean normal of its chunk
 DRIFT = 0.125  # longer sides of the picture between where a chunk and where the surfel alone would read it
 RIM = 0.98  # part of a sphere's radius that is read: the last pixels have some of the background
-MOST = 1 << 16  # cells along an axis
-TEXELS = 1 << 18  # at a time
+MOST_CELLS = 1 << 16  # cells along an axis
+TEXELS = 1 << 18  # texels at a time
 # What the picture shows to the right and down, where a surface faces x, y or z: (z, -y), (x, z), (x, -y).
 RIGHT, DOWN = ((0.0, 0, 1), (1, 0, 0), (1, 0, 0)), ((0.0, -1, 0), (0, 0, 1), (0, -1, 0))
 
@@ -72,7 +72,7 @@ def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
     for name, x in (("colors", colors), ("style", style)):
         check.shape(name, x, "N 3")
     (whiten, mean, _), (whiten_style, mean_style, _) = (
-        zca_mean(x.detach().double(), unbiased=False, eps=LEAST) for x in (colors, style)
+        zca_mean(x.detach().double(), unbiased=False, eps=LEAST_VARIANCE) for x in (colors, style)
     )
     matrix = torch.linalg.solve(whiten_style, whiten)
     return matrix, mean_style[0] - matrix @ mean[0]
@@ -162,8 +162,8 @@ def in_chunks(
     rows = torch.cat([places, normals, alone, planes.flatten(1)], 1)  # [N, 14]
     shared = alone
     for share in CELLS:
-        x, y, z = ((places / (share * side)).floor().long() % MOST).unbind(1)
-        _, chunk = (((x * MOST + y) * MOST + z) * 6 + facing).unique(return_inverse=True)
+        x, y, z = ((places / (share * side)).floor().long() % MOST_CELLS).unbind(1)
+        _, chunk = (((x * MOST_CELLS + y) * MOST_CELLS + z) * 6 + facing).unique(return_inverse=True)
         count = chunk.bincount()[:, None]
         means = rows.new_zeros(len(count), rows.shape[1]).index_add_(0, chunk, rows) / count
         place, normal, at, plane = (each[chunk] for each in means.split((3, 3, 2, 6), 1))

@@ -2,14 +2,12 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import torch
 from torch import Tensor
 
-from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.lens import Lens
 from texgs.core.names import part_files
@@ -21,12 +19,10 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import labels_of, write_texture
 from texgs.scene.parts import NewLook, entry_of, part_names, replaced, split, with_looks
 from texgs.scene.scene import Scene
-from texgs.volume.cameras import icosphere_of
 from texgs.volume.view_set import View, read_views
 
 Settings = TypeVar("Settings")
-STEPS = 6  # of a series at most, that a look is learned from beside that of the scene
-VIEWS, SIZE = 92, 400  # of an `OrbitTask`, and pixels of their sides
+SERIES_STEPS = 6  # of a series at most, that a look is learned from beside that of the scene
 
 
 def parts_of(scene: Scene, names: Sequence[str]) -> list[str]:
@@ -92,8 +88,8 @@ class Task(Generic[Settings]):
 
     def settings_for(self, part: str) -> Settings:
         """Return the settings with the picture or the instruction that the model of a part follows."""
-        look = self.followed.get(split(self.scene, part)[0])
-        changes: dict[str, Any] = {} if look is None else {method_of(self.edit).follows: look}
+        followed = self.followed.get(split(self.scene, part)[0])
+        changes: dict[str, Any] = {} if followed is None else {method_of(self.edit).follows: followed}
         return replace(self.settings, **changes)  # type: ignore[type-var]
 
     def opacity_of(self, part: str) -> float:
@@ -119,7 +115,7 @@ class Task(Generic[Settings]):
         if self.scene.series is None or name not in self.scene.series.models:
             return []
         last = len(self.scene.series.steps) - 1
-        spread = {round(last * i / (STEPS - 1)) for i in range(STEPS)} - {self.scene.time}
+        spread = {round(last * i / (SERIES_STEPS - 1)) for i in range(SERIES_STEPS)} - {self.scene.time}
         return [self.scene.at(step).models[name].surfels()[0].to(self.device) for step in sorted(spread)]
 
     def each_part(
@@ -174,31 +170,3 @@ def edited_by(method: Method[Any], task: Task[Any]) -> EditedScene:
     if not isinstance(edited, EditedScene):
         raise ConfigError(f"method {method.name}: expected an EditedScene, got {type(edited).__name__}")
     return edited
-
-
-@dataclass(frozen=True, eq=False)
-class OrbitTask(Task[Any]):
-    """An edit that learns from new views around the scene, under its light: training views are not needed."""
-
-    side: tuple[float, float] | None = None  # azimuth and polar angle of the only view; None: from all
-
-    def training_views(self, model: str) -> Sequence[View]:
-        """Return the cameras on a sphere; there are no images."""
-        return [View(camera, Path(), self.scene.light) for camera in self._cameras]
-
-    @cached_property
-    def _cameras(self) -> list[Camera]:
-        """Return the same ones for all parts."""
-        if self.side:
-            azimuth, polar = self.side
-            return [orbit(azimuth, polar, *self.lens)]
-        return icosphere_of(VIEWS, self.lens)
-
-
-def orbit_task(
-    scene: Scene, edit: EditKeys, output: Path, device: torch.device, side: tuple[float, float] | None = None
-) -> OrbitTask:
-    """Return the task of an edit, which writes its files to a folder."""
-    lens = scene.framed().lens().square(SIZE)
-    settings = method_of(edit).of(edit)
-    return OrbitTask(settings, edit, scene, {}, output, device, 1, lens, "look", side=side)

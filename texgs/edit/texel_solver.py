@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from texgs.core.geometry import nearest
 from texgs.core.progress import progress
 from texgs.edit.observations import LinearObservation
 from texgs.fields.optimizer import Rate
@@ -13,9 +14,9 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors, owners
 from texgs.raster.losses import l1_dssim
 
-FAINT = 1e-4  # gain times alpha below which a pixel says nothing
-HARDLY = 0.01  # of the mean weight: what is seen less than that is hardly seen
-STEP = 1.5  # of a Newton step in a typical observation: 2 is the limit of stability
+FAINT_GAIN = 1e-4  # gain times alpha below which a pixel says nothing
+HARDLY_SEEN = 0.01  # share of the mean weight: texels below it are hardly seen
+FIRST_STEP = 1.5  # share of a Newton step in a typical observation: 2 is the limit of stability
 LAST_STEP = 0.1  # what single observations disagree about averages out as steps fall
 RIDGE = 0.02  # added to curvatures, relative to their median: texels that are hardly seen stay
 DSSIM = 0.2  # share of D-SSIM in what Adam follows
@@ -44,11 +45,11 @@ def back_project(observations: Sequence[LinearObservation], model: Surfels) -> B
         ones = torch.ones_like(texels).requires_grad_()
         image = observation.image(ones, plain=True)
         gains = image.detach()[..., :1]  # [h, w, 1]
-        shows = gains > FAINT
+        shows = gains > FAINT_GAIN
         wanted = observation.wanted
         if observation.is_lit:
             wanted = wanted - observation.image(torch.zeros_like(ones)).detach()
-        bare = torch.where(shows, wanted / gains.clamp_min(FAINT), 0.0).clamp(0, 1)
+        bare = torch.where(shows, wanted / gains.clamp_min(FAINT_GAIN), 0.0).clamp(0, 1)
         # The rasterizer treats channels alike and apart: two sums share a pass.
         both = torch.cat([shows.to(gains), gains, torch.zeros_like(gains)], dim=-1)
         (sums,) = torch.autograd.grad(image, ones, bare, retain_graph=True)
@@ -64,7 +65,7 @@ def back_project(observations: Sequence[LinearObservation], model: Surfels) -> B
 
 def seen_texels(weights: Tensor) -> Tensor:
     """Return which texels [T] views really show: not those glimpsed through what is in front of them."""
-    return weights > HARDLY * weights.mean()
+    return weights > HARDLY_SEEN * weights.mean()
 
 
 def fill_unseen(colors: Tensor, weights: Tensor, model: Surfels) -> Tensor:
@@ -82,25 +83,21 @@ def fill_unseen(colors: Tensor, weights: Tensor, model: Surfels) -> Tensor:
         return bare_colors(model)
     totals = colors.new_zeros(len(model), 3).index_add_(0, surfel, colors[place] * weight[:, None])
     mean = totals / of_surfel.clamp_min(torch.finfo(weight.dtype).tiny)[:, None]
-    few = HARDLY * of_surfel.mean()
-    around = mean[_nearest(model.parameters["means"], of_surfel > few)]
+    few = HARDLY_SEEN * of_surfel.mean()
+    around = mean[_nearest_known(model.parameters["means"], of_surfel > few)]
     mean = (totals + few * around) / (of_surfel + few)[:, None]
-    few = HARDLY * weight.mean()
+    few = HARDLY_SEEN * weight.mean()
     filled = colors.clone()
     filled[place] = (colors[place] * weight[:, None] + few * mean[surfel]) / (weight + few)[:, None]
     return filled
 
 
-def _nearest(means: Tensor, known: Tensor) -> Tensor:
+def _nearest_known(means: Tensor, known: Tensor) -> Tensor:
     """Return indices [N] of the nearest of the known surfels, one at least; of these themselves their own."""
-    from scipy.spatial import cKDTree
-
     index = torch.arange(len(means), device=means.device)
-    if bool(known.all()):
-        return index
-    ids, points, is_known = known.nonzero()[:, 0], means.detach().cpu().numpy(), known.cpu().numpy()
-    _, nearest = cKDTree(points[is_known]).query(points[~is_known])
-    index[~known] = ids[torch.as_tensor(nearest, device=ids.device)]
+    if not bool(known.all()):
+        _, neighbours = nearest(means[known], means[~known])
+        index[~known] = index[known][neighbours.to(means.device)]
     return index
 
 
@@ -128,7 +125,7 @@ def solve(
     for step, index in enumerate(progress(order, title=title, unit="view")):
         image = observations[index].image(colors)
         (gradient,) = torch.autograd.grad(image, colors, image.detach() - observations[index].wanted)
-        rate = STEP * (LAST_STEP / STEP) ** (step / len(order))
+        rate = FIRST_STEP * (LAST_STEP / FIRST_STEP) ** (step / len(order))
         with torch.no_grad():
             colors.addcmul_(gradient, scale, value=-rate).clamp_(0, 1)
     return colors.detach()

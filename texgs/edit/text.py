@@ -13,7 +13,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.memory import require_memory
 from texgs.edit.canvas import require_editable
-from texgs.edit.observations import LinearObservation, Target, joined, observe, render_views
+from texgs.edit.observations import LinearObservation, Target, join_views, observe, render_views
 from texgs.edit.steps import Shot, placed, shots_of
 from texgs.edit.texel_solver import back_project, fill_unseen, learn, seen_texels, solve
 from texgs.fields.optimizer import Rate
@@ -24,7 +24,7 @@ from texgs.models.instruction import require_instruction
 
 SIZE = 512  # pixels along the longer side of the views: what InstructPix2Pix was trained on
 PIXEL = 64  # bytes of memory for a pixel of a view: what the guidance sees, returns, and the colours there
-FOLLOWED, SURFEL = 24, 28  # for a pixel and a surfel in a view at one opacity, which texels follow
+FOLLOWED, SURFEL = 24, 28  # bytes for a pixel and a surfel that texels follow in a view at one opacity
 # Azimuth and polar angle of cameras at the front (+z), back, left, right, top and bottom, degrees.
 AXES = ((-90, 0), (90, 0), (180, 0), (0, 0), (-90, 90), (-90, -90))
 ANY_FOV = 45.0  # degrees, of cameras that only their directions are needed of
@@ -66,7 +66,7 @@ RECIPES = {
 }
 
 
-class Edited(NamedTuple):
+class EditedModel(NamedTuple):
     """What an edit gives."""
 
     model: Surfels  # with new texels and offsets of surfels; the rest stays as it was, bit for bit
@@ -89,7 +89,7 @@ def edit_by_text(
     size: int = SIZE,
     seed: int = 0,
     title: str = "text",
-) -> Edited:
+) -> EditedModel:
     """Restyle a model by an instruction (the paper's sections Text-Driven NPSE and Text prompt refinement).
 
     Geometry, material, lighting and palette of the model stay: views of any angle agree, however the edits
@@ -121,7 +121,7 @@ def edit_by_text(
     shots = shots_of(model, steps, edited_cameras(recipe, cameras, means, size), changing)
     _require_memory(shots, recipe)
     shown = [render_views(each.model, each.cameras, shine, opacity) for each in shots]
-    views = joined(shown)
+    views = join_views(shown)
     edited = require_edited(guidance(views, instruction, generator), views, guidance.name)
     own = model if recipe.is_textured else untextured(model, changing)
     opacities = [opacity * x for x in recipe.opacities]
@@ -134,7 +134,7 @@ def edit_by_text(
     share = _seen_share(weights, own, changing)
     colors = colors if recipe.is_textured else spread(colors, own, model)
     changing = changing if recipe.fills else changing & _shown(weights, own)
-    return Edited(recolored(model, colors, changing), views, edited, share)
+    return EditedModel(recolored(model, colors, changing), views, edited, share)
 
 
 def _require_memory(shots: Sequence[Shot], recipe: TextRecipe) -> None:

@@ -7,12 +7,13 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.geometry import nearest
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.raster import Render, splat
 
 Vote = Literal["contribution", "centre"]
-SEEN = 0.01  # pixels in all views together that a surfel must make up to have a vote
+VOTING_PIXELS = 0.01  # pixels in all views together that a surfel must make up to have a vote
 ROUNDS = 5
 NEIGHBOURS = 5  # seen surfels, whose mean share one that no view shows gets
 
@@ -51,12 +52,12 @@ class ContributionVotes:
     @property
     def seen(self) -> Tensor:
         """Return the surfels [N] bool that have votes."""
-        return self.weights > SEEN
+        return self.weights > VOTING_PIXELS
 
     @property
     def shares(self) -> Tensor:
         """Return the share [N] of each surfel's plain votes that are for the object; 0 without votes."""
-        return torch.where(self.seen, self.sums / self.weights.clamp_min(SEEN), 0.0)
+        return torch.where(self.seen, self.sums / self.weights.clamp_min(VOTING_PIXELS), 0.0)
 
     @torch.no_grad()
     def refined(self) -> Tensor:
@@ -68,20 +69,16 @@ class ContributionVotes:
                 shown = self.shown(camera, shares[:, None])
                 mean = shown.color[..., 0] / shown.alpha.clamp_min(1e-6)
                 change += self._splat(camera, mask - mean)[0]
-            shares = (shares + change / self.weights.clamp_min(SEEN)).clamp(0, 1)
+            shares = (shares + change / self.weights.clamp_min(VOTING_PIXELS)).clamp(0, 1)
         return shares
 
     def selected(self) -> Tensor:
         """Return the surfels [N] bool that belong to the object."""
         shares, seen = self.refined(), self.seen
         if bool(seen.any()) and not bool(seen.all()):
-            from scipy.spatial import cKDTree
-
-            means = self.model.parameters["means"].detach().cpu()
-            count = min(NEIGHBOURS, int(seen.count_nonzero()))
-            known, hidden = seen.cpu(), ~seen.cpu()
-            nearest = cKDTree(means[known].numpy()).query(means[hidden].numpy(), k=range(1, count + 1))[1]
-            shares[~seen] = shares[seen][torch.from_numpy(nearest).to(shares.device)].mean(1)
+            means, count = self.model.parameters["means"], min(NEIGHBOURS, int(seen.count_nonzero()))
+            _, neighbours = nearest(means[seen], means[~seen], count)
+            shares[~seen] = shares[seen][neighbours.to(shares.device)].mean(1)
         return shares > self.threshold
 
     def shown(self, camera: Camera, values: Tensor, outputs: Collection[str] = ()) -> Render:

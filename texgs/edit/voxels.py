@@ -16,8 +16,8 @@ from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import Losses, Painting, Terms, image_variation, learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_start import color_map
-from texgs.fields.voxels.model import Voxels
-from texgs.fields.voxels.rays import training_rays
+from texgs.fields.voxels import Voxels
+from texgs.fitting.rays import training_rays
 from texgs.models.vgg import Vgg
 from texgs.raster.shading import Y00
 from texgs.raster.voxel_grid import GREY, VoxelGrid, drop_sh, recolored
@@ -46,7 +46,7 @@ def stylize_voxels(
     """Give a grid the style of a picture; densities stay, and colours no longer depend on the direction.
 
     Colours are moved to those of the style, learned from the recoloured views, then from the distance of
-    rendered views to the style, and moved once more. See `moved` for `exact`, `VoxelPainting` for weights.
+    rendered views to the style, and moved once more. For `exact` see `move_colors`.
     """
     generator = torch.Generator().manual_seed(recipe.seed)
     stride = max(1, round((images.planes[:, 0].numel() / COUNTED) ** 0.5))
@@ -54,14 +54,14 @@ def stylize_voxels(
     colors = object_colors(planes[:3].T, planes[3], generator, recipe.foreground)
     matrix, offset = (x.float() for x in color_map(colors, style.pixels))
     images = recolored_images(images, matrix, offset, recipe.foreground)
-    grid = moved(drop_sh(field.grid), matrix, offset, exact)
+    grid = move_colors(drop_sh(field.grid), matrix, offset, exact)
     objective = Objective.of_views(recipe, style, images.size, vgg)
     run = VoxelPainting(grid, field, images, objective, generator, **weights)
     run.learn_rays(ray_epochs, title)
     losses = learn_style(run, len(images), recipe, title)
     colors = run.rendered_colors(images.cameras, recipe.foreground, stride)
     matrix, offset = (x.float() for x in color_map(colors, style.pixels))
-    return replace(field, grid=moved(run.grid, matrix, offset, exact)), losses
+    return replace(field, grid=move_colors(run.grid, matrix, offset, exact)), losses
 
 
 def object_colors(color: Tensor, alpha: Tensor, generator: torch.Generator, foreground: bool) -> Tensor:
@@ -85,14 +85,14 @@ def recolored_images(images: Images, matrix: Tensor, offset: Tensor, foreground:
     return replace(images, planes=planes)
 
 
-def moved(grid: VoxelGrid, matrix: Tensor, offset: Tensor, is_exact: bool) -> VoxelGrid:
+def move_colors(grid: VoxelGrid, matrix: Tensor, offset: Tensor, is_exact: bool) -> VoxelGrid:
     """Return the grid with mapped colours; not exact: coefficients s become A s + b, as in ARF's code."""
     if not is_exact:
         offset = Y00 * offset + GREY - GREY * matrix.sum(1)
     return recolored(grid, matrix, offset)
 
 
-def sampled(grid: VoxelGrid, field: Voxels, rays: Tensor) -> tuple[Samples, Rays]:
+def sample_rays(grid: VoxelGrid, field: Voxels, rays: Tensor) -> tuple[Samples, Rays]:
     """Return the samples of rays [N, 6] over white, and what they bring back."""
     out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
     return Samples(grid, field.march, rays, out), out
@@ -122,7 +122,7 @@ class VoxelPainting:
         steps = range(round(epochs * len(rays) / RAYS))
         for step in progress(steps, title=f"{title}, recoloured views", unit="step"):
             drawn, target = rays.draw(RAYS, RUN, self.generator)
-            samples, out = sampled(self.grid, self.original, drawn)
+            samples, out = sample_rays(self.grid, self.original, drawn)
             error = out.color - target
             samples.add_gradient(error * (2 / error.numel()), None, self.optimizer.gradient)
             self.step(step)
@@ -131,7 +131,7 @@ class VoxelPainting:
         """Show a view over white."""
         width, height = self.images.size
         target = self.images.target(view)
-        samples, out = sampled(self.grid, self.original, camera_rays(target.camera).flatten(0, 1))
+        samples, out = sample_rays(self.grid, self.original, camera_rays(target.camera).flatten(0, 1))
         image = out.color.unflatten(0, (height, width)).permute(2, 0, 1).contiguous().requires_grad_()
 
         def backward(gradient: Tensor) -> None:
@@ -153,7 +153,7 @@ class VoxelPainting:
         colors = []
         for camera in cameras:
             rays = camera_rays(camera)[::stride, ::stride].flatten(0, 1).contiguous()
-            _, out = sampled(self.grid, self.original, rays)
+            _, out = sample_rays(self.grid, self.original, rays)
             colors.append(object_colors(out.color, out.alpha, self.generator, foreground))
         return torch.cat(colors)
 
@@ -192,7 +192,7 @@ class VoxelLearner:
             camera = images.cameras[views[place]].crop(left, top, left + side, top + side)
             rays.append(camera_rays(camera).flatten(0, 1))
             wanted.append(images.planes[views[place], :3, top : top + side, left : left + side])
-        samples, out = sampled(self.grid, self.original, torch.cat(rays))
+        samples, out = sample_rays(self.grid, self.original, torch.cat(rays))
         target = torch.stack(wanted).permute(0, 2, 3, 1).float() / 255
         with torch.enable_grad():
             loss, gradient = self.loss.with_gradient(out.color.reshape(target.shape), target)

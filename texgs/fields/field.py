@@ -1,19 +1,22 @@
 """What all fields have in common: things that are fitted to views, drawn, edited and saved."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any, ClassVar, Literal, Protocol, Self
+from typing import Any, ClassVar, Generic, Literal, NamedTuple, Protocol, Self, TypeVar
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.memory import MIB
-from texgs.fields.part_edit import PartEdit
+from texgs.fields.part_edit import PartEdit, opacity_factors
 from texgs.raster import Render
 
 Role = Literal["geometry", "appearance"]
 Look = Literal["shaded", "unshaded", "texture", "discs", "ambient", "diffuse", "specular", "shininess"]
+F = TypeVar("F", bound="Field")
 
 
 class Field(Protocol):
@@ -65,20 +68,29 @@ class Field(Protocol):
         """
 
 
-class Composed(Protocol):
+class Asked(NamedTuple):
+    """What is asked of a view, see `Composed.render`."""
+
+    background: Tensor | None
+    outputs: Collection[str]
+    depth_range: Tensor | None
+
+
+class Composed(ABC):
     """Fields of one kind as a scene. Edits are one for each field, behind it one for each of its segments."""
 
+    device: torch.device  # of its tensors
+
+    @abstractmethod
     def __len__(self) -> int:
         """Return the number of primitives of all fields."""
 
     @property
-    def device(self) -> torch.device:
-        """Where its tensors are."""
-
-    @property
+    @abstractmethod
     def palettes(self) -> list[tuple[float, ...]]:
         """The colour of each field as fitted, which edits replace; black for those without one."""
 
+    @torch.no_grad()
     def render(
         self,
         camera: Camera,
@@ -105,6 +117,13 @@ class Composed(Protocol):
         Raises:
             ArgumentError: if there are not as many edits as parts, or fields of this kind cannot show one.
         """
+        return self._draw(camera, light, edits, look, Asked(background, outputs, depth_range))
+
+    @abstractmethod
+    def _draw(
+        self, camera: Camera, light: Light, edits: Sequence[PartEdit] | None, look: Look, asked: Asked
+    ) -> Render:
+        """Render one view of all visible fields, see `render`."""
 
 
 def sizes_in_mib(
@@ -119,3 +138,67 @@ def sizes_in_mib(
     sizes = {**counted, "total": total, "files": total if n_files is None else n_files}
     sizes |= {f"stored_{group}": count for group, count in {**stored, "total": sum(stored.values())}.items()}
     return {f"{group}_mib": count / MIB for group, count in sizes.items()}
+
+
+class UnlitField(ABC):
+    """A field whose colours have the light of its views in them."""
+
+    kind: ClassVar[str]
+
+    def render(
+        self,
+        camera: Camera,
+        light: Light = HEADLIGHT,
+        *,
+        background: Tensor | None = None,
+        outputs: Collection[str] = (),
+    ) -> Render:
+        """Render one view, see `Field`; light changes nothing."""
+        return self.draw(camera, background, outputs)
+
+    @abstractmethod
+    def draw(self, camera: Camera, background: Tensor | None, outputs: Collection[str]) -> Render:
+        """Render the field with the colours that it has."""
+
+
+class UnlitScene(Composed, Generic[F]):
+    """Fields of one kind that are drawn together.
+
+    There is at least one, all are on one device, and none has segments. Light changes nothing.
+    """
+
+    def __init__(self, fields: Sequence[F], segments: Sequence[Sequence[Tensor]] = ()) -> None:
+        if not fields:
+            raise ArgumentError("models: expected at least one, got none")
+        if any(segments):
+            raise ArgumentError(f"segments: expected none of {fields[0].kind}, got some; remove them")
+        self.fields, self.kind, self.device = list(fields), fields[0].kind, fields[0].device
+        self.counts = [len(field) for field in fields]
+
+    def __len__(self) -> int:
+        return sum(self.counts)
+
+    @property
+    def palettes(self) -> list[tuple[float, ...]]:
+        """Black for each field: edits of a scene replace no palette."""
+        return [(0.0, 0.0, 0.0)] * len(self.counts)
+
+    def _draw(
+        self, camera: Camera, light: Light, edits: Sequence[PartEdit] | None, look: Look, asked: Asked
+    ) -> Render:
+        if look != "shaded":
+            raise ArgumentError(
+                f"look: expected shaded, got {look}; {self.kind} have light in their colours, fit surfels"
+            )
+        factors = opacity_factors(edits, len(self.counts), self.kind)
+        return self._blend(factors, camera, asked)
+
+    @abstractmethod
+    def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
+        """Render all fields, each with a factor on its opacity."""
+
+
+def require_depth(outputs: Collection[str], kind: str) -> None:
+    """Require that no other output is asked for than the depth."""
+    if unknown := sorted(set(outputs) - {"depth"}):
+        raise ArgumentError(f"outputs: expected depth of {kind}, got {unknown[0]}")

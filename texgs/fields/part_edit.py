@@ -1,4 +1,4 @@
-"""Photorealistic edits of a basic model in a scene: numbers, applied anew to every frame."""
+"""Photorealistic edits of a basic model in a scene: numbers, applied to every frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -7,7 +7,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.names import is_number
 from texgs.fields.kinds import kinds
 
-MOST = 1000.0  # of a factor: what is larger is a typing error
+MOST_FACTOR = 1000.0  # a larger factor is a typing error
 MOST_OPAQUE = 1 - 1e-6  # has a logit
 # What a field has to be capable of for a value of an edit; all others are factors of a material.
 NEEDS = {"visible": "opacity", "opacity": "opacity", "palette": "palette"}
@@ -38,8 +38,10 @@ class PartEdit:
         object.__setattr__(self, "tint", color("tint", self.tint))
         for each in fields(self)[2:-1]:
             value = getattr(self, each.name)
-            if not is_number(value) or not 0 <= value <= MOST:
-                raise ArgumentError(f"{each.name}: expected a factor from 0 to {MOST:g}, got {value!r}")
+            if not is_number(value) or not 0 <= value <= MOST_FACTOR:
+                raise ArgumentError(
+                    f"{each.name}: expected a factor from 0 to {MOST_FACTOR:g}, got {value!r}"
+                )
 
     @property
     def material(self) -> tuple[object, ...]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from texgs.core.geometry import nearest
 from texgs.fields.surfels.material import nearest_material
 from texgs.fields.surfels.shading import raw_material
 from texgs.raster.shading import MATERIAL
@@ -18,7 +18,7 @@ from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
 HELD = ("colors", "normals")
-NEIGHBOURS = 3  # of a surfel, whose normals are compared
+NEIGHBOURS = 3  # neighbours of a surfel whose normals are compared with its own
 # Where data are smooth, normals of the volume are better than learned ones; where they are noisy, or bend
 # from one surfel to the next, learned ones are, which average many samples. Between these two coherences the
 # strength of the hold grows from none to all.
@@ -31,7 +31,7 @@ class Attributes:
     """What a volume says of surfels, and how strongly they are held to it."""
 
     lookup: Lookup
-    look: Appearance
+    appearance: Appearance
     coherence: float  # how alike its normals are from one surfel to the next, 0 to 1
     hold: float  # share of a difference that an iteration takes away; 0: the volume is no more than the start
 
@@ -39,7 +39,7 @@ class Attributes:
     def of(
         cls,
         caster: Caster,
-        look: Appearance,
+        appearance: Appearance,
         tf: TransferFunction,
         means: Tensor,
         hold: float | None = None,
@@ -51,7 +51,7 @@ class Attributes:
         lookup = Lookup(caster, tf)
         alike = coherence(lookup, means)
         share = min(max((alike - ROUGH) / (SMOOTH - ROUGH), 0.0), 1.0)
-        return cls(lookup, look, alike, HOLD * share if hold is None else hold)
+        return cls(lookup, appearance, alike, HOLD * share if hold is None else hold)
 
     @property
     def held(self) -> Attributes | None:
@@ -63,7 +63,7 @@ class Attributes:
 
         The material is that of the views, or the nearest that materials of a kind can express.
         """
-        factors = {name: getattr(self.look, name) for name in MATERIAL}
+        factors = {name: getattr(self.appearance, name) for name in MATERIAL}
         material = raw_material(**nearest_material(factors, kind), kind=kind)
         return {**self.at(means), **{name: x.to(means) for name, x in material.items()}}
 
@@ -89,12 +89,9 @@ def coherence(lookup: Lookup, means: Tensor) -> float:
     Light sees no difference between a normal and its opposite, so that cosines count without their sign. It
     is 0 for fewer points than have neighbours.
     """
-    from scipy.spatial import cKDTree
-
     if len(means) <= NEIGHBOURS:
         return 0.0
     normals = normalize(lookup.at(means, ("gradients",))["gradients"].cpu(), dim=1)
-    places = means.detach().cpu().numpy()
-    _, near = cKDTree(places).query(places, k=1 + NEIGHBOURS)
-    cosines = (normals[:, None] * normals[torch.from_numpy(near[:, 1:])]).sum(dim=2)
+    _, near = nearest(means, means, 1 + NEIGHBOURS)
+    cosines = (normals[:, None] * normals[near[:, 1:]]).sum(dim=2)
     return float(cosines.abs().mean())

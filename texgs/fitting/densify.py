@@ -9,8 +9,8 @@ from texgs.fitting.settings import Densify
 from texgs.raster import native
 from texgs.raster.shading import MATERIAL
 
-CHILDREN = 2  # of a split
-SHRINK = 1.6  # by which children are smaller
+CHILDREN = 2  # surfels that a split makes of one
+SHRINK = 1.6  # factor by which children are smaller
 RESET_OPACITY = 0.01
 native.declare("texgs_observe", "n p ff pp")
 

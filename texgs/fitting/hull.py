@@ -7,12 +7,12 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.fields.voxels.rays import widened
+from texgs.fitting.rays import widened
 from texgs.volume.images import Images
 
-TRIED = 200_000  # points at a time
+TRIED_POINTS = 200_000  # points at a time
 ROUNDS = 20
-SEARCHED = 64  # voxels along a side of the cube that is searched for the object
+SEARCHED_VOXELS = 64  # voxels along a side of the cube that is searched for the object
 
 Box = tuple[Tensor, Tensor]  # lowest and highest corner [3]
 
@@ -21,7 +21,7 @@ def hull_points(images: Images, box: Box, count: int, generator: torch.Generator
     """Draw random points of the box that every view shows, [count, 3], or fewer where the hull is tiny."""
     inside: list[Tensor] = []
     for _ in range(ROUNDS):
-        points = random_points(box, TRIED, generator)
+        points = random_points(box, TRIED_POINTS, generator)
         for index, camera in enumerate(images.cameras):
             points = points[is_covered(images.planes[index, 3], camera, points)]
         inside.append(points)
@@ -75,9 +75,9 @@ def mean_colors(images: Images, points: Tensor) -> Tensor:
 
 def hull_box(images: Images, half_size: float) -> Box:
     """Return the box around the visual hull in a cube around the origin."""
-    spacing = 2 * half_size / SEARCHED
+    spacing = 2 * half_size / SEARCHED_VOXELS
     low = torch.full((3,), -half_size + spacing / 2)
-    points = lattice([SEARCHED] * 3, low, spacing)
+    points = lattice([SEARCHED_VOXELS] * 3, low, spacing)
     inside = points[in_hull(images, points, spacing)]
     if not len(inside):
         raise _empty(f"within {half_size} of the origin")

@@ -2,14 +2,17 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import FitError
+from texgs.core.progress import progress
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.splats import Shading, Splats, join, visible_part
+from texgs.fields.surfels.model import Surfels
 from texgs.fitting.attributes import HELD, Attributes
 from texgs.fitting.checkpoint import ResumableFit
 from texgs.fitting.densify import DensityControl
@@ -18,8 +21,8 @@ from texgs.fitting.settings import Phase, Rates
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 
-USUAL_DISTANCE = 4.0  # of cameras, in radii of the object
-SMALLEST = 1e-3  # distance, world units
+USUAL_DISTANCE = 4.0  # distance of cameras, in radii of the object
+SMALLEST_EXTENT = 1e-3  # distance, world units
 
 
 class Fit(ResumableFit):
@@ -62,6 +65,11 @@ class Fit(ResumableFit):
     def fitted(self) -> dict[str, Tensor]:
         """Raw parameters of the surfels or Gaussians of now; differentiable in `parameters`."""
         return self.parameters if self.held is None else self.held.added_to(self.parameters)
+
+    @property
+    def result(self) -> dict[str, Tensor]:
+        """The same without a graph."""
+        return {name: x.detach() for name, x in self.fitted.items()}
 
     def run(self) -> Iterator[int]:
         """Iterate to the end of the phase."""
@@ -128,6 +136,16 @@ class Fit(ResumableFit):
         self.control.counts = state["control.counts"].to(device, copy=True)
 
 
+def fit_further(
+    model: Surfels, images: Images, phase: Phase, seed: int, title: str, held: Attributes | None = None
+) -> Surfels:
+    """Return a model of a phase that starts with another one, without checkpoints."""
+    fit = Fit(model.parameters, model.shading, images, phase, seed, held)
+    for _ in progress(fit.run(), phase.iterations, title=title, unit=fit.unit):
+        pass
+    return replace(model, parameters=fit.result)
+
+
 def extent(cameras: Sequence[Camera], means: Tensor) -> float:
     """Return the length that rates of means, and sizes of density control, refer to.
 
@@ -136,7 +154,7 @@ def extent(cameras: Sequence[Camera], means: Tensor) -> float:
     """
     around = spread(torch.stack([camera.position for camera in cameras]))
     radius = spread(means)
-    return 1.1 * max(around if around > radius else USUAL_DISTANCE * radius, SMALLEST)
+    return 1.1 * max(around if around > radius else USUAL_DISTANCE * radius, SMALLEST_EXTENT)
 
 
 def spread(points: Tensor) -> float:

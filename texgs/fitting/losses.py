@@ -47,10 +47,10 @@ def view_loss(
     tensors = (*surfels[:4], surfels.features)
     wanted = [torch.is_grad_enabled() and x is not None and x.requires_grad for x in tensors]
     observed = (shift_gradient, weights.alpha > 0)
-    return _ViewLoss.apply(view, compared(target, weights), observed, wanted, *tensors)
+    return _ViewLoss.apply(view, comparison(target, weights), observed, wanted, *tensors)
 
 
-def compared(target: Target, weights: Losses) -> native.Struct:
+def comparison(target: Target, weights: Losses) -> native.Struct:
     """Return what the library compares a view with, and the weights of its losses."""
     l1 = 1 - weights.dssim
     of_alpha = (weights.alpha * l1 * weights.alpha_l1, weights.alpha * weights.dssim)

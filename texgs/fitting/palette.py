@@ -6,20 +6,27 @@ fit of a voxel grid, and for rays near the object over white in place of all ray
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import Parameters, base_color, density, light, new_networks, palette_color
-from texgs.fields.palette.rendering import Geometry, Shown, blending_weights, points_on, shown, view_harmonics
-from texgs.fitting.checkpoint import ResumableFit
+from texgs.fields.palette.rendering import (
+    Geometry,
+    Shown,
+    blending_weights,
+    points_on,
+    view_harmonics,
+    visible_points,
+)
+from texgs.fitting.checkpoint import FOLDER, ResumableFit, run_to_end
+from texgs.fitting.colors import object_palette
 from texgs.fitting.ray_settings import PaletteKeys
+from texgs.fitting.task import FitTask, Fitted
 from texgs.fitting.voxels import VoxelFit
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, voxel_grid
@@ -27,21 +34,19 @@ from texgs.volume.images import Images
 
 NEIGHBOURS = 2  # rays of a step that follow each other
 BETAS = (0.9, 0.99)  # of Adam
-MIXED = ("palette", "mixture", "trunk", "light")  # networks that learn in the last part
-TRUSTED = 0.5  # of the grid's densities, for where rays may end
-LEAST_DENSITY = 0.1  # of its voxels, so that points of rays are there
-SEEDS = 16_384  # of these voxels, in a step in which density learns that of the grid
-DRAWN = 50_000  # colours that are clustered
-OPAQUE = 128  # of 255: alpha from which a pixel tells a colour
+MIXED = ("palette", "mixture", "trunk", "light")  # networks that learn in the last period
+TRUSTED_SHARE = 0.5  # share of the grid's densities that says where rays may end
+LEAST_DENSITY = 0.1  # density of the grid's voxels at least, so that rays have points there
+SEEDS = 16_384  # voxels of a step in which density learns that of the grid
 
 
 @dataclass(frozen=True)
-class Part:
+class Period:
     """Steps in which some networks learn."""
 
     start: int  # among the steps of networks
     end: int
-    networks: tuple[str, ...]  # that learn
+    networks: tuple[str, ...]  # those that learn
     last_rate: float  # of Adam at its end, relative to that at its start
 
 
@@ -68,14 +73,14 @@ class PaletteFit(ResumableFit):
         return max(self.iteration - self.settings.voxels.steps, 0)
 
     @property
-    def parts(self) -> list[Part]:
-        """The parts of the fit of networks, one after the other."""
+    def periods(self) -> list[Period]:
+        """The periods of the fit of networks, one after the other."""
         s = self.settings
         base, palette = s.seed_steps, s.seed_steps + s.base_steps
         return [
-            Part(0, base, ("density",), 1.0),
-            Part(base, palette, ("density", "trunk", "base"), s.last_rate),
-            Part(palette, palette + s.palette_steps, MIXED, s.last_rate),
+            Period(0, base, ("density",), 1.0),
+            Period(base, palette, ("density", "trunk", "base"), s.last_rate),
+            Period(palette, palette + s.palette_steps, MIXED, s.last_rate),
         ]
 
     def run(self) -> Iterator[int]:
@@ -85,11 +90,11 @@ class PaletteFit(ResumableFit):
             yield done
         self.geometry = places(self.voxels, self.levels, self.settings.step)
         self.seeds = self.geometry.unit(self.geometry.grid.points())
-        for part in self.parts:
-            if self.own == part.start:
-                self.begin(part)
-            while self.own < part.end:
-                self.step(part)
+        for period in self.periods:
+            if self.own == period.start:
+                self.begin(period)
+            while self.own < period.end:
+                self.step(period)
                 yield self.iteration
 
     def field(self, metadata: Mapping[str, str]) -> PaletteField:
@@ -97,36 +102,35 @@ class PaletteFit(ResumableFit):
         kept = {name: x.detach() for name, x in self.parameters.items() if not name.startswith("base.")}
         return PaletteField(self.geometry, kept, metadata)
 
-    def begin(self, part: Part) -> None:
-        """Make the networks of a part, and an optimiser of those that learn in it."""
+    def begin(self, period: Period) -> None:
+        """Make the networks of a period, and an optimiser of those that learn in it."""
         known = {name.split(".")[0] for name in self.parameters if name != "palette.colors"}
-        missing = set(part.networks) - known
-        new = new_networks(missing, self.levels, len(self.colors), self.generator)
+        new = new_networks({*period.networks} - known, self.levels, len(self.colors), self.generator)
         parameters = {"palette.colors": self.colors, **self.parameters, **new}
-        learned = [name for name in parameters if name.split(".")[0] in part.networks]
-        rate = Rate(self.settings.rate, part.last_rate)
+        learned = [name for name in parameters if name.split(".")[0] in period.networks]
+        rate = Rate(self.settings.rate, period.last_rate)
         self.optimizer = Optimizer(parameters, dict.fromkeys(learned, rate), BETAS)
         self.parameters = self.optimizer.parameters
 
-    def step(self, part: Part) -> None:
+    def step(self, period: Period) -> None:
         """Take a step of the optimiser."""
-        loss, error = self.loss_of(part)
+        loss, error = self.loss_of(period)
         loss.backward()
-        self.optimizer.step((self.own - part.start) / (part.end - part.start))
+        self.optimizer.step((self.own - period.start) / (period.end - period.start))
         self.iteration += 1
         if self.is_checked:
             self.note(error.detach(), {"loss": loss.detach(), **self.parameters})
 
-    def loss_of(self, part: Part) -> tuple[Tensor, Tensor]:
-        """Compute what a part makes small, and what of it is reported, of random voxels or rays."""
+    def loss_of(self, period: Period) -> tuple[Tensor, Tensor]:
+        """Compute what a period makes small, and what of it is reported, of random voxels or rays."""
         s, networks = self.settings, self.parameters
-        if "trunk" not in part.networks:
+        if "trunk" not in period.networks:
             drawn = torch.randint(len(self.seeds), (SEEDS,), generator=self.generator)
             sigma, _ = density(self.seeds[drawn], networks, self.levels)
             loss = (sigma.log() - self.geometry.grid.density[1:][drawn].log()).square().mean()
             return loss, loss
         rays, target = self.rays.draw(s.rays, NEIGHBOURS, self.generator)
-        if "base" in part.networks:
+        if "base" in period.networks:
             loss = base_loss(rays, target, self.geometry, networks, s.weight_min)
             return loss, loss
         return palette_loss(rays, target, self.geometry, networks, self.colors, s)
@@ -141,19 +145,27 @@ class PaletteFit(ResumableFit):
         """Go on from what `state` returned."""
         super().restore(state)
         self.voxels.restore(_under("voxels.", state))
-        for part in self.parts:
-            if part.start < self.own:
-                self.begin(part)
+        for period in self.periods:
+            if period.start < self.own:
+                self.begin(period)
         if self.own:
             self.optimizer.restore(_under("networks.", state))
         self.generator.set_state(state["random"])
+
+
+def fit_palette(task: FitTask[PaletteKeys]) -> Fitted:
+    """Fit networks to random rays, from the last checkpoint if there is one."""
+    run = PaletteFit(task.images, task.settings, task.seed)
+    seconds = run_to_end(run, task.output / FOLDER, task.title)
+    field = run.field(task.metadata)
+    return Fitted(field, seconds, run.iterations, run.losses, {"palette": field.colors.tolist()})
 
 
 def places(fit: VoxelFit, levels: HashLevels, step: float) -> Geometry:
     """Return the voxels that show in the training views: only cells next to them ask the networks."""
     grid = fit.grid
     around = voxel_grid(fit.seen(), grid.lower, grid.spacing, 0)
-    values = (TRUSTED * interpolate_rows(grid, around.points())[:, 3]).clamp_min(LEAST_DENSITY)
+    values = (TRUSTED_SHARE * interpolate_rows(grid, around.points())[:, 3]).clamp_min(LEAST_DENSITY)
     rows = torch.cat([around.rows[:1], pack_rows(values, torch.zeros(len(values), 1, 3))])
     return Geometry(around.with_rows(rows), replace(fit.march, step=step), levels)
 
@@ -172,7 +184,7 @@ def base_loss(
     """
     with torch.no_grad():
         points = points_on(rays, geometry, parameters)
-        chosen = shown(points, weight_min).chosen.nonzero()[:, 0]
+        chosen = visible_points(points, weight_min).chosen.nonzero()[:, 0]
     sigma, features = density(points.at[chosen], parameters, geometry.levels)
     depth = points.depth.index_copy(0, chosen, geometry.length * sigma)
     weights = blending_weights(depth, points.ray)[chosen]
@@ -194,7 +206,7 @@ def palette_loss(
     Offsets of colours are held down, and the palette stays near its start [P, 3].
     """
     with torch.no_grad():
-        shows = shown(points_on(rays, geometry, parameters), settings.weight_min)
+        shows = visible_points(points_on(rays, geometry, parameters), settings.weight_min)
     mixed = palette_color(shows.points.at, parameters, geometry.levels)
     lit = light(shows.points.features, view_harmonics(rays)[shows.points.ray], parameters)
     error = error_over_white(shows, mixed.color + lit, target)
@@ -208,35 +220,3 @@ def error_over_white(shows: Shown, colors: Tensor, target: Tensor) -> Tensor:
     values = torch.cat([colors, torch.ones_like(colors[:, :1])], dim=1)
     color, alpha = shows.blend(values, len(target)).split([3, 1], dim=1)
     return (color + 1 - alpha - target).square().mean()
-
-
-def cluster_colors(colors: Tensor, count: int, seed: int = 0) -> Tensor:
-    """Return mean colours [count, 3] of clusters of colours [n, 3], the largest cluster first.
-
-    Clusters are of red, green and blue relative to their sum, so that light and shadow on one material are
-    one cluster. Where there are fewer, the last colours are those of the largest cluster. PaletteNeRF and
-    StyleRF-VolVis take the corners of a hull of colours and places (RGBXY) instead. Transfer functions have a
-    colour each: clusters find these too, and are a call of a library.
-    """
-    from scipy.cluster.vq import kmeans2
-
-    random = np.random.default_rng(seed)
-    chosen = torch.from_numpy(random.permutation(len(colors))[:DRAWN])
-    colors = colors[chosen].double()
-    hues = colors / colors.sum(1, keepdim=True).clamp_min(1e-3)
-    distinct = len(np.unique(hues.numpy().round(6), axis=0))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of empty clusters
-        _, labels = kmeans2(hues.numpy(), min(count, distinct), minit="++", seed=random)
-    members = [colors[torch.from_numpy(labels == label)] for label in range(count)]
-    members.sort(key=len, reverse=True)
-    return torch.stack([(each if len(each) else members[0]).mean(0) for each in members]).float()
-
-
-def object_palette(images: Images, count: int, seed: int) -> Tensor:
-    """Cluster the colours of all pixels that are opaque enough, or of the most opaque ones, [count, 3]."""
-    alpha = images.planes[:, 3]
-    opaque = alpha >= min(int(alpha.max()), OPAQUE)
-    share = alpha[opaque, None].float() / 255
-    colors = images.planes.permute(0, 2, 3, 1)[opaque][:, :3].float() / 255
-    return cluster_colors(((colors - 1 + share) / share).clamp(0, 1), count, seed)

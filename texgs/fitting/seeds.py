@@ -10,35 +10,34 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from texgs.core.errors import ArgumentError, located
-from texgs.core.geometry import facing
+from texgs.core.geometry import facing, nearest
 from texgs.core.names import POINTS
 from texgs.core.ply_file import read_vertices
 from texgs.fields.ply_columns import take
-from texgs.fields.splats import split, zeroth
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
-from texgs.fitting.ends import Points, ends_of_rays
+from texgs.fitting.casting import RayEnds, ends_of_rays
 from texgs.fitting.hull import Box, hull_points, mean_colors, random_points
 from texgs.fitting.loop import Fit
 from texgs.fitting.settings import Densify, Losses, Phase, Rates, Seeds
 from texgs.raster.shading import MATERIAL
 from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
-from texgs.volume.images import Images, shrunk
+from texgs.volume.images import Images, shrink
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
 
 MARGIN = 0.02  # of the box around the data, relative to its longest side
 HALF_SIZE = 1.1  # of the cube around the origin where nothing else is known, in halves of the longest side
-SIDE = 1.0  # the longest side of data where views do not say, world units
+USUAL_SIDE = 1.0  # the longest side of data where views do not say, world units
 GREY = 0.5  # the colour of random seeds
-USUAL = 10_000  # seeds, where nothing says how many
+USUAL_COUNT = 10_000  # seeds, where nothing says how many
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
-SMALLEST = 1e-4  # scale, world units
+LEAST_SCALE = 1e-4  # scale, world units
 # A quick fit finds what is seen of more surfels than are kept.
-CANDIDATES = 2  # for each surfel that is kept
-PIXELS = 200  # of the longer side of its small images, about
+CANDIDATES = 2  # seeds for each surfel that is kept
+PIXELS = 200  # pixels of the longer side of small images, about
 PHASE = Phase(
     iterations=100,
     rates=Rates(quats=0.016),
@@ -69,7 +68,7 @@ def seed_surfels(
         raise ArgumentError(f"seeds.opacity: expected a value between 0 and 1, got {seeds.opacity}")
     if kind == "auto":
         kind = "volume" if volume is not None and "tf" in views.metadata else "visible"
-    count = seeds.count or (most if kind in ("volume", "visible") else None) or USUAL
+    count = seeds.count or (most if kind in ("volume", "visible") else None) or USUAL_COUNT
     generator = torch.Generator().manual_seed(seed)
     if kind == "volume":
         ends = points_in(volume, views, images, count, seed)
@@ -94,35 +93,15 @@ def seed_surfels(
     return most_seen(surfels, colors, images, count, seed)
 
 
-def seed_gaussians(
-    images: Images,
-    views: ViewSet,
-    seeds: Seeds,
-    degree: int,
-    seed: int,
-    volume: Grid | None = None,
-    most: int | None = None,
-) -> dict[str, Tensor]:
-    """Return raw parameters of the first Gaussians: as surfels start, as thick as they are wide.
-
-    `sh` is apart from `sh_rest`, as they learn at different rates; all but the zeroth harmonic are zero.
-    """
-    surfels, colors = seed_surfels(images, views, seeds, seed, volume, most)
-    thickness = surfels["scales"].amin(dim=1, keepdim=True)  # seeds of surfels are round, or nearly so
-    zeros = torch.zeros(len(colors), (degree + 1) ** 2 - 1, 3)
-    sh = torch.cat([zeroth(colors), zeros], dim=1)
-    return {**surfels, "scales": torch.cat([surfels["scales"], thickness], dim=1), **split(sh)}
-
-
-def points_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed: int) -> Points:
+def points_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed: int) -> RayEnds:
     """Return where rays of all views end in what they show of a volume."""
     if volume is None or "tf" not in views.metadata:
         raise ArgumentError(
             f"{views.folder}: seeds.kind=volume needs a volume and views that name their transfer function; "
             "seeds.kind=visible needs neither"
         )
-    caster, look, tf = shown_volume(volume, views)
-    return ends_of_rays(caster, look, tf, images.cameras, most, seed)
+    caster, appearance, tf = shown_volume(volume, views)
+    return ends_of_rays(caster, appearance, tf, images.cameras, most, seed)
 
 
 def shown_volume(
@@ -131,9 +110,9 @@ def shown_volume(
     """Return what casts rays through a volume as its views show it, how it looks there, and the function."""
     told, named = views.metadata, views.metadata["tf"]
     shading = {name: told["shading"][name] for name in MATERIAL if name in (told.get("shading") or {})}
-    look = Appearance(**shading, opacity_unit=told.get("opacity_unit", Appearance.opacity_unit))
+    appearance = Appearance(**shading, opacity_unit=told.get("opacity_unit", Appearance.opacity_unit))
     points = {key: named[key] for key in named if key != "name"} if isinstance(named, Mapping) else named
-    return Caster(volume, look, device), look, TransferFunction.from_dict(points)
+    return Caster(volume, appearance, device), appearance, TransferFunction.from_dict(points)
 
 
 def tell_fewer(views: ViewSet, found: int, count: int) -> None:
@@ -151,7 +130,7 @@ def box_of(views: ViewSet, half_size: float | None) -> Box:
     """
     aabb = views.metadata.get("aabb")
     if aabb is None:
-        corner = torch.full((3,), (half_size or HALF_SIZE) * SIDE / 2)
+        corner = torch.full((3,), (half_size or HALF_SIZE) * USUAL_SIDE / 2)
         return -corner, corner
     try:
         low, high = torch.tensor(aabb, dtype=torch.float32).reshape(2, 3)
@@ -190,13 +169,10 @@ def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
 
 def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
     """Return raw geometry of round surfels at points [N, 3], as far apart as large, turned at random."""
-    from scipy.spatial import cKDTree
-
     if len(points) <= NEIGHBOURS:
         raise ArgumentError(f"seeds: expected at least {NEIGHBOURS + 1} points, got {len(points)}")
-    places = points.double().numpy()
-    distances, _ = cKDTree(places).query(places, k=NEIGHBOURS + 1)
-    scale = torch.from_numpy(np.sqrt(np.mean(distances[:, 1:] ** 2, axis=1))).float().clamp_min(SMALLEST)
+    distances = nearest(points, points, NEIGHBOURS + 1)[0].numpy()
+    scale = torch.from_numpy(np.sqrt(np.mean(distances[:, 1:] ** 2, axis=1))).float().clamp_min(LEAST_SCALE)
     return {
         "means": points.float(),
         "quats": normalize(torch.randn(len(points), 4, generator=generator), dim=1),
@@ -205,7 +181,7 @@ def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> di
     }
 
 
-def surfels_on(points: Points, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
+def surfels_on(points: RayEnds, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
     """Return raw geometry of round surfels at points, which face along their normals."""
     return {**surfels_at(points.places, opacity, generator), "quats": facing(points.normals)}
 
@@ -214,18 +190,18 @@ def most_seen(
     surfels: Mapping[str, Tensor], colors: Tensor, images: Images, count: int, seed: int
 ) -> tuple[dict[str, Tensor], Tensor]:
     """Fit surfels for a moment and keep the `count` that contribute most to all views, as they are then."""
-    small = shrunk(images, max(images.planes.shape[2:]) // PIXELS)
+    small = shrink(images, max(images.planes.shape[2:]) // PIXELS)
     start = {**surfels, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20.0, "bounded")}
     fit = Fit(start, ShadingModel(), small, PHASE, seed)
     for _ in fit.run():
         pass
     fitted = {name: x.detach() for name, x in fit.parameters.items()}
-    best = shown(Surfels(fitted), small).topk(min(count, len(colors))).indices
+    best = visible_weights(Surfels(fitted), small).topk(min(count, len(colors))).indices
     return {name: fitted[name][best] for name in surfels}, fitted["colors"][best].clamp(0, 1)
 
 
 @torch.no_grad()
-def shown(model: Surfels, images: Images) -> Tensor:
+def visible_weights(model: Surfels, images: Images) -> Tensor:
     """Sum the blending weights [N] of each surfel over all pixels of all views."""
     total = torch.zeros(len(model), device=model.device)
     for camera, light in zip(images.cameras, images.lights, strict=True):

@@ -1,6 +1,6 @@
-"""Settings of the phases of a fit, and of where it starts. Fits of all kinds build on them."""
+"""Settings of fits of surfels and 3D Gaussians: their phases, and where they start."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from texgs.core.keys import key
 
@@ -100,6 +100,33 @@ class Seeds:
         "half the side of the cube of seeds, in halves of the data's longest side; default the data's box",
         above=0,
     )
+
+
+@dataclass(frozen=True)
+class GaussianKeys:
+    """How 3D Gaussians are fitted: in one phase of the loop that surfels are fitted by."""
+
+    iterations: int = key(30000, "iterations, each of one view", least=0)
+    sh_degree: int = key(3, "degree of the spherical harmonics", least=0, most=3)
+    sh_every: int = key(1000, "iterations between degrees", least=1)
+    antialiased: bool = key(False, "thin Gaussians keep their weight in images of every size")
+    dssim: float = key(0.2, "lambda: weight of D-SSIM against L1", least=0)
+    alpha: float = key(0.0, "weight of L1 + D-SSIM of alpha", least=0)
+    rates: CommonRates = key(CommonRates, "learning rates")
+    densify: Densify = key(Densify, "density control")
+    seeds: Seeds = key(Seeds, "where Gaussians start")
+
+    @property
+    def phase(self) -> Phase:
+        """The run of the loop."""
+        return Phase(
+            self.iterations,
+            self.sh_degree,
+            self.sh_every,
+            rates=Rates(**asdict(self.rates)),
+            losses=Losses(self.dssim, self.alpha),
+            densify=self.densify,
+        )
 
 
 @dataclass(frozen=True)

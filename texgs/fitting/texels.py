@@ -10,6 +10,7 @@ from texgs.core.progress import progress
 from texgs.fields.splats import visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import EXTENT, offsets_of
+from texgs.fitting.colors import mean_color
 from texgs.fitting.settings import TextureKeys
 from texgs.fitting.texture_solve import refine, solve
 from texgs.raster import Texture
@@ -17,8 +18,8 @@ from texgs.raster.arguments import MOST_TEXELS
 from texgs.volume.cameras import farthest_first
 from texgs.volume.images import Images
 
-LOOKED = 54  # views, spread, that tell what is seen of surfels
-HALVINGS = 40  # of the interval that the edge of texels is searched in
+SIGHT_VIEWS = 54  # views, spread, that tell what is seen of surfels
+HALVINGS = 40  # halvings of the interval that has the edge of texels
 
 
 def texturize(
@@ -33,13 +34,13 @@ def texturize(
         raise ArgumentError(f"model: expected stage shading, got {model.stage}; pass what that stage wrote")
     palette = mean_color(images).to(model.device)
     n, scales = len(model), model.parameters["scales"].exp()
-    flat = textured(model, palette, torch.ones(n, 2, dtype=torch.int32, device=scales.device))
-    sight = look(flat, images, title)
+    flat = add_texture(model, palette, torch.ones(n, 2, dtype=torch.int32, device=scales.device))
+    sight = gather_sight(flat, images, title)
     budget = keys.texels
     sizes = sizes_where_seen(scales, sight) if budget is None else sizes_for_budget(scales, budget)
     if keys.has_offset:
         palette = mean_unlit_color(model, sight)
-    result = textured(model, palette, sizes)
+    result = add_texture(model, palette, sizes)
     if not keys.has_offset:
         result = without_offset(result)
     if keys.sweeps:
@@ -49,7 +50,7 @@ def texturize(
     return result
 
 
-def textured(model: Surfels, palette: Tensor, sizes: Tensor) -> Surfels:
+def add_texture(model: Surfels, palette: Tensor, sizes: Tensor) -> Surfels:
     """Give a model texels 0, of sizes [N, 2] int32, and offsets from a palette [3]: it looks as before."""
     p = model.parameters
     texels = palette.new_zeros(int(sizes.long().prod(dim=1).sum()), 3)
@@ -63,16 +64,6 @@ def without_offset(model: Surfels) -> Surfels:
     owners = torch.repeat_interleave(p["sizes"].long().prod(dim=1))
     moved = {"texels": p["texels"] + p["colors"][owners], "colors": torch.zeros_like(p["colors"])}
     return replace(model, parameters={**p, **moved})
-
-
-def mean_color(images: Images) -> Tensor:
-    """Return the mean colour [3] of what images show, weighted by alpha; black where they show nothing."""
-    total = images.planes.new_zeros(4, dtype=torch.float64)
-    for planes in images.planes:
-        total += planes.sum(dim=(1, 2), dtype=torch.int64)
-    color, alpha = total[:3], total[3]
-    premultiplied = color - (255.0 * images.planes[:, 3].numel() - alpha)  # without the white behind
-    return (premultiplied / alpha.clamp_min(1)).clamp(0, 1).float()
 
 
 def mean_unlit_color(model: Surfels, sight: "Sight") -> Tensor:
@@ -100,8 +91,8 @@ class Sight:
 
 
 @torch.no_grad()
-def look(model: Surfels, images: Images, title: str) -> Sight:
-    """Gather what views show of a textured model, whatever its texels: `LOOKED` of them, spread.
+def gather_sight(model: Surfels, images: Images, title: str) -> Sight:
+    """Gather what views show of a textured model, whatever its texels: `SIGHT_VIEWS` of them, spread.
 
     A surfel seen by few views has a small mean curvature and still a large one where it is seen;
     `curvature` is therefore the mean over views weighted by itself, sum c^2 / sum c, and at least half of
@@ -111,7 +102,7 @@ def look(model: Surfels, images: Images, title: str) -> Sight:
     n = len(means)
     largest, shown, total, squares, steepest = means.new_zeros(5, n)
     pixel = means.new_full((n,), torch.inf)
-    for index in progress(farthest_first(images.cameras)[:LOOKED], title=f"{title}, sight", unit="view"):
+    for index in progress(farthest_first(images.cameras)[:SIGHT_VIEWS], title=f"{title}, sight", unit="view"):
         target = visible_part(images, index, model.parameters, model.shading.options)
         camera = target.camera
         texture = model.shading.colors(model.parameters, camera, target.light)

@@ -20,10 +20,12 @@ from texgs.raster.losses import l1_dssim
 from texgs.volume.cameras import farthest_first
 from texgs.volume.images import Images
 
-STEP = 1.3  # of a Newton step in a typical view: 2 is the limit of stability, and views differ
+FIRST_STEP = 1.3  # share of a Newton step in a typical view: 2 is the limit of stability, and views differ
 LAST_STEP = 0.3  # noise of single views averages out as steps fall
-FARTHEST = 1.0  # texels from the colours of their surfels: more brings noise of views that hardly see them
-CHECKED = 12  # views, about, that tell how far to go
+FARTHEST_TEXEL = (
+    1.0  # texels from the colours of their surfels: more brings noise of views that hardly see them
+)
+CHECKED_VIEWS = 12  # views, about, that tell how far to go
 STRUCTURE = 1e-3  # weight of D-SSIM against half the mean squared error
 DSSIM = 0.2  # share of D-SSIM in what Adam follows
 
@@ -52,9 +54,9 @@ def solve(
         structure = STRUCTURE * image.numel() * l1_dssim(image, target.color, 1.0)
         loss = 0.5 * (image - target.color).square().sum() + structure
         (gradient,) = torch.autograd.grad(loss, texels)
-        rate = STEP * (LAST_STEP / STEP) ** (step / len(order))
+        rate = FIRST_STEP * (LAST_STEP / FIRST_STEP) ** (step / len(order))
         with torch.no_grad():
-            texels.addcmul_(gradient, scale, value=-rate).clamp_(-FARTHEST, FARTHEST)
+            texels.addcmul_(gradient, scale, value=-rate).clamp_(-FARTHEST_TEXEL, FARTHEST_TEXEL)
     advice = "the training views or the model of the phase before are damaged"
     require_finite("texture", {"texels": texels}, advice)
     solved = replace(model, parameters={**model.parameters, "texels": texels.detach()})
@@ -67,10 +69,10 @@ def solve(
 def share_of(solved: Surfels, start: Surfels, images: Images, views: Sequence[int]) -> float:
     """Return how much in [0, 1] of the way from a model to a solved one has the least squared error.
 
-    Images are linear in texels: it is <residual, change> / <change, change> over some `CHECKED` views.
+    Images are linear in texels: it is <residual, change> / <change, change> over some `CHECKED_VIEWS` views.
     """
     along = across = 0.0
-    for index in views[:: max(1, len(views) // CHECKED)]:
+    for index in views[:: max(1, len(views) // CHECKED_VIEWS)]:
         target = visible_part(images, index, start.parameters, start.shading.options)
         before = start.render(target.camera, target.light).color
         change = solved.render(target.camera, target.light).color - before

@@ -10,10 +10,12 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import FitError
-from texgs.fields.voxels.rays import TrainingRays, training_rays
-from texgs.fitting.checkpoint import ResumableFit
+from texgs.fields.voxels import Voxels
+from texgs.fitting.checkpoint import FOLDER, ResumableFit, run_to_end
 from texgs.fitting.hull import hull_box, in_hull, lattice
 from texgs.fitting.ray_settings import GridStage, VoxelKeys
+from texgs.fitting.rays import TrainingRays, training_rays
+from texgs.fitting.task import FitTask, Fitted
 from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, voxel_grid
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import March, Rays, Samples
@@ -39,7 +41,7 @@ class VoxelFit(ResumableFit):
         self._begin(hull_grid(images, s.stages[0].side, s.half_size, s.degree, s.start_density))
 
     def _begin(self, grid: VoxelGrid) -> None:
-        """Go on with another grid; the optimiser starts anew."""
+        """Go on with another grid and a new optimiser."""
         self.grid = grid
         self.optimizer = VoxelOptimizer(grid, self.settings.optimizer)
 
@@ -58,7 +60,7 @@ class VoxelFit(ResumableFit):
     def refine(self) -> None:
         """Remove what no ray sees, and halve the spacing."""
         self.grid.refresh_occupancy()
-        self._begin(refined(self.grid, self.seen()))
+        self._begin(refine_grid(self.grid, self.seen()))
 
     def seen(self) -> Tensor:
         """Return the voxels [X, Y, Z] that show in the training views."""
@@ -121,6 +123,14 @@ class VoxelFit(ResumableFit):
         return VoxelRates(s.density.at(self.iteration, s.steps), sh, sh)
 
 
+def fit_voxels(task: FitTask[VoxelKeys]) -> Fitted:
+    """Fit a grid to random rays, coarse to fine, from the last checkpoint if there is one."""
+    run = VoxelFit(task.images, task.settings, task.seed)
+    seconds = run_to_end(run, task.output / FOLDER, task.title)
+    field = Voxels(run.grid, run.march, task.metadata)
+    return Fitted(field, seconds, run.iterations, run.losses, {"lattice": list(run.grid.size)})
+
+
 def hull_grid(images: Images, side: int, half_size: float, degree: int, density: float) -> VoxelGrid:
     """Make a grey grid that fills the visual hull, with `side` voxels along the longest side of its box.
 
@@ -146,7 +156,7 @@ def seen_voxels(grid: VoxelGrid, rays: TrainingRays, march: March, weight: float
     return (weights > weight)[grid.links().long()]
 
 
-def refined(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
+def refine_grid(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
     """Make a grid with half the spacing, of the voxels around those to keep, [X, Y, Z] bool.
 
     Its rows are interpolated; every other one is a row as it was.
@@ -154,14 +164,14 @@ def refined(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
     mask = kept
     for axis in range(3):
         mask = mask.repeat_interleave(2, axis)
-    finer = voxel_grid(grown(mask), grid.lower, grid.spacing / 2, grid.degree)
+    finer = voxel_grid(dilate(mask), grid.lower, grid.spacing / 2, grid.degree)
     finer.rows[0] = grid.rows[0]
     interpolate_rows(grid, finer.points(), out=finer.rows[1:])
     finer.refresh()
     return finer
 
 
-def grown(mask: Tensor) -> Tensor:
+def dilate(mask: Tensor) -> Tensor:
     """Add all 26 neighbours of what is in a mask [X, Y, Z]."""
     for axis, side in enumerate(mask.shape):
         before, mask = mask, mask.clone()

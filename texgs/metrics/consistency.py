@@ -12,9 +12,9 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 
-SHORT, LONG = 1, 7  # views between those compared, as is usual for stylised scenes
+SHORT, LONG = 1, 7  # views from one to the other of a pair, as is usual for stylised scenes
 OPAQUE = 0.5  # least alpha of a pixel that has a depth
-TOLERANCE = 0.01  # of the depth, by which two views of the same point may differ
+TOLERANCE = 0.01  # share of the depth by which two views of the same point may differ
 
 # How far an image [H, W, 3], which differs in some pixels [H, W] at most, is from a view, such as by LPIPS.
 Perceptual = Callable[[Tensor, Tensor], float]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from texgs.raster import Render
     from texgs.scene.scene import Scene
 
-LAST_FRAMES = 32  # that are kept: all that a usual number of views needs
+LAST_FRAMES = 32  # frames that are kept: all that a usual number of views needs
 
 
 @dataclass(frozen=True)
@@ -199,10 +199,10 @@ def values_of(scene: MeasuredScene, chosen: Iterable[Metric] | None = None) -> d
         for view in scene.views() if watchers else ():
             for watcher in watchers:
                 watcher.see(view)
-        told = [each.values() if isinstance(each, Watcher) else each for each in results]
-    for metric, values in zip(chosen, told, strict=True):
+        given = [each.values() if isinstance(each, Watcher) else each for each in results]
+    for metric, values in zip(chosen, given, strict=True):
         require_declared(metric, values)
-    return {name: value for each in told for name, value in each.items()}
+    return {name: value for each in given for name, value in each.items()}
 
 
 def require_declared(metric: Metric, values: Any) -> None:

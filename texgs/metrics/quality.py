@@ -1,4 +1,4 @@
-"""PSNR and SSIM, as the tables define them, of images and of a model on views."""
+"""PSNR, SSIM and the share shown, as the tables define them, of images and of a model on views."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -8,10 +8,10 @@ from typing import TypeVar
 
 import torch
 from torch import Tensor
+from torch.nn.functional import avg_pool2d
 
 from texgs.core.progress import progress
 from texgs.fields.field import Field
-from texgs.metrics.shown import shown_share
 from texgs.raster import Render
 from texgs.raster.losses import ssim as structural_similarity
 from texgs.raster.reference.losses import similarities
@@ -20,6 +20,9 @@ from texgs.volume.view_set import View
 
 BEST = 100.0  # dB, of equal images
 VISIBLE = 0.01  # alpha; pixels of an object have more in one of two images
+WINDOW = 3  # pixels of the side of a square whose mean alpha is compared
+KEPT_ALPHA = 0.5  # share of that mean
+WHOLE_FROM = 0.995  # fits that lose nothing have 0.997 or more, one without some leaves of a bonsai 0.991
 Item = TypeVar("Item")
 Read = TypeVar("Read")
 
@@ -53,6 +56,30 @@ def compare(image: Render, target: Render) -> dict[str, float]:
 def object_of(image: Render, target: Render) -> Tensor:
     """Return the pixels [H, W] in which one of two images shows something."""
     return (image.alpha > VISIBLE) | (target.alpha > VISIBLE)
+
+
+def shown_share(alpha: Tensor, truth: Tensor) -> float | None:
+    """Return the share of a view's alpha [H, W] where a model has half of it at least, as means over 3 x 3.
+
+    None where the view shows nothing; faint noise has little weight. What is finer than pixels differs from
+    one to the next, and faint matter by a tenth of its alpha, in fits that have all parts: neither counts.
+    The sum of the smaller alpha of both would count them as 0.07 of what there is.
+    """
+    whole = float(truth.sum())
+    if not whole:
+        return None
+    near, expected = (avg_pool2d(x[None, None], WINDOW, 1, WINDOW // 2)[0, 0] for x in (alpha, truth))
+    return float(truth[near >= KEPT_ALPHA * expected].sum()) / whole
+
+
+def what_is_lost(share: float | None) -> str:
+    """Return what to say of a fit that misses parts, and what to do; nothing where it does not."""
+    if share is None or share >= WHOLE_FROM:
+        return ""
+    return (
+        f"the model shows {100 * share:.1f} % of what test views show, so that parts are missing; fit it in "
+        "larger views, by fit=default, or with a larger cap of densify"
+    )
 
 
 @torch.no_grad()

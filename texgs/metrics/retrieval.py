@@ -19,11 +19,12 @@ from texgs.scene.scene import Scene
 from texgs.volume.cameras import spiral
 
 LAYERS = ("relu4_3", "relu5_3")
-VIEWS, SIZE = 8, 256  # of a scene, and pixels of the longer side of views and pictures
+VIEWS = 8  # of a scene
+SIZE = 256  # pixels of the longer side of views and pictures
 SCALES = (1.0, 0.5)  # of pictures against views: a pattern may be laid on at any size
 COVERED = 0.7  # share of what a feature sees that is on the object, for it to count
 FEW = 8  # features: where fewer count, those that are a little on the object count too
-BINS = 6  # of the histogram, of each channel
+BINS = 6  # of a channel, in the histogram
 HISTOGRAM = 0.5  # weight of the histograms against a layer
 AROUND = 1 / 16  # standard deviation of what is around a pixel, in image sides: its contrast becomes 1
 LEAST = 0.02  # contrast that is not made larger

@@ -10,7 +10,7 @@ from torch.nn import functional as F
 
 from texgs.models.nnfm import StyleFeatures, nnfm
 
-ON_OBJECT = 0.5  # of alpha, from which a feature counts
+ON_OBJECT = 0.5  # mean alpha from which a feature counts
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,9 +21,9 @@ class File:
 class Single:
     """A model whose weights are one file."""
 
-    file: File  # that is downloaded
+    file: File  # for a download
     source: str  # its address
-    same: tuple[File, ...] = ()  # which hold the same weights, looked for before it
+    same: tuple[File, ...] = ()  # files of the same weights, looked for before it
 
     @property
     def files(self) -> tuple[File, ...]:
@@ -45,7 +45,7 @@ class Snapshot:
     megabytes: float
     needs: tuple[tuple[str, ...], ...]  # files of the folder, each with the names it may have
     patterns: tuple[str, ...]  # of the files that are downloaded
-    packages: tuple[str, ...] = ("transformers",)  # that read it, of the extra `models`
+    packages: tuple[str, ...] = ("transformers",)  # its readers, of the extra `models`
 
     @property
     def source(self) -> str:

@@ -14,7 +14,7 @@ from texgs.core.errors import ArgumentError
 from texgs.models.networks import read_folder
 from texgs.models.weights import locate, titled
 
-MEAN = (0.48145466, 0.4578275, 0.40821073)  # that CLIP normalises images with, per channel
+MEAN = (0.48145466, 0.4578275, 0.40821073)  # mean of images as CLIP knows them, per channel
 DEVIATION = (0.26862954, 0.26130258, 0.27577711)
 
 

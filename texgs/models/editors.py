@@ -25,7 +25,7 @@ from texgs.models.instruction import require_instruction
 
 NAMES = {"steps": "num_inference_steps", "image_scale": "image_guidance_scale", "negative": "negative_prompt"}
 MULTIPLE = 16  # pixels: what sides of images are multiples of, for autoencoders and patches of transformers
-SAID = 200  # bytes of a reply that is none, in a message
+QUOTED_BYTES = 200  # bytes of a reply that is none, in a message
 TIMEOUT = 600.0  # seconds in which nothing comes from a server
 
 
@@ -43,9 +43,9 @@ class EachAlone:
         asked = {"instruction": require_instruction(instruction), "level": views.level}
         asked["seed"] = int(torch.randint(2**31, (), generator=generator))
         images = progress(views.images, len(views), title=self.name, unit="view")
-        return torch.stack([self.edited(image, asked) for image in images])
+        return torch.stack([self.edit(image, asked) for image in images])
 
-    def edited(self, image: Tensor, asked: dict[str, Any]) -> Tensor:
+    def edit(self, image: Tensor, asked: dict[str, Any]) -> Tensor:
         """Return an image [H, W, 3] edited by an instruction, with a seed, from a level of noise or None."""
         raise NotImplementedError
 
@@ -87,7 +87,7 @@ class ImagePipeline(EachAlone):
         pipeline.set_progress_bar_config(disable=True)
         return cls(pipeline.to(device), name, **options)
 
-    def edited(self, image: Tensor, asked: dict[str, Any]) -> Tensor:
+    def edit(self, image: Tensor, asked: dict[str, Any]) -> Tensor:
         """Return an image [H, W, 3], edited."""
         sides, planes = image.shape[:2], image.permute(2, 0, 1)[None]
         scale = (self.size or max(sides)) / max(sides) / MULTIPLE
@@ -108,18 +108,18 @@ def image_of(request: Request) -> Any:
         with urlopen(request, timeout=TIMEOUT) as reply:
             body = reply.read()
     except HTTPError as error:
-        words = error.read(SAID).decode(errors="replace")
+        words = error.read(QUOTED_BYTES).decode(errors="replace")
         raise ValueError(f"{error}, {words}" if words else str(error)) from error
     found = json.loads(body)
     if not isinstance(found, dict) or "image" not in found:
-        raise ValueError(body[:SAID].decode(errors="replace"))
+        raise ValueError(body[:QUOTED_BYTES].decode(errors="replace"))
     return found["image"]
 
 
 class Endpoint(EachAlone):
     """A server at an address, which gets one request for each view, as docs/extend.md describes it."""
 
-    def edited(self, image: Tensor, asked: dict[str, Any]) -> Tensor:
+    def edit(self, image: Tensor, asked: dict[str, Any]) -> Tensor:
         """Return an image [H, W, 3], edited. The request is sent once."""
         shown = to_pillow(image)
         shown.save(file := BytesIO(), "PNG")

@@ -15,7 +15,7 @@ from texgs.core.errors import ArgumentError
 GROUP = 5  # views that follow each other, one of them a key
 LAST = 100  # timestep below which views get their own details
 BAND = 1.0  # tokens: largest distance of a match from its epipolar line
-BRANCH = 1  # of the three, whose features are compared: with the image, without the instruction
+BRANCH = 1  # the branch whose features are compared: with the image, without the instruction
 
 
 def fundamental(view: Camera, key: Camera) -> Tensor:

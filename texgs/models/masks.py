@@ -14,13 +14,19 @@ from torch.nn import functional as F
 from texgs.core import check
 from texgs.core.errors import ArgumentError
 
-REMEMBERED = 64  # images whose features are kept: the training views of a lift, and the view clicked on
+REMEMBERED_IMAGES = (
+    64  # images whose features are kept: the training views of a lift, and the view clicked on
+)
 SIZE = 320  # pixels of the longer side that is segmented; larger images are reduced, and masks enlarged
 SEED = 0.01  # radius of what a click marks for certain, of the longer side
-ALIKE = 16  # largest difference per channel of 255 of what is probably the same object as a click
-PLAIN = 20  # largest difference per channel within an empty background; less parts objects that nearly touch
+ALIKE_CHANNELS = 16  # largest difference per channel of 255 of what is probably the same object as a click
+PLAIN_CHANNELS = (
+    20  # largest difference per channel within an empty background; less parts objects that nearly touch
+)
 ROUNDS = 5
-FEW = 0.1  # of what an outline holds: less is found where what is outside looks the same, and says nothing
+FEW_SHARE = (
+    0.1  # of what an outline holds: less is found where what is outside looks the same, and says nothing
+)
 
 
 class MaskModel(Protocol):
@@ -56,7 +62,7 @@ def check_clicks(image: Tensor, points: Tensor, positive: Tensor, held: Tensor |
 class Remembered:
     """Results of a slow function of images, kept for the last ones it was asked for."""
 
-    def __init__(self, function: Callable[[Tensor], Tensor], most: int = REMEMBERED) -> None:
+    def __init__(self, function: Callable[[Tensor], Tensor], most: int = REMEMBERED_IMAGES) -> None:
         self.function, self.most = function, most
         self.results: OrderedDict[bytes, Tensor] = OrderedDict()
 
@@ -121,7 +127,7 @@ def cut(pixels: np.ndarray, places: np.ndarray, positive: np.ndarray, held: np.n
         cv2.grabCut(emptied, labels, (0, 0, 0, 0), models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
         is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
     found = connected(is_object, on_it)
-    return found if held is None or found.sum() > FEW * held.sum() else held
+    return found if held is None or found.sum() > FEW_SHARE * held.sum() else held
 
 
 def first_guess(
@@ -139,7 +145,7 @@ def first_guess(
     order = np.argsort(~positive, kind="stable")  # negative clicks last: they take from positive ones
     clicks = list(zip(places[order], positive[order], strict=True))
     for place, is_positive in clicks:
-        alike = flooded(smooth, place, ALIKE) & clicked
+        alike = flooded(smooth, place, ALIKE_CHANNELS) & clicked
         labels[alike] = cv2.GC_PR_FGD if is_positive else cv2.GC_PR_BGD
     radius = max(round(SEED * max(labels.shape)), 1)
     for place, is_positive in clicks:
@@ -152,7 +158,7 @@ def plain_border(pixels: np.ndarray) -> np.ndarray:
     """Return pixels [H, W] bool of one colour that are connected to a corner."""
     height, width = pixels.shape[:2]
     corners = ((0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1))
-    return np.any([flooded(pixels, corner, PLAIN) for corner in corners], axis=0)
+    return np.any([flooded(pixels, corner, PLAIN_CHANNELS) for corner in corners], axis=0)
 
 
 def connected(mask: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -40,7 +40,7 @@ class StyleFeatures:
         the features; by default in all, which is exact.
         """
         size = check.shape("features", features, "C h w")
-        rows = drawn(features.detach(), region, positions, torch.Generator().manual_seed(seed))
+        rows = draw_features(features.detach(), region, positions, torch.Generator().manual_seed(seed))
         if not len(rows):
             raise ArgumentError("region: expected a part of the style picture, got none of its features")
         exact = F.normalize(rows, dim=1)
@@ -89,14 +89,16 @@ def nnfm(
     positions `where` [h, w] count, of more than `most` some that are drawn at random; 0 where none does.
     """
     check.shape("features", features, "C h w", C=style.unit.shape[1])
-    queries = drawn(features, where, most, torch.Generator().manual_seed(seed))
+    queries = draw_features(features, where, most, torch.Generator().manual_seed(seed))
     if not len(queries):
         return features.sum().float() * 0
     neighbours = style.unit[style.nearest(queries.detach())]
     return (1 - F.cosine_similarity(queries, neighbours.float(), dim=1, eps=1e-8)).mean()
 
 
-def drawn(features: Tensor, where: Tensor | None, most: int | None, generator: torch.Generator) -> Tensor:
+def draw_features(
+    features: Tensor, where: Tensor | None, most: int | None, generator: torch.Generator
+) -> Tensor:
     """Return features [n, C] of [C, h, w], float32, where a mask [h, w] is true; at random `most` of them."""
     size, places = check.shape("features", features, "C h w"), None
     if where is not None:

@@ -13,7 +13,7 @@ from texgs.models.masks import GrabCut, MaskModel, Remembered, check_clicks
 from texgs.models.networks import fast_dtype, read_folder, read_tensors
 from texgs.models.weights import locate
 
-MEAN = (123.675 / 255, 116.28 / 255, 103.53 / 255)  # that images are normalised with, per channel
+MEAN = (123.675 / 255, 116.28 / 255, 103.53 / 255)  # mean of images as the encoder knows them, per channel
 DEVIATION = (58.395 / 255, 57.12 / 255, 57.375 / 255)
 PUBLISHED = {  # title, and name of the architecture in kornia, by name in the catalogue
     "mobile_sam": ("MobileSAM", "mobile_sam"),  # Zhang et al. 2023

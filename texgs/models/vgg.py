@@ -29,7 +29,7 @@ class Vgg:
     convolutions: tuple[Callable[[Tensor], Tensor], ...]  # each with its rectifier
     names: tuple[str, ...]  # of the layers, such as relu3_1
     wanted: tuple[str, ...]
-    dtype: torch.dtype  # that features are computed in
+    dtype: torch.dtype  # of the computation
 
     @classmethod
     def load(

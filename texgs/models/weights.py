@@ -7,13 +7,12 @@ from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
-from texgs.core.cache import cache_folder, weights_folder
-from texgs.core.checksum import Checksums, combined
+from texgs.core.cache import Checksums, cache_folder, combined_checksum, weights_folder
 from texgs.core.errors import ArgumentError, MissingDataError, first_line
 from texgs.core.io import read_json
 from texgs.models.catalogue import File, Single, Snapshot, entry_of
 
-VERIFIED = Checksums()  # of files that this process has read
+VERIFIED = Checksums()  # checksums of the files that this process has read
 CONNECTED = 20.0  # seconds within which a hub answers
 
 
@@ -72,7 +71,7 @@ def checksum(name: str, checksums: Checksums) -> str | None:
         return checksums.of(path)
     needs = entry.needs or pipeline_files(path)
     names = [next(each for each in names if (path / each).is_file()) for names in needs]
-    return combined((each, checksums.of(path / each)) for each in names)
+    return combined_checksum((each, checksums.of(path / each)) for each in names)
 
 
 def _file_folders() -> Iterator[Path]:

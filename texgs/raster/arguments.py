@@ -17,8 +17,8 @@ MAX_CHANNELS = 32
 TEXTURE_CHANNELS = 3
 MOST_TEXELS = 2**24  # of one surfel: the library counts them in 32-bit floats
 MAX_SIDE = 2**20 - 16  # pixels; the library counts tiles of 16 of them in 16 bits
-SKEWED = 1e-3  # by which axes of a camera may differ from a rotation's
-ROUNDING = 1e-4  # of a matrix that was inverted or multiplied
+SKEWED = 1e-3  # largest difference of a camera's axes from those of a rotation
+ROUNDING = 1e-4  # error of a matrix that was inverted or multiplied
 BYTES_PER_SURFEL = 192  # records, footprints, sorting, a few tiles: what no scene stays below
 AXES = {
     "means": "N 3",

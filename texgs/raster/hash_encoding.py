@@ -15,7 +15,7 @@ from texgs.core.errors import ArgumentError
 from texgs.raster import native
 from texgs.raster.arguments import require
 
-FEATURES = 2  # of each level
+FEATURES = 2  # numbers of a point at each level
 CPU = torch.device("cpu")
 NativeHash = native.struct("texgs_hash", "i levels, p resolution first")
 native.declare("texgs_hash_encode", NativeHash, "nppp")
@@ -79,7 +79,7 @@ def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
 
     Trilinear between the lattice points of each level; points outside of the cube have the features of its
     faces. The table has all levels, one after the other. For a definition see
-    `texgs.raster.reference.hash_encoding`.
+    `texgs.raster.reference.voxels`.
     """
     given = {"points": (points, "n 3"), "table": (table, f"{levels.rows} {FEATURES}")}
     require(given, constant=("points",), cpu="hash encoding runs on the CPU")

@@ -169,7 +169,7 @@ class _FusedLoss(torch.autograd.Function):
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
-        # Autograd may accumulate into what it is handed: another pass through a retained graph computes anew.
+        # Autograd may add to what it is handed: a second pass through a retained graph computes again.
         gradients = ctx.gradients or _evaluate(ctx.loss, ctx.saved_tensors)[1]
         ctx.gradients = None
         constants = len(ctx.needs_input_grad) - 1 - len(gradients)

@@ -49,7 +49,7 @@ class Struct(Structure):
 
     def __init__(self, *values: Any, **named: Any) -> None:
         self.kept = values, named
-        super().__init__(*map(plain, values), **{name: plain(value) for name, value in named.items()})
+        super().__init__(*map(as_ctypes, values), **{name: as_ctypes(x) for name, x in named.items()})
 
 
 def struct(name: str, layout: str) -> type[Struct]:
@@ -57,7 +57,7 @@ def struct(name: str, layout: str) -> type[Struct]:
     return cast(type[Struct], type(name, (Struct,), {"_fields_": fields(layout)}))
 
 
-def plain(value: Any) -> Any:
+def as_ctypes(value: Any) -> Any:
     """Return a value as ctypes takes it: a dense tensor's address, NULL for None."""
     return value.data_ptr() if isinstance(value, Tensor) else value
 
@@ -207,7 +207,7 @@ def call(name: str, *arguments, device: torch.device) -> None:
         stream = None
     else:
         stream = torch.cuda.current_stream(device).cuda_stream
-    _require_success(function(lib, name)(*map(plain, arguments), stream), lib, device)
+    _require_success(function(lib, name)(*map(as_ctypes, arguments), stream), lib, device)
 
 
 def require_memory(n_bytes: int, device: torch.device, what: str, advice: str) -> None:

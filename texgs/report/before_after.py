@@ -1,23 +1,20 @@
 """Pictures of an edit: the scene before and after it, and the losses on the way."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import torch
 
-from texgs.core.camera import Camera
 from texgs.core.figures import new_figure, words, write_figure, write_grid
 from texgs.core.lens import Lens
 from texgs.core.light import Light
-from texgs.core.movie import write_frames
 from texgs.core.progress import progress
 from texgs.fields.kinds import Kind
-from texgs.scene.frame import frame
+from texgs.scene.film import Film, frames_of
 from texgs.scene.scene import Scene
-from texgs.scene.twin import twin_of
-from texgs.volume.cameras import orbit_path
+from texgs.volume.cameras import FRONT, orbit_path
 
 POLAR = 20.0  # degrees
 SHOWN = 3  # views around the object
@@ -37,22 +34,14 @@ def write_before_and_after(
     scenes = {"before": before, "after": after}
     rows = {}
     for name, scene in scenes.items():
-        shown = pictures(scene, cameras, lights, device)
+        seen = [(camera, replace(scene, light=light)) for camera, light in zip(cameras, lights, strict=True)]
+        shown = frames_of(scene, seen, device)
         rows[name] = list(progress(shown, len(cameras), title=f"{title}, {name}", unit="picture"))
     write_grid(output / "edit.png", rows, titles)
-    turn = orbit_path(TURN, POLAR, lens.square(kind.film_size))
-    halves = [pictures(scene, turn, [scene.light] * TURN, device) for scene in scenes.values()]
+    film, turned = Film(what="orbit", frames=TURN, azimuth=FRONT, polar=POLAR), lens.square(kind.film_size)
+    halves = [frames_of(scene, film.shots(scene, lens=turned), device) for scene in scenes.values()]
     frames = (np.concatenate(pair, axis=1) for pair in zip(*halves, strict=True))
-    write_frames(output / "turntable.mp4", progress(frames, TURN, title=f"{title}, turntable", unit="frame"))
-
-
-def pictures(
-    scene: Scene, cameras: Sequence[Camera], lights: Sequence[Light], device: torch.device
-) -> Iterator[np.ndarray]:
-    """Yield frames [H, W, 3], uint8, as they are rendered."""
-    composition, twin = scene.open(device), twin_of(scene, device)
-    for camera, light in zip(cameras, lights, strict=True):
-        yield frame(composition, camera, replace(scene, light=light), twin=twin)
+    film.write(output / "turntable.mp4", frames, title=f"{title}, turntable")
 
 
 def write_convergence(path: str | Path, curves: Mapping[str, Mapping[str, Sequence[float]]]) -> Path:

@@ -9,8 +9,8 @@ from statistics import fmean
 
 import numpy as np
 
+from texgs.core.cache import combined_checksum, sha256
 from texgs.core.camera import Camera, orbit
-from texgs.core.checksum import combined, sha256
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
 from texgs.core.figures import write_grid
@@ -77,7 +77,7 @@ def checked(path: Path, scene: Scene) -> str:
 def checksum_of(scene: Scene) -> str:
     """Return a checksum of the models with their looks, whatever else is edited."""
     files = [(name, file) for name, model in scene.models.items() for file in model.files if file]
-    return combined((name, sha256(file)) for name, file in files)
+    return combined_checksum((name, sha256(file)) for name, file in files)
 
 
 def shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str, Camera, Scene]]:

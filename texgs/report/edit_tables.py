@@ -30,7 +30,7 @@ NOT_ALIKE = (
     "The paper's rows are means over four data sets on an RTX 4090. It publishes neither its pictures nor "
     "its instructions nor its transfer functions, so they stand by themselves."
 )
-ADAPTS = "adapts"  # in mean rows, of methods that do not work with the same on all data sets
+ADAPTS = "adapts"  # method in mean rows over data sets where it works with different things
 FOLLOWED = ("style", "instruction", "")  # what edits follow, in the order of the table of all edits
 Edit = Record[EditResult]
 Rows = list[dict[str, Any]]
@@ -52,25 +52,25 @@ def paper_measures(follows: str) -> list[Measure]:
 
 def image_driven(records: Iterable[Record[Any]]) -> Table:
     """Return the comparison of edits by pictures, of which the paper measures no CLIP scores."""
-    return table("style", compared(records, "style"), paper_measures("style"))
+    return comparison("style", compared_rows(records, "style"), paper_measures("style"))
 
 
 def text_driven(records: Iterable[Record[Any]]) -> Table:
-    """Return the comparison of edits by instructions, but for other methods with frozen geometry."""
-    rows = compared(records, "instruction")
+    """Return the comparison of edits by instructions, without other methods with frozen geometry."""
+    rows = compared_rows(records, "instruction")
     free = [row for row in rows if row["has_texture"] or not row["is_kept"]]
-    return table("instruction", free, paper_measures("instruction"))
+    return comparison("instruction", free, paper_measures("instruction"))
 
 
 def text_driven_frozen(records: Iterable[Record[Any]]) -> Table:
     """Return the comparison of edits that keep geometry; none where only those do that always do."""
-    rows = compared(records, "instruction")
+    rows = compared_rows(records, "instruction")
     kept = [row for row in rows if row["has_texture"] or row["is_kept"]]
     is_chosen = not all(row["has_texture"] for row in kept)
-    return table("", kept if is_chosen else [], paper_measures("instruction"))
+    return comparison("", kept if is_chosen else [], paper_measures("instruction"))
 
 
-def compared(records: Iterable[Record[Any]], follows: str) -> Rows:
+def compared_rows(records: Iterable[Record[Any]], follows: str) -> Rows:
     """Return the rows of the edits of a comparison."""
     return [row for row in rows_of(records) if row["is_compared"] and row["kind"] == follows]
 
@@ -86,17 +86,17 @@ def looks(records: Iterable[Record[Any]]) -> Table:
     rows = sorted(rows_of(records), key=lambda row: FOLLOWED.index(row["kind"]))
     labels = [*LABELS[:4], Column("follows"), Column("lambda_s", 2, "-")]
     columns = [Column(measure.title, measure.digits) for measure in measures()]
-    told = notes(rows, [measure.title for measure in measures()])
-    return Table(" ".join([caption, *told]), [*labels, *columns], rows)
+    own = notes(rows, [measure.title for measure in measures()])
+    return Table(" ".join([caption, *own]), [*labels, *columns], rows)
 
 
-def table(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
+def comparison(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
     """Return rows of edits, means of those of one size, and the paper's rows of its own."""
     titles = [measure.title for measure in listed]
     columns = [Column(measure.title, measure.digits) for measure in listed]
     means = mean_rows(rows, (LABEL, "edit", "pixels", "device"), ["method", *titles])
     means = [{**row, "method": row["method"] or ADAPTS} for row in means]
-    theirs = published(follows, listed) if rows and follows else []
+    theirs = paper_rows(follows, listed) if rows and follows else []
     sentences = [CAPTION, NOT_ALIKE, *notes(rows, titles)] if theirs else [CAPTION, *notes(rows, titles)]
     return Table(" ".join(sentences), [*LABELS, *columns], [*rows, *means, *theirs])
 
@@ -124,14 +124,11 @@ def pairs_of(records: Sequence[Record[Any]]) -> list[tuple[Edit, Record[EditMeas
         listed = [(name, each.result.values) for name, each in zip(pictures, seen, strict=True)]
         for metric in metrics().values():
             more = metric.among(listed) if metric.among else []
-            seen = [with_values(*pair) for pair in zip(seen, more, strict=True)] if more else seen
+            for index, values in enumerate(more):
+                known = seen[index].result
+                seen[index] = replace(seen[index], result=replace(known, values={**known.values, **values}))
         measured |= {key(edit): each for edit, each in zip(own, seen, strict=True)}
     return [(edit, measured.get(key(edit))) for edit in edits]
-
-
-def with_values(record: Record[EditMeasures], more: Mapping[str, Any]) -> Record[EditMeasures]:
-    """Return a record with more values."""
-    return replace(record, result=replace(record.result, values={**record.result.values, **more}))
 
 
 def row_of(edit: Edit, measured: Record[EditMeasures] | None) -> dict[str, Any]:
@@ -170,7 +167,7 @@ def words_of(followed: Mapping[str, str]) -> str:
     return ", ".join(f"{name}: {value}" for name, value in followed.items()) or "-"
 
 
-def published(follows: str, listed: Sequence[Measure]) -> list[dict[str, Any]]:
+def paper_rows(follows: str, listed: Sequence[Measure]) -> list[dict[str, Any]]:
     """Return rows of the paper, means over four data sets each."""
     name, pixels = PAPER[follows]
     numbers = {measure.published: measure.title for measure in listed if measure.published}

@@ -18,17 +18,23 @@ from texgs.fitting.losses import material_maps
 from texgs.metrics.quality import psnr
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import over_white, smaller
-from texgs.volume.view_set import View
+from texgs.volume.view_set import View, ViewSet
 
 VISIBLE = 2 / 255  # alpha
 MAGNIFIED = 4  # a quarter of the range of colours has the full colour
 DIVERGING = "bwr"  # 0 is white
 ERROR = Scale(-1 / MAGNIFIED, 1 / MAGNIFIED, DIVERGING)  # red where too bright, blue where too dark
-MARGIN = 1.06  # of what is shown around what is visible
+MARGIN = 1.06  # side of the part that is shown, in sides of what is visible
 KEY = Cell("", words="of the worst channel\nred: too bright\nblue: too dark")
 
 
 @torch.no_grad()
+def shown_views(views: ViewSet) -> dict[str, View]:
+    """Return two test views by the names that stand beside them; training views where there are none."""
+    split, candidates = ("test", views.test) if views.test else ("training", views.train)
+    return {f"{split} view {index}": candidates[index] for index in sorted({0, len(candidates) // 3})}
+
+
 def write_fit_figure(
     path: str | Path,
     models: Mapping[str, Field],

@@ -12,8 +12,8 @@ from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table, columns
 Run = dict[str, Record[FitResult]]  # a fit by its phases
 ON_OBJECT = Column("PSNR on the object", 2)
 SHOWN = Column("share shown", 4)
-RELIT = Column("PSNR under unseen lights", 2, UNPUBLISHED)  # of the last phase
-VARIANTS = {  # by the sweep: the heading of its variants, and that of the paper's file
+RELIT = Column("PSNR under unseen lights", 2, UNPUBLISHED)  # after the last phase
+VARIANTS = {  # heading of the variants of each sweep, and the heading in the paper's file
     "views": ("training views", "views"),
     "resolution": ("pixels", "image_px"),
 }

@@ -8,10 +8,11 @@ import numpy as np
 from PIL import Image, ImageOps
 
 from texgs.core.figures import Cell, Row, as_picture
+from texgs.core.names import style_file
 from texgs.volume.transfer import TransferFunction
 
-SIDE, INCHES = 512, 3.2  # of a picture; letters are as large as for so many inches
-LETTERS = 18  # of a line of words
+SIDE, INCHES = 512, 3.2  # side of a picture, pixels and inches; the inches decide the size of letters
+LINE_LENGTH = 18  # letters
 
 
 def given_row(
@@ -23,16 +24,16 @@ def given_row(
     """Return a row of a plot, of pictures, which are files beside edited scenes, and of instructions."""
     cells = [] if plot is None else [Cell("transfer functions", plot)]
     for name, style in styles.items():
-        files = [scene.with_name(file) for scene in scenes for file in (f"style-{name}.png", "style.png")]
+        files = [scene.with_name(file) for scene in scenes for file in map(style_file, (name, ""))]
         for file in [file for file in files if file.is_file()][:1]:  # none of methods with several pictures
             with Image.open(file) as picture:
                 square = ImageOps.pad(picture.convert("RGB"), (SIDE, SIDE), color="white")
             cells.append(Cell(f"{name}: {Path(style).stem}", np.asarray(square)))
-    cells += [Cell(name, words=fill(f"“{text}”", LETTERS)) for name, text in instructions.items()]
+    cells += [Cell(name, words=fill(f"“{text}”", LINE_LENGTH)) for name, text in instructions.items()]
     return Row("given", cells)
 
 
-def plotted(volume: Path, basic: Mapping[str, TransferFunction]) -> np.ndarray:
+def tf_plot(volume: Path, basic: Mapping[str, TransferFunction]) -> np.ndarray:
     """Return a square plot [S, S, 3] of transfer functions over the histogram of volume.nrrd."""
     from texgs.volume.summaries import read_summaries
     from texgs.volume.tf_plot import plot

@@ -29,7 +29,7 @@ def write_report(
     given: Mapping[str, Table] | None = None,
     more: Mapping[str, Sequence[Figure]] | None = None,
 ) -> Path:
-    """Write a report that needs no other file, but for pages of scenes that are too large for it.
+    """Write a report that needs no other file than pages of scenes that are too large for it.
 
     Tables by name and figures by section that need more than records are `given` and `more`.
     """
@@ -75,7 +75,7 @@ def sections(
 
 
 def loss_figures(records: Sequence[Record[Any]]) -> list[Figure]:
-    """Draw curves of the phases that have looked at their loss more than once, but for those of sweeps."""
+    """Draw curves of the phases that recorded their loss more than once, without those of sweeps."""
     by_dataset: dict[str, list[Record[FitResult]]] = {}
     for record in in_order(of(FitResult, records)):
         if len(record.result.losses) > 1 and not record.is_swept:

@@ -15,10 +15,10 @@ from texgs.report.fit_figure import VISIBLE, draw_visible
 from texgs.volume.cameras import orbit_path
 from texgs.volume.isosurface import Mesh
 
-COUNT = 300_000  # discs that a surface is drawn with
-SIZE = 640  # pixels of a view
-POLAR = 20.0  # of the cameras, degrees
-FAR = 0.02  # world units, the brightest colour of an error
+DISCS = 300_000  # discs that a surface is drawn with
+VIEW_SIZE = 640  # pixels
+POLAR = 20.0  # polar angle of the cameras, degrees
+LARGEST_ERROR = 0.02  # world units, the brightest colour of an error
 CLAY, AMBIENT = 0.8, 0.2  # colour of a surface, and its share without light
 
 
@@ -29,14 +29,14 @@ def write_mesh_figure(
 
     Errors are distances from `surface`, points on what counts of the reference.
     """
-    truth, ours = sample(reference, COUNT), sample(mesh, COUNT)
-    error = Scale(0, FAR, "inferno")
+    truth, ours = sample(reference, DISCS), sample(mesh, DISCS)
+    error = Scale(0, LARGEST_ERROR, "inferno")
     errors, rows, visible = error(distances(ours, surface)[0]), [], []
-    for index, camera in enumerate(orbit_path(2, POLAR, lens.square(SIZE)), start=1):
+    for index, camera in enumerate(orbit_path(2, POLAR, lens.square(VIEW_SIZE)), start=1):
         views = [
-            drawn(truth, reference, lit(truth, camera), camera),
-            drawn(ours, mesh, lit(ours, camera), camera),
-            drawn(ours, mesh, errors, camera),
+            render_points(truth, reference, shade(truth, camera), camera),
+            render_points(ours, mesh, shade(ours, camera), camera),
+            render_points(ours, mesh, errors, camera),
         ]
         names = {"isosurface of the volume": None, "mesh of the fit": None, "error, world units": error}
         cells = [
@@ -48,14 +48,14 @@ def write_mesh_figure(
     return draw_visible(path, rows, torch.stack(visible).any(dim=0), title)
 
 
-def lit(points: Points, camera: Camera) -> Tensor:
+def shade(points: Points, camera: Camera) -> Tensor:
     """Return the grey [N, 3] of points under a light at the camera."""
     to_camera = camera.position.to(points.places) - points.places
     cosine = (points.normals * to_camera).sum(1) / to_camera.norm(dim=1)
     return (CLAY * (AMBIENT + (1 - AMBIENT) * cosine.clamp_min(0)))[:, None].expand(-1, 3)
 
 
-def drawn(points: Points, mesh: Mesh, colors: Tensor, camera: Camera) -> Render:
+def render_points(points: Points, mesh: Mesh, colors: Tensor, camera: Camera) -> Render:
     """Return the points of a mesh over white, each as an opaque disc that reaches to its neighbours."""
     a, b, c = torch.from_numpy(mesh.corners).unbind(1)
     area = torch.linalg.cross(b - a, c - a).norm(dim=1).sum() / 2

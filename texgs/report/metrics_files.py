@@ -13,8 +13,8 @@ from texgs.core.names import METRICS
 from texgs.metrics.metric import metrics
 from texgs.report.results import EditMeasures, Result
 
-COPIES = "mlartifacts"  # folder of the files that MLflow keeps of runs
-WORDS = ("stage", "dataset", "field", "variant", "sweep", "stand_in", "result")
+ARTIFACTS = "mlartifacts"  # folder of the files that MLflow keeps of runs
+WORDS = ("stage", "dataset", "field", "variant", "sweep", "stand_in", "command", "result")
 FACTS: dict[str, tuple[Any, str]] = {  # what a metrics file holds beside its numbers, as far as it is read
     **dict.fromkeys((*WORDS, "tf", "recipe"), (str, "words")),
     **dict.fromkeys(("seed", "fit_seed"), (int, "a whole number")),
@@ -28,7 +28,7 @@ R_co = TypeVar("R_co", bound=Result, covariant=True)
 class Record(Generic[R_co]):
     """A job: its result, and what is known of it."""
 
-    path: Path  # of metrics.json
+    path: Path  # its metrics.json
     stage: str
     dataset: str
     tf: str | None  # None for jobs of a whole data set
@@ -63,7 +63,7 @@ class LeftOut:
 
     what: str  # such as "data set wood"
     why: str  # one sentence
-    places: list[str]  # of the jobs that there are none of, names of rules of the workflow
+    places: list[str]  # rules of the workflow whose jobs are missing
 
     def __str__(self) -> str:
         why = self.why.removeprefix(f"{self.what}: ")  # sentences that name it themselves
@@ -140,7 +140,7 @@ def below(folder: str | Path) -> list[Path]:
     """Find the metrics files of all results in a folder, not of jobs at work or copies of tracked runs."""
 
     def is_aside(name: str) -> bool:
-        return name.startswith(".") or name == COPIES
+        return name.startswith(".") or name == ARTIFACTS
 
     paths = Path(folder).rglob(METRICS)
     return sorted(path for path in paths if not any(map(is_aside, path.relative_to(folder).parts)))

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 R = TypeVar("R", bound=Record[Any])
-THEIRS = "the paper"  # in place of a recipe, in rows of its own numbers
-RECIPE = "paper"  # of conf/fit: what the paper's numbers are of
+THEIRS = "the paper"  # recipe in rows of its own numbers
+RECIPE = "paper"  # file of conf/fit whose results may stand beside the paper's numbers
 VIEWS = 162  # training views, where the paper does not say another number
 ALIKE = (
     "Numbers of the paper stand beside ours where recipe, size of images and number of training views are "

@@ -32,7 +32,7 @@ SECTIONS = {  # of the report, in the order of the paper
 
 
 class Result:
-    """What a job tells, a dataclass; files name it by its class."""
+    """Base of the results of jobs, which are dataclasses; files name a result by its class."""
 
     kinds: ClassVar[dict[str, type[Any]]] = {}
     pictured_in: ClassVar[str]  # section of the report for the job's pictures
@@ -98,7 +98,7 @@ class FitResult(Result, section="fitting"):
     fit_seconds: float
     primitives: int
     iterations: int = 0
-    losses: list[float] = field(default_factory=list)  # that were looked at
+    losses: list[float] = field(default_factory=list)  # recorded over the iterations
     psnr: float | None = None  # of test views, dB
     object_psnr: float | None = None  # the same on the object
     shown: float | None = None  # share of what they show that the field shows, see `shown_share`
@@ -108,7 +108,7 @@ class FitResult(Result, section="fitting"):
     relit_psnr: float | None = None  # of test views under lights that no training view has
     relit_ssim: float | None = None
     train_views: int | None = None
-    width: int | None = None  # of all these views as they were compared, pixels
+    width: int | None = None  # size of all these views as they were compared, pixels
     height: int | None = None
     peak_gpu_memory_mib: float | None = None
     sizes: dict[str, float] = field(default_factory=dict)  # of the last phase, see `Field.sizes`
@@ -149,7 +149,7 @@ class MeshResult(Result, section="fitting"):
     chamfer: float  # mean of the next two
     accuracy: float  # mean distance of the mesh from the surface
     completeness: float  # and back
-    f_score: float  # of what is within the tolerance, in [0, 1]
+    f_score: float  # F-score of points within the tolerance, in [0, 1]
     normal_angle: float  # degrees
     vertices: int
     triangles: int
@@ -164,6 +164,10 @@ class SceneResult(Result, section="pse"):
 
     models: int
     primitives: int
+
+
+COMPARED = 3  # views around the object, one of which is shown
+BELOW = "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
 
 
 @dataclass(frozen=True)
@@ -186,7 +190,7 @@ class CheckResult:
     models: str  # their checksum
     views: int
     seed: int
-    width: int  # of the views, pixels
+    width: int  # size of the views, pixels
     height: int
     psnr: dict[str, float]  # mean, percentile_5, worst and floor, dB
     object_psnr: dict[str, float]
@@ -208,10 +212,10 @@ class StepsResult(Result, section="time"):
     """A scene that follows its volume through the steps of a series in time."""
 
     steps: int
-    views: int  # of each step that was compared
-    step_mib: float  # that a step adds
+    views: int  # for each step that was compared
+    step_mib: float  # size that a step adds
     compared: list[Comparison]  # some of the steps, by their names
-    step_seconds: float | None = None  # mean, with its volume; not told where an interrupted job went on
+    step_seconds: float | None = None  # mean, with its volume; None where an interrupted job went on
 
 
 @dataclass(frozen=True)
@@ -269,7 +273,7 @@ class EditMeasures(Result):
 
     edit: str
     method: str
-    width: int | None = None  # of the frames, pixels
+    width: int | None = None  # size of the frames, pixels
     height: int | None = None
     values: dict[str, Any] = field(default_factory=dict)  # of texgs/metrics/edits, by name
 
@@ -284,6 +288,6 @@ class EditMeasures(Result):
 
 def plain(result: Result) -> dict[str, Any]:
     """Return a result for JSON, without what was not measured; values by name stand among the rest."""
-    told: dict[str, Any] = asdict(result)  # type: ignore[call-overload]
-    told |= told.pop("values", {})
-    return {name: value for name, value in told.items() if value is not None}
+    numbers: dict[str, Any] = asdict(result)  # type: ignore[call-overload]
+    numbers |= numbers.pop("values", {})
+    return {name: value for name, value in numbers.items() if value is not None}

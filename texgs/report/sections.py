@@ -4,7 +4,6 @@ import base64
 import io
 import json
 import os
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,17 +12,15 @@ from urllib.parse import quote
 
 from PIL import Image
 
+from texgs.core.names import PAGE
 from texgs.edit.method import NO_METHOD
 from texgs.report.metrics_files import Record
 from texgs.report.published import in_order
-from texgs.report.results import SECTIONS, ComparisonResult, EditResult, GalleryResult, PageResult
+from texgs.report.results import SECTIONS, EditResult, GalleryResult, PageResult
 
-OF_PICTURES = {"relight.png": "relight"}  # where a stage has pictures of several sections
-OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
-# Side by side where there is room, as pictures of styles are.
-NARROW = ("scene.png", "poster.jpg", "transfer.png", "convergence.png")
-QUALITY, EFFORT = 85, 2  # of pictures in the report; the whole ones are in the folders of their jobs
-UNREPORTED = ("turntable.png",)  # a film: it would be most of the report
+SECTIONS_OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
+NARROW_WIDTH = 1000  # pixels across, up to which pictures stand side by side where there is room
+WEBP_QUALITY, WEBP_EFFORT = 85, 2  # the whole pictures are in the folders of their jobs
 
 
 @dataclass(frozen=True)
@@ -34,10 +31,10 @@ class Figure:
     label: str  # basic TF, fit and edit
     words: str
     uri: str
-    command: str  # that makes it
+    command: str  # command line that makes it
     is_narrow: bool = False
-    page: str = ""  # that shows the same in a browser, as JSON; or
-    link: str = ""  # the way to its file
+    page: str = ""  # page that shows the same in a browser, as JSON; or
+    link: str = ""  # path of its file
 
 
 def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figure]]:
@@ -47,19 +44,27 @@ def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figu
     """
     by_section: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
     for record in in_order(records):
-        for name, words in record.facts.get("pictures", {}).items():
-            picture = record.path.with_name(name)
-            is_of_all = isinstance(record.result, GalleryResult) or not record.is_swept
-            if picture.is_file() and name not in UNREPORTED and is_of_all:
-                is_narrow, uri = name in NARROW or name.startswith("style"), data_uri(Image.open(picture))
-                told = (record.title, label(record), words, uri, command(record), is_narrow)
-                by_section[section_of(record, name)].append(Figure(*told, *page(record, folder)))
+        is_of_all = isinstance(record.result, GalleryResult) or not record.is_swept
+        for name, words in record.facts.get("pictures", {}).items() if is_of_all else ():
+            file = record.path.with_name(name)
+            if file.is_file() and (figure := figure_of(record, file, words, folder)):
+                by_section[section_of(record, file)].append(figure)
     return by_section
+
+
+def figure_of(record: Record[Any], file: Path, words: str, folder: Path) -> Figure | None:
+    """Return a picture of a job, with a page or a link from a folder; None of a film, which is too large."""
+    with Image.open(file) as picture:
+        if getattr(picture, "is_animated", False):
+            return None
+        uri, is_narrow = data_uri(picture), picture.width <= NARROW_WIDTH
+    command = str(record.facts.get("command", ""))
+    return Figure(record.title, label(record), words, uri, command, is_narrow, *page(record, folder))
 
 
 def page(record: Record[Any], folder: Path) -> tuple[str, str]:
     """Return the page of a scene, or the way to it, where a job has made one; the other is empty."""
-    file = record.path.with_name("scene.html")
+    file = record.path.with_name(PAGE)
     if not isinstance(record.result, PageResult) or not file.is_file():
         return "", ""
     if record.result.is_embedded:
@@ -67,15 +72,15 @@ def page(record: Record[Any], folder: Path) -> tuple[str, str]:
     return "", quote(Path(os.path.relpath(file, folder)).as_posix())
 
 
-def section_of(record: Record[Any], picture: str) -> str:
-    """Return the section of a picture, which a job has made; `picture` is the name of its file."""
+def section_of(record: Record[Any], picture: Path) -> str:
+    """Return the section of a picture of a job: that of its name, or else that of the job's results."""
     result = record.result
     if isinstance(result, EditResult):
         is_part = any("/" in name for name in result.followed)
-        return "parts" if is_part else OF_EDITS[result.follows]
+        return "parts" if is_part else SECTIONS_OF_EDITS[result.follows]
     if isinstance(result, GalleryResult):
         return result.section
-    return OF_PICTURES.get(picture, result.pictured_in)
+    return picture.stem if picture.stem in SECTIONS else result.pictured_in
 
 
 def label(record: Record[Any]) -> str:
@@ -89,27 +94,8 @@ def edit_of(record: Record[Any]) -> str:
     return "" if edit == NO_METHOD else edit
 
 
-def command(record: Record[Any]) -> str:
-    """Return the command that makes a job's pictures, but for overrides; words of a gallery tell it."""
-    result = record.result
-    if isinstance(result, GalleryResult):
-        return ""
-    fits = result.recipes if isinstance(result, ComparisonResult) else [record.recipe]
-    words = {
-        "tf": record.tf,
-        "fit": next(iter(fits), ""),
-        "edit": edit_of(record),
-        "variant": record.variant,
-        "fit.seed": record.facts.get("fit_seed", 0),
-        "edit.seed": record.seed if edit_of(record) else 0,
-        "fits": f"[{','.join(fits)}]" if len(fits) > 1 else "",
-    }
-    given = [f"{key}={value}" for key, value in words.items() if value]
-    return shlex.join(["texgs", record.stage, f"dataset={record.dataset}", *given])
-
-
 def data_uri(picture: Image.Image) -> str:
     """Return a picture as text for the attribute of a tag, compressed to about an eighth of its PNG."""
     file = io.BytesIO()
-    picture.convert("RGBA").save(file, format="WEBP", quality=QUALITY, method=EFFORT)
+    picture.convert("RGBA").save(file, format="WEBP", quality=WEBP_QUALITY, method=WEBP_EFFORT)
     return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}"

@@ -12,7 +12,7 @@ from PIL import Image
 from texgs.core.figures import DPI, as_picture, grid_rows, lay_out, new_figure, words
 from texgs.core.names import SCENE
 from texgs.report.metrics_files import Record
-from texgs.report.sweep_table import measured, natural, number, sweep_runs, variants
+from texgs.report.sweep_table import measured_titles, natural, number, sweep_runs, variants
 from texgs.report.table import SOURCES
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 ACROSS, WIDTH = 4, 2.6  # panels in a row, and inches of each
 HEIGHT, BAR = 2.2, 0.22  # inches of a panel over numbers, and of each bar
-PIXELS = 400  # of a picture
-WIDE = 30.0  # a range of values is logarithmic where the last is so many times the first
+PICTURE_SIZE = 400  # pixels
+LOGARITHMIC_FROM = 30.0  # ratio of the ends of an axis from which it is logarithmic
 
 
 def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
@@ -32,7 +32,7 @@ def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
     Variants that are numbers make an axis, with the standard deviation over seeds; others have bars.
     """
     runs = sweep_runs(records, name)
-    titles, pictures = different(runs), scene_pictures(runs)
+    titles, pictures = titles_that_differ(runs), scene_pictures(runs)
     series = dict(list(variants(runs).groupby("series", sort=False)))
     names = sorted(set(runs["variant"]), key=natural)
     is_axis = all(number(variant) is not None for variant in names)
@@ -42,10 +42,10 @@ def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
     width = max(WIDTH * min(ACROSS, len(titles)), *(grid.get_figwidth() for grid in grids), 0)
     figure = new_figure(width, tall * -(-len(titles) // ACROSS) + 0.25, DPI)
     draw_panels(figure, titles, series, name, [] if is_axis else names)
-    return stacked([as_picture(each) for each in (figure, *grids)])
+    return stack([as_picture(each) for each in (figure, *grids)])
 
 
-def stacked(pictures: Sequence[Image.Image]) -> Image.Image:
+def stack(pictures: Sequence[Image.Image]) -> Image.Image:
     """Return pictures one below the other, on white."""
     width, height = max(each.width for each in pictures), sum(each.height for each in pictures)
     page, top = Image.new("RGB", (width, height), "white"), 0
@@ -55,9 +55,9 @@ def stacked(pictures: Sequence[Image.Image]) -> Image.Image:
     return page
 
 
-def different(runs: DataFrame) -> dict[str, int]:
+def titles_that_differ(runs: DataFrame) -> dict[str, int]:
     """Return the measures that differ between runs with their digits; all that there are, where none does."""
-    titles = measured(runs)
+    titles = measured_titles(runs)
     counts = runs[list(titles)].nunique()
     for least in (1, 0):
         if shown := {title: digits for title, digits in titles.items() if counts[title] > least}:
@@ -99,7 +99,7 @@ def draw_line(
 ) -> None:
     """Draw means over the swept value, with their standard deviation where there are several seeds."""
     axes.errorbar(at, means, spread, label=words(label), marker="o", markersize=3, linewidth=1, capsize=2)
-    if at and min(at) > 0 and max(at) / min(at) > WIDE:
+    if at and min(at) > 0 and max(at) / min(at) > LOGARITHMIC_FROM:
         axes.set_xscale("log")
 
 
@@ -132,12 +132,12 @@ def scene_pictures(runs: DataFrame) -> dict[str, dict[str, np.ndarray]]:
 
 def picture(path: Path) -> np.ndarray:
     """Render a scene from the front."""
-    import torch
-
-    from texgs.report.before_after import POLAR, pictures
+    from texgs.report.before_after import POLAR
+    from texgs.scene.film import frames_of
     from texgs.scene.scene_file import read_scene
-    from texgs.volume.cameras import orbit_path
+    from texgs.scene.shot import Shot
+    from texgs.volume.cameras import FRONT
 
     scene = read_scene(path)
-    cameras = orbit_path(1, POLAR, scene.framed().lens().square(PIXELS))
-    return next(pictures(scene, cameras, [scene.light], torch.device("cpu")))
+    camera = Shot(azimuth=FRONT, polar=POLAR, width=PICTURE_SIZE).camera(scene.framed())
+    return next(frames_of(scene, [(camera, scene)], "cpu"))

@@ -34,7 +34,7 @@ def sweep(records: Iterable[Record[Any]], name: str) -> Table:
     Columns of names that all rows leave empty are left out.
     """
     runs = sweep_runs(records, name)
-    table, titles = variants(runs), measured(runs)
+    table, titles = variants(runs), measured_titles(runs)
     spread = [title for title in titles if table[f"± {title}"].notna().any()]
     named = [title for title in [*SERIES, "variant"] if runs[title].any()]
     columns = [*map(Column, named), Column("seeds", 0)]
@@ -92,7 +92,7 @@ def edit_measures() -> list[Measure]:
     return [measure for measure in measures() if measure.digits is not None]
 
 
-def measured(runs: DataFrame) -> dict[str, int]:
+def measured_titles(runs: DataFrame) -> dict[str, int]:
     """Return the digits of what is measured of fits, where there are some, and of edits, by titles."""
     relit = {RELIT.title: 2} if runs[RELIT.title].notna().any() else {}
     of_fits = {**OF_FITS, **relit, **dict.fromkeys(MATERIAL, 2)} if (runs["edit"] == "").any() else {}
@@ -109,7 +109,7 @@ def variants(runs: DataFrame) -> DataFrame:
     for _, group in runs.groupby([*SERIES, "variant"], sort=False):
         done = group[group["is_done"].astype(bool)]
         row = {**group.iloc[0], "seeds": len(done), SOURCES: group[SOURCES].sum()}
-        for title in measured(runs):
+        for title in measured_titles(runs):
             known = [] if done[title].isna().any() else done[title].tolist()
             row[title] = fmean(known) if known else None
             row[f"± {title}"] = stdev(known) if len(known) > 1 else None

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 MISSING = "not measured"
 SOURCES = "metrics files"  # column of the paths that a row was read from
-UNPUBLISHED = "-"  # in columns of the paper's numbers: it has none
+UNPUBLISHED = "-"  # cell of a number that the paper does not have
 PAPER = " (paper)"  # end of the titles of these columns
-UNLIKE = "≠"  # there: it has one, of something else
+UNLIKE = "≠"  # cell of a number of the paper that is not like for like
 FORMATS = ("csv", "md", "tex")
 DOCUMENT = "tables.tex"
 FORMULAS = r"""± \pm  × \times  ° ^\circ  · \cdot  ≠ \neq  ≤ \leq  ≥ \geq  → \rightarrow  ↑ \uparrow
@@ -69,7 +69,7 @@ class Column:
 
 @cache
 def tables_file() -> dict[str, dict[str, Any]]:
-    """Return what tables.yaml tells of each table, by name."""
+    """Return the entries of tables.yaml by the names of tables."""
     tables: dict[str, dict[str, Any]] = parse_yaml(report_file("tables.yaml"))
     return tables
 
@@ -81,8 +81,8 @@ def report_file(name: str) -> str:
 
 def columns(name: str) -> dict[str, Column]:
     """Return the columns of a table by their keys in tables.yaml."""
-    told = tables_file()[name]["columns"]
-    return {key: Column(**{"title": key, **facts}) for key, facts in told.items()}
+    listed = tables_file()[name]["columns"]
+    return {key: Column(**{"title": key, **facts}) for key, facts in listed.items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,12 +16,12 @@ from texgs.report.table import PAPER, Table, tables_file
 
 @dataclass(frozen=True)
 class TableSpec:
-    """A table of the report, as tables.yaml tells of it, and how it is made of records."""
+    """A table of the report: its entry in tables.yaml, and how it is made of records."""
 
     name: str  # of its files
     title: str
     section: str  # of the report, a key of `texgs.report.results.SECTIONS`
-    places: Sequence[str]  # of the jobs that it reads, names of rules of the workflow
+    places: Sequence[str]  # rules of the workflow whose jobs it reads
     make: Callable[[Sequence[Record[Any]]], Table] | None  # None: whoever writes the tables hands it in
     caption: str = ""
     number: str = ""  # in the paper, with A in its appendix; none for tables that it does not have

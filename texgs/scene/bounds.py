@@ -9,7 +9,7 @@ import torch
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.lens import ORIGIN, Frame, Lens
 from texgs.fields.field import Composed, Field
-from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
+from texgs.fields.gaussians import Gaussians, JoinedGaussians
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels

@@ -14,7 +14,7 @@ from texgs.core.errors import ArgumentError, located
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.fields.field import Field
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians import Gaussians
 from texgs.fields.part_edit import PartEdit, opacity_factors
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.composition import Part
@@ -115,13 +115,13 @@ def lit(
     model = untextured(model) if model.stage == "texture" else model
     texels = model.parameters.get("texels", torch.zeros_like(model.parameters["colors"]))
     part = Part(model, masks)
-    edited = part.edited(edits)
+    edited = part.apply(edits)
     cameras = icosphere_of(DIRECTIONS, Lens(radius=FAR))
     views = normalize(torch.stack([-camera.position for camera in cameras]).double(), dim=1)  # [M, 3]
     count = COEFFICIENTS[light.kind]
     solver = torch.linalg.pinv(harmonics(views)[:, :count]).float()  # [K, M]
     sh = texels.new_zeros(len(model), count, 3)
     for camera, weights in zip(cameras, solver.T, strict=True):
-        base, gain = part.look(edited, camera, light, "shaded")
+        base, gain = part.shade(edited, camera, light, "shaded")
         sh += weights[:, None] * (base + gain[:, None] * texels - 0.5)[:, None]
     return edited.opacities, sh

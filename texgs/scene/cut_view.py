@@ -11,7 +11,7 @@ from torch.nn.functional import interpolate, max_pool2d
 from texgs.core.camera import Camera
 from texgs.fields.field import Composed, Look
 from texgs.raster import Render
-from texgs.raster.cuts import CutRange
+from texgs.raster.api import CutRange
 from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin, range_of
 from texgs.volume.images import smaller

@@ -1,6 +1,6 @@
 """Frames of a scene as people look at them: colours, normals, depth, material; and the point at a pixel."""
 
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 import torch
@@ -15,22 +15,9 @@ from texgs.raster import Render
 from texgs.raster.shading import MATERIAL
 from texgs.scene.cut_view import cut_view
 from texgs.scene.scene import Scene
+from texgs.scene.shot import Mode
 from texgs.scene.twin import Twin
 
-Mode = Literal[
-    "shaded",
-    "volume",
-    "unshaded",
-    "normal",
-    "depth",
-    "alpha",
-    "texture",
-    "discs",
-    "ambient",
-    "diffuse",
-    "specular",
-    "shininess",
-]
 OVER_BLACK = ("alpha", *MATERIAL)
 SHININESS = 100.0  # shown as white
 BYTES = 64  # of memory for a pixel: the images of the rasterizer, over a background, clamped and rounded

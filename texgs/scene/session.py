@@ -5,9 +5,10 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 from threading import RLock
-from typing import Any, Self, TypeVar
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import numpy as np
 import torch
@@ -23,14 +24,16 @@ from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.raster import Render
 from texgs.scene.cut_view import beside
-from texgs.scene.frame import Mode, frame, point_at
+from texgs.scene.frame import frame, point_at
 from texgs.scene.parts import NewLook, entry_of, key_path, replaced, require_new, split, with_looks
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, cuts_of, functions_of, known, light_of, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
+from texgs.scene.shot import Mode
 from texgs.scene.twin import Twin, needs_twin
 
 T = TypeVar("T")
+P = ParamSpec("P")
 SCENE_KEYS: dict[str, Any] = {
     "light": "headlight",
     "background": WHITE,
@@ -39,7 +42,20 @@ SCENE_KEYS: dict[str, Any] = {
     "time": 0,
 }  # what is edited of a whole scene, and without edits
 MOST_STEPS = 200  # of the history: of more, the oldest cannot be undone
-KEPT = 3  # compositions and twins: pages may show others in turn, as before an edit and after it
+MOST_KEPT = 3  # compositions and twins: pages may show others in turn, as before an edit and after it
+
+
+def locked(
+    change: Callable[Concatenate["Session", P], T],
+) -> Callable[Concatenate["Session", P], T]:
+    """Let a method hold the lock of its session from what it reads to the step that it makes."""
+
+    @wraps(change)
+    def run(session: "Session", /, *given: P.args, **named: P.kwargs) -> T:
+        with session.lock:
+            return change(session, *given, **named)
+
+    return run
 
 
 class Session:
@@ -47,7 +63,8 @@ class Session:
 
     What is edited by numbers (colours, opacities, light) costs nothing but the next frame: files are read
     again only where a change brings others. A change that cannot be made is an ArgumentError or a ShapeError
-    that names the part, and leaves the scene as it is. Threads that share a session change it by `one_step`.
+    that names the part, and leaves the scene as it is. Threads that share a session make their changes in
+    turn; several changes that belong together are made in `one_step`.
 
     Args:
         scene: to begin with.
@@ -56,10 +73,13 @@ class Session:
 
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
         self._past, self._future = [(scene, "")], list[tuple[Scene, str]]()  # with titles of steps
-        self.lock = RLock()  # held from what a change reads to the step that it makes
+        self.lock = RLock()
+        self.changed: Callable[[], object] = lambda: (
+            None
+        )  # is called after each step, and when one is taken back
         self._device = device
-        self._opened = deque[tuple[object, Composed]](maxlen=KEPT)
-        self._twins = deque[tuple[object, Twin]](maxlen=KEPT)
+        self._opened = deque[tuple[object, Composed]](maxlen=MOST_KEPT)
+        self._twins = deque[tuple[object, Twin]](maxlen=MOST_KEPT)
 
     @classmethod
     def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Self:
@@ -83,6 +103,7 @@ class Session:
 
     # ---- Changes ------------------------------------------------------------
 
+    @locked
     def set(self, part: str, key: str, value: Any) -> None:
         """Set a value of a part's edit: `visible`, `palette`, `opacity`, or a factor of the material."""
         entry = entry_of(self.scene, part)
@@ -97,34 +118,41 @@ class Session:
         """Take a value of a part's edit back."""
         self.set(part, key, getattr(PartEdit(), key, None))
 
+    @locked
     def set_file(self, part: str, key: str, file: Path | None) -> None:
         """Give a part another `file` or `texture`; None: the texels that it was fitted with."""
         changed: dict[str, Any] = {key: file}
         scene = replaced(self.scene, part, replace(entry_of(self.scene, part), **changed))
         self._push_read(scene, {split(self.scene, part)[0]})
 
+    @locked
     def set_looks(self, looks: Mapping[str, NewLook]) -> None:
         """Give several parts new looks in one step; see `with_looks` for palettes."""
         models = {split(self.scene, part)[0] for part in looks}
         self._push_read(with_looks(self.scene, looks), models)
 
+    @locked
     def set_light(self, light: Light = HEADLIGHT) -> None:
         """Let another light shine on the scene."""
         self._push(replace(self.scene, light=light))
 
+    @locked
     def set_background(self, value: object = WHITE) -> None:
         """Put another colour behind the scene."""
         self._push(replace(self.scene, background=color("background", value)))
 
+    @locked
     def set_cuts(self, cuts: Cuts) -> None:
         """Cut the scene; cuts of before are gone."""
         self._push(replace(self.scene, cuts=cuts))
 
+    @locked
     def set_scene(self, scene: Scene) -> None:
         """Go on with another scene, whose models are read first."""
         changed = [name for name, entry in scene.models.items() if self.scene.models.get(name) != entry]
         self._push_read(scene, changed)
 
+    @locked
     def set_of_scene(self, key: str, value: Any) -> None:
         """Set what is edited of a whole scene, as a scene file has it; see `SCENE_KEYS`."""
         known({key: value}, SCENE_KEYS, "the scene")
@@ -140,6 +168,7 @@ class Session:
             case _:
                 self.set_background(value)
 
+    @locked
     def add_segment(self, part: str, file: Path) -> None:
         """Make surfels of a model, those of a file of `write_segment`, a part of their own.
 
@@ -151,6 +180,7 @@ class Session:
         before = entry.segments.get(str(name), SceneSegment(file, entry.edit, entry.texture))
         self._push_read(replaced(self.scene, part, replace(before, file=file)), {model})
 
+    @locked
     def make_segment(self, part: str, mask: Tensor, file: Path, facts: Mapping[str, Any]) -> None:
         """Write the file of a new segment, and add it.
 
@@ -181,10 +211,12 @@ class Session:
         write_segment(file, fitted, mask, facts)
         self.add_segment(part, file)
 
+    @locked
     def remove_segment(self, part: str) -> None:
         """Give the surfels of a segment back to their model."""
         self._push(replaced(self.scene, part, None))
 
+    @locked
     def rename_segment(self, part: str, name: str) -> None:
         """Give a segment another name; it keeps its place among those of its model."""
         model, segment = split(self.scene, part)
@@ -201,10 +233,10 @@ class Session:
         self._push(replaced(self.scene, model, renamed))
 
     @contextmanager
-    def one_step(self, title: str | Callable[[], str] = "") -> Iterator[None]:
+    def one_step(self, title: str = "") -> Iterator[None]:
         """Let all changes within the block be one step with a title; none where one of them fails.
 
-        Threads enter such blocks in turn. A function is asked for the title once all changes are made.
+        Threads enter such blocks in turn.
         """
         with self.lock:
             past, future = self._past, [*self._future]
@@ -214,23 +246,26 @@ class Session:
                 self._past, self._future = past, future
                 raise
             if self.scene is not past[-1][0]:
-                self._past = [*past[-MOST_STEPS:], (self.scene, title() if callable(title) else title)]
+                self._past = [*past[-MOST_STEPS:], (self.scene, title)]
+        self.changed()
 
+    @locked
     def undo(self) -> bool:
         """Take the latest change back; return whether there was one."""
-        with self.lock:
-            if len(self._past) == 1:
-                return False
-            self._future.append(self._past.pop())
-            return True
+        if len(self._past) == 1:
+            return False
+        self._future.append(self._past.pop())
+        self.changed()
+        return True
 
+    @locked
     def redo(self) -> bool:
         """Make again what was undone last; return whether there was anything."""
-        with self.lock:
-            if not self._future:
-                return False
-            self._past.append(self._future.pop())
-            return True
+        if not self._future:
+            return False
+        self._past.append(self._future.pop())
+        self.changed()
+        return True
 
     # ---- Views ------------------------------------------------------------
 

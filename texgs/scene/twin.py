@@ -17,7 +17,7 @@ from texgs.core.cuts import Cuts
 from texgs.core.errors import ArgumentError, located
 from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
-from texgs.raster.cuts import CutRange, cut_range
+from texgs.raster.api import CutRange, cut_range
 from texgs.raster.shading import MATERIAL
 from texgs.scene.scene import Scene, volume_of
 from texgs.volume.caster import Cast, Caster

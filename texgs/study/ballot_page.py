@@ -16,15 +16,11 @@ from typing import Any
 import numpy as np
 import torch
 
-from texgs.core.camera import Camera
 from texgs.core.image import open_picture
-from texgs.core.movie import write_frames
-from texgs.core.progress import progress
-from texgs.scene.frame import frame
+from texgs.scene.film import Film, frames_of
 from texgs.scene.scene import WHITE, Scene
-from texgs.scene.twin import twin_of
 from texgs.study.questions import Question, rank_name
-from texgs.volume.cameras import orbit_path
+from texgs.volume.cameras import FRONT
 
 POLAR = 20.0  # degrees above the horizon
 CRF = 23  # of H.264: half the bytes of a film that is looked at alone, so that the page can be mailed
@@ -48,16 +44,11 @@ def write_film(
 
     They show all that is framed of the first scene.
     """
-    shown = [
-        (scene.open(device), replace(scene, background=WHITE), twin_of(scene, device)) for scene in scenes
-    ]
-
-    def draw(camera: Camera) -> list[np.ndarray]:
-        return [frame(composition, camera, scene, twin=twin) for composition, scene, twin in shown]
-
-    lens = scenes[0].framed(shown[0][0]).lens().square(size)
-    turn = progress(orbit_path(frames, POLAR, lens), title=title, unit="frame")
-    return write_frames(path, (mosaic(draw(camera)) for camera in turn), crf=CRF)
+    film = Film(what="orbit", frames=frames, azimuth=FRONT, polar=POLAR, width=size)
+    lens = film.lens(scenes[0].framed())
+    plain = [replace(scene, background=WHITE) for scene in scenes]
+    turned = [frames_of(scene, film.shots(scene, lens=lens), device) for scene in plain]
+    return film.write(path, map(mosaic, zip(*turned, strict=True)), title=title, crf=CRF)
 
 
 def mosaic(pictures: Sequence[np.ndarray]) -> np.ndarray:

@@ -1,8 +1,7 @@
 """Ballots that voters send, read and checked: CSV files that the page of a study saves."""
 
 import csv
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from texgs.core.io import reading
 from texgs.study.questions import Question, Study, read_key
 
 COLUMNS = ["study", "ballot", "question", "option", "rank"]
-LARGEST = 1 << 20  # bytes
+MOST_BYTES = 1 << 20
 WHAT, ADVICE = "a ballot", "ask the voter for the file that the page saves"
 
 
@@ -64,27 +63,20 @@ def read_ballot(study: Study, path: Path) -> Ballot:
     """Read one ballot."""
     rows = rows_of(path)
     own = rows[0]["ballot"]
-    given: dict[str, dict[str, str]] = defaultdict(dict)
+    for key, expected in (("study", study.study), ("ballot", own)):
+        if got := next((row[key] for row in rows if row[key] != expected), None):
+            advice = "count it with the key of its study" if key == "study" else ADVICE
+            raise ArgumentError(f"{path}: expected {key} {expected}, got {got}; {advice}")
+    given: dict[str, list[tuple[str, str]]] = {str(n): [] for n in range(1, len(study.questions) + 1)}
     for row in rows:
-        if row["study"] != study.study:
-            advice = "count it with the key of its study"
-            raise ArgumentError(f"{path}: expected study {study.study}, got {row['study']}; {advice}")
-        if row["ballot"] != own:
-            raise ArgumentError(f"{path}: expected ballot {own}, got {row['ballot']}; {ADVICE}")
-        if row["option"] in given[row["question"]]:
+        if (number := row["question"]) not in given:
             raise ArgumentError(
-                f"{path}: question {row['question']}: expected one rank of {row['option']}, got two; {ADVICE}"
+                f"{path}: expected questions 1 to {len(given)}, got question {number}; {ADVICE}"
             )
-        given[row["question"]][row["option"]] = row["rank"]
-    numbers = [str(number) for number in range(1, len(study.questions) + 1)]
-    for number in given:
-        if number not in numbers:
-            raise ArgumentError(
-                f"{path}: expected questions 1 to {len(numbers)}, got question {number}; {ADVICE}"
-            )
+        given[number].append((row["option"], row["rank"]))
     ranks = [
         ranks_of(f"{path}: question {number}", question, given[number])
-        for number, question in zip(numbers, study.questions, strict=True)
+        for number, question in zip(given, study.questions, strict=True)
     ]
     return Ballot(own, ranks)
 
@@ -92,8 +84,8 @@ def read_ballot(study: Study, path: Path) -> Ballot:
 def rows_of(path: Path) -> list[dict[str, str]]:
     """Return the lines of a ballot by column, at least one."""
     with reading(path, WHAT, ADVICE):
-        if path.stat().st_size > LARGEST:
-            raise ArgumentError(f"{path}: expected {WHAT} of at most {LARGEST} bytes; is it another file?")
+        if path.stat().st_size > MOST_BYTES:
+            raise ArgumentError(f"{path}: expected {WHAT} of at most {MOST_BYTES} bytes; is it another file?")
         lines = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
     header, *rows = lines or [[]]
     if header != COLUMNS or any(len(row) != len(COLUMNS) for row in rows) or not rows:
@@ -101,16 +93,14 @@ def rows_of(path: Path) -> list[dict[str, str]]:
     return [dict(zip(COLUMNS, row, strict=True)) for row in rows]
 
 
-def ranks_of(where: str, question: Question, given: Mapping[str, str]) -> list[int]:
-    """Return the rank of each option of a question."""
-    for letter in given:
-        if letter not in tuple(question.letters):
-            raise ArgumentError(
-                f"{where}: expected options {question.letters[0]} to {question.letters[-1]}, got {letter}; "
-                f"{ADVICE}"
-            )
-    count = len(question.letters)
-    if sorted(given.values()) != sorted(str(rank) for rank in range(1, count + 1)):
-        got = ", ".join(f"{letter} {given.get(letter, 'none')}" for letter in question.letters)
-        raise ArgumentError(f"{where}: expected each rank from 1 to {count} once, got {got}; {ADVICE}")
-    return [int(given[letter]) for letter in question.letters]
+def ranks_of(where: str, question: Question, given: Sequence[tuple[str, str]]) -> list[int]:
+    """Return the rank of each option of a question, of which a ballot has options and ranks."""
+    count, ranks = len(question.letters), dict(given)
+    expected = sorted(str(rank) for rank in range(1, count + 1))
+    if sorted(option for option, _ in given) != list(question.letters) or sorted(ranks.values()) != expected:
+        got = ", ".join(f"{option} {rank}" for option, rank in given) or "none"
+        raise ArgumentError(
+            f"{where}: expected ranks from 1 to {count}, one for each of {', '.join(question.letters)}, got "
+            f"{got}; {ADVICE}"
+        )
+    return [int(ranks[letter]) for letter in question.letters]

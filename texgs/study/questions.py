@@ -15,7 +15,7 @@ from typing import Any
 from texgs.core.errors import ArgumentError
 from texgs.core.io import is_there, read_json, reading, write_json
 from texgs.core.keys import typed
-from texgs.core.names import SCENE
+from texgs.core.names import SCENE, STYLE
 from texgs.report.metrics_files import Record, of
 from texgs.report.results import EditResult, FitResult, SceneResult
 
@@ -117,7 +117,7 @@ def question_of(
     ]
     order.shuffle(options)
     original = original_of(first.dataset, {fit_of(record) for record in looks}, records)
-    names = [name for name in first.facts.get("pictures", {}) if name.startswith("style")]
+    names = [name for name in first.facts.get("pictures", {}) if name.startswith(STYLE)]
     pictures = [first.path.with_name(name).as_posix() for name in names]
     followed = dict(first.result.followed)
     return Question(first.dataset, first.result.follows, followed, original.as_posix(), pictures, options)

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from texgs.study.questions import Compared
 
-if TYPE_CHECKING:
-    from scipy.stats._result_classes import BinomTestResult
-
-CONFIDENCE = 0.95  # of intervals
+CONFIDENCE = 0.95  # level of intervals
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,14 +50,14 @@ def pooled(several: Sequence[Rankings]) -> Rankings:
     return Rankings(several[0].methods, np.sum([each.counts for each in several], axis=0), ranks)
 
 
-def firsts(votes: Rankings) -> list[BinomTestResult]:
+def firsts(votes: Rankings) -> list[Any]:
     """Test the share of first ranks of each method exactly, against being as often the best as each other."""
     from scipy.stats import binomtest  # slow to import
 
     return [binomtest(first, votes.number, 1 / len(votes.methods)) for first in votes.counts[:, 0].tolist()]
 
 
-def interval(first: BinomTestResult) -> tuple[float, float]:
+def interval(first: Any) -> tuple[float, float]:
     """Return the exact (Clopper-Pearson) interval of a share."""
     low, high = first.proportion_ci(CONFIDENCE, method="exact")
     return float(low), float(high)

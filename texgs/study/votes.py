@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 METHODS = {"style": "image_npse", "instruction": "text_npse"}  # the paper's files that name those of a kind
 PUBLISHED = ("best", "second_best", "second_worst", "worst")  # columns of the paper's file
-BEFORE = ("kind", "data set", "follows", "recipe", "edit", "method")
-AFTER = (
+LABELS = ("kind", "data set", "follows", "recipe", "edit", "method")
+STATISTICS = (
     Column("mean rank", 2, UNPUBLISHED),
     Column("first", 2, UNPUBLISHED),
     Column("from", 2, UNPUBLISHED),
@@ -38,11 +38,11 @@ AFTER = (
     Column("chi2 (Friedman)", 2, UNPUBLISHED),
     Column("p (Friedman)", None, UNPUBLISHED),
 )
-THE_PAPER = "the paper"  # in place of an edit
+THE_PAPER = "the paper"  # edit in rows of its votes
 NO_BALLOTS = "only counts are published"
-TWO = "needs three methods"
+TOO_FEW_METHODS = "needs three methods"
 WIDTH, DPI = 5.0, 150  # inches of a chart
-BAR, AROUND = 0.35, 1.0  # inches of a bar, and of what is above and below all of a chart
+BAR_HEIGHT, CHART_MARGIN = 0.35, 1.0  # inches of a bar, and of what is above and below all of a chart
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,17 +66,17 @@ def user_study(votes: Votes | None) -> Table:
 
     Votes are added up over the data sets on which the same methods were compared.
     """
-    groups = compared(votes)
+    groups = panels_by_kind(votes)
     ranks = max(len(panels[0].votes.methods) for _, panels in groups)
     rows = [row for kind, panels in groups for row in rows_of(kind, panels)]
     numbered = [Column(f"rank {rank}", 0, UNPUBLISHED) for rank in range(1, ranks + 1)]
-    names = [Column(title, None, UNPUBLISHED) for title in BEFORE]
-    return Table(caption(votes), [*names, *numbered, *AFTER], rows)
+    names = [Column(title, None, UNPUBLISHED) for title in LABELS]
+    return Table(caption(votes), [*names, *numbered, *STATISTICS], rows)
 
 
-def compared(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
+def panels_by_kind(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
     """Return kinds of questions, each with all that compare the same methods; the paper's follow ours."""
-    ours, theirs = counted(votes) if votes else {}, published()
+    ours, theirs = panels_of_study(votes) if votes else {}, panels_of_paper()
     return [
         (KINDS[follows], panels)
         for follows in KINDS
@@ -85,7 +85,7 @@ def compared(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
     ]
 
 
-def counted(votes: Votes) -> dict[str, list[Panel]]:
+def panels_of_study(votes: Votes) -> dict[str, list[Panel]]:
     """Return the votes of each question, by what methods follow there."""
     panels: dict[str, list[Panel]] = defaultdict(list)
     for place, question in enumerate(votes.study.questions):
@@ -96,7 +96,7 @@ def counted(votes: Votes) -> dict[str, list[Panel]]:
     return panels
 
 
-def published() -> dict[str, list[Panel]]:
+def panels_of_paper() -> dict[str, list[Panel]]:
     """Return the paper's votes, by what its methods follow."""
     keys, numbers = ({name: name for name in names} for names in (("dataset", "method"), PUBLISHED))
     votes = paper("user_study", keys, numbers)
@@ -138,7 +138,7 @@ def rows_of(kind: str, panels: Sequence[Panel]) -> list[dict[str, Any]]:
     test, edits = friedman(votes), {method.edit for method in votes.methods}
     rows.append({**every, "follows": "-", "recipe": "-", "method": "all"})
     rows[-1]["edit"] = edits.pop() if len(edits) == 1 else "-"
-    rows[-1]["p (Friedman)"] = NO_BALLOTS if votes.ranks is None else TWO
+    rows[-1]["p (Friedman)"] = NO_BALLOTS if votes.ranks is None else TOO_FEW_METHODS
     if test is not None:
         rows[-1] |= {"chi2 (Friedman)": test[0], "p (Friedman)": f"{test[1]:.2g}"}
     return rows
@@ -173,8 +173,8 @@ def caption(votes: Votes | None) -> str:
 
 def write_votes(path: str | Path, votes: Votes | None) -> Path:
     """Write a PNG with a chart for each kind of question, ours and the paper's below each other."""
-    charts = compared(votes)
-    heights = [AROUND + BAR * len(panels[0].votes.methods) for _, panels in charts]
+    charts = panels_by_kind(votes)
+    heights = [CHART_MARGIN + BAR_HEIGHT * len(panels[0].votes.methods) for _, panels in charts]
     figure = new_figure(WIDTH, sum(heights), DPI)
     places = figure.subplots(len(charts), squeeze=False, height_ratios=heights)[:, 0]
     for axes, (kind, panels) in zip(places, charts, strict=True):
@@ -182,7 +182,7 @@ def write_votes(path: str | Path, votes: Votes | None) -> Path:
     return write_figure(path, figure)
 
 
-def shown(votes: Votes | None) -> Figure:
+def votes_figure(votes: Votes | None) -> Figure:
     """Return the figure as a report has it."""
     with TemporaryDirectory() as folder, Image.open(write_votes(Path(folder, "votes.png"), votes)) as picture:
         command = "texgs votes" if votes else ""

@@ -14,9 +14,9 @@ from texgs.fields.part_edit import NEEDS, PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.raster.shading import MATERIAL
 from texgs.scene.bounds import STRAYS, models_of, span_of
-from texgs.scene.frame import Mode
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import plain_functions
+from texgs.scene.shot import Mode
 from texgs.volume.grid import closest
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.space import LETTERS, Space

@@ -1,6 +1,5 @@
 """Files of a scene that a page saves: films, and what `texgs export` writes."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from math import exp, log
 from pathlib import Path
@@ -8,65 +7,62 @@ from pathlib import Path
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.core.movie import write_frames
 from texgs.core.names import EXPORTS
-from texgs.core.progress import progress
 from texgs.fields.files import kind_of
-from texgs.scene import export
+from texgs.scene import export_keys
+from texgs.scene.film import Film
 from texgs.scene.scene import Scene
+from texgs.viewer import PAGE_VOLUME
+from texgs.viewer.export import export
 from texgs.viewer.frames import Frames
 from texgs.viewer.messages import Export, Orbit
-from texgs.viewer.page_volume import page_volume
-from texgs.viewer.scratch import scratch_folder
 from texgs.viewer.shared_edits import SharedEdits
-from texgs.viewer.standalone import write_page
 
 FILMS = ("mp4", "gif")
-PAGES = ("html", "volume")  # the second has the volume of its scene
 
 
 class Downloads:
-    """Writes files into a folder of its own, which is removed in the end."""
+    """Writes files into a folder of its own."""
 
-    def __init__(self, frames: Frames, edits: SharedEdits) -> None:
-        self._frames, self._edits = frames, edits
-        self._folder = scratch_folder()
+    def __init__(self, frames: Frames, edits: SharedEdits, folder: Path) -> None:
+        self._frames, self._edits, self._folder = frames, edits, folder
+        folder.mkdir()
 
-    def write(self, scene: Scene, asked: Export, name: str) -> Path:
-        """Return the file of a scene as it is shown; the name is without its ending."""
+    def write(self, scene: Scene, asked: Export, name: str) -> tuple[Path, list[str]]:
+        """Write a scene as it is shown; return the file, and what is to be told of it.
+
+        Args:
+            scene: to write.
+            asked: what, and how.
+            name: of the file, without its ending.
+        """
         require_kind(scene, asked.kind)
-        ending = ".html" if asked.kind in PAGES else EXPORTS.get(asked.kind, [f".{asked.kind}"])[0]
-        stem = f"{name}-{asked.kind}" if ending == ".ply" else name  # there are several kinds of these
-        path = Path(self._folder.name, f"{stem}{ending}")
-        if asked.kind in FILMS:
-            words = self._edits.checked(scene)
-            return write_frames(path, self._film(scene, asked), asked.fps, comment=words)
-        if asked.kind in PAGES:
-            volume = page_volume(scene) if asked.kind == "volume" else None
-            write_page(path, scene, name, self._edits.checked(scene), volume, asked.steps)
-            return path
-        return export.export_scene(path, scene, export.Export(asked.kind))
+        kind, volume = ("html", PAGE_VOLUME) if asked.kind == "volume" else (asked.kind, None)
+        ending = EXPORTS.get(kind, [f".{kind}"])[0]
+        stem = f"{name}-{kind}" if ending == ".ply" else name  # there are several kinds of these
+        path, words = self._folder / f"{stem}{ending}", self._edits.checked(scene)
+        if kind in FILMS:
+            view, film = replace(asked.view, transparent=False), film_of(asked)
+            frames = (self._frames.pixels(replace(view, camera=each), scene) for each in way_of(asked))
+            return film.write(path, frames, words, title="film"), []
+        keys = export_keys.Export(kind, volume=volume, steps=asked.steps if kind == "html" else "all")
+        return path, export(path, scene, keys, words, name)
 
     def file(self, name: str) -> Path | None:
         """Return a file that was written, if there is one of this name."""
-        return next((path for path in Path(self._folder.name).iterdir() if path.name == name), None)
+        return next((path for path in self._folder.iterdir() if path.name == name), None)
 
-    def close(self) -> None:
-        """Remove all files."""
-        self._folder.cleanup()
 
-    def _film(self, scene: Scene, asked: Export) -> Iterator[np.ndarray]:
-        """Yield frames of a film."""
-        view = replace(asked.view, transparent=False)
-        for camera in progress(way_of(asked), title="film", unit="frame"):
-            yield self._frames.pixels(replace(view, camera=camera), scene)
+def film_of(asked: Export) -> Film:
+    """Return how long a film is."""
+    return Film(seconds=asked.seconds, fps=asked.fps)
 
 
 def way_of(asked: Export) -> list[Orbit]:
     """Return the cameras of a film: one turn from its view on, or a smooth way through its stops."""
     from scipy.interpolate import PchipInterpolator
 
-    start, count = asked.view.camera, max(1, round(asked.seconds * asked.fps))
+    start, count = asked.view.camera, film_of(asked).count
     if len(asked.stops) < 2:
         return [replace(start, azimuth=start.azimuth + 360 * index / count) for index in range(count)]
     stops = np.array([[s.azimuth, s.polar, log(s.distance), s.fov_y, *s.target] for s in asked.stops])
@@ -82,7 +78,7 @@ def way_of(asked: Export) -> list[Orbit]:
 def exports_of(scene: Scene) -> list[str]:
     """Return what a scene can be written as."""
     kind = kind_of(next(iter(scene.models.values())).file)
-    able = [*FILMS, *(each for each in kind.exports if each not in export.OF_MODELS)]
+    able = [*FILMS, *(each for each in kind.exports if each not in export_keys.OF_MODELS)]
     has_volume = scene.volume is not None and not scene.volume.has_channels
     return [*able, "volume"] if "html" in able and has_volume else able
 

@@ -31,10 +31,10 @@ from texgs.scene.session import Session
 from texgs.viewer.messages import View
 from texgs.viewer.origins import Origins, fitted, over
 
-SLOW = 0.025  # seconds of a frame above which those of a moving camera have fewer rows and columns
-LEAST = 1 / 3  # part of them that stays
-STEPS = {"volume": 0.5}  # voxels between samples of a volume while something moves, by mode
-COARSE = 1.0  # the same of faces of cuts
+SLOW_FRAME = 0.025  # seconds of a frame above which those of a moving camera have fewer rows and columns
+LEAST_SCALE = 1 / 3  # part of them that stays
+MOVING_STEPS = {"volume": 0.5}  # voxels between samples of a volume while something moves, by mode
+MOVING_CUT_STEP = 1.0  # the same of faces of cuts
 MOVING = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
 SMALL = 300 * 300  # pixels of a picture that is enlarged on the page, and cheap to send as it is
 ENLARGED = (92, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
@@ -56,7 +56,7 @@ class Pace:
 
         What is off by less than a fifth changes nothing, so that the sharpness of a drag does not waver.
         """
-        part = min(max(scale * sqrt(SLOW / seconds), LEAST), 1.0)
+        part = min(max(scale * sqrt(SLOW_FRAME / seconds), LEAST_SCALE), 1.0)
         if scale == self.part and (part == 1 or not 0.8 < part / scale < 1.25):
             self.part = part
 
@@ -108,7 +108,7 @@ class Frames:
         """Return what a view shows, with sides of this part of the pixels, and what is measured of it."""
         if view.mode == "truth" or view.mode == "difference" or view.mode == "wipe":
             return self._beside.frame(view, scene, scale)
-        step = STEPS.get(view.mode, COARSE) if view.moving else None
+        step = MOVING_STEPS.get(view.mode, MOVING_CUT_STEP) if view.moving else None
         camera, transparent = view.camera.camera(scale), view.transparent
         return self._session.frame(camera, view.mode, scene, step, transparent=transparent), {}
 
@@ -147,17 +147,17 @@ class Beside:
         if scene.volume is not None:
             image, truth = self._session.beside(camera, scene)
             says_nothing = view.moving or scene.shows_volume
-            return shown(view, image.color, truth.color), {} if says_nothing else compare(image, truth)
+            return comparison(view, image.color, truth.color), {} if says_nothing else compare(image, truth)
         if view.mode == "wipe":
             raise ArgumentError("wipe: expected a scene that names its volume; make it by texgs compose")
         nearest = self._origins.nearest(camera, scene)
         plain = replace(scene, light=nearest.light, cuts=NO_CUTS)
         pair = (self._session.frame(nearest.camera, "shaded", plain), over(nearest, scene.background))
         seen, expected = (torch.from_numpy(each) / 255 for each in pair)
-        return fitted(shown(view, seen, expected), camera.width, camera.height), {}
+        return fitted(comparison(view, seen, expected), camera.width, camera.height), {}
 
 
-def shown(view: View, image: Tensor, truth: Tensor) -> np.ndarray:
+def comparison(view: View, image: Tensor, truth: Tensor) -> np.ndarray:
     """Return what a view shows of two pictures [H, W, 3], uint8.
 
     A difference is that of the worst channel: red where the scene is too bright, blue where it is too dark.

@@ -19,7 +19,7 @@ from texgs.viewer.shared_edits import SharedEdits
 log = logging.getLogger("texgs.viewer")
 MOST_NOTICES = 8  # that wait for a page which does not listen
 BEAT = 5.0  # seconds; a page that hears nothing for some of these takes its connection for broken
-Find = Callable[[Mask | Look, int], Awaitable[Any]]  # what clicks select, or looks for the page of a number
+Find = Callable[[Mask | Look], Awaitable[Any]]  # what clicks select as a message, or a `TriedLook`
 
 
 class Stopped(TexgsError):
@@ -37,10 +37,11 @@ class Page:
         self._notices: deque[dict[str, Any]] = deque(maxlen=MOST_NOTICES)
         self._news: dict[str, dict[str, Any]] = {}  # by type, of each the newest
         self._view: View | None = None
-        self._asked: dict[str, Mask | Look] = {}  # by type, of each the newest that waits
-        self._finding: dict[str, asyncio.Task[None]] = {}
+        self._asked: dict[type[Mask | Look], Mask | Look] = {}  # by type, of each the newest that waits
+        self._finding: dict[type[Mask | Look], asyncio.Task[None]] = {}
         self._tried: Look | None = None  # the newest preview, until it is taken off
         self._trial: dict[str, NewLook] = {}
+        self._shown_looks = deque[Any](maxlen=2)  # whose files stay: a frame of the last may be on its way
         self._pace = Pace()
         self.answered = 0  # messages that change the scene
         self._wake = asyncio.Event()
@@ -57,7 +58,7 @@ class Page:
 
     def find(self, asked: Mask | Look) -> None:
         """Send what clicks select, or show a preview of a look, in place of what was asked for before."""
-        self._asked[asked.type] = asked
+        self._asked[type(asked)] = asked
         if isinstance(asked, Look):
             self._tried = asked
         self._wake.set()
@@ -78,9 +79,9 @@ class Page:
         self._trial = {} if looks is None else {**self._trial, **looks}
         self._tell_newest({"type": "trial", "parts": list(self._trial)})
 
-    def tell(self, text: str, **more: Any) -> None:
+    def tell(self, text: str, level: str = "info", **more: Any) -> None:
         """Send a notice."""
-        self._notices.append({"type": "notice", "text": text, **more})
+        self._notices.append({"type": "notice", "text": text, "level": level, **more})
         self._wake.set()
 
     def tell_error(self, error: Exception, **more: Any) -> None:
@@ -143,12 +144,13 @@ class Page:
     async def _find(self, asked: Mask | Look) -> None:
         """Find what was asked for: it may have to wait for another page, while frames go on."""
         try:
-            found = await self._found(asked, self.number)
+            found = await self._found(asked)
             if isinstance(asked, Mask):
                 self._tell_newest(found)
             elif asked is self._tried:
+                self._shown_looks.append(found)
                 self._trial = {}  # of parts that are no longer chosen
-                self.try_on(found)
+                self.try_on(found.looks)
         except Exception as error:  # whatever it is, the server goes on
             self.tell_error(error, **({"mask": asked.id} if isinstance(asked, Mask) else {}))
         finally:

@@ -11,9 +11,8 @@ from torch.nn import functional as F
 
 from texgs.core.errors import ArgumentError, located
 from texgs.scene.scene import Scene, volume_of
-from texgs.viewer import PAGE_VOLUME
 from texgs.volume.grid import Grid, Triple
-from texgs.volume.nrrd_file import MAKES, open_grid
+from texgs.volume.nrrd_file import REMEDY, open_grid
 
 MEGABYTE = 10**6
 LEVELS = 255  # the largest code of 8 bits
@@ -51,15 +50,12 @@ class PageVolume:
         return {**facts, "appearance": asdict(volume_of(scene).appearance)}
 
 
-def page_volume(scene: Scene, budget: float = PAGE_VOLUME) -> PageVolume:
+def page_volume(scene: Scene, budget: float) -> PageVolume:
     """Return the volume that a scene names, with as many samples as a budget in MB holds.
 
     Raises:
-        ArgumentError: if the scene names no volume, it cannot be read or has several channels, or the budget
-            is none.
+        ArgumentError: if the scene names no volume, or it cannot be read or has several channels.
     """
-    if not isinstance(budget, int | float) or not 0 < budget < np.inf:
-        raise ArgumentError(f"volume: expected a size in MB above 0, got {budget!r}")
     source = volume_of(scene)
     if source.has_channels:
         raise ArgumentError(
@@ -137,7 +133,7 @@ def extremes(values: np.ndarray) -> tuple[float, float]:
     low, high = (float(end) for end in (np.min(ends), np.max(ends)))
     if not -np.inf < low < high < np.inf:
         raise ArgumentError(
-            f"expected finite samples of two values at least, got {low:g} to {high:g}; {MAKES}"
+            f"expected finite samples of two values at least, got {low:g} to {high:g}; {REMEDY}"
         )
     return low, high
 

@@ -2,8 +2,12 @@
 
 import base64
 import io
+from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, replace
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,21 +17,21 @@ from torch import Tensor
 
 from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import TexgsError
-from texgs.edit.clicks import Clicks, inside_of, places_of
-from texgs.edit.lift import Lifted, lift, view_mask
-from texgs.edit.new_segment import clicked_model
+from texgs.edit.clicks import Clicks, inside_of
+from texgs.edit.lift import Lifted
+from texgs.edit.mask_keys import MaskKeys
+from texgs.edit.new_segment import clicked_mask, clicked_model, new_segment
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
 from texgs.models.sam import mask_model
 from texgs.scene.parts import entry_of, split
 from texgs.scene.scene import Scene
-from texgs.scene.session import state_of
+from texgs.scene.session import Session, last_of, state_of
 from texgs.viewer.messages import Clicked, Mask, Segment
-from texgs.volume.cameras import icosphere_of
 
-VIEWS, SIZE = 42, 512  # that vote, as `texgs segment` has them, and pixels of their sides
-COLOR = (170, 0, 255, 150)  # over what is masked
+VOTING = MaskKeys()  # views that vote, and how, as for `texgs segment`
+MASK_COLOR = (170, 0, 255, 150)  # over what is masked
 CHOICES = ("mobile_sam", "grabcut")  # the first whose weights are here
 
 
@@ -36,30 +40,28 @@ class Segmenter:
 
     def __init__(self, device: torch.device | str = "cpu") -> None:
         self._device = torch.device(device)
-        self._masks: MaskModel | None = None
-        self._opened: tuple[list[object], Surfels] | None = None  # states of its files
+        self._opened = deque[tuple[object, Surfels]](maxlen=1)  # for the next click on the same model
 
     def mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
         """Return the mask of a view as a message with a PNG picture, which is transparent elsewhere."""
-        model, clicks = self._model(scene, asked.model), self._clicks(asked)
-        places_of(model, clicks)  # they have to be on the model
-        mask = view_mask(model, clicks, self._mask_model(), scene.light)
-        return {"type": "mask", "id": asked.id, "picture": picture_of(mask), "by": self._mask_model().name}
+        entry_of(scene, asked.model)
+        name, masks = split(scene, asked.model)[0], self._masks
+        states = [state_of(file) for file in scene.models[name].files]
+        model = last_of(self._opened, states, lambda: clicked_model(scene, name, self._device))
+        mask = clicked_mask(model, self._clicks(asked), masks, scene.light)
+        return {"type": "mask", "id": asked.id, "picture": picture_of(mask), "by": masks.name}
 
-    def lift(self, scene: Scene, asked: Segment) -> Lifted:
-        """Return the surfels that masks of many views agree on, which have the scene's light."""
-        model = self._model(scene, split(scene, asked.part)[0])
-        lens = scene.framed().lens().square(SIZE)
-        cameras = [camera.to(self._device) for camera in icosphere_of(VIEWS, lens)]
-        clicks, masks, title = self._clicks(asked), self._mask_model(), f"segment {asked.part}"
-        return lift(model, clicks, cameras, masks, light=scene.light, title=title)
-
-    def facts(self, asked: Segment) -> dict[str, Any]:
-        """Return what a segment comes from, for its file."""
-        name = "" if self._masks is None else self._masks.name
+    def segment(self, session: Session, asked: Segment, file: Callable[[], Path]) -> Lifted:
+        """Make a segment of what clicks select, whose file gets the place that is free in the end."""
         on, off = ([[x, y] for x, y, is_on in asked.points if is_on == sign] for sign in (True, False))
-        shown = {"camera": asdict(asked.camera), "point": on, "other": off, "outline": asked.outline}
-        return {**shown, "masks": name, "vote": "contribution"}
+        facts = {"camera": asdict(asked.camera), "point": on, "other": off, "outline": asked.outline}
+        made = new_segment(
+            *(session, asked.part, self._clicks(asked), VOTING, session.scene.framed().lens(), file),
+            {**facts, "masks": self._masks.name},
+            masks=self._masks,
+            title=f"segment {asked.part}",
+        )
+        return made.lifted
 
     def _clicks(self, clicked: Clicked) -> Clicks:
         """Return the clicks of a page."""
@@ -69,23 +71,13 @@ class Segmenter:
         held = inside_of(torch.tensor(outline, device=self._device), camera) if outline else None
         return Clicks(camera, points, positive, held)
 
-    def _model(self, scene: Scene, name: str) -> Surfels:
-        """Return a model with its textures, kept for the next click."""
-        entry_of(scene, name)
-        model = scene.models[split(scene, name)[0]]
-        states: list[object] = [state_of(file) for file in model.files]
-        if self._opened is None or self._opened[0] != states:
-            self._opened = (states, clicked_model(scene, name, self._device))
-        return self._opened[1]
-
-    def _mask_model(self) -> MaskModel:
+    @cached_property
+    def _masks(self) -> MaskModel:
         """Return MobileSAM where its weights are, else GrabCut, which has none."""
-        for choice in CHOICES:
-            if self._masks is None:
-                with suppress(TexgsError):
-                    self._masks = mask_model(choice, self._device)
-        assert self._masks is not None, "GrabCut is always there"
-        return self._masks
+        for name in CHOICES[:-1]:
+            with suppress(TexgsError):
+                return mask_model(name, self._device)
+        return mask_model(CHOICES[-1], self._device)
 
 
 def isolated(scene: Scene, name: str) -> Scene:
@@ -102,7 +94,7 @@ def isolated(scene: Scene, name: str) -> Scene:
 def picture_of(mask: Tensor) -> str:
     """Return a mask [H, W] bool as the address of a PNG picture."""
     pixels = np.zeros((*mask.shape, 4), dtype=np.uint8)
-    pixels[mask.cpu().numpy()] = COLOR
+    pixels[mask.cpu().numpy()] = MASK_COLOR
     file = io.BytesIO()
     Image.fromarray(pixels).save(file, format="PNG")
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"

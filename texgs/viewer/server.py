@@ -23,7 +23,7 @@ from texgs.viewer.messages import Cancel, Export, Fit, Look, Mask, Message, Pick
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
-from texgs.viewer.styles import LARGEST
+from texgs.viewer.styles import LARGEST_PICTURE
 from texgs.viewer.work import Work
 
 WEB = Path(__file__).parent / "web"
@@ -54,8 +54,8 @@ class Server:
         self._origins = Origins(opened.scene)
         self._beside = Beside(session, self._origins)
         self.frames = Frames(session, self._beside)
-        self._changing = asyncio.Lock()  # jobs give what they have made in another thread
-        self.work = Work(self.frames, self.edits, self._changing, self.tell_all, device, styles)
+        self._changing = asyncio.Lock()  # changes are made in other threads, one after the other
+        self.work = Work(self.frames, self.edits, self.tell_all, device, styles)
         self._choices = {
             "styles": self.work.styles.names,
             "words": list(WORDS),
@@ -71,7 +71,7 @@ class Server:
 
         Other pages, such as notebooks, may show pages that are framed.
         """
-        app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST)
+        app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST_PICTURE)
         handlers = {
             "": self.index,
             "socket": self.socket,
@@ -106,7 +106,7 @@ class Server:
             await self._listen(socket, page)
         finally:
             del self._pages[page]
-            self.work.forget(page)
+            self.work.stop(page)
             for each in sending:
                 each.cancel()
             await asyncio.gather(*sending, return_exceptions=True)
@@ -126,7 +126,7 @@ class Server:
 
     async def still(self, request: web.Request) -> web.StreamResponse:
         """Return a PNG file of the view in the query on its page, as `texgs render` writes it."""
-        view = parse(request.query.get("view", ""), messages.VIEWS)
+        view = parse(request.query.get("view", ""), View)
         scene = self._shown(view, request.query.get("page", ""))
         words = await asyncio.to_thread(self.edits.checked, scene)
         png = await self.frames.still(view, scene, words)
@@ -135,7 +135,7 @@ class Server:
 
     async def thumbnail(self, request: web.Request) -> web.StreamResponse:
         """Return a small view of the scene with a picture laid on."""
-        asked = parse(request.query.get("look", ""), messages.LOOKS)
+        asked = parse(request.query.get("look", ""), Look)
         picture = await self.work.thumbnail(replace(asked, preview=True))  # never by a full recipe
         return web.Response(body=picture, content_type="image/jpeg")
 
@@ -172,7 +172,7 @@ class Server:
         elif isinstance(message, Mask) or (isinstance(message, Look) and message.preview):
             page.find(message)
         elif isinstance(message, Segment | Look | Fit | messages.Keep | Export):
-            await self.work.begin(message, page)
+            self.work.begin(message, page)
         elif isinstance(message, Cancel):
             if not message.preview:
                 self.work.stop(page)
@@ -183,7 +183,7 @@ class Server:
                     if isinstance(message, Save):
                         await self._save(message, page)
                     else:
-                        self.edits.change(message, page.number)
+                        await asyncio.to_thread(self.edits.change, message, page.number)
             finally:
                 page.answered += 1
             self.tell_all()
@@ -200,7 +200,7 @@ class Server:
             page.tell(f"{message.name} is there already.", level="question", name=message.name)
             return
         path = await asyncio.to_thread(self.edits.save, message.name)
-        page.tell(f"Saved as {path}", level="info")
+        page.tell(f"Saved as {path}")
 
     def _shown(self, view: View, number: str) -> Scene:
         """Return what a view shows on the page of a number; on none, what all pages share."""

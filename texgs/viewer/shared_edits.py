@@ -6,13 +6,8 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from torch import Tensor
-
 from texgs.core.errors import ArgumentError
 from texgs.core.names import METRICS, SCENE, SCENES, file_name, new_part_file
-from texgs.edit.function_model import with_model
-from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.model_file import write_model
 from texgs.report.check import checked
 from texgs.scene.copied import require_files, write_copy
 from texgs.scene.parts import NewLook, part_names, with_looks
@@ -21,8 +16,8 @@ from texgs.scene.scene_file import read_scene, scene_path, write_scene
 from texgs.scene.session import SCENE_KEYS, Session, files_of, state_of
 from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
-from texgs.volume.transfer import TransferFunction
 
+LONGEST_TITLE = 300  # letters
 Change = Edit | Undo | Redo | Rename | Remove
 
 
@@ -63,7 +58,7 @@ class SharedEdits:
     """The scene that all pages edit, and where it is saved."""
 
     def __init__(self, session: Session, opened: Opened) -> None:
-        self._session, self._folder, self._copies = session, opened.folder, opened.copies
+        self.session, self._folder, self._copies = session, opened.folder, opened.copies
         self.name, self._source = opened.name, opened.source
         self._title = opened.title or title_of(opened.source)
         files = [opened.file.resolve()] if opened.file else []
@@ -75,7 +70,7 @@ class SharedEdits:
     @property
     def scene(self) -> Scene:
         """Return the scene as it is now."""
-        return self._session.scene
+        return self.session.scene
 
     def checked(self, scene: Scene) -> str:
         """Return what `texgs check` has found of the models of a scene, if anything."""
@@ -102,8 +97,8 @@ class SharedEdits:
     def state(self) -> dict[str, Any]:
         """Return what pages show of the history, JSON."""
         return {
-            "past": self._session.past,
-            "future": self._session.future,
+            "past": self.session.past,
+            "future": self.session.future,
             "saved": self.is_saved,
             "file": self.name,
             "folder": str((self._copies or self._folder).resolve()),
@@ -112,7 +107,7 @@ class SharedEdits:
 
     def change(self, asked: Change, author: int) -> None:
         """Make a change; edits with the same number by the same author are one step."""
-        session, step = self._session, None
+        session, step = self.session, None
         with session.lock:
             if isinstance(asked, Undo):
                 session.undo()
@@ -131,43 +126,13 @@ class SharedEdits:
                 is_latest = self._latest[0] == step and self._latest[1] is self.scene
                 goes_on = step is not None and is_latest and session.undo()
                 try:
-                    with session.one_step(lambda: asked.title):
+                    with session.one_step(asked.title[:LONGEST_TITLE]):
                         self._edit(asked)
                 except Exception:
                     if goes_on:
                         session.redo()
                     raise
             self._latest = step, self.scene
-
-    def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:
-        """Write the file of a new segment, and add it."""
-        file = new_part_file("segment", self._folder, Path(self.name).stem, part)
-        with self._session.one_step(f"{part} new"):
-            self._session.make_segment(part, mask, file, facts)
-
-    def give_looks(self, looks: Mapping[str, NewLook], name: str) -> list[str]:
-        """Give parts new looks, and back the palettes these were made for; return parts that are gone."""
-        with self._session.lock:
-            names = part_names(self.scene)
-            there = {part: look for part, look in looks.items() if part in names}
-            with self._session.one_step(f"{', '.join(there)} {name}"):
-                if there:
-                    self._session.set_looks(there)
-        return [part for part in looks if part not in names]
-
-    def give_model(self, name: str, model: Surfels, tf: TransferFunction, before: Path | None) -> Path | None:
-        """Write a model and put it in the place of its function, or of the model in the file `before`.
-
-        Return its file; None where that is not there any more.
-        """
-        with self._session.one_step(f"{name} {'model' if before is None else 'finer model'}"):
-            scene, entry = self.scene, self.scene.models.get(name)
-            is_there = scene.functions.get(name) == tf if before is None else entry and entry.file == before
-            if not is_there:
-                return None
-            file = write_model(new_part_file("model", self._folder, Path(self.name).stem, name), model)
-            self._session.set_scene(with_model(scene, name, file, tf))
-            return file
 
     def path_of(self, name: str) -> Path:
         """Return the scene file of a name in the folder for saving, or of a folder of that name there."""
@@ -195,6 +160,10 @@ class SharedEdits:
         self._own[path.resolve()] = state_of(path.resolve())
         return path
 
+    def new_file(self, where: str, part: str) -> Path:
+        """Return the file of a new part that is not there yet."""
+        return new_part_file(where, self._folder, Path(self.name).stem, part)
+
     def new_folder(self, kind: str) -> Path:
         """Return a folder for the files of a new look that is not there yet."""
         stem = Path(self.name).stem
@@ -211,7 +180,7 @@ class SharedEdits:
 
     def _edit(self, edit: Edit) -> None:
         """Change one value of a part or of the scene."""
-        session, value = self._session, edit.value
+        session, value = self.session, edit.value
         if not edit.part:
             session.set_of_scene(edit.key, SCENE_KEYS.get(edit.key) if value is None else value)
         elif value is None:

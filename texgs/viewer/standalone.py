@@ -19,7 +19,7 @@ from texgs import __version__
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import write_bytes
-from texgs.fields.surfels.compact import STEP, compact_tensors
+from texgs.fields.surfels.compact import TEXEL_STEP, compact_tensors
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
@@ -171,7 +171,7 @@ def pack(composition: Composition) -> str:
             own["labels"] = part.labels.cpu().numpy().astype(np.uint8 if part.segments < 256 else np.int32)
         tensors |= {f"{number}.{name}": values for name, values in own.items()}
     optics = [asdict(part.model.shading) for part in composition.parts]
-    facts = {"models": optics, "low_pass": composition.options.low_pass, "step": STEP}
+    facts = {"models": optics, "low_pass": composition.options.low_pass, "step": TEXEL_STEP}
     # One entry: safetensors writes several in any order.
     return b64encode(zlib.compress(save(tensors, {"optics": json.dumps(facts)}), 9)).decode()
 
@@ -179,9 +179,9 @@ def pack(composition: Composition) -> str:
 def require_range(texels: Tensor) -> None:
     """Require texels [T, 3] that 16 bits hold."""
     largest = float(texels.abs().max()) if len(texels) else 0.0
-    if largest > MOST_STEPS * STEP:
+    if largest > MOST_STEPS * TEXEL_STEP:
         raise ArgumentError(
-            f"texels: expected at most {MOST_STEPS * STEP:g}, got {largest:g}; fit the texture again"
+            f"texels: expected at most {MOST_STEPS * TEXEL_STEP:g}, got {largest:g}; fit the texture again"
         )
 
 

@@ -12,32 +12,30 @@ from texgs.core.image import FORMATS
 from texgs.core.names import file_name
 from texgs.edit.style_picture import read_style
 from texgs.models.pictures import PICTURES
-from texgs.viewer.scratch import scratch_folder
 
-LARGEST = 32 * 2**20  # bytes of a picture that a page sends
-MOST = 50  # pictures of a folder, and of pages
+LARGEST_PICTURE = 32 * 2**20  # bytes of a picture that a page sends
+MOST_PICTURES = 50  # pictures of a folder, and of pages
 MOST_PIXELS = 50_000_000  # of one: more takes many seconds to read, at each preview again
 
 
 class Styles:
-    """Pictures by name: those that texgs has, those of a folder, and files that pages send.
+    """Pictures by name: those that texgs has, those of a folder, and files that pages send."""
 
-    The latter are kept as long as this is.
-    """
-
-    def __init__(self, folder: Path | None = None) -> None:
+    def __init__(self, scratch: Path, folder: Path | None = None) -> None:
         self._own = {} if folder is None else pictures_in(folder)
-        self._folder = scratch_folder()
+        self._scratch = scratch  # for the files of pages
         self._files: dict[str, Path] = {}
         self._adding = Lock()  # pages may send several at once
 
     def add(self, name: str, content: bytes) -> str:
         """Take in a file, with the name that its author gave it; return the name that it has from then on."""
         with self._adding:
-            if len(self._files) >= MOST:
-                raise ArgumentError(f"style: expected at most {MOST} pictures, got another one; start again")
+            if len(self._files) >= MOST_PICTURES:
+                expected = f"expected at most {MOST_PICTURES} pictures"
+                raise ArgumentError(f"style: {expected}, got another one; start again")
             known = f"{len(self._files) + 1} {file_name('style', name)}"
-            path = Path(self._folder.name, known)
+            path = self._scratch / known
+            self._scratch.mkdir(exist_ok=True)
             path.write_bytes(content)
             try:
                 require_readable(path)
@@ -63,10 +61,6 @@ class Styles:
         require_readable(path)
         return str(path)
 
-    def close(self) -> None:
-        """Remove the files."""
-        self._folder.cleanup()
-
 
 def pictures_in(folder: Path) -> dict[str, Path]:
     """Return the files of a folder that are pictures by their endings, by name."""
@@ -76,9 +70,11 @@ def pictures_in(folder: Path) -> dict[str, Path]:
         raise ArgumentError(f"--styles: expected a folder, got {folder} ({error.strerror})") from error
     endings = {end for end, kind in Image.registered_extensions().items() if kind in FORMATS}
     pictures = {path.name: path for path in files if path.suffix.lower() in endings}
-    if not 0 < len(pictures) <= MOST:
-        few = f"expected 1 to {MOST} pictures (.png, .jpg, .webp, ...) in {folder}, got {len(pictures)}"
-        raise ArgumentError(f"--styles: {few}; name a folder with {'fewer' if pictures else 'some'}")
+    if not 0 < len(pictures) <= MOST_PICTURES:
+        raise ArgumentError(
+            f"--styles: expected 1 to {MOST_PICTURES} pictures (.png, .jpg, .webp, ...) in {folder}, got "
+            f"{len(pictures)}; name a folder with {'fewer' if pictures else 'some'}"
+        )
     return pictures
 
 

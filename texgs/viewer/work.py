@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,23 +15,24 @@ from typing import Any, TypeVar
 import torch
 
 from texgs.config.kept_function import keep
-from texgs.core.errors import ArgumentError, located
-from texgs.core.names import part_file, require_name
-from texgs.core.progress import watched
-from texgs.edit.function_model import models_of, overlap_of, tried
-from texgs.fields.surfels.model import Surfels
-from texgs.scene import export
-from texgs.scene.parts import NewLook, entry_of, require_new, split
-from texgs.viewer.downloads import FILMS, PAGES, Downloads, require_kind
+from texgs.core.errors import ArgumentError
+from texgs.core.progress import let_stop, watched
+from texgs.edit.function_model import FIRST, fit_function, overlap_of
+from texgs.scene.parts import NewLook
+from texgs.scene.scene import Scene
+from texgs.viewer.downloads import Downloads
 from texgs.viewer.frames import Frames
-from texgs.viewer.looks import Looks, looks_of, with_parts
+from texgs.viewer.looks import Looks
 from texgs.viewer.messages import Export, Fit, Keep, Look, Mask, Segment
 from texgs.viewer.page import Page, Stopped
+from texgs.viewer.scratch import scratch_folder
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import Styles
 
 T = TypeVar("T")
+Job = Segment | Look | Fit | Keep | Export
+Call = Callable[..., object]
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,7 @@ class Jobs:
         def watched_work() -> T:
             torch.set_num_threads(threads)
             with watched(step):
-                result = work()
-            if watch.stop.is_set():  # after the last step, or there was none
-                raise Stopped("It was cancelled; nothing has changed.")
-            return result
+                return work()
 
         return await loop.run_in_executor(self._thread, watched_work)
 
@@ -78,74 +76,50 @@ class Jobs:
 
 
 class Work:
-    """Does one job at a time, which adds to edits; `changing` is held meanwhile, then `changed` called."""
+    """Does one job at a time, which edits the shared scene; `changed` is called whenever one has."""
 
     def __init__(
         self,
         frames: Frames,
         edits: SharedEdits,
-        changing: asyncio.Lock,
         changed: Callable[[], None],
         device: torch.device | str,
         styles: Path | None = None,
     ) -> None:
-        self._edits, self._changing, self._changed = edits, changing, changed
-        self._device = device
+        self._edits, self._changed, self._device = edits, changed, device
         self._jobs, self._previews, self._thumbnails = Jobs(), Jobs(), Jobs()  # side by side
-        self.styles = Styles(styles)
-        self._segmenter, self._looks = Segmenter(device), Looks(self.styles, device)
-        self.downloads = Downloads(frames, edits)
+        self._scratch = scratch_folder()
+        folder = Path(self._scratch.name)
+        self.styles = Styles(folder / "styles", styles)
+        self._segmenter, self._looks = Segmenter(device), Looks(self.styles, folder / "looks", device)
+        self.downloads = Downloads(frames, edits, folder / "downloads")
         self._task: asyncio.Task[None] | None = None
         self._page: Page | None = None  # that it is for
         self._stop = threading.Event()
 
-    async def find(self, asked: Mask | Look, page: int) -> Any:
-        """Return what clicks select, as a message, after a job of another page; or a preview, beside jobs."""
+    async def find(self, asked: Mask | Look) -> Any:
+        """Return what clicks select, as a message, after a job of another page; or a look, beside jobs."""
         scene = self._edits.scene
         if isinstance(asked, Mask):
             return await self._jobs.run(partial(self._segmenter.mask, scene, asked), Watch())
-        work = partial(self._looks.preview, scene, asked, page)
-        return await self._previews.run(work, Watch(), is_urgent=True)
+        return await self._previews.run(partial(self._looks.tried, scene, asked), Watch(), is_urgent=True)
 
     async def thumbnail(self, asked: Look) -> bytes:
         """Return a small picture of the scene with a look, after those that were asked for before."""
         return await self._thumbnails.run(partial(self._looks.thumbnail, self._edits.scene, asked), Watch())
 
-    async def begin(self, asked: Segment | Look | Fit | Keep | Export, page: Page) -> None:
-        """Begin to make or write something; what is wrong with it is told first."""
-        scene = self._edits.scene
-        match asked:
-            case Segment():
-                require_new(scene, asked.part)
-                name = split(scene, asked.part)[1]
-                require_name(name, "segment")
-                part_file("segment", str(name))
-                job = partial(self._segment, asked, page)
-            case Look():
-                for part in asked.parts:
-                    entry_of(scene, part)
-                edit = await asyncio.to_thread(self._looks.edit_of, asked)  # reads its picture
-                job = partial(self._look, asked, edit, page)
-            case Fit():
-                tried(scene, asked.function)
-                require_name(asked.function, "function")
-                job = partial(self._fit, asked, page)
-            case Keep():
-                job = partial(self._keep, asked, page)
-            case Export():
-                require_kind(scene, asked.kind)
-                job = partial(self._export, asked, page)
-        self._begin(page, job)
+    def begin(self, asked: Job, page: Page) -> None:
+        """Begin to make or write something for a page, unless another job is at work."""
+        if self.is_at_work:
+            of = " for another page: wait for it" if page is not self._page else ": wait for it, or cancel it"
+            raise ArgumentError(f"a job is at work already{of}")
+        self._page, self._stop = page, threading.Event()
+        self._task = asyncio.create_task(self._work(asked, page, Watch(page.tell_job, self._stop)))
 
     @property
     def is_at_work(self) -> bool:
         """Return whether something is being made."""
         return self._task is not None and not self._task.done()
-
-    def forget(self, page: Page) -> None:
-        """Stop the job of a page that is gone, and remove its previews."""
-        self.stop(page)
-        self._looks.forget(page.number)
 
     def stop(self, page: Page | None = None) -> None:
         """Stop the job that is at work, if there is one, and it is for this page or whichever."""
@@ -153,28 +127,21 @@ class Work:
             self._stop.set()
 
     def close(self) -> None:
-        """Stop, and end the thread."""
+        """Stop, end the threads, and remove files that nobody has saved."""
         self.stop()
         for jobs in (self._jobs, self._previews, self._thumbnails):
             jobs.close()
-        self._looks.close()
-        self.downloads.close()
-        self.styles.close()
+        self._scratch.cleanup()
 
-    def _begin(self, page: Page, job: Callable[[Watch], Awaitable[None]]) -> None:
-        """Begin a job for a page, unless another one is at work."""
-        if self.is_at_work:
-            of = " for another page: wait for it" if page is not self._page else ": wait for it, or cancel it"
-            raise ArgumentError(f"a job is at work already{of}")
-        self._page, self._stop = page, threading.Event()
-        self._task = asyncio.create_task(self._work(page, job, Watch(page.tell_job, self._stop)))
-
-    async def _work(self, page: Page, job: Callable[[Watch], Awaitable[None]], watch: Watch) -> None:
+    async def _work(self, asked: Job, page: Page, watch: Watch) -> None:
         """Do a job, and tell its page when it begins, fails and ends."""
+        loop = asyncio.get_running_loop()
         page.tell_job("", 0.0)
         failed = False
         try:
-            await job(watch)
+            work = partial(self._do, asked, page, loop.call_soon_threadsafe)
+            notice = await self._jobs.run(work, watch, is_urgent=isinstance(asked, Fit))
+            page.tell(**notice)
         except Exception as error:  # whatever it is, the server goes on
             page.tell_error(error)
             failed = True
@@ -182,75 +149,62 @@ class Work:
         self._changed()
         page.tell_job("", None, failed)
 
-    async def _segment(self, asked: Segment, page: Page, watch: Watch) -> None:
-        """Make a segment, and tell its page on how many views it rests."""
-        lifted = await self._jobs.run(partial(self._segmenter.lift, self._edits.scene, asked), watch)
-        facts = self._segmenter.facts(asked)
-        async with self._changing:
-            await asyncio.to_thread(self._edits.make_segment, asked.part, lifted.mask, facts)
-        page.tell(f"{asked.part}: {lifted.basis}", level="info")
+    def _tell_changed(self, page: Page, text: str) -> None:
+        """Tell all pages of the scene while a job goes on, and the page that it is for what it has done."""
+        self._changed()
+        page.tell(text)
 
-    async def _look(self, asked: Look, edit: Any, page: Page, watch: Watch) -> None:
-        """Show textures on their way on the page that asked, then give them to the scene."""
-        scene, loop = self._edits.scene, asyncio.get_running_loop()
-        name, output = asked.style or asked.instruction, self._edits.new_folder(edit.name)
-        edit = await asyncio.to_thread(with_parts, edit, scene)
+    # ---- Jobs, in their thread: `call` calls functions of the page in its own -----------------
 
-        def show(part: str, look: NewLook) -> None:
-            loop.call_soon_threadsafe(page.try_on, {part: look})
+    def _do(self, asked: Job, page: Page, call: Call) -> dict[str, str]:
+        """Do a job, and return what there is to tell its page in the end."""
+        match asked:
+            case Segment():
+                file = partial(self._edits.new_file, "segment", asked.part)
+                lifted = self._segmenter.segment(self._edits.session, asked, file)
+                return {"text": f"{asked.part}: {lifted.basis}"}
+            case Look():
+                output = self._edits.new_folder("image" if asked.style else "text")
+                return {"text": self._look(asked, output, partial(call, page.try_on))}
+            case Fit():
+                return {"text": self._fit(asked.function, partial(call, self._tell_changed, page))}
+            case Keep():
+                return {"text": keep(self._edits.scene, asked.function)}
+            case Export():
+                return {"level": "file", **self._export(asked, page.shown(asked.view))}
 
+    def _look(
+        self, asked: Look, output: Path, try_on: Callable[[Mapping[str, NewLook] | None], object]
+    ) -> str:
+        """Give parts of the scene a look that a page tries on meanwhile; return what was done."""
         start = monotonic()
         try:
-            edited = await self._jobs.run(partial(self._looks.make, scene, edit, output, show), watch)
-            looks = looks_of(edited.scene, edit.parts, scene)
-            with located(f"textures are in {output}"):
-                async with self._changing:
-                    gone = await asyncio.to_thread(self._edits.give_looks, looks, name)
+            given = self._looks.give(self._edits.session, asked, output, lambda *look: try_on(dict([look])))
         finally:
-            page.try_on(None)
-        how = f"{name}: {edited.how}, {monotonic() - start:.0f} s."
-        left = f" Not in the scene any more: {', '.join(gone)}." if gone else ""
-        page.tell(f"{how}{left} Textures are in {output}; the scene is not saved yet.", level="info")
+            try_on(None)
+        left = f" Not in the scene any more: {', '.join(given.gone)}." if given.gone else ""
+        done = f"{asked.style or asked.instruction}: {given.how}, {monotonic() - start:.0f} s."
+        return f"{done}{left} Textures are in {output}; the scene is not saved yet."
 
-    async def _fit(self, asked: Fit, page: Page, watch: Watch) -> None:
-        """Put a first model in the place of its function, and then a finer one in the place of that."""
-        scene, name, edits = self._edits.scene, asked.function, self._edits
-        tf, start, loop = tried(scene, name), monotonic(), asyncio.get_running_loop()
-        given: list[Path] = []  # files of the first model and of the finer one
-
-        async def give(model: Surfels) -> None:
-            before = given[0] if given else None
-            async with self._changing:
-                file = await asyncio.to_thread(edits.give_model, name, model, tf, before)
-            if file is None:
-                was = "first model" if given else "function"
-                raise ArgumentError(f"{name}: its {was} was changed meanwhile; make the model again")
-            self._changed()
-            what, more = ("finer model", "") if given else ("model", overlap_of(edits.scene, name))
-            took = f"{monotonic() - start:.0f} s; the scene is not saved yet."
-            page.tell(f"{name}: {what}, {took}{more}", level="info")
-            given.append(file)
-
-        def work() -> None:
-            for model in models_of(scene, name, self._device):
-                asyncio.run_coroutine_threadsafe(give(model), loop).result()
-
+    def _fit(self, name: str, tell: Callable[[str], object]) -> str:
+        """Put a first model in the place of a function, and tell it; return the same of the finer model."""
+        edits, start, done = self._edits, monotonic(), ""
+        models = fit_function(edits.session, name, partial(edits.new_file, "model", name), self._device)
         try:
-            await self._jobs.run(work, watch, is_urgent=True)
+            for made in models:
+                more = overlap_of(edits.scene, name) if made == FIRST else ""
+                done = f"{name}: {made}, {monotonic() - start:.0f} s; the scene is not saved yet.{more}"
+                if made == FIRST:
+                    tell(done)
         except Stopped as stopped:
-            if given:
+            if done:
                 raise Stopped(f"{name}: the finer model was cancelled; the first one stays.") from stopped
             raise
+        return done
 
-    async def _keep(self, asked: Keep, page: Page, watch: Watch) -> None:
-        """Write a function into the file of its data set, and tell its page what that means."""
-        kept = partial(keep, self._edits.scene, asked.function)
-        page.tell(await self._jobs.run(kept, watch), level="info")
-
-    async def _export(self, asked: Export, page: Page, watch: Watch) -> None:
-        """Write a file, and tell its page where it is."""
-        scene, name = page.shown(asked.view), Path(self._edits.name).stem
-        path = await self._jobs.run(partial(self.downloads.write, scene, asked, name), watch)
-        told = [f"{path.stat().st_size / 2**20:.1f} MiB"]
-        told += [] if asked.kind in (*PAGES, *FILMS) else export.remarks(scene, export.Export(asked.kind))
-        page.tell(f"{path.name}: {', '.join(told)}", level="file", name=path.name)
+    def _export(self, asked: Export, scene: Scene) -> dict[str, str]:
+        """Write a file of a scene; return its name, and what there is to say of it."""
+        path, notes = self.downloads.write(scene, asked, Path(self._edits.name).stem)
+        let_stop(path.name)
+        words = ", ".join([f"{path.stat().st_size / 2**20:.1f} MiB", *notes])
+        return {"text": f"{path.name}: {words}", "name": path.name}

@@ -1,7 +1,8 @@
-"""Axes of arrays with labels: which are those of space, how samples lie along them, one index of others."""
+"""Axes of labelled arrays: which are x, y and z, where samples lie along them, and places on all others."""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.coding import attributes_of
 from texgs.volume.grid import ONES, ZEROS, Triple
 
 if TYPE_CHECKING:
     import xarray
 
-UNEVEN = 0.01  # of the mean distance: coordinates are often rounded to float32
-COMPONENTS = (2, 3, 4)  # sizes of a last axis without a name that is none of space
+NUMBER = re.compile("0|[1-9][0-9]{0,17}")  # of a channel or step
+SPACING_TOLERANCE = 0.01  # of the mean distance: coordinates are often rounded to float32
+COMPONENTS = (2, 3, 4)  # sizes of a nameless last axis that holds components
 POWERS = {"nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3}
 WORDS = ("meter", "metre", "meters", "metres")
 METRES = {prefix + word: 10.0**n for prefix, n in POWERS.items() for word in WORDS}
@@ -25,16 +26,22 @@ METRES |= {f"{prefix[:1]}m": 10.0**n for prefix, n in POWERS.items() if prefix !
 METRES |= dict.fromkeys(("um", "µm", "μm", "micron", "microns"), 1e-6) | {"angstrom": 1e-10}
 # What CF and cf_xarray call axes, and the letters that they have here.
 LETTERS = {"X": "x", "longitude": "x", "Y": "y", "latitude": "y", "Z": "z", "vertical": "z", "T": "t"}
+# Attributes of CF: codes of missing samples, scaling of packed ones, bounds of valid ones, and labels.
+CODES, PACKED = ("_FillValue", "missing_value"), {"scale_factor": 1.0, "add_offset": 0.0}
+NUMBERS = (*CODES, *PACKED, "valid_min", "valid_max", "valid_range")
+UNSIGNED = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
+CF = (*NUMBERS, UNSIGNED, "axis", "standard_name", "long_name", "units", "positive")
+CF += ("cartesian_axis", "grads_dim", "_CoordinateAxisType")  # of others, known to cf_xarray
 PRESSURES = ("Pa", "hPa", "kPa", "mbar", "millibar", "dbar", "decibar", "bar")
 
 
 @dataclass(frozen=True)
 class Channel:
-    """What a file says of a channel: its name, and how it is shown, if it says that at all."""
+    """The name of a channel and the way it is shown, as far as the file says."""
 
     label: str = ""
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)  # red, green, blue
-    window: tuple[float, float] | None = None  # the values that are black and of the full colour
+    window: tuple[float, float] | None = None  # values shown black, and in the full colour
 
 
 @dataclass(frozen=True)
@@ -56,6 +63,14 @@ class Axis:
         if self.letter == "t" or self.name.lower() in ("t", "time") or " since " in self.unit:
             return "time"
         return "channel" if self.name.lower() in ("c", "ch", "channel") else "space"
+
+
+def attributes_of(array: Any) -> dict[str, Any]:
+    """Return the attributes of CF that an array of h5py, Zarr or xarray has, with bytes as text."""
+    said = {key: np.ravel(array.attrs[key]) for key in CF if key in array.attrs}
+    is_text = {key for key, values in said.items() if values.dtype.kind in "SUO" and values.size == 1}
+    words = {key: said[key][0] for key in is_text}
+    return said | {k: v.decode(errors="replace") if isinstance(v, bytes) else v for k, v in words.items()}
 
 
 def nameless(shape: Sequence[int]) -> list[str]:
@@ -102,7 +117,7 @@ def along(name: str, size: int, places: xarray.DataArray | None = None, letter: 
     if positive.lower() == "down" or (unit in PRESSURES and not positive):
         numbers = -numbers
     step = float(numbers[-1] - numbers[0]) / (size - 1)
-    is_even = bool(np.abs(np.diff(numbers) - step).max() <= UNEVEN * abs(step))
+    is_even = bool(np.abs(np.diff(numbers) - step).max() <= SPACING_TOLERANCE * abs(step))
     return Axis(name, size, unit, float(numbers[0]), step, is_even, letter=letter)
 
 
@@ -121,8 +136,10 @@ def upright(axes: Sequence[Axis]) -> tuple[list[int], str]:
     return [0, 1, 2], f"axes {names} are taken for z, y, x, as they are stored" if is_guess else ""
 
 
-def picked(axes: Sequence[Axis], channel: str | None = None, time: int | None = None) -> list[int | slice]:
-    """Return one index for each axis that is none of space or of size 1, all of the three others."""
+def choose_places(
+    axes: Sequence[Axis], channel: str | None = None, time: int | None = None
+) -> list[int | slice]:
+    """Return a slice for each of the three axes of space, and the place on each other axis."""
     said = {kind: str(value) for kind, value in (("time", time), ("channel", channel)) if value is not None}
     is_space = [axis.kind == "space" and axis.size > 1 for axis in axes]
     sizes = " x ".join(f"{axis.name} {axis.size}" for axis in axes)
@@ -131,20 +148,21 @@ def picked(axes: Sequence[Axis], channel: str | None = None, time: int | None = 
     if unfit := said.keys() - {axis.kind for axis in axes}:
         raise ArgumentError(f"dataset.volume.{min(unfit)}: there is no such axis in {sizes}; leave it out")
     pairs = zip(axes, is_space, strict=True)
-    return [slice(None) if is_kept else _place(axis, said.get(axis.kind, "")) for axis, is_kept in pairs]
+    return [slice(None) if is_kept else place_on(axis, said.get(axis.kind)) for axis, is_kept in pairs]
 
 
-def _place(axis: Axis, wanted: str) -> int:
+def place_on(axis: Axis, wanted: str | int | None) -> int:
     """Return the index of a channel by its label or number, or of a step of time, by default the first."""
-    numbers = [str(k) for k in range(axis.size)]
-    wanted = wanted or ("0" if axis.size == 1 or axis.kind == "time" else "")
+    first = "0" if axis.size == 1 or axis.kind == "time" else ""
+    name = first if wanted is None else str(wanted)
     labels = [channel.label for channel in axis.channels] if axis.kind == "channel" else []
-    for names in (labels, numbers):
-        if wanted in names:
-            return names.index(wanted)
-    known = ", ".join(map("{} ({})".format, numbers, labels)) or f"0 to {axis.size - 1}"
+    if name in labels:
+        return labels.index(name)
+    if NUMBER.fullmatch(name) and int(name) < axis.size:
+        return int(name)
+    known = ", ".join(f"{k} ({label})" for k, label in enumerate(labels)) or f"0 to {axis.size - 1}"
     key = f"dataset.volume.{axis.kind}" + ", or a basic TF's channel" * (axis.kind == "channel")
-    raise ArgumentError(f"{key}: expected one of {known}, got {wanted or 'none'}")
+    raise ArgumentError(f"{key}: expected one of {known}, got {name or 'none'}")
 
 
 def lattice(

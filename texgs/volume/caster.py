@@ -29,18 +29,18 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.core.memory import require_memory
 from texgs.raster import native
+from texgs.raster.api import CutRange
 from texgs.raster.arguments import pinhole, require
-from texgs.raster.cuts import CutRange
 from texgs.volume.grid import Grid
 from texgs.volume.render import Appearance, directions
 from texgs.volume.transfer import TransferFunction, left_limit, right_limit
 
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64")
 OUTPUTS = ("depth", "median", "normal")
-BYTES = 64  # of memory for a pixel
-PREPARED = 2  # sets of functions that are kept ready: two pictures that are compared take turns
-LEAST_WIDTH = torch.finfo(torch.float32).tiny  # of a transfer function, in data values
-MOST_SAMPLES = 2**24  # along a ray; their numbers are floats
+BYTES_PER_PIXEL = 64  # of memory for a pixel
+CACHE_SIZE = 2  # sets of functions that are kept ready: two pictures that are compared take turns
+MIN_WIDTH = torch.finfo(torch.float32).tiny  # of a transfer function, in data values
+MAX_SAMPLES = 2**24  # along a ray; their numbers are floats
 Prepared = tuple[Any, Any, Any]  # functions and by_cell, the arguments of the library, what these need
 PADDING = 3  # bytes behind the distances of bricks, which are loaded as words
 NativeVolume = native.struct("texgs_volume", "p values, i type, 3i size, 3f half")
@@ -84,7 +84,7 @@ class Caster:
         # With the number of the GPU, whichever is the current one later.
         self.device = torch.empty(0, device=device).device
         self._channels = dict[int, tuple[native.Struct, Tensor]]()  # that were shown, of all copies
-        self._prepared = list[Prepared]()  # the last PREPARED, of all copies
+        self._prepared = list[Prepared]()  # the last CACHE_SIZE, of all copies
         if not grid.others:
             self.channel(0)
 
@@ -123,7 +123,9 @@ class Caster:
         they know bricks only: faster for a function that is shown in one small picture.
         """
         height, width = camera.height, camera.width
-        require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
+        require_memory(
+            BYTES_PER_PIXEL * height * width, f"a view of {width} x {height} pixels", "choose a smaller one"
+        )
         self._check(camera, outputs)
         tfs = [tf] if isinstance(tf, TransferFunction) else [*tf]
         _, prepared, _kept = self._prepare(tfs, by_cell)
@@ -168,9 +170,9 @@ class Caster:
         check.finite(viewmat=camera.viewmat, K=camera.K)
         pinhole(camera.viewmat.cpu(), camera.K.cpu())
         samples = self._diagonal / (self._appearance.step * self._voxel)
-        if samples > MOST_SAMPLES:
+        if samples > MAX_SAMPLES:
             raise ArgumentError(
-                f"step: expected at most {MOST_SAMPLES} samples on a ray, got {samples:.3g}; raise it"
+                f"step: expected at most {MAX_SAMPLES} samples on a ray, got {samples:.3g}; raise it"
             )
 
     def _prepare(self, tfs: list[TransferFunction], by_cell: bool) -> Prepared:
@@ -186,7 +188,7 @@ class Caster:
             nearest = torch.stack(distances).amin(dim=0)
             in_any = reduce(torch.bitwise_or, cells) if by_cell else None
             prepared = key, (*arrays, len(tfs), nearest, in_any), kept
-            self._prepared[:] = [prepared, *last[: PREPARED - 1]]
+            self._prepared[:] = [prepared, *last[: CACHE_SIZE - 1]]
         return prepared
 
     def _shown(
@@ -246,7 +248,7 @@ def points_of(tf: TransferFunction) -> Tensor:
         if is_step and value == high:
             rows.append(rows[-1])  # the last interval has no width: values at its start have those of its end
     points = torch.tensor(np.array(rows), dtype=torch.float32)
-    if not LEAST_WIDTH <= points[-1, 0] - points[0, 0] < inf:
+    if not MIN_WIDTH <= points[-1, 0] - points[0, 0] < inf:
         raise ArgumentError(
             "transfer function: expected values that differ in single precision, got "
             f"{low:.9g} to {high:.9g}; scale or shift the data"

@@ -3,6 +3,7 @@
 Which series, which of its steps in time, and whether their slices are a lattice.
 """
 
+import tempfile
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -11,21 +12,19 @@ from typing import Any
 import numpy as np
 import pydicom
 import SimpleITK as sitk
+from pydicom.uid import MultiFrameGrayscaleWordSecondaryCaptureImageStorage as CAPTURE
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.dicom_phases import ALL, FileSeries, phases_of
-from texgs.volume.dicom_samples import samples_of, without_padding
-from texgs.volume.dicom_slice import CONVERT, TIMES, Slice, said_in, slices_in
-from texgs.volume.grid import dims_of
+from texgs.volume.axes import Axis, place_on
+from texgs.volume.dicom_series import ALL, FileSeries, choose_series, phases_of, series_in
+from texgs.volume.dicom_slice import CONVERT, TIMES, Slice, slices_in
+from texgs.volume.grid import dims_of, require_room
 from texgs.volume.itk_image import sentence
-from texgs.volume.slabs import require_step
 from texgs.volume.space import LPS
 
-OF_SERIES = ["SeriesNumber", "SeriesDescription", "TemporalPositionIdentifier", "Modality"]
-UNEVEN = 0.05  # of the distance of slices: how much one may differ, as places are rounded in files
-TILT = 0.01  # of the distance of the outer slices: how far one may be shifted across it
+GAP_TOLERANCE = 0.05  # of the distance of slices: places are rounded in files
+TILT_TOLERANCE = 0.01  # of the distance to the first slice: how far one may lie beside it
 ROUNDING = 0.01  # mm; and of the widest gap: slices that are closer are at one place
-MAGIC, PIXELS = b"DICM", b"\xe0\x7f\x10\x00"  # of a file with 128 bytes before it; the tag of its samples
 
 
 def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any], np.ndarray]:
@@ -47,7 +46,7 @@ def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any
         "space": LPS,
         "unit": "mm",
         "n_steps": n_steps,
-        "note": "; ".join(filter(None, (note, first.note, without_padding(values, slices)))),
+        "note": "; ".join(filter(None, (note, first.note, replace_padding(values, slices)))),
     }
     return lattice, values
 
@@ -57,73 +56,15 @@ def step_at(path: Path, series: str | None, time: int) -> tuple[list[Slice], int
     every = series_in(path) if path.is_dir() else [FileSeries([str(path)])]
     if series == ALL and len(every) > 1:
         phases, note = phases_of(every)
-        require_step(time, len(phases))
-        return slices_of(phases[time]), len(phases), note
-    steps = steps_of(slices_of(chosen(every, series)))
-    require_step(time, len(steps))
-    return steps[time], len(steps), ""
-
-
-def series_in(folder: Path) -> list[FileSeries]:
-    """Return all series of a folder, one at least; no slice may be damaged."""
-    every, reader = [], sitk.ImageSeriesReader
-    for uid in reader.GetGDCMSeriesIDs(str(folder)):
-        files = reader.GetGDCMSeriesFileNames(str(folder), uid)
-        header = pydicom.dcmread(files[0], stop_before_pixels=True, force=True, specific_tags=OF_SERIES)
-        first = said_in([header])
-        number, description, position, kind = (str(first.get(each, "")) for each in OF_SERIES)
-        lattice = lattice_of(Path(files[0]), len(files))
-        every.append(FileSeries(files, uid, number, description or kind, position, lattice))
-    names = {Path(file).name for each in every for file in each.files}
-    unlisted = [path for path in sorted(folder.iterdir()) if path.name not in names]
-    if damaged := next(filter(is_damaged, unlisted), None):
-        raise ArgumentError(
-            f"{damaged.name}: cut off, damaged or no file of DICOM; put it there again, or take it away"
-        )
-    if not every:
-        below = ", ".join([path.name for path in unlisted if path.is_dir()][:3])
-        advice = f"; open the folder with the slices, in {below}" if below else ""
-        raise ArgumentError(
-            f"expected a folder of DICOM slices or TIFFs (.tif, .tiff), found none in it{advice}"
-        )
-    return every
-
-
-def lattice_of(file: Path, count: int) -> tuple[float, ...]:
-    """Return that of a series as `FileSeries` has it, rounded to 0.001 mm."""
-    try:
-        first, *others = slices_in(file)
-    except (ArgumentError, KeyError):  # a report, say, that has no place
-        return ()
-    numbers = count * (1 + len(others)), *first.sizes, *first.spacing, *first.place, *first.directions.flat
-    return tuple(round(float(each), 3) for each in numbers)
-
-
-def chosen(every: Sequence[FileSeries], series: str | None) -> FileSeries:
-    """Return the only series, or the one whose number or UID is asked for."""
-    matching = [each for each in every if series in (None, ALL, each.uid, each.number)]
-    if len(matching) != 1:
-        what = "several series" if series is None else f"{len(matching)} series for {series!r}"
-        raise ArgumentError(
-            f"expected one series of DICOM slices, got {what}; choose one by dataset.volume.series=NUMBER "
-            f"or UID, or series={ALL} for those alike, as steps in time, of {'; '.join(map(str, every))}"
-        )
-    return matching[0]
+        return slices_of(phases[place_on(Axis("time", len(phases)), time)]), len(phases), note
+    steps = steps_of(slices_of(choose_series(every, series)))
+    return steps[place_on(Axis("time", len(steps)), time)], len(steps), ""
 
 
 def slices_of(series: FileSeries) -> list[Slice]:
     """Return the slices of a series, sorted by height."""
     slices = [each for file in series.files for each in slices_in(Path(file))]
     return sorted(slices, key=lambda each: each.height)
-
-
-def is_damaged(path: Path) -> bool:
-    """Return whether a file that GDCM does not list should be a slice; hidden ones of macOS do not count."""
-    if path.name.startswith(".") or not path.is_file():
-        return False
-    with path.open("rb") as file:
-        is_dicom = file.read(132)[128:] == MAGIC
-        return PIXELS in file.read() if is_dicom else path.suffix.lower() == ".dcm"
 
 
 def steps_of(slices: list[Slice]) -> list[list[Slice]]:
@@ -172,7 +113,7 @@ def slice_distance(slices: list[Slice]) -> float:
                 f"{each.name}: expected size, spacing and orientation of {first.name}; {CONVERT}"
             )
         shift = np.abs(first.directions[:2] @ (each.place - first.place)).max()
-        if shift > TILT * (each.height - first.height) + ROUNDING:
+        if shift > TILT_TOLERANCE * (each.height - first.height) + ROUNDING:
             raise ArgumentError(
                 f"{each.name}: expected slices behind each other, got one {shift:.3g} mm "
                 f"beside {first.name}; correct the tilt of the gantry first"
@@ -180,9 +121,62 @@ def slice_distance(slices: list[Slice]) -> float:
     gaps = np.diff([each.height for each in slices])
     step = float(np.sort(gaps)[(len(gaps) - 1) // 2])
     worst = int(np.abs(gaps - step).argmax())
-    if abs(gaps[worst] - step) > UNEVEN * step:
+    if abs(gaps[worst] - step) > GAP_TOLERANCE * step:
         raise ArgumentError(
             f"{slices[worst].name} and {slices[worst + 1].name}: expected slices {step:.6g} mm apart, got "
             f"{gaps[worst]:.6g} mm; complete the series, or {CONVERT}"
         )
     return float(slices[-1].height - first.height) / len(gaps)
+
+
+def samples_of(slices: Sequence[Slice]) -> np.ndarray:
+    """Return samples [Z, Y, X] of slices, rescaled by slope and intercept."""
+    require_room((*slices[0].sizes, len(slices)), np.dtype(np.float32))
+    if any(each.frame is not None for each in slices):
+        return samples_of_frames(slices)
+    return np.concatenate([sitk.GetArrayFromImage(sitk.ReadImage(each.path)) for each in slices])
+
+
+def samples_of_frames(slices: Sequence[Slice]) -> np.ndarray:
+    """Return samples [Z, Y, X] of frames; whole numbers that fit into 16 bits stay such."""
+    stored = {path: stored_frames(path) for path in {each.path for each in slices}}
+    planes = [stored[each.path][each.frame or 0] for each in slices]
+    scales = [each.scale for each in slices]
+    if {*scales} == {(1, 0)}:
+        return np.stack(planes)
+    values = np.stack([plane * a + b for plane, (a, b) in zip(planes, scales, strict=True)], dtype=np.float32)
+    with np.errstate(invalid="ignore"):
+        whole = values.astype(np.int16)
+    return whole if np.array_equal(whole, values) else values
+
+
+def stored_frames(path: Path) -> np.ndarray:
+    """Return samples [frames, Y, X] of a file as they are stored."""
+    data = pydicom.dcmread(path, force=True)
+    if not data.file_meta.TransferSyntaxUID.is_encapsulated:
+        return data.pixel_array.reshape(-1, data.Rows, data.Columns)
+    # GDCM unpacks more than pydicom, but would rescale all frames as the first.
+    bare = data.group_dataset(0x0028)
+    bare.RescaleSlope, bare.RescaleIntercept = 1, 0
+    bare["PixelData"], bare.file_meta = data["PixelData"], data.file_meta
+    bare.SOPInstanceUID, bare.SOPClassUID = data.SOPInstanceUID, CAPTURE
+    with tempfile.TemporaryDirectory() as folder:
+        bare.save_as(file := Path(folder) / "bare.dcm", enforce_file_format=True)
+        return sitk.GetArrayFromImage(sitk.ReadImage(file))
+
+
+def replace_padding(values: np.ndarray, slices: Sequence[Slice]) -> str:
+    """Set padding to the smallest value of all other samples, in place; return a note for the user."""
+    masks = np.zeros(values.shape, bool)
+    for mask, plane, each in zip(masks, values, slices, strict=True):
+        if each.padding:
+            low, high = sorted(each.scale[0] * code + each.scale[1] for code in each.padding)
+            half = abs(each.scale[0]) / 2  # of the distance of values: they are rounded
+            mask[:] = (plane >= low - half) & (plane <= high + half)
+    count = int(masks.sum())
+    if count in (0, values.size):
+        return ""
+    one, least = values[masks][0], values.min(where=~masks, initial=values.max())
+    values[masks] = least
+    share = f"{100 * count / values.size:.3g} %"
+    return f"{share} of the samples are padding ({one:g}) and take the smallest other value, {least:g}"

@@ -61,11 +61,11 @@ def slices_in(path: Path) -> list[Slice]:
     data = pydicom.dcmread(path, stop_before_pixels=True, force=True)
     count, groups = int(data.get("NumberOfFrames") or 1), data.get("PerFrameFunctionalGroupsSequence") or []
     shared = data.get("SharedFunctionalGroupsSequence") or [()]
-    said = said_in([*(data.get("DetectorInformationSequence") or [])[:1], data, *first_items(shared[0])])
+    said = values_in([*(data.get("DetectorInformationSequence") or [])[:1], data, *first_items(shared[0])])
     with located(path.name if count < 2 else f"{path.name}, a multi-frame file"):
-        frames = [said | said_in(first_items(group)) for group in groups] or [said]
+        frames = [said | values_in(first_items(group)) for group in groups] or [said]
         if count > 1 and not groups:
-            frames = stacked(said, count)
+            frames = place_frames(said, count)
         if len(frames) != count:
             raise ArgumentError(f"expected places of {count} frames, got {len(frames)}; {CONVERT}")
         if len(stacks := {str(each.get("StackID", "")) for each in frames}) > 1:
@@ -73,7 +73,7 @@ def slices_in(path: Path) -> list[Slice]:
         return [slice_of(path, each, k if count > 1 else None) for k, each in enumerate(frames)]
 
 
-def said_in(items: Iterable[Any]) -> dict[str, Any]:
+def values_in(items: Iterable[Any]) -> dict[str, Any]:
     """Return what items say by keywords, those behind in place of those before, without sequences."""
     elements = (each for item in items for each in item if each.VR != "SQ")
     return {each.keyword: each.value for each in elements if each.value not in (None, "")}
@@ -84,7 +84,7 @@ def first_items(group: Iterable[Any]) -> list[Any]:
     return [item for each in group if each.VR == "SQ" for item in each.value[:1]]
 
 
-def stacked(said: dict[str, Any], count: int) -> list[dict[str, Any]]:
+def place_frames(said: dict[str, Any], count: int) -> list[dict[str, Any]]:
     """Return what is said of frames without groups of their own: doses, and slices of nuclear medicine."""
     pointers = {keyword_for_tag(int(each)) for each in np.ravel(said.get("FrameIncrementPointer", ()))}
     if OFFSETS in said:

@@ -10,46 +10,43 @@ from typing import NamedTuple
 import numpy as np
 
 from texgs.core.errors import ArgumentError
+from texgs.volume.axes import Axis, place_on
 from texgs.volume.headers import METAIMAGE, NRRD, read_fields
-from texgs.volume.slabs import require_step
 
 OF_SPACE = ("domain", "space")  # kinds of axes of NRRD
 SEQUENCE = ".seq.nrrd"  # of 3D Slicer, whose list is one of steps in time
-WORD = re.compile(r'\([^)]*\)|"[^"]*"|\S+')  # of a field of NRRD: a vector is one, and so is a text
+WORD = re.compile(r'\([^)]*\)|"[^"]*"|\S+')  # of a field of NRRD; a vector or a quoted text is one word
 TEXTS = ("type", "color")  # fields whose four words are not of four axes
 
 
 class ExtraAxis(NamedTuple):
-    """Which axis it is, from the fastest; its size; and the key that chooses one of it."""
+    """Place of the axis, counted from the fastest; its size; and the key that chooses on it."""
 
     place: int
     size: int
     key: str
 
     def picked(self, values: np.ndarray, index: int) -> np.ndarray:
-        """Return the samples [Z, Y, X] at an index, from those of all in the order of the file."""
+        """Return the samples [Z, Y, X] at an index, from all samples in the order of the file."""
         z, y, x = values.shape
         shape = [z // self.size, y, x]
         shape.insert(3 - self.place, self.size)
         return np.moveaxis(values.reshape(shape), 3 - self.place, 0)[index]
 
 
-def extra_axis(path: Path, time: int, channel: str | None) -> tuple[ExtraAxis | None, int]:
-    """Return the axis that is none of space, and which of it is chosen: by default the first step."""
+def extra_axis(path: Path, time: int | None, channel: str | None) -> tuple[ExtraAxis | None, int]:
+    """Return the axis besides those of space, and the chosen place on it, by default the first step."""
     axis = axis_of(path)
-    for key, is_said in (("time", time > 0), ("channel", channel is not None)):
-        if is_said and (axis is None or axis.key != key):
+    for key, wanted in (("time", time), ("channel", channel)):
+        if wanted is not None and (axis is None or axis.key != key):
             raise ArgumentError(f"dataset.volume.{key}: there is no such axis; leave it out")
-    if axis is not None and axis.key == "time":
-        require_step(time, axis.size)
-    elif axis is not None and channel not in [str(k) for k in range(axis.size)]:
-        known = f"0 to {axis.size - 1}, as there are {axis.size} components per sample"
-        raise ArgumentError(f"dataset.volume.channel: expected one of {known}, got {channel or 'none'}")
-    return axis, int(channel or time)
+    if axis is None:
+        return None, 0
+    return axis, place_on(Axis(axis.key, axis.size), channel if axis.key == "channel" else time)
 
 
 def axis_of(path: Path) -> ExtraAxis | None:
-    """Return the axis that a file has besides those of space; None where there is none, or more than one."""
+    """Return the one axis that a file has besides those of space; None if it has none, or several."""
     fields, _ = read_fields(path)
     if path.suffix.lower() in METAIMAGE:
         count, sizes = int(fields.get("elementnumberofchannels", "1")), fields.get("dimsize", "").split()
@@ -68,7 +65,7 @@ def axis_of(path: Path) -> ExtraAxis | None:
 
 @contextmanager
 def one_volume(path: Path, axis: ExtraAxis | None) -> Iterator[Path]:
-    """Give a header of the volume at one place of the axis: ITK has other rules for the fourth axis."""
+    """Yield a header without the extra axis, for ITK, which has other rules for a fourth axis."""
     if axis is None:
         yield path
         return
@@ -76,13 +73,13 @@ def one_volume(path: Path, axis: ExtraAxis | None) -> Iterator[Path]:
         head = file.read(read_fields(path)[1]).decode("latin-1")
     with TemporaryDirectory() as folder:
         header = Path(folder) / path.name
-        lines = [bare(line, axis.place, path.suffix.lower() in NRRD) for line in head.splitlines()]
+        lines = [without_axis(line, axis.place, path.suffix.lower() in NRRD) for line in head.splitlines()]
         header.write_text("\n".join([*lines, "", ""]), encoding="latin-1")
         yield header
 
 
-def bare(line: str, place: int, is_nrrd: bool) -> str:
-    """Return a line of a header without what it says of an axis: one of four words, or of a matrix."""
+def without_axis(line: str, place: int, is_nrrd: bool) -> str:
+    """Return a line of a header without the words for one axis, in a list of four or in a matrix."""
     name, mark, value = line.partition(":" if is_nrrd else "=")
     key, words = name.replace(" ", "").strip().lower(), WORD.findall(value)
     if key == "datafile" or value.startswith("="):  # pairs of key and value are for others

@@ -1,6 +1,6 @@
-"""Formats that SimpleITK or PyVista reads, as sources; they do it in a process of their own: this module.
+"""Sources of the formats that SimpleITK and PyVista read, in a process of its own that runs this module.
 
-Damaged files crash libraries that are written in C++, and make them print instead of raising.
+Damaged files crash these libraries, or make them print instead of raising.
 """
 
 import json
@@ -32,14 +32,15 @@ from texgs.volume.grid import (
     require_room,
 )
 from texgs.volume.headers import METAIMAGE, NRRD
-from texgs.volume.samples import StoredSamples, stored_samples, unpacked
+from texgs.volume.samples import StoredSamples, stored_samples, unpack
 from texgs.volume.slabs import ArraySource, RawSource, Source, step_note
 from texgs.volume.space import LEFT_HANDED, RIGHT_HANDED, Space
 
 BY_VTK = (".vti", ".vtr", ".vts", ".pvti", ".pvtr", ".vtk", ".slc")
-DICOM = (".dcm", ".ima")  # suffixes of files; slices without are read in their folder
-SECONDS, RATE = 60.0, 1e6  # how long reading may take: at least, and bytes per second of a large file
-LONGEST_LINE = 1 << 20  # bytes of what the process says before the samples
+DICOM = (".dcm", ".ima")  # suffixes; slices may have none, and are read by their folder
+MIN_SECONDS = 60.0  # that reading may take, of a file of any size
+BYTES_PER_SECOND = 1e6  # that reading has to keep up with, of a large file
+MAX_LINE_BYTES = 1 << 20  # bytes of the line that comes before the samples
 COMPLAINT = re.compile(r"error|fail|cannot|corrupt|unexpected", re.IGNORECASE)
 
 
@@ -50,7 +51,7 @@ def open_foreign(path: Path, spacing: Triple | None, origin: Triple | None, **ke
     those of the file; `series` is the number or UID of one of several in a folder of DICOM slices, `time` the
     step of one that has several volumes, and `variable` the name of a point array of VTK's image data.
     """
-    suffix, time = path.suffix.lower(), keys.get("time", 0)
+    suffix, time = path.suffix.lower(), keys.get("time")
     with reading_as(_kind(path)):
         stored = stored_samples(path) if suffix in (*NRRD, *METAIMAGE) else None
         extra, index = extra_axis(path, time, keys.get("channel")) if stored is not None else (None, 0)
@@ -64,13 +65,13 @@ def open_foreign(path: Path, spacing: Triple | None, origin: Triple | None, **ke
                 return _raw(stored, dims, dtype, steps, first, space)
             every = (nx, ny, nz * extra.size) if extra else dims
             is_raw = stored.encoding == "raw"
-            values = _raw(stored, every, dtype).mapped() if is_raw else unpacked(stored, every, dtype)
+            values = _raw(stored, every, dtype).mapped() if is_raw else unpack(stored, every, dtype)
             if extra is not None:
                 values = extra.picked(values, index)
                 reply["n_steps"] = extra.size if extra.key == "time" else 1
         source = ArraySource(Grid(permuted_values(values, axes), steps, first, space=space), path.name)
         source.n_steps = reply.get("n_steps", 1)
-        source.note = "; ".join(filter(None, (step_note(time, source.n_steps), reply.get("note"))))
+        source.note = "; ".join(filter(None, (step_note(time or 0, source.n_steps), reply.get("note"))))
         return source
 
 
@@ -101,16 +102,16 @@ def _kind(path: Path) -> str:
 
 
 def _ask(path: Path, keys: dict[str, Any], is_header_only: bool) -> tuple[dict[str, Any], np.ndarray]:
-    """Let a process of its own read a file: what it says, and the samples [Z, Y, X]."""
+    """Read a file in a process of its own; return its lattice and its samples [Z, Y, X]."""
     request = json.dumps({"path": str(path.absolute()), "keys": keys, "is_header_only": is_header_only})
     command = [sys.executable, "-P", "-m", "texgs.volume.foreign", request]
     size = sum(each.stat().st_size for each in (path.iterdir() if path.is_dir() else [path]))
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(command, **pipes) as child:  # type: ignore[call-overload]
-        watchdog = Timer(SECONDS + size / RATE, child.kill)
+        watchdog = Timer(MIN_SECONDS + size / BYTES_PER_SECOND, child.kill)
         watchdog.start()
         try:
-            reply, values = _received(child.stdout, is_header_only)
+            reply, values = _receive(child.stdout, is_header_only)
         finally:
             watchdog.cancel()
             child.kill()
@@ -123,9 +124,9 @@ def _ask(path: Path, keys: dict[str, Any], is_header_only: bool) -> tuple[dict[s
     return reply, values
 
 
-def _received(stream: IO[bytes], is_header_only: bool) -> tuple[dict[str, Any] | None, np.ndarray]:
+def _receive(stream: IO[bytes], is_header_only: bool) -> tuple[dict[str, Any] | None, np.ndarray]:
     """Return what the process says about a volume, None if it died, and the samples where it sends some."""
-    reply = json.loads(stream.readline(LONGEST_LINE) or "null")
+    reply = json.loads(stream.readline(MAX_LINE_BYTES) or "null")
     if reply is None or "error" in reply or is_header_only:
         return reply, np.empty(0)
     dims, dtype = reply["dims"], np.dtype(reply["dtype"])
@@ -136,7 +137,7 @@ def _received(stream: IO[bytes], is_header_only: bool) -> tuple[dict[str, Any] |
 
 
 def answer(path: Path, keys: dict[str, Any], is_header_only: bool) -> None:
-    """Print a line of JSON about a file, or what is wrong with it, and then the samples: all in the child."""
+    """Print a line of JSON with the lattice or the error, and then the samples; runs in the child."""
     with os.fdopen(os.dup(1), "wb") as output, tempfile.TemporaryFile("w+", errors="replace") as printed:
         os.dup2(printed.fileno(), 1)
         os.dup2(printed.fileno(), 2)
@@ -145,7 +146,7 @@ def answer(path: Path, keys: dict[str, Any], is_header_only: bool) -> None:
         try:
             with reading_as(_kind(path)):
                 reply, values = image_of(path, keys, is_header_only)
-            printed.seek(0)  # what a library has printed instead of raising it
+            printed.seek(0)  # errors that a library printed instead of raising
             for line in printed:
                 if COMPLAINT.search(line) and "warning" not in line.lower():
                     raise ArgumentError(f"the file is damaged or cut off, its reader says: {line.strip()}")
@@ -157,7 +158,7 @@ def answer(path: Path, keys: dict[str, Any], is_header_only: bool) -> None:
 
 
 def limit_memory() -> None:
-    """Let this process have no more memory than there is; it would take the rest of the machine with it."""
+    """Limit the memory of this process to what is free, so that a damaged file cannot stall the machine."""
     if sys.platform == "linux":
         import resource
 

@@ -11,7 +11,7 @@ from texgs.volume.grid import Grid
 from texgs.volume.slabs import ArraySource, slab_bounds
 from texgs.volume.transfer import TransferFunction
 
-INSIDE = 1 + 1e-7  # times a squared radius: rounding, of points that nearly lie in a plane too
+SQUARE_SLACK = 1 + 1e-7  # times a squared radius: rounding, of points that nearly lie in a plane too
 
 
 def frame_of(grid: Grid, tfs: Iterable[TransferFunction]) -> Frame:
@@ -26,7 +26,7 @@ def frame_of(grid: Grid, tfs: Iterable[TransferFunction]) -> Frame:
 def out_of_frame(grid: Grid, tf: TransferFunction, frame: Frame) -> str:
     """Return how far a function reaches out of a frame, in half a sentence; nothing where it does not."""
     reach = float(np.linalg.norm(shown_corners(grid, [tf]) - frame.target, axis=1).max())
-    if reach <= frame.radius * INSIDE:
+    if reach <= frame.radius * SQUARE_SLACK:
         return ""
     return (
         f"reaches {reach - frame.radius:.2g} out of the frame of radius {frame.radius:.2g}: what views do "
@@ -97,7 +97,7 @@ def smallest_ball(points: np.ndarray) -> Frame:
     while True:
         distances = np.square(points - center).sum(axis=1)
         farthest = int(distances.argmax())
-        if distances[farthest] <= square * INSIDE:
+        if distances[farthest] <= square * SQUARE_SLACK:
             break
         grown = around_few(np.concatenate([rim, points[farthest : farthest + 1]]))
         if grown[1] <= square:
@@ -115,7 +115,7 @@ def around_few(points: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
             step = np.linalg.lstsq(sides, 0.5 * np.square(sides).sum(axis=1))[0]
             center = points[rim[0]] + step
             square = float(np.square(step).sum())
-            if np.square(points - center).sum(axis=1).max() <= square * INSIDE:
+            if np.square(points - center).sum(axis=1).max() <= square * SQUARE_SLACK:
                 balls.append((square, center, points[rim]))
     square, center, rim_points = min(balls, key=lambda ball: ball[0])
     return center, square, rim_points

@@ -1,11 +1,12 @@
-"""Volumes made here, for examples and tests: a sphere, an orbital, decaying turbulence, and jets.
+"""Volumes that are computed, for examples and tests; rings and a flame change in time.
 
 All are cubes of float32 in [0, 1] with spacing 1, and the same everywhere for the same arguments up to
-rounding. Turbulence and jets are one flow for each seed, whatever the size they are sampled at.
+rounding. Turbulence and jets are one flow for each seed, whatever the size they are sampled at. Rings and
+flame are formulas, so that a moment costs no more than its samples; their time goes from 0 to 1.
 """
 
 from collections.abc import Callable
-from math import factorial, pi, sqrt
+from math import cos, factorial, pi, sin, sqrt
 
 import numpy as np
 import torch
@@ -26,12 +27,20 @@ from texgs.volume.navier_stokes import (
 
 Array = np.ndarray
 ORBITAL = (4, 3, 0)  # quantum numbers n, l and m: 4f z^3
-FADED = 0.05  # of the largest amplitude along the radius of an orbital: what is farther out is cut off
+AMPLITUDE_CUTOFF = 0.05  # of the largest along the radius of an orbital: what is farther out is cut off
 STEPS = 4096  # along the radius and the polar angle, where the largest amplitude is looked for
 TURBULENCE_RESOLUTION, JETS_RESOLUTION = 64, 48  # cells of the simulation along each side; even
 DURATION = 1.5  # of turbulence; an eddy turns over in about 1. Tubes have formed by 1, then they decay
 VISCOSITY = 0.01  # of turbulence, for a box 2 pi wide and an initial speed of 1 (root mean square, per axis)
 NOISE_RESOLUTION = 16  # of the random initial motion
+RADIUS, CORE = 0.42, 0.11  # of rings and of their cores, half sides of the cube
+TURN = (0.14, 0.2)  # half axes of the ellipse on which the rings turn about each other: radius and height
+CLIMB = 0.5  # of both, in a series
+WAVES, CREST = (4, 7), 0.05  # around the first ring and the second one, and how high they are
+FLOW_RESOLUTION = 32  # of the motion in a flame; even
+RISE = 4.0  # that this motion rises in a series, radians of a box 2 pi wide
+WIDTH, TOP = 0.45, 0.8  # of a flame at its widest, half sides of the cube; and its height, sides
+SWAY, FLICKER = 0.16, 0.2  # of a flame, sideways and up, at its top, for motion of mean speed 1
 
 
 def sphere(size: int) -> Grid:
@@ -89,6 +98,45 @@ def jets(size: int, seed: int = 0) -> Grid:
     return _grid(scalar)
 
 
+def rings(size: int, time: float) -> Grid:
+    """Make the vorticity magnitude of two rings on one axis that climb and pass through each other.
+
+    The hind one narrows and slips through the other one, which widens, and they change places. Their
+    cores have Gaussian profiles, thinner where the ring is wider: fluid keeps its volume, and its vorticity
+    grows as it is stretched (Helmholtz).
+    """
+    axis = torch.linspace(-1, 1, size)
+    z, y, x = torch.meshgrid(axis, axis, axis, indexing="ij")
+    distance, azimuth = torch.hypot(x, z), torch.atan2(z, x)
+    total = torch.zeros_like(x)
+    for start, waves in zip((0, pi), WAVES, strict=True):
+        turn = pi * time + start
+        wave = CREST * torch.cos(waves * azimuth + turn)
+        radius = RADIUS + TURN[0] * cos(turn)
+        height = CLIMB * (time - 0.5) + TURN[1] * sin(turn) + wave
+        stretch = radius / RADIUS
+        square = (distance - radius - wave).square() + (y - height).square()
+        total += stretch * torch.exp(-square * stretch / CORE**2)
+    return Grid((total / (1 + TURN[0] / RADIUS)).clamp(0, 1).numpy())
+
+
+def flame(size: int, time: float, seed: int = 0) -> Grid:
+    """Make the temperature of a flame that flickers: tongues part from it and burn out.
+
+    Random motion without divergence rises through it as it is (Taylor's hypothesis), and moves it the more
+    the higher.
+    """
+    flow = random_flow(FLOW_RESOLUTION, 0.5, 5.0, seed)
+    place = pi * torch.linspace(0, 1, size)  # half of the box in which the motion repeats itself
+    height = torch.linspace(0, 1, size)[:, None]
+    z, x = torch.linspace(-1, 1, size)[:, None, None], torch.linspace(-1, 1, size)
+    along_x, along_y, along_z = sample(flow, place, place - RISE * time, place)
+    above = (height + FLICKER * height * along_y) / TOP
+    distance = torch.hypot(x - SWAY * height * along_x, z - SWAY * height * along_z)
+    width = WIDTH * (above.clamp(0, 1) + 0.12).sqrt() * (1.2 - above).clamp_min(0.02)
+    return Grid((torch.exp(-((distance / width) ** 2)) * (1 - above**3).clamp(0, 1)).numpy())
+
+
 def random_flow(size: int, mean_energy: float, peak: float, seed: int) -> Tensor:
     """Return a spectrum [3, size, size, size // 2 + 1], complex64, of random motion without divergence.
 
@@ -136,7 +184,7 @@ def orbital_cube(size: int, n: int, degree: int, order: int) -> Array:
     """
     r = np.linspace(0, 4 * n * (n + 2), STEPS)
     along_radius = np.abs(radial(n, degree, r))
-    reach = r[np.flatnonzero(along_radius > FADED * along_radius.max())[-1] + 1]
+    reach = r[np.flatnonzero(along_radius > AMPLITUDE_CUTOFF * along_radius.max())[-1] + 1]
     around = np.abs(angular(degree, abs(order), np.linspace(-1, 1, STEPS), np.zeros(1)))
     axis = np.linspace(-reach, reach, size)
     values = wave_function(n, degree, order, axis[:, None, None], axis, axis[:, None])
@@ -174,4 +222,10 @@ GENERATORS: dict[str, Callable[..., Grid]] = {
     "turbulence": turbulence,
     "jets": jets,
 }
+SERIES: dict[str, Callable[..., Grid]] = {"rings": rings, "flame": flame}
 RANDOM = ("turbulence", "jets", "flame")  # those that a seed changes, also of series
+
+
+def series(name: str, size: int, steps: int) -> list[Grid]:
+    """Make all steps of a series, from its beginning to its end."""
+    return [SERIES[name](size, time) for time in torch.linspace(0, 1, steps).tolist()]

@@ -18,7 +18,7 @@ from texgs.core.light import Light
 from texgs.core.memory import require_memory
 from texgs.volume.view_set import View
 
-BYTES = 64  # of memory for a pixel of a view that is being read
+BYTES_PER_PIXEL = 64  # of memory for a pixel of a view that is being read
 MARGIN = 11  # pixels: a window of SSIM, so that those of pixels near content end in white
 
 
@@ -104,7 +104,9 @@ def load(views: Sequence[View], reduce: int = 1) -> Images:
     if height % reduce or width % reduce:
         raise ArgumentError(f"reduce: expected a divisor of {width} x {height} pixels, got {reduce}")
     threads = torch.get_num_threads()
-    pixels = 4 * len(views) * (height // reduce) * (width // reduce) + BYTES * height * width * threads
+    pixels = (
+        4 * len(views) * (height // reduce) * (width // reduce) + BYTES_PER_PIXEL * height * width * threads
+    )
     require_memory(pixels, f"{len(views)} views of {width} x {height} pixels", "raise fit.reduce")
     planes = torch.empty(len(views), 4, height // reduce, width // reduce, dtype=torch.uint8)
 
@@ -140,7 +142,7 @@ def smaller(camera: Camera, reduce: int) -> Camera:
     return replace(camera, K=K, width=camera.width // reduce, height=camera.height // reduce)
 
 
-def shrunk(images: Images, factor: int) -> Images:
+def shrink(images: Images, factor: int) -> Images:
     """Average factor x factor pixels; incomplete blocks at the right and bottom are cut off."""
     if factor <= 1:
         return images

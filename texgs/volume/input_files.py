@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from texgs.core.checksum import Checksums, combined
+from texgs.core.cache import Checksums, combined_checksum
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.core.names import POINTS, SLICES
@@ -24,10 +24,10 @@ def checksum_of_input(path: Path, checksums: Checksums) -> str:
         files = [each for each in path.rglob("*") if each.is_file()]  # chunks and DICOM have any suffix
         members = [each for each in files if each.suffix.lower() in SLICES] or files
     elif parts := parts_of(path):
-        return combined((each.name, checksums.of(each)) for each in (path, *parts))
+        return combined_checksum((each.name, checksums.of(each)) for each in (path, *parts))
     else:
         return checksums.of(path)
-    return combined(
+    return combined_checksum(
         (str(each.relative_to(folder) if each.is_relative_to(folder) else each), checksums.of(each))
         for each in members
     )

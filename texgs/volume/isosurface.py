@@ -10,8 +10,8 @@ from texgs.core.memory import require_memory
 from texgs.volume.grid import Grid, Triple
 from texgs.volume.transfer import TransferFunction
 
-BYTES = 8  # of memory for a sample: what is opaque, in single precision, and the mesh
-FAR_OUTSIDE = 1000.0  # times the largest value, around a volume: its surface ends at the outermost samples
+BYTES_PER_SAMPLE = 8  # of memory for a sample: what is opaque, in single precision, and the mesh
+OUTSIDE_FACTOR = 1000.0  # times the largest value, around a volume: its surface ends at the outermost samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +52,11 @@ def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
     grid = grid.channel(tf.channel)
     least, most = float(np.nanmin(grid.values)), float(np.nanmax(grid.values))  # what is missing is clear
     span = max(most - least, 1e-30)
-    require_memory(BYTES * grid.values.size, "the surface of the volume", "prepare it with reduce=2")
+    require_memory(
+        BYTES_PER_SAMPLE * grid.values.size, "the surface of the volume", "prepare it with reduce=2"
+    )
     # In a shell of samples so low that the surface ends at the outermost of the volume.
-    shelled = np.full([size + 2 for size in grid.values.shape], -FAR_OUTSIDE * span, np.float32)
+    shelled = np.full([size + 2 for size in grid.values.shape], -OUTSIDE_FACTOR * span, np.float32)
     signed = shelled[1:-1, 1:-1, 1:-1]  # above 0 in what is opaque
     signed[:] = -span
     for low, high in opaque_ranges(tf, opacity):

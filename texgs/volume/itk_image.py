@@ -12,7 +12,7 @@ from texgs.volume.grid import Dims, byte_count, check_lattice, require_room
 from texgs.volume.headers import NRRD, read_fields, spacing_in, unit_in
 from texgs.volume.space import LEFT_HANDED, LETTERS, LPS, RAS, RIGHT_HANDED
 
-# Names of spaces in NRRD files; places in those that run to the front are told as RAS, from ITK's LPS.
+# Our names for spaces of NRRD. ITK turns spaces with an anterior axis into LPS; we turn them back to RAS.
 NRRD_SPACES = {
     **dict.fromkeys((RAS, "ras", "left-anterior-superior", "las"), RAS),
     **dict.fromkeys((LPS, "lps"), LPS),
@@ -34,7 +34,7 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
         dims, dtype = require_volume(sizes, reader.GetPixelIDValue(), reader.GetNumberOfComponents())
         if suffix == ".gipl":
             expected, size = GIPL_HEADER + byte_count(dims, dtype), path.stat().st_size
-            if size < expected:  # ITK fills what is missing with what is in memory
+            if size < expected:  # ITK would fill the rest with whatever is in memory
                 raise ArgumentError(f"the file is cut off: expected {expected} bytes, found {size}")
         fields = read_fields(path)[0] if suffix in NRRD else {}
         space = NRRD_SPACES.get(fields.get("space", "").lower(), RIGHT_HANDED) if fields else LPS

@@ -6,6 +6,7 @@ link to nowhere or a type that NetCDF lacks, and on one of Zarr in which a singl
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from math import ceil, prod
 from pathlib import Path
@@ -16,8 +17,18 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
-from texgs.volume.axes import METRES, Axis, axes_of, lattice, picked, upright
-from texgs.volume.coding import coding_of, decoded
+from texgs.volume.axes import (
+    CODES,
+    METRES,
+    NUMBERS,
+    PACKED,
+    UNSIGNED,
+    Axis,
+    axes_of,
+    choose_places,
+    lattice,
+    upright,
+)
 from texgs.volume.grid import Triple, require_room
 from texgs.volume.slabs import SLAB_BYTES, Source
 from texgs.volume.space import Space
@@ -25,8 +36,9 @@ from texgs.volume.space import Space
 if TYPE_CHECKING:
     import xarray
 
-SHARE = 4  # one layer takes this part of the free memory at most
-LISTED = 8  # arrays in a message
+MEMORY_PARTS = 4  # a layer takes at most a quarter of the free memory
+MAX_LISTED = 8  # arrays in a message
+EVERYTHING = (-np.inf, np.inf)
 
 
 class LayerSource(Source):
@@ -59,7 +71,7 @@ class LayerSource(Source):
         **keys: Any,
     ) -> None:
         self._name, self._array = name, array
-        self._index = picked(axes, **keys)
+        self._index = choose_places(axes, **keys)
         space = [k for k, index in enumerate(self._index) if isinstance(index, slice)]
         self._turn, guess = upright([axes[k] for k in space])
         z, y, x = (axes[space[k]] for k in self._turn)
@@ -67,16 +79,16 @@ class LayerSource(Source):
         self._signs = [-1 if axis.step < 0 else 1 for axis in (z, y, x)]
         spacing, origin, remark = lattice((x, y, z), *given)
         self._coding = coding_of(attributes, array.dtype)
-        dtype = decoded(np.empty(0, array.dtype), *self._coding).dtype
+        dtype = decode(np.empty(0, array.dtype), *self._coding).dtype
         super().__init__(Path(name).name, (x.size, y.size, z.size), dtype, spacing, origin)
         self.space = Space(unit=x.unit if x.unit in METRES and not remark else "")
         self.take(axes, self._index)
         self.note = "; ".join(filter(None, (note, self.note, guess, remark)))
         plane, chunk = x.size * y.size * self.dtype.itemsize, chunks[self._z] if chunks else 1
-        most = max(1, free_memory() // (SHARE * plane))
+        most = max(1, free_memory() // (MEMORY_PARTS * plane))
         self._depth = min(chunk * max(1, SLAB_BYTES // (chunk * plane)), most)  # slices in a layer
         require_room((x.size, y.size, self._depth), self.dtype)
-        self._first, self._kept = -1, np.empty(0)  # index of its first slice, and the layer in memory
+        self._first, self._kept = -1, np.empty(0)  # first slice of the layer in memory, and its samples
 
     def slices(self, start: int, stop: int) -> np.ndarray:
         """Return samples [stop - start, Y, X], NaN where they are missing."""
@@ -88,15 +100,59 @@ class LayerSource(Source):
         return values.astype(self.dtype, copy=False)
 
     def _layer(self, first: int) -> np.ndarray:
-        """Return the layer that begins with a slice, as it is stored."""
+        """Return the layer that begins with a slice, in the order of the file."""
         if self._first != first:
-            self._first, self._kept = -1, np.empty(0)  # gives its memory back before the next one is read
+            self._first, self._kept = -1, np.empty(0)  # frees the memory before the next layer is read
             index = list(self._index)
             index[self._z] = slice(first, min(first + self._depth, self.dims[2]))
             with reading_as("an array that is whole", where=f"{self._name}: "):
                 samples = np.asarray(self._array[tuple(index)]).transpose(self._turn)
-                self._first, self._kept = first, decoded(samples, *self._coding)
+                self._first, self._kept = first, decode(samples, *self._coding)
         return self._kept
+
+
+def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> tuple[dict[str, Any], tuple[float, float]]:
+    """Return how samples of a type are coded, by attributes of CF, and the range of those that are valid.
+
+    Numbers may be written as text. Codes are as samples have them, which may have fewer digits. The range is
+    that after decoding; one of whole numbers is of packed samples.
+    """
+    said: dict[str, np.ndarray] = {}
+    for key in (each for each in NUMBERS if np.size(attributes.get(each, ())) > 0):
+        values = np.ravel(attributes[key])
+        try:
+            values = values if values.dtype.kind in "iuf" else values.astype(np.float64)
+        except ValueError:
+            raise ArgumentError(f"{key}: expected a number, got {values[0]}; correct the file") from None
+        with np.errstate(over="ignore"):
+            said[key] = values.astype(dtype) if key in CODES and dtype.kind == "f" else values
+    coding: dict[str, Any] = {key: said[key] for key in CODES if key in said}
+    coding |= {key: float(said[key][0]) for key in PACKED if key in said}
+    if str(attributes.get(UNSIGNED, "")).lower() == "true" and dtype.kind == "i":
+        coding[UNSIGNED] = "true"
+    low, high = said.get("valid_range", EVERYTHING)
+    low, high = said.get("valid_min", [low])[0], said.get("valid_max", [high])[0]
+    if coding.keys() & PACKED and any(np.asarray(end).dtype.kind in "iu" for end in (low, high)):
+        scale, offset = (coding.get(key, default) for key, default in PACKED.items())
+        low, high = sorted(((low - 0.5) * scale + offset, (high + 0.5) * scale + offset))
+    return coding, (float(low), float(high))
+
+
+def decode(values: np.ndarray, coding: Mapping[str, Any], valid: tuple[float, float]) -> np.ndarray:
+    """Return samples as `coding_of` says they are: packed ones are scaled, NaN stands for those that miss.
+
+    Integers become float32 where any of this is said.
+    """
+    import xarray
+
+    stored = xarray.Variable([*map(str, range(values.ndim))], values, coding)
+    with warnings.catch_warnings(), np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
+        warnings.simplefilter("ignore", xarray.SerializationWarning)  # of several codes
+        samples = xarray.conventions.decode_cf_variable("field", stored, decode_times=False).values
+        if valid != EVERYTHING:
+            samples = np.where((samples < valid[0]) | (samples > valid[1]), np.nan, samples)
+        is_new = samples.dtype.kind == "f" != values.dtype.kind
+        return samples.astype(np.float32) if is_new else samples
 
 
 def one_of(arrays: Mapping[str, Any], variable: str | None) -> str:
@@ -109,16 +165,18 @@ def one_of(arrays: Mapping[str, Any], variable: str | None) -> str:
     name = fields[0] if len(fields) == 1 and not variable else (variable or "").strip("/")
     if name in fields:
         return name
-    got, more = variable or "none", f" and {len(fields) - LISTED} more" if len(fields) > LISTED else ""
+    got, n_more = variable or "none", len(fields) - MAX_LISTED
     if name in arrays:
         got = f"{name or '/'} of {' x '.join(map(str, arrays[name].shape))} {arrays[name].dtype}"
+    known = ", ".join(each or "/" for each in fields[:MAX_LISTED]) or "another file"
+    known += f" and {n_more} more" if n_more > 0 else ""
     raise ArgumentError(
         "dataset.volume.variable: expected an array of real numbers with three axes or more, got "
-        f"{got}; choose one of {', '.join(each or '/' for each in fields[:LISTED]) or 'another file'}{more}"
+        f"{got}; choose one of {known}"
     )
 
 
-def labelled(
+def labelled_source(
     name: str | Path, field: xarray.DataArray, given: tuple[Triple | None, Triple | None], **keys: Any
 ) -> LayerSource:
     """Return an array of xarray, whose labels say where its axes run; keys are those of `LayerSource`."""

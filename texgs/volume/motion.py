@@ -14,10 +14,10 @@ from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 
 MARGIN = 6  # samples around what is shown
-MOST = 96  # samples along a side that are registered; of more, blocks are averaged
+MAX_SIDE = 96  # samples along a side that are registered; of more, blocks are averaged
 LEVELS = ((4, 60), (2, 40), (1, 20))  # samples of a block, and iterations, one level after the other
 SMOOTHNESS = 0.7  # standard deviation that displacements are smoothed with after each iteration, blocks
-BELOW = 0.1  # of the range of values that show: so far below it values still tell where matter goes
+LOW_MARGIN = 0.1  # of the range of values that show: so far below it values still tell where matter goes
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ def motion(before: Grid, after: Grid, tf: TransferFunction) -> Motion:
     corners = corners / voxel + (dims - 1) / 2  # in samples
     low = np.maximum(np.floor(corners.min(axis=0)).astype(int) - MARGIN, 0)
     high = np.minimum(np.ceil(corners.max(axis=0)).astype(int) + MARGIN + 1, dims)
-    field = registered([shown_image(grid, tf, low, high) for grid in (before, after)])
+    field = register([shown_image(grid, tf, low, high) for grid in (before, after)])
     displacements = torch.from_numpy(sitk.GetArrayFromImage(field) * voxel).float()
     first = np.array(field.GetOrigin())
     last = first + np.array(field.GetSpacing()) * (np.array(field.GetSize()) - 1)
@@ -57,7 +57,7 @@ def motion(before: Grid, after: Grid, tf: TransferFunction) -> Motion:
     return Motion(displacements, *ends)
 
 
-def registered(images: Sequence[sitk.Image]) -> sitk.Image:
+def register(images: Sequence[sitk.Image]) -> sitk.Image:
     """Return displacements in samples from the first image to the second one, from coarse to fine."""
     start: list[sitk.Image] = []
     for block, iterations in LEVELS:
@@ -79,7 +79,7 @@ def shown_image(grid: Grid, tf: TransferFunction, low: np.ndarray, high: np.ndar
     box = tuple(slice(*ends) for ends in zip(low[::-1], high[::-1], strict=True))
     shown = grid.channel(tf.channel).values[box].astype(np.float32)
     values = np.nan_to_num(shown, nan=least, posinf=most, neginf=least)
-    image = sitk.GetImageFromArray(((values - least) / (most - least)).clip(-BELOW, 1))
+    image = sitk.GetImageFromArray(((values - least) / (most - least)).clip(-LOW_MARGIN, 1))
     image.SetOrigin(low.astype(float).tolist())
-    blocks = [-(-size // MOST) for size in image.GetSize()]
+    blocks = [-(-size // MAX_SIDE) for size in image.GetSize()]
     return sitk.BinShrink(image, blocks)

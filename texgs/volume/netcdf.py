@@ -10,14 +10,13 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
-from texgs.volume.axes import Axis, axes_of, nameless
-from texgs.volume.coding import attributes_of
+from texgs.volume.axes import Axis, attributes_of, axes_of, nameless
 from texgs.volume.grid import Triple
-from texgs.volume.layers import LayerSource, gaps_in, labelled, one_of
+from texgs.volume.layers import LayerSource, gaps_in, labelled_source, one_of
 
 CLASSIC = (b"CDF\x01", b"CDF\x02")  # the latter with offsets of 64 bits
-NO_COORDINATES = b"This is a netCDF dimension but not a netCDF variable"  # begins the NAME of such a scale
-# What names the samples of NetCDF that were never written, where a file does not; bytes have none.
+NO_COORDINATES = b"This is a netCDF dimension but not a netCDF variable"  # start of the NAME of a scale
+# NetCDF fills what was never written with these codes, unless the file names another; bytes have no code.
 INTEGERS = {"i2": -32767, "u2": 2**16 - 1, "i4": 1 - 2**31, "u4": 2**32 - 1, "i8": 2 - 2**63, "u8": 2**64 - 2}
 CODES = INTEGERS | dict.fromkeys(("f4", "f8"), 9.969209968386869e36)
 NEVER_WRITTEN: dict[str, dict[str, Any]] = {dtype: {"_FillValue": code} for dtype, code in CODES.items()}
@@ -46,7 +45,7 @@ def _classic(path: Path, variable: str | None, given: Any, **keys: Any) -> Layer
     file = xarray.open_dataset(path, engine="scipy", decode_cf=False, cache=False)
     field = file[one_of({str(name): file[name] for name in file.variables}, variable)]
     code = NEVER_WRITTEN.get(field.dtype.str[1:], {})
-    return labelled(path, field.assign_attrs(code | field.attrs), given, **keys)
+    return labelled_source(path, field.assign_attrs(code | field.attrs), given, **keys)
 
 
 def _hdf5(path: Path, variable: str | None, given: Any, **keys: Any) -> LayerSource:
@@ -66,7 +65,7 @@ def _hdf5(path: Path, variable: str | None, given: Any, **keys: Any) -> LayerSou
     asked = (variable or "").strip("/")
     for name in [name for name in broken if name == asked or not arrays]:
         raise ArgumentError(f"{name} {broken[name]}; put it there")
-    if asked and _is_array(file.get(asked)):  # also by the path of a link
+    if asked and _is_array(file.get(asked)):  # a path may be that of a link
         arrays[asked] = file[asked]
     array = arrays[one_of(arrays, variable)]
     require_filters(array)
@@ -96,7 +95,7 @@ def arrays_in(file: Any) -> tuple[dict[str, Any], dict[str, str]]:
     import h5py
 
     links: dict[str, Any] = {}
-    names: dict[Any, str] = {}  # of each item, once
+    names: dict[Any, str] = {}  # one name for each item
     broken: dict[str, str] = {}
     file.visititems(lambda name, item: names.update({item: name}))
     file.visititems_links(lambda name, link: links.update({name: link}))
@@ -112,7 +111,7 @@ def arrays_in(file: Any) -> tuple[dict[str, Any], dict[str, str]]:
 
 
 def require_filters(array: Any) -> None:
-    """Require what unpacks the chunks of an array."""
+    """Require the filters that unpack the chunks of an array."""
     import h5py
 
     stored = array.id.get_create_plist()
@@ -123,13 +122,13 @@ def require_filters(array: Any) -> None:
 
 
 def require_sources(array: Any) -> None:
-    """Require the arrays that a virtual one is made of: HDF5 gives its fill value for what is not there."""
+    """Require all parts of a virtual array: HDF5 would silently read fill values for missing ones."""
     import h5py
 
     own = Path(array.file.filename)
     for name, part in {(each.file_name, each.dset_name) for each in array.virtual_sources()}:
         places = [own] if name == "." else [own.parent / name, Path(name)]
-        if "%" in name:  # a pattern, of which HDF5 takes all that there are
+        if "%" in name:  # a pattern: HDF5 takes whatever files match
             continue
         place = next(filter(Path.is_file, places), None)
         with h5py.File(place, "r") if place else nullcontext({}) as source:

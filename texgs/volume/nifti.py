@@ -7,13 +7,14 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading_as
+from texgs.volume.axes import Axis, place_on
 from texgs.volume.grid import Grid, Triple, check_lattice, dims_of, require_room
-from texgs.volume.slabs import ArraySource, Source, require_step, step_note
+from texgs.volume.slabs import ArraySource, Source, step_note
 from texgs.volume.space import RAS, RIGHT_HANDED, Space
 
 BY_NIBABEL = (".nii", ".nii.gz", ".hdr", ".img", ".mgh", ".mgz")
-ORIENTED = ("sform_code", "qform_code", "goodRASFlag")  # of headers of NIfTI and MGH: 0 for none
-UNITS = {"meter": "m", "micron": "um"}  # mm where a file tells none
+ORIENTED = ("sform_code", "qform_code", "goodRASFlag")  # fields of headers; 0: no orientation
+UNITS = {"meter": "m", "micron": "um"}  # mm if the file tells none
 
 
 def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: int = 0) -> Source:
@@ -26,13 +27,13 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: 
 
     with reading_as("a NIfTI file"), LoggingOutputSuppressor():
         image = nibabel.load(path)
-        if not isinstance(image, nibabel.AnalyzeImage | nibabel.MGHImage):  # the former has NIfTI below it
+        if not isinstance(image, nibabel.AnalyzeImage | nibabel.MGHImage):  # NIfTI is a subclass of ANALYZE
             raise ArgumentError(f"expected a NIfTI image, got {type(image).__name__}")
         stored = image.get_data_dtype()
         if stored.fields:
             raise ArgumentError(f"expected a scalar volume, got {len(stored.fields)} components per sample")
         n_steps, *rest = image.shape[3:] or (1,)
-        require_step(time, n_steps)
+        place_on(Axis("time", n_steps), time)
         shape = image.shape[:3] + tuple(size for size in rest if size != 1)
         x, y, z = dims_of(shape)[::-1]
         check_lattice((x, y, z), stored)
@@ -42,7 +43,7 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: 
             raise ArgumentError("expected three independent axes, got a singular affine matrix")
         proxy: Any = image.dataobj
         is_scaled = (proxy.slope, proxy.inter) != (1, 0)
-        proxy = proxy[..., time, *[0] * len(rest)] if n_steps > 1 else proxy  # reads no other step
+        proxy = proxy[..., time, *[0] * len(rest)] if n_steps > 1 else proxy  # reads this step only
         require_room((x, y, z), np.dtype(np.float32) if is_scaled else stored)
         samples = np.asarray(proxy, np.float32) if is_scaled else np.asanyarray(proxy)
         values = nibabel.apply_orientation(samples.reshape(shape, order="F"), turn)  # [X, Y, Z]

@@ -10,13 +10,19 @@ import numpy as np
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
 from texgs.volume.grid import Dims, Grid, Triple, byte_count
-from texgs.volume.headers import UPRIGHT, read_fields, spacing_in, unit_in
+from texgs.volume.headers import UPRIGHT_SPACING, read_fields, spacing_in, unit_in
 from texgs.volume.slabs import RawSource
 from texgs.volume.space import UNTOLD, Space
 
 ALIGNMENT = 64  # bytes; where the samples of a canonical file start: cache lines, and any vector type
-WORDS = {"int8": "signed char", "uint8": "uchar", "int16": "short", "uint16": "ushort", "float32": "float"}
-MAKES = "texgs volume dataset=NAME makes it"
+NRRD_TYPES = {
+    "int8": "signed char",
+    "uint8": "uchar",
+    "int16": "short",
+    "uint16": "ushort",
+    "float32": "float",
+}
+REMEDY = "texgs volume dataset=NAME makes it"
 NUMBER = re.compile(r"[-+.\deE]+")
 
 
@@ -24,7 +30,7 @@ def open_grid(path: str | Path) -> Grid:
     """Map a prepared volume into memory; samples are read when they are used."""
     path = Path(path)
     if not path.is_file():
-        raise ArgumentError(f"{path}: no such file; {MAKES}")
+        raise ArgumentError(f"{path}: no such file; {REMEDY}")
     with located(path):
         first, *others = open_prepared(path)
     values = [each.mapped() for each in (first, *others)]
@@ -33,22 +39,22 @@ def open_grid(path: str | Path) -> Grid:
 
 def open_prepared(path: Path) -> list[RawSource]:
     """Return the channels of a prepared volume as sources; most have one."""
-    with reading_as("an NRRD file", f"{MAKES} again"):
+    with reading_as("an NRRD file", f"{REMEDY} again"):
         fields, offset = read_fields(path)
         encoding = fields["encoding"]
         if encoding != "raw":
-            raise ArgumentError(f"expected a prepared volume with raw encoding, got {encoding}; {MAKES}")
+            raise ArgumentError(f"expected a prepared volume with raw encoding, got {encoding}; {REMEDY}")
         nx, ny, nz, *n = map(int, fields["sizes"].split())
         directions = fields["spacedirections"].removesuffix("none")
         vectors = np.reshape(np.array(NUMBER.findall(directions), float), (3, 3))
         dx, dy, dz = spacing_in(fields) or map(hypot, *vectors.T.tolist())
         space = Space.along(vectors, fields["space"], unit_in(fields))
         x, y, z = map(float, NUMBER.findall(fields["spaceorigin"]))
-        stored = np.dtype({word: name for name, word in WORDS.items()}[fields["type"]]).newbyteorder("<")
+        stored = np.dtype({word: name for name, word in NRRD_TYPES.items()}[fields["type"]]).newbyteorder("<")
         lattice, size = ((dx, dy, dz), (x, y, z), space), byte_count((nx, ny, nz), stored)
         (count,) = n or [1]
         if count < 1:
-            raise ArgumentError(f"expected at least one channel, got {count}; {MAKES}")
+            raise ArgumentError(f"expected at least one channel, got {count}; {REMEDY}")
         return [
             RawSource(path, (nx, ny, nz), stored, offset + channel * size, *lattice)
             for channel in range(count)
@@ -60,17 +66,17 @@ def write_header(
 ) -> int:
     """Write the header of a canonical file, and return its length, a multiple of `ALIGNMENT` bytes.
 
-    Raw samples follow, little endian, of one of the types in `WORDS`; of one channel after the other.
+    Raw samples follow, little endian, of one of the types in `NRRD_TYPES`; of one channel after the other.
     """
     vectors = (space.axes * np.array(spacing)[:, None]).tolist()
     directions = " ".join(map(_vector, vectors))
     # Lengths of vectors of any direction may differ from the spacing in the last bit.
-    pair = [f"{UPRIGHT}:={' '.join(repr(float(step)) for step in spacing)}"]
+    pair = [f"{UPRIGHT_SPACING}:={' '.join(repr(float(step)) for step in spacing)}"]
     units = ["space units:" + 3 * f' "{space.unit}"'] if space.unit else []
     size, none, kind = (f" {channels}", " none", " list") if channels > 1 else ("", "", "")
     lines = [
         "NRRD0004",
-        f"type: {WORDS[dtype.name]}",
+        f"type: {NRRD_TYPES[dtype.name]}",
         f"dimension: {4 if channels > 1 else 3}",
         f"space: {space.name}",
         f"sizes: {dims[0]} {dims[1]} {dims[2]}{size}",

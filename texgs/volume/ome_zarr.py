@@ -18,8 +18,7 @@ import numpy as np
 from texgs.core.io import reading_as
 from texgs.core.memory import room_for_volume
 from texgs.core.names import is_number
-from texgs.volume.axes import Axis, Channel, axes_of, nameless
-from texgs.volume.coding import attributes_of
+from texgs.volume.axes import Axis, Channel, attributes_of, axes_of, nameless
 from texgs.volume.grid import Triple
 from texgs.volume.layers import LayerSource, gaps_in, one_of
 

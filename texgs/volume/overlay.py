@@ -7,8 +7,8 @@ import numpy as np
 
 from texgs.volume.transfer import Array, TransferFunction, combine, just_above, left_limit, overlapping
 
-PARTS = 8  # straight pieces between two points: products of transparencies are curves
-DENSEST = 1 - 1e-9  # opacity whose extinction is still finite
+PIECES = 8  # straight pieces between two points: products of transparencies are curves
+MAX_OPACITY = 1 - 1e-9  # opacity whose extinction is still finite
 
 
 def overlay(functions: Mapping[str, TransferFunction]) -> TransferFunction:
@@ -21,7 +21,7 @@ def overlay(functions: Mapping[str, TransferFunction]) -> TransferFunction:
         return combine(functions)
     each = list(functions.values())
     values = places(each)
-    sides = mixed(each, values, left_of), mixed(each, values, TransferFunction.__call__)
+    sides = mix(each, values, left_of), mix(each, values, TransferFunction.__call__)
     points = []
     for value, left, right in zip(values.tolist(), *sides, strict=True):
         points += [(value, *row) for row in ([left, right] if not np.allclose(left, right) else [right])]
@@ -47,17 +47,17 @@ def places(functions: list[TransferFunction]) -> Array:
     """Return ascending values [N] between which straight lines show all functions closely."""
     ends = [just_above(tf.opacity[-1][0]) for tf in functions if tf.opacity[-1][1] > 0]
     knots = np.unique([*(p[0] for tf in functions for p in (*tf.opacity, *tf.color)), *ends])
-    shares = np.arange(PARTS) / PARTS
+    shares = np.arange(PIECES) / PIECES
     between = knots[:-1, None] + np.diff(knots)[:, None] * shares
     return np.unique([*between.ravel(), knots[-1]])
 
 
-def mixed(
+def mix(
     functions: list[TransferFunction], values: Array, limit: Callable[[TransferFunction, Array], Array]
 ) -> Array:
     """Return r, g, b and opacity [N, 4] of all functions together, as limits from one side of values [N]."""
     limits = np.stack([limit(tf, values) for tf in functions])  # [F, N, 4]
-    extinction = -np.log1p(-np.minimum(limits[..., 3], DENSEST))
+    extinction = -np.log1p(-np.minimum(limits[..., 3], MAX_OPACITY))
     near = [(tf.support[0] <= values) & (values <= tf.support[1]) for tf in functions]
     weights = extinction + 1e-12 * (np.stack(near) + 1e-12)  # where nothing is seen, colours go on
     color = (weights[..., None] * limits[..., :3]).sum(axis=0) / weights.sum(axis=0)[:, None]

@@ -13,13 +13,13 @@ from texgs.core.io import write_atomic
 from texgs.core.memory import GIB
 from texgs.core.names import check_count, is_number
 from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
-from texgs.volume.nrrd_file import WORDS, open_prepared, write_header
+from texgs.volume.nrrd_file import NRRD_TYPES, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.space import Space
 from texgs.volume.summaries import Summary, summarize
 
 Bounds = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
-WHOLE = 2**24  # up to which float32 has all whole numbers
+FLOAT32_INTEGERS = 2**24  # up to which float32 has all whole numbers
 Step = tuple[int, int, int]  # channel, and a slab: slices [start, stop)
 Progress = Callable[[Iterable[Step], int], Iterable[Step]]
 
@@ -68,7 +68,7 @@ def prepare_channels(
     bounds, axes = bounds_of(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin, space = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
     kept = "uint8" if source.dtype.kind == "b" else source.dtype.name
-    dtype = np.dtype(kept if kept in WORDS else "float32")
+    dtype = np.dtype(kept if kept in NRRD_TYPES else "float32")
     ((x0, x1), (y0, y1), (z0, z1)), size = bounds, prod(dims) * dtype.itemsize
 
     def write(file: BinaryIO) -> None:
@@ -97,8 +97,8 @@ def _summaries(source: Source, target: Path, tallies: Sequence["_Tally"]) -> lis
     summaries = [summarize(each, t.minimum, t.maximum, (t.low, t.high)) for each, t in pairs]
     notes = [source.note, *(each.note for each in summaries)]
     largest = max(-tallies[0].minimum, tallies[0].maximum)
-    if source.dtype.kind in "iu" and written[0].dtype.kind == "f" and largest > WHOLE:
-        notes.append(f"whole numbers above {WHOLE} are rounded, so that labels may become equal")
+    if source.dtype.kind in "iu" and written[0].dtype.kind == "f" and largest > FLOAT32_INTEGERS:
+        notes.append(f"whole numbers above {FLOAT32_INTEGERS} are rounded, so that labels may become equal")
     source.note = "; ".join(dict.fromkeys(filter(None, notes)))
     return summaries
 

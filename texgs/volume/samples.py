@@ -15,8 +15,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Dims, byte_count, require_room
-from texgs.volume.headers import METAIMAGE, read_fields, samples_file
-from texgs.volume.pointers import require_itself
+from texgs.volume.headers import METAIMAGE, read_fields, require_itself, samples_file
 
 NUMBERS = ("elementspacing", "elementsize", "offset", "position", "origin", "transformmatrix", "rotation")
 ENCODINGS = {"raw": "raw", "gzip": "gzip", "gz": "gzip", "bzip2": "bzip2", "bz2": "bzip2"} | dict.fromkeys(
@@ -70,11 +69,11 @@ def _is_true(fields: dict[str, str], name: str) -> bool:
     return fields.get(name, "").lower() in ("true", "1")
 
 
-def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
+def unpack(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
     """Unpack samples [Z, Y, X] of a type with byte order, as far as the header says and no further."""
     n_bytes = byte_count(dims, dtype)
     if stored.encoding == "text":
-        # What a narrow type cannot hold would begin again at its other end.
+        # A narrow type would wrap numbers that it cannot hold.
         wide = dtype if dtype.kind == "f" or dtype.itemsize == 8 else np.dtype(np.int64)
         require_room(dims, wide, n_bytes)
         with stored.path.open("rb") as file:
@@ -87,13 +86,13 @@ def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
             got = values[wrong][0]
             raise ArgumentError(f"expected samples of {dtype.name}, got {got}; is the header another's?")
         return stored_as.reshape(dims[::-1])
-    # The stream is in memory beside what it unpacks to, which is copied once from the library's own blocks.
+    # The stream, the library's blocks and the unpacked copy are in memory at once.
     require_room(dims, dtype, stored.path.stat().st_size - stored.offset + n_bytes)
-    # One byte more than there should be makes the library go to the end of its stream, and compare checksums.
+    # Asking for one byte too many makes the library reach the end of the stream and compare checksums.
     most = 2 * n_bytes if stored.skip == -1 else n_bytes + stored.skip + 1
     with stored.path.open("rb") as file:
         file.seek(stored.offset)
-        samples = _unpack(file, stored.encoding, most)
+        samples = _read_stream(file, stored.encoding, most)
     start = len(samples) - n_bytes if stored.skip == -1 else stored.skip
     if start < 0 or len(samples) != start + n_bytes:
         more = "at least " if len(samples) == most else ""
@@ -104,8 +103,8 @@ def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
     return np.frombuffer(samples, dtype, prod(dims), start).reshape(dims[::-1])
 
 
-def _unpack(file: BinaryIO, encoding: str, most: int) -> bytes:
-    """Read a stream, or several behind each other, as programs write them that use several cores."""
+def _read_stream(file: BinaryIO, encoding: str, most: int) -> bytes:
+    """Read a stream, or several in a row, as parallel packers write them."""
     if encoding == "zlib":
         return zlib.decompressobj().decompress(file.read(), most)
     with gzip.GzipFile(fileobj=file) if encoding == "gzip" else bz2.BZ2File(file) as stream:

@@ -82,8 +82,7 @@ def prepare_fields(
 
 def generated_field(volume: VolumeKeys) -> Source:
     """Return the field of a generator, at its time where it changes."""
-    from texgs.volume.generate import GENERATORS, RANDOM
-    from texgs.volume.generate_series import SERIES
+    from texgs.volume.generate import GENERATORS, RANDOM, SERIES
     from texgs.volume.slabs import ArraySource
 
     name, last = str(volume.generator), volume.steps - 1

@@ -100,12 +100,6 @@ def size_text(dims: Dims, stored: np.dtype, skip: int) -> str:
     return f"{factors} ({stored.name}){skipped} = {skip + byte_count(dims, stored)} bytes"
 
 
-def require_step(time: int, count: int) -> None:
-    """Require the number of one of so many steps."""
-    if not 0 <= time < count:
-        raise ArgumentError(f"dataset.volume.time: expected one of 0 to {count - 1}, got {time}")
-
-
 def step_note(time: int, n_steps: int) -> str:
     """Say which step of several was chosen."""
     return f"step {time} of {n_steps}; dataset.volume.time chooses another" if n_steps > 1 else ""

@@ -4,35 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import Any, NamedTuple
+from zipfile import ZipFile, is_zipfile
 
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
 from texgs.volume.foreign import BY_VTK, DICOM, open_foreign
-from texgs.volume.grid import ONES, ZEROS, Dims, Grid, Triple, byte_count, check_lattice, dims_of
-from texgs.volume.headers import METAIMAGE, NRRD
+from texgs.volume.grid import Triple
+from texgs.volume.headers import METAIMAGE, NRRD, require_itself
 from texgs.volume.mrc import MAPS, open_mrc
 from texgs.volume.netcdf import open_netcdf
 from texgs.volume.nifti import BY_NIBABEL, open_nifti
 from texgs.volume.ome_zarr import is_zarr, open_zarr
-from texgs.volume.pointers import require_itself, require_packing
-from texgs.volume.slabs import ArraySource, RawSource, Source, size_text
-from texgs.volume.slice_names import tiffs_in
-from texgs.volume.text_columns import ColumnSource
+from texgs.volume.plain import open_npy, open_raw, open_text
+from texgs.volume.slabs import Source
 from texgs.volume.tiff import open_tiff
+from texgs.volume.tiff_images import tiffs_in
 
-# Tried in this order where the size of a plain file does not fit the type given.
-COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
-DEFAULTS = {"endian": "little", "skip": 0, "time": 0}  # of keys, which every format may be given
+DEFAULTS = {"endian": "little", "skip": 0, "time": 0}  # values that every format accepts
 HDF5 = (".nc", ".nc4", ".h5", ".hdf5", ".hdf", ".nxs")
 IMARIS = (
     "Imaris pads arrays with zeros, and tells size and extent by text that is not read: dataset.volume.crop "
     "and spacing set them"
 )
-IN_FILES = ("variable", "channel", "time")  # keys of an array among others
-IN_PAGES = ("image", "channel", "time")  # keys of an image of TIFF
+IN_FILES = ("variable", "channel", "time")  # keys that choose an array and a part of it
+IN_PAGES = ("image", "channel", "time")  # keys that choose an image of TIFF and a part of it
+GZIP = b"\x1f\x8b"  # the first bytes of a gzip file
+OF_ZARR = (".zarray", ".zgroup", ".zattrs", "zarr.json")  # names in a zip of Zarr
+
+
+class Format(NamedTuple):
+    """How a format is opened."""
+
+    open: Callable[..., Source]  # takes the path, spacing and origin that replace the file's, and keys
+    keys: tuple[str, ...] = ()  # the keys that `open` takes
+    is_superior: bool = False  # z points to the head
 
 
 def open_source(
@@ -82,7 +88,7 @@ def open_source(
 
 
 def _try_to_read(path: Path) -> None:
-    """Raise where that is not possible; the readers of the formats say it each in other words."""
+    """Refuse what cannot be read at all, before readers refuse it in words of their own."""
     if path.is_dir():
         files = (each for each in path.iterdir() if not each.name.startswith(".") and not each.is_dir())
         if first := min(files, default=None):
@@ -91,121 +97,89 @@ def _try_to_read(path: Path) -> None:
     elif path.exists() and not path.is_file():
         raise ArgumentError("expected a file or a folder, got a named pipe, a device or a socket")
     else:
-        require_packing(path, OPENERS)
+        _require_packing(path)
 
 
 def _suffix(path: Path) -> str:
-    """Return the suffix in lower case; both where a file is compressed as a whole."""
+    """Return the suffix in lower case, with the one before it if the whole file is gzipped."""
     suffixes = [suffix.lower() for suffix in path.suffixes]
     return "".join(suffixes[-2:] if suffixes[-1:] == [".gz"] else suffixes[-1:])
 
 
 def holds_arrays(path: Path) -> bool:
     """Return whether a file is of a format of arrays, which are read as needed and may have channels."""
-    return "channel" in _opener(path)[1]
+    kind = _format(path)
+    return kind is not None and "channel" in kind.keys
 
 
 def tells_superior(path: Path) -> bool:
-    """Return whether z points to the head by a volume's format: of NIfTI, and of a folder of DICOM."""
-    opener, _ = _opener(path)
-    return opener is open_nifti or (opener is open_foreign and (path.is_dir() or _suffix(path) in DICOM))
+    """Return whether the format has z point to the head, as NIfTI and DICOM have."""
+    kind = _format(path)
+    return kind is not None and kind.is_superior
 
 
-def _opener(path: Path) -> tuple[Callable[..., Source] | None, tuple[str, ...]]:
-    """Return what opens a file or a folder, and the keys that it takes."""
-    suffix = _suffix(path)
+def _format(path: Path) -> Format | None:
+    """Return the format of a file by its suffix, or of a folder by what is in it."""
     if not path.is_dir():
-        return OPENERS.get(suffix, (None, ()))
-    if is_zarr(path) or suffix == ".zarr":
-        return open_zarr, IN_FILES
-    return (open_tiff, IN_PAGES) if tiffs_in(path) else (open_foreign, ("series", "time"))
+        return FORMATS.get(_suffix(path))
+    if is_zarr(path) or _suffix(path) == ".zarr":
+        return Format(open_zarr, IN_FILES)
+    if tiffs_in(path):
+        return Format(open_tiff, IN_PAGES)
+    return Format(open_foreign, ("series", "time"), is_superior=True)
+
+
+def _require_packing(path: Path) -> None:
+    """Require gzip if and only if the suffix says so, where a format has suffixes for both."""
+    start, suffix = require_itself(path), path.suffix.lower()
+    is_packed = start.startswith(GZIP)
+    if suffix == ".gz" and start and not is_packed and Path(path.stem).suffix.lower() + suffix in FORMATS:
+        raise ArgumentError(f"expected gzip, got another file; if it is whole, rename it to {path.stem}")
+    if is_packed and suffix + ".gz" in FORMATS:
+        raise ArgumentError(f"expected a file that is not packed, got gzip; rename it to {path.name}.gz")
+    if suffix == ".zip" and is_zipfile(path):
+        with reading_as("a folder or zip of Zarr"), ZipFile(path) as archive:
+            names = archive.namelist()
+        if not any(name.endswith(OF_ZARR) for name in names):
+            raise ArgumentError(f"expected a zip of Zarr, got one of {', '.join(names[:3])} ...; unpack it")
 
 
 def _open(path: Path, spacing: Triple | None, origin: Triple | None, said: dict[str, Any]) -> Source:
-    """Open a file by its suffix, or a folder of slices; `said` are keys that only some formats take."""
-    opener, takes = _opener(path)
+    """Open a file or a folder by its format; `said` are keys that not every format takes."""
+    kind = _format(path)
     if path.name.upper() == "DICOMDIR":
         raise ArgumentError(
             "expected a volume, got a list of files of DICOM; open the folder of a series below it"
         )
-    if opener is None:
+    if kind is None:
         raise ArgumentError(
-            f"unknown suffix {_suffix(path)!r}; expected {', '.join(OPENERS)}, or a folder of slices or Zarr"
+            f"unknown suffix {_suffix(path)!r}; expected {', '.join(FORMATS)}, or a folder of slices or Zarr"
         )
-    if unfit := [key for key in said if key not in takes]:
+    if unfit := [key for key in said if key not in kind.keys]:
         raise ArgumentError(f"{', '.join(unfit)}: not for this format; leave them out")
-    return opener(path, spacing, origin, **said)
-
-
-def _open_raw(
-    path: Path,
-    spacing: Triple | None,
-    origin: Triple | None,
-    dims: Dims | None = None,
-    dtype: str | None = None,
-    endian: str = "little",
-    skip: int = 0,
-) -> RawSource:
-    """Open plain samples; the file's size must fit exactly, the only check there is."""
-    if dims is None or dtype is None:
-        missing = " and ".join(key for key, value in (("dims", dims), ("dtype", dtype)) if value is None)
-        raise ArgumentError(f"plain samples have no header; set {missing}, and endian and skip where needed")
-    if endian not in ("little", "big"):
-        raise ArgumentError(f"endian: expected little or big, got {endian!r}")
-    try:
-        stored = np.dtype(dtype).newbyteorder("<" if endian == "little" else ">")
-    except (SyntaxError, TypeError) as error:
-        raise ArgumentError(f"dtype: expected a name such as uint8 or float32, got {dtype!r}") from error
-    check_lattice(dims, stored)
-    size = path.stat().st_size
-    if size != skip + byte_count(dims, stored):
-        fits = [name for name in COMMON_TYPES if size == skip + byte_count(dims, np.dtype(name))]
-        advice = f"dtype {fits[0]} would fit" if fits else "correct dims, dtype or skip"
-        raise ArgumentError(f"expected {size_text(dims, stored, skip)}, found {size}; {advice}")
-    return RawSource(path, dims, stored, skip, spacing or ONES, origin or ZEROS)
-
-
-def _open_npy(
-    path: Path, spacing: Triple | None, origin: Triple | None, variable: str | None = None
-) -> Source:
-    """Open a NumPy array [Z, Y, X], or one of an archive."""
-    with reading_as(f"a {path.suffix.lower()} file"):
-        values = np.load(path, mmap_mode="r", allow_pickle=False)
-        if isinstance(values, np.lib.npyio.NpzFile):
-            with values as arrays:
-                name = variable or (arrays.files[0] if len(arrays.files) == 1 else "none")
-                if name not in arrays.files:
-                    known = ", ".join(arrays.files)
-                    raise ArgumentError(f"dataset.volume.variable: expected one of {known}, got {name}")
-                values = arrays[name]
-    lattice = (spacing or ONES, origin or ZEROS)
-    if isinstance(values, np.memmap) and values.flags.c_contiguous:
-        return RawSource(path, dims_of(values.shape), values.dtype, values.offset, *lattice)
-    return ArraySource(Grid(values, *lattice), path.name)
+    return kind.open(path, spacing, origin, **said)
 
 
 def _open_imaris(path: Path, spacing: Triple | None, origin: Triple | None, **keys: Any) -> Source:
-    """Open an array of Imaris as one of HDF5."""
+    """Open an Imaris file, which is HDF5."""
     source = open_netcdf(path, spacing, origin, **keys)
     source.note = "; ".join(filter(None, (source.note, "" if spacing else IMARIS)))
     return source
 
 
-# Function of the path, of spacing and origin where they replace the file's, and of these keys; suffixes.
-FORMATS: tuple[tuple[Callable[..., Source], tuple[str, ...], tuple[str, ...]], ...] = (
-    (_open_raw, ("dims", "dtype", "endian", "skip"), (".raw", ".bin", ".dat")),
-    (open_tiff, IN_PAGES, (".tif", ".tiff")),
-    (_open_npy, (), (".npy",)),
-    (_open_npy, ("variable",), (".npz",)),
-    (open_nifti, ("time",), BY_NIBABEL),
-    (open_foreign, ("channel", "time"), (*NRRD, *METAIMAGE)),  # by SimpleITK
-    (open_foreign, (), (".gipl",)),
-    (open_mrc, (), (*MAPS, *(f"{suffix}.gz" for suffix in MAPS))),
-    (open_foreign, ("variable",), BY_VTK),
-    (open_foreign, ("time",), DICOM),
-    (open_netcdf, IN_FILES, HDF5),
-    (_open_imaris, IN_FILES, (".ims",)),
-    (open_zarr, IN_FILES, (".zip", ".ozx")),
-    (ColumnSource, ("dims", "column"), (".txt", ".txt.gz")),
-)
-OPENERS = {suffix: (opener, keys) for opener, keys, suffixes in FORMATS for suffix in suffixes}
+FORMATS: dict[str, Format] = {
+    **dict.fromkeys((".raw", ".bin", ".dat"), Format(open_raw, ("dims", "dtype", "endian", "skip"))),
+    **dict.fromkeys((".tif", ".tiff"), Format(open_tiff, IN_PAGES)),
+    ".npy": Format(open_npy),
+    ".npz": Format(open_npy, ("variable",)),
+    **dict.fromkeys(BY_NIBABEL, Format(open_nifti, ("time",), is_superior=True)),
+    **dict.fromkeys((*NRRD, *METAIMAGE), Format(open_foreign, ("channel", "time"))),
+    ".gipl": Format(open_foreign),
+    **dict.fromkeys((*MAPS, *(f"{suffix}.gz" for suffix in MAPS)), Format(open_mrc)),
+    **dict.fromkeys(BY_VTK, Format(open_foreign, ("variable",))),
+    **dict.fromkeys(DICOM, Format(open_foreign, ("time",), is_superior=True)),
+    **dict.fromkeys(HDF5, Format(open_netcdf, IN_FILES)),
+    ".ims": Format(_open_imaris, IN_FILES),
+    **dict.fromkeys((".zip", ".ozx"), Format(open_zarr, IN_FILES)),
+    **dict.fromkeys((".txt", ".txt.gz"), Format(open_text, ("dims", "column"))),
+}

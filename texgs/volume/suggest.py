@@ -24,17 +24,17 @@ COLORS = (
     (0.78, 0.48, 0.70),  # mauve
     (0.20, 0.36, 0.70),  # blue
 )
-MOST = 5  # classes, where the user does not say
-SHELLS = 3  # classes of a histogram without peaks but the background
-ALONE = 0.3  # opacity of the only function
-FEW = 32  # a histogram with no more values than this holds labels
-SMOOTHING = 0.02  # standard deviation, as a fraction of the range
-FINE = 0.006  # the same beside the background, or half of the distance of bins that hold any
-RARE = 2e-4  # of the voxels outside the most frequent bin: a bin with fewer is empty ...
-NOISE = 8.0  # ... and so is one with fewer voxels than this
-DIP = 0.3  # a valley is this much (natural log of counts) below the peaks on both sides: 26 percent
-BROAD = 0.03  # width (of the range) times share (of the foreground) that makes the tail of a peak a class
-BELOW = 0.1  # of the foreground's voxels, that makes values below the background worth showing
+MAX_CLASSES = 5  # classes, where the user does not say
+SHELL_COUNT = 3  # classes of a histogram without peaks but the background
+SINGLE_OPACITY = 0.3  # opacity of the only function
+MAX_LABELS = 32  # a histogram with no more values than this holds labels
+SMOOTHING_WIDTH = 0.02  # standard deviation, as a fraction of the range
+FINE_WIDTH = 0.006  # the same beside the background, or half of the distance of bins that hold any
+EMPTY_SHARE = 2e-4  # of the voxels outside the most frequent bin: a bin with fewer is empty ...
+EMPTY_COUNT = 8.0  # ... and so is one with fewer voxels than this
+VALLEY_DEPTH = 0.3  # a valley is this much (natural log of counts) below the peaks on both sides: 26 percent
+TAIL_AREA = 0.03  # width (of the range) times share (of the foreground) that makes the tail of a peak a class
+LOW_SHARE = 0.1  # of the foreground's voxels, that makes values below the background worth showing
 
 
 def suggested(
@@ -55,7 +55,7 @@ def suggested(
         raise ArgumentError(f"count: expected a whole number from 1 on, got {count!r}")
     known = known.get("robust") or known
     low, high = known["minimum"], known["maximum"]
-    if count is None and channel and (shown := windowed(channel, low, high)):
+    if count is None and channel and (shown := window_function(channel, low, high)):
         return {"TF01": shown.rounded(low, high)}
     to, back = (np.log, np.exp) if known.get("scale") == "log" else (float, float)
     minimum, maximum = float(to(low)), float(to(high))
@@ -65,11 +65,11 @@ def suggested(
     if looks_like_labels(counts, maximum - minimum):
         values, counts = values[present], counts[present]
         # Every value but the lowest is a class; too many are grouped with their neighbours.
-        classes = _divided([(1, len(counts))], np.sqrt(counts), count or MOST)
+        classes = _divide([(1, len(counts))], np.sqrt(counts), count or MAX_CLASSES)
     else:
         classes = _materials(counts, count)
     edges = np.concatenate([[minimum], (values[1:] + values[:-1]) / 2, [maximum]])
-    opacities = np.geomspace(0.08, 0.6, len(classes)) if len(classes) > 1 else [ALONE]
+    opacities = np.geomspace(0.08, 0.6, len(classes)) if len(classes) > 1 else [SINGLE_OPACITY]
     basic = [
         _trapezoid(edges[start], edges[stop], opacities[i], i, (minimum, maximum), back).rounded(low, high)
         for i, (start, stop) in enumerate(classes)
@@ -77,12 +77,12 @@ def suggested(
     return {f"TF{i:02d}": tf for i, tf in enumerate(basic, start=1)}
 
 
-def windowed(channel: Channel, low: float, high: float) -> TransferFunction | None:
+def window_function(channel: Channel, low: float, high: float) -> TransferFunction | None:
     """Return a function in a channel's colour that rises over its window; None if it shows nothing."""
     if channel.window is None or channel.window[0] >= high:
         return None
     values = np.clip([*channel.window, high], low, high)
-    opacity = np.interp(values, channel.window, (0, ALONE))
+    opacity = np.interp(values, channel.window, (0, SINGLE_OPACITY))
     points = zip(values.tolist(), opacity.tolist(), strict=True)
     return TransferFunction(tuple(points), ((values.tolist()[0], *channel.color),))
 
@@ -96,13 +96,13 @@ def looks_like_labels(counts: Array, extent: float) -> bool:
     present = counts > 0
     groups = int(present[0]) + int(np.count_nonzero(present[1:] & ~present[:-1]))
     is_step = 0.5 < extent / len(counts) <= 1
-    return int(present.sum()) <= FEW and (is_step or 2 * groups >= int(present.sum()))
+    return int(present.sum()) <= MAX_LABELS and (is_step or 2 * groups >= int(present.sum()))
 
 
 def _materials(counts: Array, count: int | None) -> list[Class]:
     """Return the basins of the log histogram, without the background."""
     log = _smooth_log(counts)
-    most, dip = count or MOST, DIP
+    most, dip = count or MAX_CLASSES, VALLEY_DEPTH
     classes, tails = _classes(counts, log, dip)
     while len(classes) > most and _valleys(log, dip):
         dip *= 1.2
@@ -110,9 +110,9 @@ def _materials(counts: Array, count: int | None) -> list[Class]:
     classes = sorted(sorted(classes, key=lambda c: -counts[slice(*c)].sum())[:most])
     weights = log - log.min() + 1e-3  # positive: also an empty class can be divided
     if count is not None:
-        return _divided(classes, weights, count)
+        return _divide(classes, weights, count)
     peaks, tails = [c for c in classes if c not in tails], [c for c in classes if c in tails]
-    return sorted(peaks + _divided(tails, weights, max(SHELLS - len(peaks), len(tails))))
+    return sorted(peaks + _divide(tails, weights, max(SHELL_COUNT - len(peaks), len(tails))))
 
 
 def _smooth_log(counts: Array) -> Array:
@@ -123,12 +123,13 @@ def _smooth_log(counts: Array) -> Array:
     """
     from scipy.ndimage import gaussian_filter1d
 
-    floor, mode = RARE * (counts.sum() - counts.max()) + NOISE, _mode(counts)
-    widths = SMOOTHING * len(counts), max(FINE * len(counts), 0.5 * len(counts) / np.count_nonzero(counts))
+    floor, mode = EMPTY_SHARE * (counts.sum() - counts.max()) + EMPTY_COUNT, _mode(counts)
+    fine_width = max(FINE_WIDTH * len(counts), 0.5 * len(counts) / np.count_nonzero(counts))
+    widths = SMOOTHING_WIDTH * len(counts), fine_width
     wide, fine = (np.log(gaussian_filter1d(counts, width) + floor) for width in widths)
     for log, finer in ((wide[mode:], fine[mode:]), (wide[mode::-1], fine[mode::-1])):
-        end = [*_valleys(log, DIP), len(log)][0]
-        if any(valley < _foot(log[:end]) for valley in _valleys(finer[:end], DIP)):
+        end = [*_valleys(log, VALLEY_DEPTH), len(log)][0]
+        if any(valley < _foot(log[:end]) for valley in _valleys(finer[:end], VALLEY_DEPTH)):
             log[:end] = finer[:end]
     return wide
 
@@ -145,10 +146,10 @@ def _classes(counts: Array, log: Array, dip: float) -> tuple[list[Class], list[C
     low, high = next(c for c in basins if c[0] <= mode < c[1])
     left, right = mode + 1 - _foot(log[low : mode + 1][::-1]), mode + _foot(log[mode:high])
     foreground = counts[:left].sum() + counts[right:].sum()
-    lowest = 0 if counts[:left].sum() >= BELOW * foreground else right
+    lowest = 0 if counts[:left].sum() >= LOW_SHARE * foreground else right
 
     def is_broad(start: int, stop: int) -> bool:
-        return counts[start:stop].sum() * (stop - start) >= BROAD * foreground * len(counts)
+        return counts[start:stop].sum() * (stop - start) >= TAIL_AREA * foreground * len(counts)
 
     classes: list[Class] = []
     for start, stop in basins:
@@ -189,7 +190,7 @@ def _foot(log: Array) -> int:
     return int(below.argmax()) + 1 if below.max() > 1e-9 else max(len(log) // 2, 1)
 
 
-def _divided(classes: Sequence[Class], weights: Array, count: int) -> list[Class]:
+def _divide(classes: Sequence[Class], weights: Array, count: int) -> list[Class]:
     """Split the class of the largest variance at Otsu's threshold until there are `count`."""
     classes = list(classes)
     while len(classes) < count and any(stop - start > 1 for start, stop in classes):

@@ -19,11 +19,12 @@ Counted = dict[str, Any]  # minimum, maximum, histogram, and its scale: "linear"
 Ends = tuple[float, float]
 
 BINS = 256
-FENCE = 1.0  # times the range that neighbours share: what is farther out are outliers ...
-RARE, FEW = 1e-3, 8  # ... where they are less of the samples outside the most frequent bin, or not more
-GAP = 1 / 8  # of the range, empty above padding
-AIR = (-1100.0, -900.0)  # Hounsfield units
-DECADES = 1e4  # largest value over the median, from which on logarithms are counted
+OUTLIER_DISTANCE = 1.0  # times the range that neighbours share: what is farther out are outliers ...
+OUTLIER_SHARE = 1e-3  # ... where they are less of the samples outside the most frequent bin ...
+OUTLIER_COUNT = 8  # ... or not more than these
+PADDING_GAP = 1 / 8  # of the range, empty above padding
+AIR_VALUES = (-1100.0, -900.0)  # Hounsfield units
+LOG_RATIO = 1e4  # largest value over the median, from which on logarithms are counted
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Summary:
 
 def summarize(source: Source, minimum: float, maximum: float, shared: Ends = (0.0, 0.0)) -> Summary:
     """Summarize a volume whose range is known, and that which neighbours share; reads it once or more."""
-    whole = counted(source, minimum, maximum)
+    whole = count_samples(source, minimum, maximum)
     lattice = (source.dims, source.dtype.name, source.spacing, source.origin)
     return Summary(
         *lattice, minimum, maximum, whole["histogram"], robust_histogram(source, whole, shared), source.space
@@ -70,34 +71,35 @@ def robust_histogram(source: Source, whole: Counted, shared: Ends) -> Counted | 
     are outliers, as hot pixels are. Far below a CT in air lies padding. Decades are counted by logarithms.
     """
     found, low, high = whole, whole["minimum"], whole["maximum"]
-    margin = FENCE * (shared[1] - shared[0])
+    margin = OUTLIER_DISTANCE * (shared[1] - shared[0])
     fences = max(low, shared[0] - margin), min(high, shared[1] + margin)
     if margin > 0 and fences != (low, high):
-        inner = _counted_within(source, *fences)
+        inner = _count_within(source, *fences)
         inside = sum(inner["histogram"])
-        if prod(source.dims) - inside <= max(FEW, RARE * (inside - max(inner["histogram"]))):
+        most = max(OUTLIER_COUNT, OUTLIER_SHARE * (inside - max(inner["histogram"])))
+        if prod(source.dims) - inside <= most:
             found, low, high = inner, inner["minimum"], inner["maximum"]
     first, second = np.flatnonzero(found["histogram"])[:2]
-    if low < AIR[0] and second - first > GAP * BINS:
-        rest = _counted_within(source, np.nextafter(low, high), high)
+    if low < AIR_VALUES[0] and second - first > PADDING_GAP * BINS:
+        rest = _count_within(source, np.nextafter(low, high), high)
         mode = np.linspace(rest["minimum"], high, BINS)[np.argmax(rest["histogram"])]
-        found = rest if AIR[0] < mode < AIR[1] else found
-    elif source.dtype.kind == "f" and 0 < low < high / DECADES:
-        logs = counted(source, low, high, "log")
-        below = int(BINS * (1 - np.log(DECADES) / np.log(high / low)))
+        found = rest if AIR_VALUES[0] < mode < AIR_VALUES[1] else found
+    elif source.dtype.kind == "f" and 0 < low < high / LOG_RATIO:
+        logs = count_samples(source, low, high, "log")
+        below = int(BINS * (1 - np.log(LOG_RATIO) / np.log(high / low)))
         found = logs if 2 * sum(logs["histogram"][:below]) > prod(source.dims) else found
     is_whole = found is whole or looks_like_labels(np.array(found["histogram"]), high - low)
     return None if is_whole else found
 
 
-def _counted_within(source: Source, low: float, high: float) -> Counted:
+def _count_within(source: Source, low: float, high: float) -> Counted:
     """Count the samples within bounds, over the range that they have."""
     inside = (slab[(slab >= low) & (slab <= high)] for slab in slabs(source))
     ends = [(float(part.min()), float(part.max())) for part in inside if part.size]
-    return counted(source, min(ends)[0], max(high for _, high in ends))
+    return count_samples(source, min(ends)[0], max(high for _, high in ends))
 
 
-def counted(source: Source, minimum: float, maximum: float, scale: str = "linear") -> Counted:
+def count_samples(source: Source, minimum: float, maximum: float, scale: str = "linear") -> Counted:
     """Count samples in equal bins over a range, or over its logarithms ("log"); reads the volume once."""
     to = partial(np.log, dtype=np.float64) if scale == "log" else np.asarray
     with np.errstate(divide="ignore", invalid="ignore"):  # of outliers that have no logarithm

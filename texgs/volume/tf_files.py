@@ -17,8 +17,8 @@ Point = tuple[float, float, float, float]
 FORMAT, VERSION = "texgs-tf", 1
 SPACES = ("RGB", "HSV", "Lab", "Diverging", "Lab/CIEDE2000", "Step")  # at VTK's number of each
 SAMPLES = 256  # shared by the segments of a function that is not linear, four each at least
-FINE = 64  # points of colour, from which on its space makes no difference between two of them
-JUST = 1e-6  # of a segment: how close to its ends it is sampled
+LINEAR_POINTS = 64  # points of colour, from which on its space makes no difference between two of them
+END_OFFSET = 1e-6  # of a segment: how close to its ends it is sampled
 
 
 def read_tf(path: str | Path) -> TransferFunction:
@@ -53,8 +53,8 @@ def write_paraview(path: str | Path, tf: TransferFunction, name: str) -> Path:
     preset = {
         "Name": name,
         "ColorSpace": "RGB",
-        "RGBPoints": [x for point in _extended(tf.color, low, high) for x in point],
-        "Points": [x for point in _extended(tf.opacity, low, high) for x in (*point, 0.5, 0.0)],
+        "RGBPoints": [x for point in _extend(tf.color, low, high) for x in point],
+        "Points": [x for point in _extend(tf.opacity, low, high) for x in (*point, 0.5, 0.0)],
     }
     return write_json(path, [preset])
 
@@ -89,7 +89,7 @@ def _from_preset(presets: list[dict[str, Any]]) -> TransferFunction:
     space = preset.get("ColorSpace", "RGB")
     if space not in SPACES:
         raise ArgumentError(f"ColorSpace: expected one of {', '.join(SPACES)}, got {space!r}")
-    is_curved = space == "Step" or (space != "RGB" and len(color) < FINE)
+    is_curved = space == "Step" or (space != "RGB" and len(color) < LINEAR_POINTS)
     if is_curved and color[0][0] < color[-1][0]:
         color = _sampled_color(color, SPACES.index(space), bool(preset.get("HSVWrap")))
     if all((middle, sharpness) == (0.5, 0) for _, _, middle, sharpness in nodes):
@@ -118,7 +118,7 @@ def _sampled_color(points: Sequence[Point], space: int, wrap: bool) -> Any:
     function.SetHSVWrap(wrap)
     for point in points:
         function.AddRGBPoint(*point)
-    return _sampled(function, [value for value, *_ in points], channels=3)
+    return _sample(function, [value for value, *_ in points], channels=3)
 
 
 def _sampled_opacity(nodes: Sequence[Point]) -> Any:
@@ -130,17 +130,17 @@ def _sampled_opacity(nodes: Sequence[Point]) -> Any:
     for node in nodes:
         function.AddPoint(*node)
     middles = [a + middle * (b - a) for (a, _, middle, _), (b, *_) in pairwise(nodes)]
-    return _sampled(function, sorted([*(value for value, *_ in nodes), *middles]), channels=1)
+    return _sample(function, sorted([*(value for value, *_ in nodes), *middles]), channels=1)
 
 
-def _sampled(function: Any, values: Sequence[float], channels: int) -> Any:
+def _sample(function: Any, values: Sequence[float], channels: int) -> Any:
     """Return points of a VTK function between neighbouring values; at these the limits from inside."""
     count = max(SAMPLES // len(values), 4)
     points: list[list[float]] = []
     for a, b in pairwise(values):
         if a < b:
             table = np.empty(count * channels)
-            function.GetTable(a + JUST * (b - a), b - JUST * (b - a), count, table)
+            function.GetTable(a + END_OFFSET * (b - a), b - END_OFFSET * (b - a), count, table)
             heights = table.reshape(count, channels).clip(0, 1)
             rows = np.column_stack([np.linspace(a, b, count), heights]).tolist()
             is_continuous = bool(points) and np.allclose(points[-1], rows[0], rtol=0, atol=1e-4)
@@ -148,7 +148,7 @@ def _sampled(function: Any, values: Sequence[float], channels: int) -> Any:
     return points
 
 
-def _extended(points: Sequence[tuple[float, ...]], low: float, high: float) -> list[tuple[float, ...]]:
+def _extend(points: Sequence[tuple[float, ...]], low: float, high: float) -> list[tuple[float, ...]]:
     """Return the points with the first and the last continued to the ends of a range."""
     first = [(low, *points[0][1:])] if points[0][0] > low else []
     last = [(high, *points[-1][1:])] if points[-1][0] < high else []

@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SIZE, DPI = (10.0, 4.5), 100  # inches, dots per inch: plots by themselves have 1000 x 450 pixels
+PLOT_INCHES, DPI = (10.0, 4.5), 100  # inches, dots per inch: plots by themselves have 1000 x 450 pixels
 SAMPLES = 512
-CAST, INCHES = 160, 1.9  # pixels of a side of a cast, height of the row of them
+CAST_PIXELS, CAST_INCHES = 160, 1.9  # pixels of a side of a cast, height of the row of them
 
 
 def plot(
     channels: Mapping[str, Mapping[str, Any]],
     basic: Mapping[str, TransferFunction],
     title: str = "",
-    size: tuple[float, float] = SIZE,
+    size: tuple[float, float] = PLOT_INCHES,
     dpi: float = DPI,
     casts: Mapping[str, np.ndarray] | None = None,
 ) -> Figure:
@@ -40,7 +40,7 @@ def plot(
     integers as if each bin held equally many. Channels are one below the other, with their labels; casts of
     functions are the last row.
     """
-    heights = [*[size[1]] * len(channels), *[INCHES] * bool(casts)]
+    heights = [*[size[1]] * len(channels), *[CAST_INCHES] * bool(casts)]
     figure = new_figure(size[0], sum(heights), dpi)
     rows = figure.subplots(len(heights), squeeze=False, height_ratios=heights)[:, 0]
     for number, (label, summary) in enumerate(channels.items()):
@@ -49,7 +49,9 @@ def plot(
         _fill(rows[number], {**summary, **(summary.get("robust") or {})}, own, above)
     if casts:
         rows[-1].imshow(np.concatenate([*casts.values()], axis=1))
-        rows[-1].set(xticks=CAST * (np.arange(len(casts)) + 0.5), xticklabels=map(words, casts), yticks=[])
+        rows[-1].set(
+            xticks=CAST_PIXELS * (np.arange(len(casts)) + 0.5), xticklabels=map(words, casts), yticks=[]
+        )
         rows[-1].set_frame_on(False)
     return figure
 
@@ -57,7 +59,7 @@ def plot(
 def casts_of(grid: Grid, basic: Mapping[str, TransferFunction]) -> dict[str, np.ndarray]:
     """Return small pictures [S, S, 3] over white of what each function shows, and all of them."""
     caster, light = Caster(grid, Appearance()), Light("headlight")
-    camera = orbit(30.0, 20.0, *frame_of(grid, basic.values()).lens(width=CAST, height=CAST))
+    camera = orbit(30.0, 20.0, *frame_of(grid, basic.values()).lens(width=CAST_PIXELS, height=CAST_PIXELS))
     shown = {name: [tf] for name, tf in basic.items()} | {"all": overlays(basic)}
     casts = {name: caster.cast(tfs, camera, light, by_cell=False).rgba.numpy() for name, tfs in shown.items()}
     return {name: (rgba[..., :3] + 1 - rgba[..., 3:]).clip(0, 1) for name, rgba in casts.items()}

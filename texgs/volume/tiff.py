@@ -12,15 +12,25 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError, located
 from texgs.core.io import reading_as
-from texgs.volume.axes import Axis, picked
+from texgs.volume.axes import Axis, choose_places
 from texgs.volume.grid import ONES, ZEROS, Grid, Triple, require_room
 from texgs.volume.slabs import ArraySource, RawSource, Source
-from texgs.volume.slice_names import arranged, tiffs_in
-from texgs.volume.tiff_images import axes_of, chosen, file_of, images_in, is_set, require_pages, told_of
+from texgs.volume.tiff_images import (
+    arrange,
+    axes_of,
+    choose_image,
+    file_of,
+    images_in,
+    is_set,
+    require_pages,
+    spacing_and_labels,
+    tiffs_in,
+)
 
-READABLE = (1, 8, 32773, 32946, 34925)  # none, deflate, packbits and LZMA: others need imagecodecs
-PAGES = 2  # in memory at a time: one as it is decoded, and its place in the slab
-LOST = ("subset", "incompletely")  # words of tifffile's warnings about samples that are not there
+# None, deflate, packbits and LZMA: others need imagecodecs.
+READABLE_COMPRESSIONS = (1, 8, 32773, 32946, 34925)
+PAGES_IN_MEMORY = 2  # one as it is decoded, and its place in the slab
+LOSS_WORDS = ("subset", "incompletely")  # words of warnings about lost samples
 NO_SPACING = "TIFF tells no spacing, so that samples are 1 apart; dataset.volume.spacing sets it"
 
 
@@ -87,13 +97,13 @@ def open_tiff(
         is_slices = path.is_dir() and not is_set(images, files)
         if is_slices and len(tiff.pages) != 1:
             raise ArgumentError(f"expected one page per file, got {len(tiff.pages)} in {files[0].name}")
-        one, note = chosen(images, image, None if path.is_dir() else tiff)
+        one, note = choose_image(images, image, None if path.is_dir() else tiff)
         kind = _kind(one.keyframe)
-        told, labels = told_of(one, tiff, images)
+        told, labels = spacing_and_labels(one, tiff, images)
         axes, remark = axes_of(one, labels)
         if is_slices:
-            axes, files = arranged(files)
-        index = picked([*axes, *map(Axis, "YX", kind[0])], **keys)
+            axes, files = arrange(files)
+        index = choose_places([*axes, *map(Axis, "YX", kind[0])], **keys)
         sizes = [axis.size for axis in axes]
         numbers = np.arange(prod(sizes)).reshape(sizes)[tuple(index[:-2])]  # of the planes of z slices
         lattice = (spacing or told or ONES, origin or ZEROS)
@@ -133,12 +143,12 @@ def _kind(page: Any) -> tuple[tuple[int, int], np.dtype]:
     """Return the shape (Y, X) and sample type of a page that can be read."""
     if page.samplesperpixel != 1:
         raise ArgumentError(f"expected a scalar volume, got {page.samplesperpixel} components per sample")
-    if page.compression not in READABLE and find_spec("imagecodecs") is None:
+    if page.compression not in READABLE_COMPRESSIONS and find_spec("imagecodecs") is None:
         raise ArgumentError(
             f"expected samples that are uncompressed or deflated, got {page.compression.name}; save them so, "
             "or pip install '.[tiff]'"
         )
-    require_room((page.imagewidth, page.imagelength, PAGES), np.dtype(page.dtype))
+    require_room((page.imagewidth, page.imagelength, PAGES_IN_MEMORY), np.dtype(page.dtype))
     return (page.imagelength, page.imagewidth), np.dtype(page.dtype)
 
 
@@ -150,7 +160,7 @@ def complaints_raised() -> Iterator[None]:
 
     def collect(record: logging.LogRecord) -> bool:
         records.append(record)
-        return False  # nobody else hears of it
+        return False  # keeps it from all other handlers
 
     logger.addFilter(collect)
     try:
@@ -159,5 +169,5 @@ def complaints_raised() -> Iterator[None]:
         logger.removeFilter(collect)
     for record in records:
         said = record.getMessage()
-        if record.levelno >= logging.ERROR or any(word in said for word in LOST):
+        if record.levelno >= logging.ERROR or any(word in said for word in LOSS_WORDS):
             raise ArgumentError(f"the file is damaged or cut off, tifffile says: {said}")

@@ -15,7 +15,7 @@ from texgs.core.errors import ArgumentError
 
 Array = NDArray[np.float64]
 
-MAXIMUM = sys.float_info.max
+MAX_FLOAT = sys.float_info.max
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def _points(name: str, points: Any, channels: str, least: int) -> tuple[tuple[fl
         where = f"{name}[{i}]"
         if len(row) != channels.count(",") + 2 or not all(isinstance(x, Real) for x in row):
             raise ArgumentError(f"{where}: expected the numbers (value, {channels}), got {row_text(row)}")
-        if not all(-MAXIMUM <= x <= MAXIMUM for x in row):
+        if not all(-MAX_FLOAT <= x <= MAX_FLOAT for x in row):
             raise ArgumentError(f"{where}: expected finite numbers, got {row_text(row)}")
         if not all(0 <= x <= 1 for x in row[1:]):
             raise ArgumentError(f"{where}: expected {channels} in [0, 1], got {row_text(row[1:])}")

@@ -22,7 +22,7 @@ from texgs.core.names import is_number, named_file
 Split = Literal["train", "test", "relit"]
 LENS_KEYS = ("camera_angle_x", "w", "h", "fl_x", "fl_y", "cx", "cy")
 OPENCV_FROM_OPENGL = torch.diag(torch.tensor([1.0, -1.0, -1.0, 1.0], dtype=torch.float64))  # its own inverse
-RIGID = 1e-4  # entries of R^T R may differ from the identity by this much
+RIGID_TOLERANCE = 1e-4  # entries of R^T R may differ from the identity by this much
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +165,7 @@ def world_to_camera(where: str, matrix: Any) -> Tensor:
     R_wc = rigid[:3, :3]
     defect = float((R_wc.T @ R_wc - torch.eye(3, dtype=torch.float64)).abs().max())
     # Written so that NaN is refused as well.
-    if not (defect < RIGID and bool(rigid.isfinite().all()) and float(torch.linalg.det(R_wc)) > 0):
+    if not (defect < RIGID_TOLERANCE and bool(rigid.isfinite().all()) and float(torch.linalg.det(R_wc)) > 0):
         raise ArgumentError(
             f"{where}: transform_matrix: expected a rotation and a position, got a matrix that is singular, "
             "scaled, mirrored or not finite"

@@ -15,7 +15,7 @@ from texgs.volume.grid import dims_of, require_room
 
 IN_XML = (".vti", ".vtr", ".vts", ".pvti", ".pvtr")  # suffixes
 TAIL = 1024  # bytes; more than the end tag and whatever blanks an editor left behind it
-UNEVEN = 0.01  # of a distance: coordinates are often rounded to float32
+SPACING_TOLERANCE = 0.01  # of a distance: coordinates are often rounded to float32
 
 
 def read_vtk(path: Path, variable: str | None = None) -> tuple[dict[str, Any], np.ndarray]:
@@ -45,13 +45,15 @@ def field_of(image: Any, variable: str | None = None) -> tuple[dict[str, Any], n
     elif isinstance(image, pyvista.RectilinearGrid):
         places = [np.asarray(each, np.float64) for each in (image.x, image.y, image.z)]
         gaps = [np.diff(each) if each.size > 1 else np.ones(1) for each in places]
-        if uneven := [x for x, each in zip("xyz", gaps, strict=True) if np.ptp(each) > UNEVEN * each[0]]:
+        if uneven := [
+            x for x, each in zip("xyz", gaps, strict=True) if np.ptp(each) > SPACING_TOLERANCE * each[0]
+        ]:
             raise ArgumentError(f"expected even distances along {', '.join(uneven)}; resample it to an image")
         spacing = np.array([each.mean() for each in gaps])
     else:
         kind = type(image).__name__
         raise ArgumentError(f"expected image data (structured points), got {kind}; resample it to an image")
-    values, is_cell, note = chosen(image, variable)
+    values, is_cell, note = choose_array(image, variable)
     shape = tuple(size - is_cell for size in image.dimensions[::-1])
     if values.size != np.prod(shape, dtype=np.int64):
         raise ArgumentError(f"expected image data of {list(shape)}, got {values.size} values; is it damaged?")
@@ -66,7 +68,7 @@ def field_of(image: Any, variable: str | None = None) -> tuple[dict[str, Any], n
     return lattice, values.reshape(shape)
 
 
-def chosen(image: Any, variable: str | None) -> tuple[np.ndarray, bool, str]:
+def choose_array(image: Any, variable: str | None) -> tuple[np.ndarray, bool, str]:
     """Return the array to take, whether it is one of cells, and what to tell of others.
 
     Those of points come first, also where cells have one of that name.

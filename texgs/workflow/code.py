@@ -14,8 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from texgs.core.cache import cache_folder, keep, recall
-from texgs.core.checksum import digest, sha256
+from texgs.core.cache import cache_folder, digest, keep, recall, sha256
 from texgs.core.native_sources import library_sources
 
 ROOT = Path(__file__).parents[2]

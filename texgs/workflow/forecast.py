@@ -4,18 +4,17 @@ import csv
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from texgs.config.schema import Config
 from texgs.workflow.cases import Cases
-from texgs.workflow.job import Job
 from texgs.workflow.locate import source_file
 from texgs.workflow.sweep import as_sweep
 
-PROBE = "probe"  # the row of speeds.csv with the seconds of `probe` on the same machine
-START_SECONDS = 8  # of a run before its first job, on that machine
+START_SECONDS = 8  # of a run before its first job
 STEP_SECONDS = 0.8  # between two jobs of a run
 
 
@@ -34,60 +33,68 @@ class Forecast:
 class Speed:
     """Seconds of the jobs of a stage, as `benchmarks/speeds.py` has measured them."""
 
-    constant: float
-    per_megapixel: float  # of one view
-    per_iteration: float  # and megapixel
+    constant: float = 0.0
+    per_megapixel: float = 0.0  # of one view
+    per_iteration: float = 0.0  # and megapixel
+    iterations: str = ""  # key of their number in the settings of a job; empty where there are none
 
-    def seconds(self, megapixels: float, iterations: int) -> float:
+    def seconds(self, settings: Mapping[str, Any], megapixels: float) -> float:
         """Return those of one job."""
+        iterations = number(settings, self.iterations) if self.iterations else 0
         return self.constant + megapixels * (self.per_megapixel + iterations * self.per_iteration)
+
+
+def number(settings: Any, key: str) -> int:
+    """Return the number at a key of settings, such as phase.iterations; of those in a list the sum."""
+    if isinstance(settings, list):
+        return sum(number(each, key) for each in settings)
+    name, _, rest = key.partition(".")
+    return number(settings[name], rest) if rest else int(settings[name] or 0)
+
+
+@cache
+def speeds() -> dict[str, Speed]:
+    """Return the measured speeds by stage."""
+    text = files("texgs.workflow").joinpath("speeds.csv").read_text(encoding="utf-8")
+    rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
+    return {
+        row["stage"]: Speed(
+            float(row["constant"]),
+            float(row["per_megapixel"]),
+            float(row["per_iteration"]),
+            row["iterations"],
+        )
+        for row in rows
+    }
+
+
+def megapixels(config: Config) -> float:
+    """Return those of a view, as fits see it."""
+    return config.views.width * config.views.height / config.fit.reduce**2 / 1e6
 
 
 def forecast(words: tuple[str, ...]) -> Forecast:
     """Return what a run with these words would do; nothing is written."""
-    from texgs.core.checksum import Checksums
+    from texgs.core.cache import Checksums
     from texgs.workflow.graph import graph_of
 
     cases, planned = graph_of(as_sweep(words), Checksums.load())
     lack_files = {folder for folders in planned.missing.values() for folder in folders}
-    table, to_do, seconds, done = speeds(), Counter[str](), 0.0, 0
+    to_do, seconds, done = Counter[str](), 0.0, 0
     for folder, job in planned.run.items():
         if folder in lack_files:
-            continue  # told where the selection is shown
+            continue  # reported with the missing things
         if job.is_done() and not planned.is_replaced(folder):
             done += 1
             continue
         to_do[job.stage.name] += 1
-        speed = table.get(job.stage.name, Speed(0, 0, 0))  # nobody has measured stages of one's own
-        seconds += STEP_SECONDS + speed.seconds(*work_of(job, planned.configs[folder]))
+        speed = speeds().get(job.stage.name, Speed())  # nobody has measured stages of one's own
+        seconds += STEP_SECONDS + speed.seconds(job.settings, megapixels(planned.configs[folder]))
     return Forecast(cases, [*planned.missing], to_do, done, seconds + (START_SECONDS if to_do else 0))
-
-
-def work_of(job: Job, config: Config) -> tuple[float, int]:
-    """Return megapixels of a view of a job, and its iterations."""
-    pixels = config.views.width * config.views.height / config.fit.reduce**2
-    return pixels / 1e6, iterations(job.settings)
-
-
-def iterations(settings: Any) -> int:
-    """Return all iterations and steps that the settings of a job name."""
-    if isinstance(settings, Mapping):
-        own = [value for key, value in settings.items() if key == "iterations" or key.endswith("steps")]
-        return sum(each for each in own if isinstance(each, int)) + sum(map(iterations, settings.values()))
-    return sum(map(iterations, settings)) if isinstance(settings, list) else 0
-
-
-def speeds() -> dict[str, Speed]:
-    """Return the measured speeds by stage, and that of the probe."""
-    text = files("texgs.workflow").joinpath("speeds.csv").read_text(encoding="utf-8")
-    lines = [line for line in text.splitlines() if not line.startswith("#")]
-    return {row.pop("stage"): Speed(**{k: float(v) for k, v in row.items()}) for row in csv.DictReader(lines)}
 
 
 def show(words: tuple[str, ...]) -> int:
     """Print a forecast, a line for each thing; return 1 if the run would not start."""
-    from texgs.raster.probe import probe
-
     expected = forecast(words)
     for name, config in {each.dataset.name: each for each in expected.cases.configs[::-1]}.items():
         if not any(line.startswith(f"data set {name}:") for line in expected.missing):
@@ -99,10 +106,9 @@ def show(words: tuple[str, ...]) -> int:
     kinds = ", ".join(f"{count} {stage}" for stage, count in expected.to_do.items())
     print(f"jobs     {sum(expected.to_do.values())} to do ({kinds or 'none'}), {expected.done} done")
     if expected.to_do:
-        slower = probe() / speeds()[PROBE].constant
         print(
-            f"time     about {duration(expected.seconds * slower)}: an estimate, from speeds measured on "
-            f"other scenes; just now this machine rasterizes {1 / slower:.1f} times as fast as theirs"
+            f"time     about {duration(expected.seconds)} on two cores of an AMD EPYC with AVX-512, one job "
+            "after the other, from speeds measured on other scenes"
         )
     return 1 if expected.missing else 0
 

@@ -6,9 +6,10 @@ from os.path import normpath
 from pathlib import Path
 from typing import Any
 
+from texgs.config.case import Case
 from texgs.config.project import Words
 from texgs.config.schema import Config
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.io import read_json
 from texgs.core.names import METRICS
@@ -67,8 +68,9 @@ class Graph:
     def _replaced(self) -> dict[str, bool]:
         return {}
 
-    def add(self, config: Config, checksums: Checksums) -> list[str]:
+    def add(self, case: Case, checksums: Checksums) -> list[str]:
         """Add the jobs of a configuration, which is checked before, and return their folders."""
+        config = case.config
         check_basic_tfs(config.dataset)
         check_fit(config)
         check_edit(config)
@@ -81,7 +83,7 @@ class Graph:
         folders = []
         for stage, each in listed:
             try:
-                job = Job.of(stage, each, checksums)
+                job = Job.of(stage, each, checksums, case.words)
             except MissingDataError as error:
                 job = Job(stage, stage.settings(each), {}, stage.output(each))
                 self.missing.setdefault(str(error), []).append(job.output.as_posix())
@@ -102,7 +104,7 @@ def graph_of(words: Words, checksums: Checksums) -> tuple[Cases, Graph]:
     """Return the cases that a user's words come to, and their jobs."""
     cases, graph = cases_of(words, lacking), Graph()
     for sweep, listed in cases.by_sweep.items():
-        folders = [folder for case in listed for folder in graph.add(case.config, checksums)]
+        folders = [folder for case in listed for folder in graph.add(case, checksums)]
         graph.sweeps[sweep] = list(dict.fromkeys(folders))
     return cases, graph
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from texgs.config.schema import Config
-from texgs.core.checksum import Checksums
+from texgs.core.cache import Checksums
 from texgs.core.errors import MissingDataError
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import NO_METHOD, method_of

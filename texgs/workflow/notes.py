@@ -9,8 +9,7 @@ from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
 
-from texgs.core.cache import keep, recall
-from texgs.core.checksum import Checksums, sha256
+from texgs.core.cache import Checksums, keep, recall, sha256
 from texgs.core.io import write_bytes
 from texgs.core.names import METRICS
 from texgs.workflow.job import Job

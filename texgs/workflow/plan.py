@@ -15,8 +15,7 @@ from typing import Any
 
 from texgs.config.project import ROOT, folders
 from texgs.config.schema import Config
-from texgs.core.cache import keep, recall
-from texgs.core.checksum import Checksums, digest, of_folders
+from texgs.core.cache import Checksums, checksum_of_folders, digest, keep, recall
 from texgs.core.errors import ConfigError
 from texgs.core.io import write_bytes
 from texgs.volume.settings import cached_volume
@@ -39,7 +38,7 @@ class Plan:
     tracking: str | None  # URI of the store
     experiment: str  # of the store
     gpu: list[str]  # what GPUs are for: "views", "fit" or both
-    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code, inputs and swept values, by folder
+    jobs: dict[str, dict[str, Any]]  # by folder, see `plain`
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
     wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
@@ -111,7 +110,7 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
     """
     path = Path(".snakemake", "texgs", f"plan-{digest(repr(words))}.json")
     data = os.environ.get("TEXGS_DATA", "")
-    key = digest("\n".join([*words, data, of_folders(ROOT / "texgs", *folders())]))
+    key = digest("\n".join([*words, data, checksum_of_folders(ROOT / "texgs", *folders())]))
     if is_job and (kept := recall(path, key)):
         with suppress(TypeError):  # of a damaged file, it is made again
             return Plan(**kept), []
@@ -160,6 +159,7 @@ def plain(job: Job, results: str) -> dict[str, Any]:
         "code": job.stage.code(job.settings),
         "inputs": {name: path.as_posix() for name, path in job.inputs.items()},
         "swept": dict(job.swept),
+        "command": job.command,
     }
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from texgs.core.checksum import Checksums, combined, sha256
+from texgs.core.cache import Checksums, combined_checksum, sha256
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, remove_scratch, write_json
 from texgs.core.names import METRICS
@@ -27,7 +27,7 @@ from texgs.volume.input_files import checksum_of_input
 
 STAMP = ".job.json"
 FILES = ".files.json"
-TIMES = "times.json"  # of single views; like METRICS it differs from one run to the next
+TIMES = "times.json"  # times of single views; like METRICS it differs from one run to the next
 
 
 @contextmanager
@@ -112,7 +112,7 @@ def recover(output: Path) -> None:
     """Finish what a process that was killed while it swapped two results had begun."""
     work, old = work_folder(output), output.with_name(f".{output.name}.old")
     if output.exists() and not output.is_dir():
-        return  # it is none of ours
+        return  # somebody else's
     if not output.exists() or not any(output.iterdir()):
         complete = (folder for folder in (work, old) if (folder / FILES).exists())
         if (folder := next(complete, None)) is not None:
@@ -193,7 +193,7 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
     is_foreign = path.exists() and path.name not in made_files
     if (folder / FILES).exists() and not is_foreign:
         made = [(name, sha) for name, sha in made_files.items() if name not in (METRICS, TIMES)]
-        return combined([*made, (STAMP, json.dumps(stamped(folder), sort_keys=True))])
+        return combined_checksum([*made, (STAMP, json.dumps(stamped(folder), sort_keys=True))])
     return checksum_of_input(path, checksums)
 
 
@@ -209,5 +209,5 @@ def require_intact(path: Path) -> None:
     maker = (stamped(folder) or {}).get("stage", "the stage before")
     raise ArgumentError(
         f"{folder / lost[0]}: missing or damaged since {maker} made it; "
-        "run the same command again, and it is made anew"
+        "run the same command again to repair it"
     )

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, cast, get_type_hints
 
 from texgs.config.schema import Config
-from texgs.core.checksum import digest
+from texgs.core.cache import digest
 from texgs.core.errors import ConfigError
 from texgs.edit.method import methods
 from texgs.fields.kinds import kinds
@@ -106,7 +106,7 @@ class Stage:
         """
         modules = [self.module, self.fits] if self.fits else [self.module]
         if self.place != "phase" and "fit" in settings:
-            modules.append(kinds()[settings["fit"]["field"]].module)
+            modules += kinds()[settings["fit"]["field"]].modules
         if "edit" in settings:
             modules.append(methods()[settings["edit"]["method"]].module)
         if self.name == "edit_metrics":

@@ -12,7 +12,7 @@ from typing import Any
 
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
-from texgs.core.specifications import imported, require_call
+from texgs.core.specifications import import_specification, require_call
 from texgs.workflow.inputs import is_fit
 from texgs.workflow.locate import tf_names
 from texgs.workflow.stage import RULES, Stage
@@ -25,7 +25,7 @@ SWEPT = ("volume", "views", "phase", "edit", "edit_metrics", "gallery")  # place
 def discovered() -> Iterator[Stage]:
     """Yield the stages that the modules define."""
     for entry in pkgutil.iter_modules(import_module(PACKAGE).__path__):
-        module = imported(f"{PACKAGE}.{entry.name}")
+        module = import_specification(f"{PACKAGE}.{entry.name}")
         for stage in getattr(module, "STAGES", [module.STAGE] if hasattr(module, "STAGE") else []):
             require_stage(module.__name__, stage)
             yield stage

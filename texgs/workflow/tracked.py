@@ -12,18 +12,18 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.schema import NO_SWEEP
-from texgs.core.checksum import digest
+from texgs.core.cache import digest
 from texgs.core.io import write_json
 from texgs.report.metrics_files import label
 from texgs.workflow import result
 from texgs.workflow.provenance import facts, git_revision, user
-from texgs.workflow.runs import PARENT, Run, begin, process_tags
+from texgs.workflow.runs import OUTPUT, PARENT, Run, begin
 
 if TYPE_CHECKING:
     from texgs.workflow.job import Job
     from texgs.workflow.plan import Plan
 
-RUNS = "TEXGS_RUNS"  # environment variable: the file that says which run each job is inside of
+RUNS = "TEXGS_RUNS"  # environment variable: the file of `runs_file`
 WHOLE = ""  # the run of the workflow among those of its sweeps
 
 
@@ -36,13 +36,13 @@ class Tracking:
     parent: str | None = None  # identifier of the run that it is inside of
 
 
-def of_workflow(output: Path) -> tuple[Tracking, dict[str, str]]:
-    """Return where the workflow wants the job of a folder recorded, and the values of its variant."""
+def of_workflow(output: Path) -> tuple[Tracking, dict[str, str], str]:
+    """Return where the workflow wants a folder's job recorded, the values of its variant, and its command."""
     uri, experiment = os.environ.get("TEXGS_TRACKING"), os.environ.get("TEXGS_EXPERIMENT", "texgs")
     own: dict[str, Any] = {}
     with suppress(KeyError, OSError, ValueError):  # of a job that no run of the workflow has started
-        own = json.loads(Path(os.environ[RUNS]).read_text())[output.as_posix()] if uri else {}
-    return Tracking(uri, experiment, own.get("parent")), own.get("swept", {})
+        own = json.loads(Path(os.environ[RUNS]).read_text())[output.as_posix()]
+    return Tracking(uri, experiment, own.get("parent")), own.get("swept", {}), own.get("command", "")
 
 
 def name(job: Job) -> str:
@@ -67,9 +67,25 @@ def tags(job: Job, identity: Mapping[str, Any], parent: str | None) -> dict[str,
         "config.sha": identity["settings"],
         "code.sha": identity["code"],
         "git.sha": git_revision(),
-        "output": job.output.as_posix(),
-        **process_tags(job.output / result.METRICS),
+        OUTPUT: job.output.absolute().as_posix(),
     }
+
+
+def params(job: Job) -> dict[str, str]:
+    """Return the settings of a job as text, by their whole keys, and the values that its sweep gives it."""
+    return flatten({**job.swept, **job.settings})
+
+
+def flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, str]:
+    """Return parameters of a nested mapping: keys joined by dots, lists and such as JSON."""
+    flat: dict[str, str] = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping) and value:
+            flat |= flatten(value, f"{prefix}{key}.")
+        else:
+            is_plain = not (value is None or isinstance(value, bool | list | tuple | Mapping))
+            flat[f"{prefix}{key}"] = str(value) if is_plain else json.dumps(value, default=str)
+    return flat
 
 
 def log_result(run: Run, job: Job, metrics: Mapping[str, Any]) -> None:
@@ -131,7 +147,7 @@ def rows(key: str, listed: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def runs_file(results: str) -> str:
-    """Return the file that tells jobs which run they are inside of, and their swept values."""
+    """Return the file that tells jobs which run they are inside of, their swept values and commands."""
     return f"{results}/.conf/runs.json"
 
 
@@ -142,37 +158,40 @@ def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, Run]:
     """
     place = Path(plan.results).absolute().as_posix()
     key = digest("\n".join([place, *words]))
-    common = {"mlflow.user": user(), "git.sha": git_revision(), "output": place}
+    common = {"mlflow.user": user(), "git.sha": git_revision()}
 
-    def run(name: str, title: str, tags: Mapping[str, str], params: Mapping[str, object]) -> Run:
+    def run(name: str, title: str, tags: Mapping[str, str], params: Mapping[str, str]) -> Run:
         given: dict[str, Any] = {"name": title, "tags": {**common, **tags}, "params": params}
         return begin(plan.tracking, experiment=plan.experiment, key=f"{key} {name}", **given)
 
     values = {word.partition("=")[0].lstrip("+"): word.partition("=")[2] for word in words}
     groups = " ".join(word for word in words if "." not in word.partition("=")[0])
-    runs = {WHOLE: run(WHOLE, groups or "texgs", {"stage": "workflow"}, values)}
+    runs = {WHOLE: run(WHOLE, groups or "texgs", {"stage": "workflow", OUTPUT: place}, values)}
     for name in filter(None, plan.sweeps):
         keys = {key for folder in plan.sweeps[name] for key in plan.jobs[folder]["swept"]}
-        tags = {"stage": "sweep", "sweep": name, PARENT: str(runs[WHOLE].id)}
+        tags = {"stage": "sweep", "sweep": name}
         runs[name] = run(name, f"sweep {name}", tags, {"keys": ", ".join(sorted(keys))})
-    if plan.tracking is not None:
-        jobs = plan.jobs.items()
-        told = {x: {"parent": runs[owner(plan, x)].id, "swept": job["swept"]} for x, job in jobs}
-        write_json(runs_file(plan.results), told)
+        runs[name].end("FINISHED")  # it only holds those of its jobs
+    known = {
+        folder: {"parent": runs[owner(plan, folder)].id, "swept": job["swept"], "command": job["command"]}
+        for folder, job in plan.jobs.items()
+    }
+    write_json(runs_file(plan.results), known)
     return runs
 
 
 def end_runs(runs: Mapping[str, Run], status: str, plan: Plan, made: Iterable[str]) -> None:
-    """End the runs of a workflow, with the tables and the report among the files that it has made."""
+    """End the run of a workflow; it and its sweeps get the tables and the report that it has made."""
     files = [Path(file) for file in sorted(made) if Path(file).is_file()]
     tables, report = Path(plan.results, "tables"), Path(plan.results, "report.html")
-    for name, run in reversed([*runs.items()]):
+    for name, run in runs.items():
         for file in files:
             if file.parent == tables and (name == WHOLE or file.stem == f"sweep-{name}"):
                 run.artifact(file, tables.name)
             elif file == report and name == WHOLE:
                 run.artifact(file)
-        run.end(status)
+    if runs:
+        runs[WHOLE].end(status)
 
 
 def owner(plan: Plan, folder: str) -> str:

@@ -16,19 +16,20 @@ for each in RULES.values():
         name:
             each.name
         input:
-            reads(each),
+            JOBS.reads(each),
         output:
-            writes(each),
+            list(made(each)),
         log:
-            log_of(each),
+            f"<logs>/{each.folder}.log",
         threads: each.threads
         resources:
             gpu=PLAN.gpus(each),
         params:
-            code=code(each),
-            words=words(each),
+            code=JOBS.code(each),
+            words=JOBS.words(each),
+        # Snakemake removes the log of an earlier attempt.
         shell:
-            RUN
+            "texgs {params.words:q} 2>&1 | tee {log:q}"
 
 
 rule downloads:

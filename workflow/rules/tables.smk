@@ -11,7 +11,7 @@ rule tables:
     log:
         "<logs>/tables.log",
     params:
-        **BESIDE,
+        **report_params(PLAN),
         code=code_digest("texgs.cli.tables"),
         folder=subpath(output[0], parent=True),
     shell:
@@ -28,7 +28,7 @@ rule report:
     log:
         "<logs>/report.log",
     params:
-        **BESIDE,
+        **report_params(PLAN),
         code=code_digest("texgs.cli.tables"),
     shell:
         "texgs report {input.metrics:q} {params.earlier:q} --missing {params.left_out:q} "

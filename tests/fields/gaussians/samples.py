@@ -2,7 +2,7 @@
 
 import torch
 
-from texgs.fields.gaussians.model import Baked, Gaussians
+from texgs.fields.gaussians import Baked, Gaussians
 
 
 def sample(n=7, *, degree=3, seed=0, antialiased=False, **metadata):

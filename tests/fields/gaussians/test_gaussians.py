@@ -18,8 +18,7 @@ from tests.raster.requirements import require_equal
 from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.fields.files import open_field
-from texgs.fields.gaussians.files import read_ply, write_gaussians, write_ply
-from texgs.fields.gaussians.model import Baked, Gaussians, JoinedGaussians
+from texgs.fields.gaussians import Baked, Gaussians, JoinedGaussians, read_ply, write_gaussians, write_ply
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.ply import write_ply as write_surfels
 from texgs.raster import Options

@@ -12,7 +12,7 @@ from texgs.fields.palette.model import PaletteField, PaletteScene
 from texgs.fields.palette.networks import new_networks
 from texgs.fields.palette.rendering import Geometry, blending_weights
 from texgs.fields.part_edit import PartEdit
-from texgs.fitting.palette import cluster_colors
+from texgs.fitting.colors import cluster_colors
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import pack_rows, voxel_grid
 from texgs.raster.voxels import March

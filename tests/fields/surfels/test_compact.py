@@ -15,7 +15,7 @@ from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError, TexgsError
 from texgs.core.geometry import quats_to_matrices
-from texgs.fields.surfels.compact import STEP, open_model, read_compact, seen_surfels, write_compact
+from texgs.fields.surfels.compact import TEXEL_STEP, open_model, read_compact, seen_surfels, write_compact
 from texgs.fields.surfels.model_file import write_model
 from texgs.metrics.quality import psnr
 
@@ -46,7 +46,7 @@ def test_every_tensor_comes_back_within_its_bound(tmp_path, stage, shared):
     rotations = [quats_to_matrices(p.pop("quats")) for p in (got, given)]
     assert float((rotations[0] - rotations[1]).abs().max()) < 2e-3
     if stage == "texture":
-        assert float((got.pop("texels") - given.pop("texels")).abs().max()) <= STEP / 2
+        assert float((got.pop("texels") - given.pop("texels")).abs().max()) <= TEXEL_STEP / 2
     for name, values in given.items():
         bound = 0 if shared and values.shape == (1,) else 2**-11 * values.abs() + 2**-24
         assert bool(((got[name] - values).abs() <= bound).all()), name
@@ -75,7 +75,7 @@ def test_textures_in_any_order_come_back_one_after_the_other(tmp_path):
     for n, old in enumerate(order.tolist()):
         count = int(p["sizes"][old].prod())
         got = restored["texels"][restored["offsets"][n] :][:count]
-        assert float((got - p["texels"][p["offsets"][old] :][:count]).abs().max()) <= STEP / 2
+        assert float((got - p["texels"][p["offsets"][old] :][:count]).abs().max()) <= TEXEL_STEP / 2
 
 
 def test_colors_hardly_change_and_the_file_is_an_eighth(tmp_path):
@@ -106,7 +106,7 @@ def test_unseen_surfels_keep_one_mean_texel(tmp_path):
         count = int(p["sizes"][n].prod())
         old = p["texels"][p["offsets"][n] :][:count]
         new = restored["texels"][restored["offsets"][n] :][: int(restored["sizes"][n].prod())]
-        assert float((new - (old if seen[n] else old.mean(0))).abs().max()) <= STEP / 2 + 1e-6
+        assert float((new - (old if seen[n] else old.mean(0))).abs().max()) <= TEXEL_STEP / 2 + 1e-6
     one_stage = sample("shading")
     restored = read_compact(write_compact(tmp_path / "s", one_stage, torch.zeros(7, dtype=torch.bool)))
     assert len(restored) == 7, "a model without texture has none to drop"
@@ -143,7 +143,7 @@ def test_no_surfels_are_a_model(tmp_path):
 def test_the_format_is_public(tmp_path):
     line, _, packed = write_compact(tmp_path / "m", sample(low_pass=3.0)).read_bytes().partition(b"\n")
     header = json.loads(line)
-    assert (header["texgs-compact"], header["step"], header["model"]["stage"]) == (1, STEP, "texture")
+    assert (header["texgs-compact"], header["step"], header["model"]["stage"]) == (1, TEXEL_STEP, "texture")
     stored = load(lzma.decompress(packed))
     assert stored["codes"].dtype == "uint8"
     assert stored["codes"].shape[1:] == (3, len(sample().parameters["texels"]))

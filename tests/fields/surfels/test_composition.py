@@ -115,7 +115,7 @@ def test_highlights_have_the_tint_of_their_part():
     gold, blue = (1.0, 0.7, 0.3), (0.0, 0.0, 1.0)
     edits = [PartEdit(specular=3.0, shininess=0.5, tint=gold), PartEdit(specular=2.0, tint=blue)]
     part = Part(model, [first])
-    base, gain = part.look(part.edited(edits), CAMERA, SIDE, "shaded")
+    base, gain = part.shade(part.apply(edits), CAMERA, SIDE, "shaded")
     p = {name: x.double() for name, x in model.parameters.items()}
     k_s, beta = torch.where(first, 0.4, 0.6), torch.where(first, 20.0, 10.0)
     zero, place = torch.zeros(150).double(), CAMERA.position.double()

@@ -7,7 +7,7 @@ import torch
 
 from texgs.core.camera import orbit
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.voxels.model import Voxels, VoxelScene, merged
+from texgs.fields.voxels import Voxels, VoxelScene, merge_grids
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, unpack_rows, voxel_grid
 
 CAMERA = orbit(30, 20, 4.0, 30.0, 48, 40)
@@ -38,7 +38,7 @@ def test_two_apart_are_seen_as_each_alone():
 
 def test_densities_add_up_where_grids_overlap():
     one, other = ball(density=10.0, color=1.0), ball(density=30.0, color=-1.0)
-    grid = merged([one.grid, other.grid])
+    grid = merge_grids([one.grid, other.grid])
     density, sh = unpack_rows(grid.rows)
     inside = grid.points().norm(dim=1) < 0.1
     torch.testing.assert_close(density[1:][inside], torch.full_like(density[1:][inside], 40.0))
@@ -69,7 +69,7 @@ def test_an_empty_grid_changes_nothing(order):
 
 def test_a_negative_density_takes_nothing_from_another_grid():
     grids = [noise(seed).grid for seed in range(3)]
-    whole = merged(grids)
+    whole = merge_grids(grids)
     density = torch.stack([unpack_rows(interpolate_rows(grid, whole.points()))[0] for grid in grids])
     positive = density.clamp_min(0).sum(0)
     expected = torch.where(positive > 0, positive, density.amin(0))
@@ -82,7 +82,7 @@ def test_the_lattice_of_equal_lattices_is_theirs():
     for spacing in torch.linspace(0.01, 0.1, 20).tolist():
         lower = torch.randn(3, generator=generator).tolist()
         grid = voxel_grid(torch.ones(8, 64, 16, dtype=torch.bool), lower, spacing, 0)
-        assert merged([grid, grid]).size == grid.size
+        assert merge_grids([grid, grid]).size == grid.size
 
 
 @pytest.mark.parametrize("ratio", [1.5, 2.0, 3.0, 5.0])
@@ -106,16 +106,16 @@ def test_a_finer_grid_leaves_no_holes_in_a_coarse_one(ratio, is_visible):
 def test_a_merged_lattice_has_at_most_1024_voxels_a_side():
     long = voxel_grid(torch.ones(256, 8, 8, dtype=torch.bool), [0.0] * 3, 0.1, 0)
     fine = voxel_grid(torch.ones(8, 8, 8, dtype=torch.bool), [0.0] * 3, 0.02, 0)
-    whole = merged([long, fine])
+    whole = merge_grids([long, fine])
     assert max(whole.size) == 1024
     assert whole.spacing == pytest.approx(25.5 / 1023)
 
 
 def test_merging_makes_no_tensor_on_another_device_than_the_rows():
     grids = [noise(seed).grid for seed in range(2)]
-    expected = merged(grids)
+    expected = merge_grids(grids)
     with torch.device("meta"):  # where tensors are made that name no device
-        assert torch.equal(merged(grids).rows, expected.rows)
+        assert torch.equal(merge_grids(grids).rows, expected.rows)
 
 
 def test_edits_of_opacity_and_visibility():

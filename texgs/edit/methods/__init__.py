@@ -1,1 +1,1 @@
-"""Ways to give a scene a new look: a module each. texgs/edit/method.py finds those that define METHOD."""
+"""Ways to give a scene a new look. Their modules define METHOD, one or several; see texgs/edit/method.py."""

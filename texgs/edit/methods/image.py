@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods.style import Look, StyleKeys
-from texgs.edit.readable import OpacityKeys, raised
+from texgs.edit.methods.style import StyleKeys, StyleWork
+from texgs.edit.readable import OpacityKeys, raise_opacities
 from texgs.models.catalogue import CLIP_BACKBONES
 
 if TYPE_CHECKING:
@@ -83,36 +83,36 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     from texgs.models.vgg import Vgg
     from texgs.volume.images import smaller
 
-    task = raised(task)
+    task = raise_opacities(task)
     keys, recipe = task.settings, task.settings.recipe_of(task.edit.seed)
     dtype = torch.float32 if recipe.single_precision else None
-    look = Look(task, Vgg.load(device=task.device, dtype=dtype) if recipe.needs_vgg else None)
+    work = StyleWork(task, Vgg.load(device=task.device, dtype=dtype) if recipe.needs_vgg else None)
     network = Clip.load(keys.clip, task.device) if recipe.needs_clip else None
     seconds, adapted = dict[str, dict[str, float]](), list["Recipe"]()
 
     def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
-        picture = look.picture(name)
+        picture = work.picture(name)
         result = stylize(
             model,
             [smaller(view.camera, task.reduce) for view in views],
             [task.scene.light] * len(views),
             picture,
             replace(recipe, opacity=task.opacity_of(name)),
-            vgg=look.vgg,
+            vgg=work.vgg,
             clip=ClipLoss(network, picture.image.permute(1, 2, 0).to(task.device)) if network else None,
             surfels=surfels,
             steps=task.other_steps(name),
             title=task.title_of(name),
             show=partial(task.show, name),
         )
-        look.losses[name], seconds[name] = result.losses, result.seconds
+        work.losses[name], seconds[name] = result.losses, result.seconds
         adapted.append(result.recipe)
         return result.model
 
     scene = task.each_part(one)
     share = recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None
     words = how(adapted, network.name if network else keys.clip)
-    return EditedScene(scene, words, look.write_pictures(), share, {"seconds": seconds}, look.losses)
+    return EditedScene(scene, words, work.write_pictures(), share, {"seconds": seconds}, work.losses)
 
 
 def how(recipes: Sequence[Recipe], clip: str) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from texgs.models.guidance import Guidance
 
-SHOWN = 6  # edited views in the picture of them
+SHOWN_VIEWS = 6  # edited views in the picture of them
 EDITORS = f"instruct_pix2pix, {', '.join(PIPELINES)}, {HUB}, a folder of diffusers, an address or filters"
 WEB = ("http://", "https://")
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.keys import key
 from texgs.core.lens import Lens, frequency_of
 from texgs.core.names import require_name
+from texgs.edit.mask_keys import MASKS, MaskKeys, mask_weights
 from texgs.edit.method import Method, MethodKeys
 
 if TYPE_CHECKING:
@@ -21,14 +22,13 @@ if TYPE_CHECKING:
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.surfels.model import Surfels
 
-SHOWN = 3  # views of the segment around the object
-POLAR = 20.0  # of these views, degrees
+SHOWN_VIEWS = 3  # views of the segment around the object
+POLAR = 20.0  # polar angle of these views, degrees
 DIMMED = 0.15  # opacity of what is not in the segment, in its picture
-MASKS = ("mobile_sam", "sam_vit_h", "grabcut")  # the second is the paper's
 
 
 @dataclass(frozen=True)
-class SegmentKeys(MethodKeys):
+class SegmentKeys(MethodKeys, MaskKeys):
     """Where is clicked, and how masks become surfels."""
 
     model: str = key("", "model whose part it is; may be left out where there is one")
@@ -38,19 +38,11 @@ class SegmentKeys(MethodKeys):
     points: list[Any] = key([], "clicks on the part: right and down, as shares of the view's sides")
     others: list[Any] = key([], "clicks on what does not belong to it")
     masks: str = key("mobile_sam", "what finds the part in a view; grabcut needs no weights", choices=MASKS)
-    vote: str = key(
-        "contribution",
-        "how masks become surfels; centre: as in the paper",
-        choices=("contribution", "centre"),
-    )
-    connected: bool = key(False, "only the connected pieces that hold a click are kept")
     voters: str = key(
         "icosphere",
         "views that vote: some around the object, or those of training, as in the paper",
         choices=("icosphere", "training"),
     )
-    views: int = key(42, "number of views of the icosphere, 10 f^2 + 2", least=12)
-    size: int = key(512, "side of these views", "pixels", least=32)
 
     def places(self) -> list[list[float]]:
         """Return the clicks, those beside the part last, as shares of the sides of the view."""
@@ -85,24 +77,21 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
     from texgs.core.names import part_file
     from texgs.edit.new_segment import model_name, new_segment
     from texgs.edit.task import EditedScene
-    from texgs.models.sam import mask_model
+    from texgs.scene.session import Session
 
-    settings, device = task.settings, task.device
+    settings, session = task.settings, Session(task.scene)
     name = model_name(task.scene, settings.model, "edit.segment.model")
-    clicks = clicks_of(settings, task.lens, device)
+    clicks = clicks_of(settings, task.lens, task.device)
     made = new_segment(
-        *(task.scene, f"{name}/{settings.name}", clicks),
-        voters(task, name),
-        mask_model(settings.masks, device),
-        task.output / part_file("edit.segment.name", name, settings.name),
-        asdict(settings),
-        vote=settings.vote,  # type: ignore[arg-type]
-        connected=settings.connected,
+        *(session, f"{name}/{settings.name}", clicks, settings, task.lens),
+        lambda: task.output / part_file("edit.segment.name", name, settings.name),
+        {},
+        cameras=voters(task, name),
         title=f"{task.title} {task.edit.name}",
     )
     show(task, clicks, made)
     return EditedScene(
-        made.scene,
+        session.scene,
         f"{settings.masks}, {settings.vote}",
         {"edit.png": "Clicks with the mask of their view, and the segment that all views agree on."},
         notes={
@@ -113,15 +102,12 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
 
 
 def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
-    """Return the cameras of the views that vote on a model."""
-    from texgs.volume.cameras import icosphere_of
+    """Return the cameras of the training views that vote on a model; none where others vote."""
     from texgs.volume.images import smaller
 
-    if task.settings.voters == "training":
-        cameras = [smaller(view.camera, task.reduce) for view in task.training_views(model)]
-    else:
-        cameras = icosphere_of(task.settings.views, task.lens.square(task.settings.size))
-    return [camera.to(task.device) for camera in cameras]
+    if task.settings.voters != "training":
+        return []
+    return [smaller(view.camera, task.reduce) for view in task.training_views(model)]
 
 
 def clicks_of(settings: SegmentKeys, lens: Lens, device: torch.device) -> Clicks:
@@ -157,9 +143,9 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
         return of.render(camera.to(task.device), task.scene.light).color.clamp(0, 1)
 
     marked = overlay(shown(model, clicks.camera), lifted.reference, clicks)
-    around = orbit_path(SHOWN, POLAR, task.lens)
+    around = orbit_path(SHOWN_VIEWS, POLAR, task.lens)
     pictures = [marked, shown(dimmed, clicks.camera), *(shown(dimmed, camera) for camera in around)]
-    titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN))]
+    titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN_VIEWS))]
     write_grid(task.output / "edit.png", {"": [image.cpu().numpy() for image in pictures]}, titles)
 
 
@@ -171,11 +157,6 @@ METHOD = Method(
     needs=frozenset({"segments"}),
     is_look=False,
 )
-
-
-def mask_weights(masks: str) -> dict[str, str]:
-    """Return the weights of what finds the object, for `Method.weights`."""
-    return {} if masks == "grabcut" else {masks: "masks=grabcut"}
 
 
 def normalized_clicks(name: str, points: Sequence[Any]) -> list[list[float]]:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
+from texgs.edit.mask_keys import MASKS, mask_weights
 from texgs.edit.method import MethodKeys
-from texgs.edit.methods.segment import MASKS, mask_weights, normalized_clicks
+from texgs.edit.methods.segment import normalized_clicks
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -89,7 +90,7 @@ class FeatureKeys(StyleKeys):
         without = "nnfm=0" if self.patches else ""
         return {**({"vgg16": without} if self.nnfm > 0 else {}), **super().weights()}
 
-    def stylize(self, look: Look, name: str, model: Any, views: Sequence[View]) -> tuple[Any, Losses]:
+    def stylize(self, work: StyleWork, name: str, model: Any, views: Sequence[View]) -> tuple[Any, Losses]:
         """Return a model of this name with the style of its picture, by training views; and the losses."""
         raise NotImplementedError
 
@@ -113,7 +114,7 @@ class FeatureKeys(StyleKeys):
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class StyleWork:
     """Pictures on their way onto the parts of a scene, and what there is to tell about it."""
 
     task: Task[Any]
@@ -134,6 +135,7 @@ class Look:
         import torch
 
         from texgs.core.image import write_png
+        from texgs.core.names import style_file
 
         pictures = self.pictures
         first, *others = (picture.image for picture in pictures.values())
@@ -141,7 +143,7 @@ class Look:
             pictures = {"": next(iter(pictures.values()))}
         shown = {}
         for name, picture in pictures.items():
-            file = f"style-{name.replace('/', '-')}.png" if name else "style.png"
+            file = style_file(name)
             write_png(self.task.output / file, picture.image.permute(1, 2, 0))
             shown[file] = f"The style picture{f' of {name}' if name else ''}."
         return shown
@@ -153,16 +155,16 @@ def run(task: Task[FeatureKeys]) -> EditedScene:
     from texgs.models.vgg import Vgg
 
     keys = task.settings
-    look = Look(task, Vgg.load(device=task.device) if keys.nnfm > 0 else None)
+    work = StyleWork(task, Vgg.load(device=task.device) if keys.nnfm > 0 else None)
 
     def one(name: str, model: Field, views: Sequence[View]) -> Field:
         edited: Field
-        edited, look.losses[name] = keys.stylize(look, name, model, views)
+        edited, work.losses[name] = keys.stylize(work, name, model, views)
         return edited
 
     scene = task.each_model(one)
     how = " + ".join(["VGG-16"] * (keys.nnfm > 0) + ["patches"] * (keys.patches > 0))
-    return EditedScene(scene, how, look.write_pictures(), notes=look.notes, losses=look.losses)
+    return EditedScene(scene, how, work.write_pictures(), notes=work.notes, losses=work.losses)
 
 
 def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
-from texgs.edit.readable import OpacityKeys, raised
+from texgs.edit.methods.instruction import SHOWN_VIEWS, InstructionKeys, write_views
+from texgs.edit.readable import OpacityKeys, highlights_of, raise_opacities
 
 if TYPE_CHECKING:
     import numpy as np
@@ -59,12 +59,11 @@ class TextKeys(OpacityKeys, InstructionKeys):
 
 def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
-    from texgs.edit.material import highlights_of
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
     from texgs.volume.images import smaller
 
-    task = raised(task)
+    task = raise_opacities(task)
     settings, guidance = task.settings, task.settings.opened(task.device)
     rows: dict[str, list[np.ndarray]] = {}
     seen: dict[str, float] = {}
@@ -83,8 +82,8 @@ def run(task: Task[TextKeys]) -> EditedScene:
             title=task.title_of(name),
         )
         seen[name] = result.seen
-        rows[f"{name} before"] = [image.cpu().numpy() for image in result.views.images[:SHOWN]]
-        rows[f"{name} edited"] = [image.cpu().numpy() for image in result.images[:SHOWN]]
+        rows[f"{name} before"] = [image.cpu().numpy() for image in result.views.images[:SHOWN_VIEWS]]
+        rows[f"{name} edited"] = [image.cpu().numpy() for image in result.images[:SHOWN_VIEWS]]
         return result.model
 
     def highlights(name: str, model: Surfels, surfels: Tensor | None) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What methods share that edit training views again and again: when, and how a field learns from them."""
+"""The paper's baselines that edit training views again and again while a field learns from them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
-from texgs.edit.update_schedule import UpdateSchedule
+from texgs.edit.method import Method
+from texgs.edit.methods.instruction import SHOWN_VIEWS, InstructionKeys, write_views
+from texgs.edit.recipe import UpdateSchedule
+from texgs.fitting.settings import CommonRates
 
 if TYPE_CHECKING:
     import numpy as np
@@ -78,7 +80,7 @@ def run(task: Task[UpdateKeys]) -> EditedScene:
             seed=task.edit.seed,
             title=task.title_of(name),
         )
-        before, after = zip(*updated.some(SHOWN), strict=True)
+        before, after = zip(*updated.some(SHOWN_VIEWS), strict=True)
         rows[f"{name} before"] = [old.numpy() for old in before]
         rows[f"{name} edited"] = [new.numpy() for new in after]
         notes[name] = {"edits": updated.count, "seconds of them": updated.seconds}
@@ -89,3 +91,124 @@ def run(task: Task[UpdateKeys]) -> EditedScene:
     notes["instruction"] = task.followed or keys.instruction
     how = f"{guidance.name}, geometry {'frozen' if keys.frozen else 'learns'}"
     return EditedScene(scene, how, write_views(task.output, rows), notes=notes, losses=losses)
+
+
+def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float], ...]:
+    """Return one range of noise for all rounds."""
+    if len(noise) != 2 or not 0 <= noise[0] <= noise[1] <= 1:
+        raise ArgumentError(f"{where}: expected two shares from 0 to 1, the smaller one first, got {noise}")
+    return ((noise[0], noise[1]),)
+
+
+def rates_of_3dgs(zeroth: float, means_final: float) -> CommonRates:
+    """Return the rates at which fits of 3DGS end, but for two."""
+    return CommonRates(1.6e-4, 0.001, 0.005, 0.05, zeroth, zeroth / 20, means_final, 1.0)
+
+
+@dataclass(frozen=True)
+class Igs2gsKeys(UpdateKeys):
+    """Instruct-GS2GS (Vachha and Haque 2024): Gaussians learn from all views, edited one after another."""
+
+    passes: int = key(3, "times that each view is edited", least=1)
+    every: int = key(2500, "iterations from pass to pass", least=1)
+    noise: list[float] = key([0.7, 0.98], "level of noise of an edit, from and to, as a share")
+    rates: CommonRates = key(rates_of_3dgs(0.0025, 0.01), "learning rates")
+
+    def schedule(self, views: int) -> UpdateSchedule:
+        """Edit all views in passes, and learn from each when it is edited."""
+        levels = noise_range("edit.igs2gs.noise", self.noise)
+        return UpdateSchedule(self.passes, self.every, learned="newest", levels=levels)
+
+    def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Any:
+        """Return Gaussians that learn."""
+        from texgs.edit.gaussians import GaussianLearner
+
+        return GaussianLearner(model, images, loss, iterations, self.rates, self.frozen)
+
+
+@dataclass(frozen=True)
+class DgeKeys(UpdateKeys):
+    """DGE (Chen et al. 2024): in each round Gaussians learn from some views that are edited together."""
+
+    keeps_renders = True
+
+    l1: float = key(10.0, "weight of the absolute difference to edited views", least=0)
+    dssim: float = key(0.0, "weight of D-SSIM", least=0)
+    lpips: float = key(10.0, "weight of LPIPS on VGG-16; 0 needs no weights", least=0)
+    rounds: int = key(3, "rounds of edits", least=1)
+    every: int = key(500, "iterations of a round", least=1)
+    views: int = key(20, "views edited in a round, drawn at random", least=1)
+    noise: list[float] = key(
+        [0.998, 0.3, 0.3, 0.021], "levels of noise of the rounds' edits, as shares; the last one holds on"
+    )
+    prune: bool = key(True, "Gaussians that are faint or large are removed, if geometry learns")
+    rates: CommonRates = key(rates_of_3dgs(0.0125, 0.1), "learning rates")
+
+    def schedule(self, views: int) -> UpdateSchedule:
+        """Edit some views together in each round, and learn from nothing but them."""
+        if not self.noise or not all(0 <= level <= 1 for level in self.noise):
+            raise ArgumentError(f"edit.dge.noise: expected one share from 0 to 1 at least, got {self.noise}")
+        levels = tuple((level, level) for level in self.noise)
+        return UpdateSchedule(self.rounds, self.every, self.views, self.views, "random", "round", levels)
+
+    def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Any:
+        """Return Gaussians that learn, and may be removed."""
+        from texgs.edit.gaussians import GaussianLearner
+
+        return GaussianLearner(model, images, loss, iterations, self.rates, self.frozen, self.prune)
+
+
+@dataclass(frozen=True)
+class In2nKeys(UpdateKeys):
+    """Instruct-NeRF2NeRF (Haque et al. 2023): one view is edited at a time, patches of all are learned."""
+
+    l1: float = key(1.0, "weight of the absolute difference to edited views", least=0)
+    dssim: float = key(0.0, "weight of D-SSIM, which patches have not", least=0, most=0)
+    lpips: float = key(1.0, "weight of LPIPS on VGG-16; 0 needs no weights", least=0)
+    passes: float = key(3.0, "times that each view is edited", above=0)
+    every: int = key(10, "iterations between edits", least=1)
+    noise: list[float] = key([0.02, 0.98], "level of noise of an edit, from and to, as a share")
+    patches: int = key(16, "patches that an iteration learns from", least=1)
+    side: int = key(32, "side of a patch", "pixels", least=16)
+    density: float = key(0.05, "learning rate of densities", least=0)
+    sh: float = key(0.01, "learning rate of spherical harmonics", least=0)
+
+    def schedule(self, views: int) -> UpdateSchedule:
+        """Edit one view after the other."""
+        rounds = max(1, round(self.passes * views))
+        return UpdateSchedule(rounds, self.every, views=1, levels=noise_range("edit.in2n.noise", self.noise))
+
+    def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Any:
+        """Return a grid that learns."""
+        from texgs.edit.voxels import VoxelLearner, VoxelRates
+
+        rates = VoxelRates(0.0 if self.frozen else self.density, self.sh, self.sh)
+        return VoxelLearner(model, loss, rates, self.patches, self.side)
+
+
+METHOD = (
+    Method(
+        "dge",
+        "edit some views of a scene of 3D Gaussians together by an instruction, as DGE does",
+        DgeKeys,
+        run,
+        fields=frozenset({"gaussians"}),
+        follows="instruction",
+    ),
+    Method(
+        "igs2gs",
+        "edit all views of a scene of 3D Gaussians in turn by an instruction, as Instruct-GS2GS does",
+        Igs2gsKeys,
+        run,
+        fields=frozenset({"gaussians"}),
+        follows="instruction",
+    ),
+    Method(
+        "in2n",
+        "edit views of a scene of voxels one by one by an instruction, as Instruct-NeRF2NeRF does",
+        In2nKeys,
+        run,
+        fields=frozenset({"voxels"}),
+        follows="instruction",
+    ),
+)

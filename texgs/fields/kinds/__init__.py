@@ -1,16 +1,16 @@
 """Kinds of field: what each can do, and how its files are known, read, written and made a scene.
 
-A kind is one module of this package, which defines FIELD. How it is fitted stands in `texgs.fitting.kinds`,
-or as FIT in the same module.
+Those of texgs stand in `builtin`. Another kind is a module of this package that defines FIELD, and FIT, how
+it is fitted.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 from texgs.core.errors import ConfigError
-from texgs.core.specifications import specifications
+from texgs.core.specifications import named, specifications
 
 Capability = Literal[
     "relight",  # light and material may change
@@ -24,42 +24,38 @@ Capability = Literal[
 ALL: frozenset[Capability] = frozenset(get_args(Capability))
 
 
-class Functions(NamedTuple):
-    """What is done with fields of one kind."""
-
-    read: Callable[[Path], Any]
-    write: Callable[[Path, Any], Path]
-    compose: Callable[[Sequence[Any], Sequence[Sequence[Any]]], Any]
-
-
 @dataclass(frozen=True)
 class Kind:
-    """One kind of field. Its module imports nothing heavy before `functions` is called."""
+    """One kind of field. What handles it is named, as "module:function", and imported when it is used."""
 
     name: str
     formats: tuple[str, ...]  # entries of headers by which its files are known
     can: frozenset[Capability]  # what edits may do with it
-    functions: Callable[[], Functions]  # imports what reads, writes and composes it
+    reader: str  # of a file
+    writer: str  # to a path, of a field
+    composer: str  # of fields and the masks of the segments of each
     exports: tuple[str, ...] = ()  # what `texgs export` writes of it
     depth: Literal["", "median", "depth"] = ""  # which of its outputs meshes are made of, if it has one
     film_size: int = 320  # pixels of a side of its films of edits; fewer where a frame takes seconds
 
     @property
-    def module(self) -> str:
-        """The module that defines it."""
-        return self.functions.__module__
+    def modules(self) -> tuple[str, ...]:
+        """The modules that read, write and compose it."""
+        names = (self.reader, self.writer, self.composer)
+        return tuple(dict.fromkeys(name.partition(":")[0] for name in names))
 
     def read(self, path: Path) -> Any:
         """Read the `Field` in a file."""
-        return self.functions().read(path)
+        return named(self.reader)(path)
 
     def write(self, path: Path, field: Any) -> Path:
         """Write the file of a `Field` in one step."""
-        return self.functions().write(path, field)
+        written: Path = named(self.writer)(path, field)
+        return written
 
     def compose(self, fields: Sequence[Any], segments: Sequence[Sequence[Any]]) -> Any:
         """Make one `Composed` of fields and the masks of their segments."""
-        return self.functions().compose(fields, segments)
+        return named(self.composer)(fields, segments)
 
 
 def kinds() -> dict[str, Kind]:

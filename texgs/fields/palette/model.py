@@ -5,24 +5,40 @@ of the palette mix where theirs keep the largest alone, and weights are as fitte
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from math import inf
+from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import torch
 from torch import Tensor
 
+from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.core.errors import DeviceError
-from texgs.fields.field import Role, sizes_in_mib
-from texgs.fields.palette.networks import Parameters, free_color, light, palette_color
-from texgs.fields.palette.rendering import RAYS, Geometry, Points, merged, points_on, shown, view_harmonics
-from texgs.fields.unlit import Asked, UnlitField, UnlitScene, require_depth
+from texgs.core.errors import ArgumentError, DeviceError, ShapeError, located
+from texgs.core.io import reading_as
+from texgs.core.tensor_file import read_tensor_file, write_tensor_file
+from texgs.fields.field import Asked, Role, UnlitField, UnlitScene, require_depth, sizes_in_mib
+from texgs.fields.palette.networks import Parameters, free_color, light, network_shapes, palette_color
+from texgs.fields.palette.rendering import (
+    RAYS,
+    Geometry,
+    Points,
+    merge_points,
+    points_on,
+    view_harmonics,
+    visible_points,
+)
+from texgs.fields.voxels import grid_of, lattice, march_of
 from texgs.raster import Render
+from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxels import camera_rays
 
-LEAST_WEIGHT = 1e-4  # of points whose colours are looked at
-OCCUPIED = 128  # places along each side of the two lattices of the authors
+LEAST_WEIGHT = 1e-4  # weight of points whose colours are looked at
+OCCUPANCY_SIDE = 128  # places along each side of the two lattices of the authors
+FORMAT = "texgs-palette"
+VERSION = 1
+GRID = ("masks", "density")  # its tensors, before networks
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +100,7 @@ class PaletteField(UnlitField):
         networks, and a mask for each block of voxels and a number for each voxel.
         """
         grid, groups = self.geometry.grid, {"density": "geometry", "free": "texture"}
-        counted = {"geometry": 2 * 4 * OCCUPIED**3, "shading": 0, "texture": 0}
+        counted = {"geometry": 2 * 4 * OCCUPANCY_SIDE**3, "shading": 0, "texture": 0}
         stored = {"geometry": 8 * grid.masks.numel() + 4 * len(grid.rows), "shading": 0, "texture": 0}
         for name, x in self.parameters.items():
             group = groups.get(name.split(".")[0], "shading")
@@ -121,8 +137,8 @@ class PaletteScene(UnlitScene[PaletteField]):
             points = points_on(rays, each.geometry, each.parameters)
             points = points.take((points.distance >= near[points.ray]) & (points.distance < far[points.ray]))
             several.append(points._replace(depth=factor * points.depth))
-        points, owner = merged(several)
-        shows = shown(points, LEAST_WEIGHT)
+        points, owner = merge_points(several)
+        shows = visible_points(points, LEAST_WEIGHT)
         owner, harmonics = owner[shows.chosen], view_harmonics(rays)
         values = torch.ones(len(owner), 5)
         values[:, 4] = shows.points.distance
@@ -131,3 +147,52 @@ class PaletteScene(UnlitScene[PaletteField]):
             own_points = shows.points.take(own)
             values[own, :3] = each.color(own_points, harmonics[own_points.ray])
         return shows.blend(values, len(rays))
+
+
+def write_palette(path: str | Path, field: PaletteField) -> Path:
+    """Create or replace a file of a palette field in one step; its metadata must be JSON."""
+    geometry = field.geometry
+    networks = {name: x.detach().contiguous() for name, x in field.parameters.items()}
+    check.finite(**networks)
+    description = {
+        "version": VERSION,
+        **lattice(geometry.grid, geometry.march),
+        "hash": asdict(geometry.levels),
+        "metadata": dict(field.metadata),
+    }
+    grid = {"masks": geometry.grid.masks, "density": geometry.grid.density}
+    return write_tensor_file(path, FORMAT, description, {**grid, **networks})
+
+
+def read_palette(path: str | Path) -> PaletteField:
+    """Read a file of a palette field as `write_palette` writes it, bit for bit. Nothing in it is executed."""
+    description, tensors = read_tensor_file(Path(path), FORMAT, VERSION)
+    with located(path), reading_as("networks and a grid", "write it again"):
+        networks = {name: x for name, x in tensors.items() if name not in GRID}
+        check.finite(density=tensors["density"], **networks)
+        geometry = _geometry(tensors, description)
+        _check_networks(networks, geometry.levels)
+        return PaletteField(geometry, networks, dict(description["metadata"]))
+
+
+def _geometry(tensors: Mapping[str, Tensor], description: Mapping[str, Any]) -> Geometry:
+    grey = torch.zeros(len(tensors["density"]), 1, 3)
+    grid = grid_of({**tensors, "sh": grey}, description)
+    return Geometry(grid, march_of(description), HashLevels(**description["hash"]))
+
+
+def _check_networks(networks: Mapping[str, Tensor], levels: HashLevels) -> None:
+    """Require all networks, those of free colours perhaps, in the right shapes."""
+    colors = check.shape("palette.colors", networks["palette.colors"], "P 3")["P"]
+    absent = {"base"} if any(name.startswith("free.") for name in networks) else {"base", "free"}
+    shapes = {
+        name: shape
+        for name, shape in network_shapes(levels, colors).items()
+        if name.split(".")[0] not in absent
+    }
+    if unknown := sorted(set(networks) ^ set(shapes)):
+        raise ArgumentError(f"{unknown[0]}: expected the networks of a palette field, got others")
+    for name, shape in shapes.items():
+        check.floating(name, networks[name])
+        if tuple(networks[name].shape) != shape:
+            raise ShapeError(f"{name}: expected {list(shape)}, got {list(networks[name].shape)}")

@@ -18,7 +18,7 @@ from texgs.raster.hash_encoding import HashLevels, encode
 HIDDEN = 64
 GEOMETRY = 15  # features of a point that the density network hands on
 HARMONICS = 16  # spherical harmonics of the direction
-LEAST_SHARE = 0.05  # that a palette colour has before shares are made to add up to 1
+LEAST_SHARE = 0.05  # share of a palette colour before shares are made to add up to 1
 MOST_DENSITY = 15.0  # its logarithm: more would overflow
 TABLE = 1e-4  # largest entry at the start
 TABLES = ("density", "palette", "free")  # networks with a hash grid

@@ -13,7 +13,7 @@ from texgs.raster.reference.shading import harmonics
 from texgs.raster.voxel_grid import VoxelGrid
 from texgs.raster.voxels import March, ray_points
 
-RAYS = 8192  # at a time
+RAYS = 8192  # rays at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ def blending_weights(depth: Tensor, ray: Tensor) -> Tensor:
     return (torch.exp(-passed) * -torch.expm1(-depth)).float()
 
 
-def shown(points: Points, weight_min: float) -> Shown:
+def visible_points(points: Points, weight_min: float) -> Shown:
     """Choose the points with a weight above `weight_min`."""
     weights = blending_weights(points.depth, points.ray)
     chosen = weights > weight_min
@@ -103,7 +103,7 @@ def view_harmonics(rays: Tensor) -> Tensor:
     return harmonics(normalize(rays[:, 3:], dim=1))
 
 
-def merged(several: list[Points]) -> tuple[Points, Tensor]:
+def merge_points(several: list[Points]) -> tuple[Points, Tensor]:
     """Merge points of several fields in the order of their rays, and return the field [n] that each is of.
 
     Densities of fields add up: a ray meets the points of all of them, each with its own depth.

@@ -27,17 +27,20 @@ from texgs.fields.surfels.texels import mean_texels, offsets_of, owners, with_fi
 FORMAT = "texgs-compact"
 VERSION = 1
 MAGIC = b'{"texgs-compact":'
-STEP = 1 / 128  # of texels: none is off by more than 1/256, a level of an 8-bit picture
-MOST_STEPS = 2**23  # of a texel; float32 holds so many exactly
-LISTS = ("texels", "sizes", "offsets")
-EXACT = ("means", "palette")  # half precision would move surfels by up to a tenth of a pixel at 800x800
+TEXEL_STEP = 1 / 128  # unit of texels: none is off by more than 1/256, a level of an 8-bit picture
+MOST_STEPS = 2**23  # units of a texel; float32 holds so many exactly
+TEXTURE_TENSORS = ("texels", "sizes", "offsets")
+EXACT_TENSORS = (
+    "means",
+    "palette",
+)  # half precision would move surfels by up to a tenth of a pixel at 800x800
 LONGEST_HEADER = 2**20  # bytes, of the tensors' names and shapes
-COPIES = 6  # of what is unpacked, in memory at a time: texels are bytes in the file and floats in a model
+COPIES = 6  # copies of the tensors in memory: texels are bytes in the file and floats in a model
 MEMORY = 2**28  # bytes that unpacking may use besides its result; these files need 9 MiB
 
 
 def write_compact(
-    path: str | Path, model: Surfels, seen: Tensor | None = None, *, step: float = STEP
+    path: str | Path, model: Surfels, seen: Tensor | None = None, *, step: float = TEXEL_STEP
 ) -> Path:
     """Create or replace a compact model file in one step; the same model gives the same bytes.
 
@@ -99,9 +102,13 @@ def seen_surfels(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
 # -- writing ---
 
 
-def compact_tensors(model: Surfels, step: float = STEP) -> dict[str, np.ndarray]:
+def compact_tensors(model: Surfels, step: float = TEXEL_STEP) -> dict[str, np.ndarray]:
     """Return the tensors of a compact file, see `write_compact`, of a model on the CPU."""
-    stored = {name: _rounded(name, x.detach()) for name, x in model.parameters.items() if name not in LISTS}
+    stored = {
+        name: _rounded(name, x.detach())
+        for name, x in model.parameters.items()
+        if name not in TEXTURE_TENSORS
+    }
     if model.stage == "texture":
         stored |= _texture(model.parameters, step)
     return stored
@@ -125,7 +132,7 @@ def _rounded(name: str, values: Tensor) -> np.ndarray:
     is_turn = name in ("quats", "normals")
     if is_turn and not torch.equal(half.float(), values):  # those of a compact file stay as they are
         half = normalize(values, dim=1).half()  # any length is the same rotation, but half has few of them
-    exact = name in EXACT or values.shape == (1,) or not bool(half.isfinite().all())
+    exact = name in EXACT_TENSORS or values.shape == (1,) or not bool(half.isfinite().all())
     return (values if exact else half).contiguous().numpy()
 
 

@@ -1,6 +1,6 @@
 """Basic models as one scene: geometry and texels are joined once, edits cost a frame no copy of them."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import accumulate
@@ -12,8 +12,8 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.field import Look
+from texgs.core.light import Light
+from texgs.fields.field import Asked, Composed, Look
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
@@ -71,7 +71,7 @@ class Part:
             return self.colors + palettes[0]
         return self.colors + torch.stack(palettes)[self.labels]
 
-    def edited(self, edits: Sequence[PartEdit]) -> Edited:
+    def apply(self, edits: Sequence[PartEdit]) -> Edited:
         """Return what edits make of the model."""
         a, d, s, b = (
             self.material[name] * self.per_surfel([getattr(edit, name) for edit in edits])
@@ -83,7 +83,7 @@ class Part:
             tint = self.colors.new_tensor(tints)[0 if self.labels is None else self.labels]
         return Edited(self.colored(edits), (a, d, s, b), self.opacity(edits), tint)
 
-    def look(self, edited: Edited, camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
+    def shade(self, edited: Edited, camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
         """Return base [N, 3] and gain [N]: the colour of a fragment is base + gain * texel."""
         colors, n = edited.colors, len(self.model)
         if look == "unshaded":
@@ -105,7 +105,7 @@ class Part:
         return (self.opacities * factor).clamp_max(1)
 
 
-class Composition:
+class Composition(Composed):
     """Relightable models as one scene on one device; `segments` are of each the masks [N] bool."""
 
     def __init__(self, models: Sequence[Surfels], segments: Sequence[Sequence[Tensor]] | None = None) -> None:
@@ -119,7 +119,8 @@ class Composition:
         self.options = models[0].shading.options
         geometries = [geometry(model.parameters)[:3] for model in models]
         self.means, self.quats, self.scales = (torch.cat(x) for x in zip(*geometries, strict=True))
-        self.texels, self.sizes, self.offsets = joined_textures(models)
+        self.device = self.means.device
+        self.texels, self.sizes, self.offsets = join_textures(models)
         self.has_normals = any("normals" in model.parameters for model in models)
         self._latest: tuple[list[PartEdit] | None, list[Edited], Tensor] | None = None
 
@@ -127,34 +128,20 @@ class Composition:
         return len(self.means)
 
     @property
-    def device(self) -> torch.device:
-        """Where the surfels are."""
-        return self.means.device
-
-    @property
     def palettes(self) -> list[tuple[float, ...]]:
         """The palette of each model as fitted; black for a model without one."""
         given = (part.palette for part in self.parts)
         return [(0.0, 0.0, 0.0) if palette is None else tuple(palette.tolist()) for palette in given]
 
-    @torch.no_grad()
-    def render(
-        self,
-        camera: Camera,
-        light: Light = HEADLIGHT,
-        edits: Sequence[PartEdit] | None = None,
-        *,
-        look: Look = "shaded",
-        background: Tensor | None = None,
-        outputs: Collection[str] = (),
-        depth_range: Tensor | None = None,
+    def _draw(
+        self, camera: Camera, light: Light, edits: Sequence[PartEdit] | None, look: Look, asked: Asked
     ) -> Render:
-        """Render one view, see `Composed`."""
         if look not in get_args(Look):
             raise ArgumentError(f"look: expected one of {', '.join(get_args(Look))}, got {look}")
         edited, opacities = self._edited(edits)
-        looks = [part.look(own, camera, light, look) for part, own in zip(self.parts, edited, strict=True)]
+        looks = [part.shade(own, camera, light, look) for part, own in zip(self.parts, edited, strict=True)]
         base, gain = (torch.cat(x) for x in zip(*looks, strict=True))
+        background = asked.background
         if background is None:
             background = self.means.new_full((3,), float(look not in MATERIAL))
         scales = self.scales
@@ -164,11 +151,11 @@ class Composition:
             rasterize,
             *(self.means, self.quats, scales, opacities),
             *(camera.viewmat, camera.K, camera.width, camera.height),
-            depth_range=depth_range,
+            depth_range=asked.depth_range,
             options=self.options,
         )
         texture = Texture(base, gain, self.texels, self.sizes, self.offsets)
-        render = draw(texture=texture, background=background, outputs=outputs)
+        render = draw(texture=texture, background=background, outputs=asked.outputs)
         if render.normal is None or not self.has_normals:
             return render
         normals = torch.cat([seen_normals(part.model.parameters, camera) for part in self.parts])
@@ -180,7 +167,7 @@ class Composition:
         latest = self._latest  # another thread may put another one there
         if latest is None or latest[0] != own:
             pairs = zip(self.parts, by_part(self.parts, own), strict=True)
-            edited = [part.edited(each) for part, each in pairs]
+            edited = [part.apply(each) for part, each in pairs]
             self._latest = latest = (own, edited, torch.cat([each.opacities for each in edited]))
         return latest[1:]
 
@@ -196,7 +183,7 @@ def by_part(parts: Sequence[Part], edits: Sequence[PartEdit] | None) -> list[Seq
     return [edits[end - count : end] for count, end in zip(counts, accumulate(counts), strict=True)]
 
 
-def joined_textures(models: Sequence[Surfels]) -> tuple[Tensor, Tensor, Tensor]:
+def join_textures(models: Sequence[Surfels]) -> tuple[Tensor, Tensor, Tensor]:
     """Join texels [T, 3], sizes [N, 2] and offsets [N] of models; surfels without any get one texel of 0."""
     textures, count = [], 0
     for model in models:

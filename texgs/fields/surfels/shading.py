@@ -15,7 +15,7 @@ from texgs.raster import Options, Texture
 from texgs.raster.shading import MATERIAL, Ranges, between, blinn_phong, spherical_harmonics
 
 FAR = 1e4  # world units: a viewer so far away sees all surfels from one direction
-LEAST = 1e-6  # share of ambient or of diffuse light, so that its logit is finite
+LEAST_SHARE = 1e-6  # share of ambient or of diffuse light, so that its logit is finite
 
 
 @dataclass(frozen=True)
@@ -104,5 +104,5 @@ def in_full_light(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tens
         return dict(parameters)
     factors = material(parameters, kind)
     light = factors["ambient"] + factors["diffuse"]  # [N] or [1]
-    scaled = {name: (factors[name] / light).logit(eps=LEAST) for name in ("ambient", "diffuse")}
+    scaled = {name: (factors[name] / light).logit(eps=LEAST_SHARE) for name in ("ambient", "diffuse")}
     return {**parameters, **scaled, "colors": parameters["colors"] * light[:, None]}

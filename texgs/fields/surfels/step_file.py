@@ -22,7 +22,7 @@ VERSION = 1
 UNITS = {"means": 2**-14, "quats": 2**-13, "scales": 2**-10, "opacities": 2**-10, "colors": 2**-13}
 UNITS |= {"normals": 2**-13}  # of models that have them
 TURNS = ("quats", "normals")
-MOST = 2**15 - 1  # units of a difference
+MOST_UNITS = 2**15 - 1  # units of a difference
 
 
 def write_step(path: str | Path, key: Surfels, model: Surfels, metadata: Mapping[str, Any]) -> Path:
@@ -32,7 +32,7 @@ def write_step(path: str | Path, key: Surfels, model: Surfels, metadata: Mapping
     Quaternions are of length 1 there. Metadata are JSON, such as where the step is from.
     """
     tensors = {
-        name: (x / UNITS[name]).round().clamp(-MOST, MOST).to(torch.int16)
+        name: (x / UNITS[name]).round().clamp(-MOST_UNITS, MOST_UNITS).to(torch.int16)
         for name, x in differences(key, model).items()
     }
     description = {"version": VERSION, "key": known_by(key), "metadata": dict(metadata)}

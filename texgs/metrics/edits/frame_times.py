@@ -12,8 +12,8 @@ from texgs.metrics.metric import Measure, MeasuredScene, Metric
 if TYPE_CHECKING:
     from texgs.core.camera import Camera
 
-WARM = 3  # frames before those that count
-FRAMES = 8  # spread over the path: their mean is within 2 % of that of all
+WARM_UP_FRAMES = 3
+TIMED_FRAMES = 8  # spread over the path: their mean is within 2 % of that of all
 
 
 def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], title: str) -> list[float]:
@@ -29,7 +29,7 @@ def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], 
             torch.cuda.synchronize()
         return 1e3 * (time.perf_counter() - start)
 
-    for camera in cameras[:WARM]:
+    for camera in cameras[:WARM_UP_FRAMES]:
         milliseconds_of(camera)
     return [milliseconds_of(camera) for camera in progress(cameras, title=title, unit="frame")]
 
@@ -41,7 +41,7 @@ def run(measured: MeasuredScene) -> dict[str, float]:
     scene, composition = measured.after, measured.shown
     frames = milliseconds(
         lambda camera: composition.render(camera, scene.light, scene.edits),
-        spread(measured.cameras, FRAMES),
+        spread(measured.cameras, TIMED_FRAMES),
         measured.title,
     )
     return {"frame_mean_ms": fmean(frames), "frame_max_ms": max(frames)}

@@ -1,6 +1,6 @@
 """Metric `retrieval`: how far framed views are from each picture of texgs, with colours and by the pattern.
 
-From these distances tables tell the place of the picture that a look follows, see `named`.
+From these distances tables tell the place of the picture that a look follows, see `places_among`.
 """
 
 from collections import Counter
@@ -22,7 +22,7 @@ def run(measured: MeasuredScene) -> dict[str, Any]:
     return {f"far_by_{kind}": dict(zip(PICTURES, each.tolist(), strict=True)) for kind, each in far.items()}
 
 
-def named(looks: Sequence[tuple[str, Mapping[str, Any]]]) -> list[dict[str, int]]:
+def places_among(looks: Sequence[tuple[str, Mapping[str, Any]]]) -> list[dict[str, int]]:
     """Return the place of the picture that each look of a scene follows, 1 for the nearest, by measures.
 
     A picture that is near to all looks says little about one, so the mean over the looks is taken from the
@@ -60,5 +60,5 @@ METRIC = Metric(
     order=80,
     is_in_paper=False,
     tables=("far_by_colors", "far_by_pattern"),
-    among=named,
+    among=places_among,
 )

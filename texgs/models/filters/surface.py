@@ -15,9 +15,9 @@ from texgs.models.guidance import EditViews
 
 CELLS = 26.0  # patterns along the longest side of the scene
 KEY_LIGHT = (-0.45, 0.75, 0.48)  # direction of the light that a drawing's tone is made by, fixed in the world
-SOLID = 0.02  # alpha from which a pixel shows enough of the scene to be painted
-LOUD = 0.95  # quantile of luminance that counts as white
-MOST_SORTED = 2**24  # pixels whose quantile torch takes; of more, some count
+SOLID_ALPHA = 0.02  # alpha from which a pixel shows enough of the scene to be painted
+WHITE_QUANTILE = 0.95  # quantile of luminance that counts as white
+MOST_SORTED_PIXELS = 2**24  # pixels whose quantile torch takes; of more, some count
 PRIMES = (73856093, 19349663, 83492791)  # of the usual hash of cells (Teschner et al. 2003)
 
 
@@ -39,7 +39,7 @@ class Surface:
 
 def surface_of(views: EditViews) -> tuple[Surface, Tensor]:
     """Return the points that views show, and where they are [V, H, W]."""
-    where = views.alphas > SOLID
+    where = views.alphas > SOLID_ALPHA
     alpha = views.alphas[where][:, None]
     color = ((views.images[where] - (1 - alpha)) / alpha).clamp(0, 1)
     points, normals = views.points[where], views.normals[where]
@@ -47,8 +47,8 @@ def surface_of(views: EditViews) -> tuple[Surface, Tensor]:
     unit = _side(points) / CELLS
     shade = 0.5 + 0.5 * (normals @ normals.new_tensor(KEY_LIGHT))
     luma = luminance(color)
-    some = luma[:: 1 + len(luma) // MOST_SORTED]
-    white = some.quantile(LOUD).clamp_min(1e-3) if len(some) else luma.new_ones(())
+    some = luma[:: 1 + len(luma) // MOST_SORTED_PIXELS]
+    white = some.quantile(WHITE_QUANTILE).clamp_min(1e-3) if len(some) else luma.new_ones(())
     tone = shade * (luma / white).clamp(0, 1)
     pixel = _pixel(views, points) / unit
     return Surface(color, tone, shade.clamp(0, 1), points / unit, normals, pixel), where

@@ -1,6 +1,6 @@
 // A scene that several pages edit: the server holds it, and what is edited here shows here at once.
 
-import { State, edited } from "./state.js";
+import { State, edited, titleOf } from "./state.js";
 
 export class SharedState extends State {
   #connection;
@@ -35,7 +35,7 @@ export class SharedState extends State {
   }
 
   edit(part, key, value, step = 0) {
-    if (this.#send({ type: "edit", part, key, value, step })) {
+    if (this.#send({ type: "edit", part, key, value, step, title: titleOf({ part, key, value }) })) {
       this.update({ scene: edited(this.scene, { part, key, value }) });
     } else {
       this.update({}); // without a connection nothing changes: inputs show what there is

@@ -51,7 +51,7 @@ function partsOf(scene) {
   ]));
 }
 
-/** What the list of steps calls an edit, as the server does. */
+/** What the list of steps calls an edit. */
 export function titleOf({ part, key, value }) {
   const ofScene = { cuts: titleOfCuts, functions: (functions) => Object.keys(functions).join(", ") };
   const title = value && ofScene[key] ? ofScene[key](value) : titleOfValue(value);
@@ -69,6 +69,7 @@ function titleOfValue(value) {
   if (value === null) return "reset";
   if (typeof value === "boolean") return value ? "on" : "off";
   if (Array.isArray(value)) return toHex(value);
+  if (Number.isInteger(value) || typeof value === "string") return `${value}`;
   if (typeof value === "number") return `${Number(value.toPrecision(4))}`;
   return Object.entries(value).map(([key, angle]) => `${key} ${Math.round(angle)}°`).join(", ");
 }

@@ -6,7 +6,6 @@ from pathlib import Path
 from texgs.report.results import ComparisonResult
 from texgs.workflow.inputs import is_first_recipe, is_fit, is_swept, last_phase, view_set, with_recipe
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, made, read
-from texgs.workflow.stages.figure import shown_views
 from texgs.workflow.stages.settings import OfTF
 
 
@@ -24,7 +23,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     transforms_train.json; without test views training views are shown.
     """
     from texgs.fields.files import open_field
-    from texgs.report.fit_figure import write_comparison
+    from texgs.report.fit_figure import shown_views, write_comparison
     from texgs.volume.view_set import read_views
 
     shown = shown_views(read_views(inputs["views"].parent))

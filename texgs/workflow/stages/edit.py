@@ -4,48 +4,26 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.recipes import Edit
 from texgs.core.names import SCENE
 from texgs.edit.method import Method, method_of, methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import EditResult
-from texgs.workflow.edits import VIEWS, edit_keys, edited_scene, looks_of
-from texgs.workflow.stage import Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import FitLabel, OfDataset
+from texgs.workflow.edits import VIEWS, edited_scene
+from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.stages.settings import OfEdit
 
 if TYPE_CHECKING:
     from texgs.edit.task import Task
     from texgs.scene.scene import Scene
 
-POINTS = 100  # of a curve of losses at most
-SHOWN = "Before and after the edit; what can be relit, under another light too."
+CURVE_POINTS = 100  # of a curve of losses at most
+CAPTION = "Before and after the edit; what can be relit, under another light too."
 
 
-@dataclass(kw_only=True)
-class EditedFit(FitLabel):
-    """The same, with the variant of the edit."""
-
-    sweep: str = read("sweep.name")
-    variant: str = read("variant")
-
-
-@dataclass(kw_only=True)
-class Settings(OfDataset):
-    """What the stage reads of the configuration; `weights` comes from the job."""
-
-    edit: Edit = read(edit_keys)
-    fit: EditedFit
-    reduce: int = read("fit.reduce")
-    fov_y: float = read("views.fov_y")  # degrees
-    weights: dict[str, str | None]
-    followed: dict[str, str] = read(looks_of)  # by model, where not as the edit says
-
-
-def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+def work(settings: OfEdit, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write scene.yaml, edit.png, what the method writes, and turntable.mp4 where the scene looks different.
 
     It reads `scene`, and for each model `views.MODEL`, the transforms_train.json of its views.
@@ -76,14 +54,14 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     write_scene(output / SCENE, edited.scene)
     result = EditResult(
         *(task.edit.name, method.name, edited.how, seconds, edited.lambda_s, dict(edited.notes)),
-        *(method.follows, followed(task), *fallen(edited.losses), task.edit.compared),
+        *(method.follows, followed(task), *mean_losses(edited.losses), task.edit.compared),
         opacity_factors(before, edited.scene),
     )
     pictures = dict(edited.pictures)
     if method.is_look:
         kind = kinds()[settings.fit.field]
         write_before_and_after(before, edited.scene, kind, lens, output, device, title)
-        pictures["edit.png"] = f"{SHOWN} The edit: {result.lifted}." if result.lifted else SHOWN
+        pictures["edit.png"] = f"{CAPTION} The edit: {result.lifted}." if result.lifted else CAPTION
     if edited.losses:
         write_convergence(output / "convergence.png", edited.losses)
         pictures["convergence.png"] = "How the loss of the edit fell, term by term."
@@ -99,13 +77,13 @@ def opacity_factors(before: Scene, after: Scene) -> dict[str, float]:
     return {part: round(factor, 4) for part, factor in factors.items() if factor != 1}
 
 
-def fallen(losses: Mapping[str, Mapping[str, Sequence[float]]]) -> tuple[int, dict[str, list[float]]]:
+def mean_losses(losses: Mapping[str, Mapping[str, Sequence[float]]]) -> tuple[int, dict[str, list[float]]]:
     """Return how many iterations there were, and mean losses over equal shares of them, by part and term."""
     import numpy as np
 
     curves = {f"{part}/{term}": values for part, terms in losses.items() for term, values in terms.items()}
     iterations = max(map(len, curves.values()), default=0)
-    shares = max(1, min(POINTS, iterations))
+    shares = max(1, min(CURVE_POINTS, iterations))
     return iterations, {
         name: [float(share.mean()) for share in np.array_split(values, min(shares, len(values)))]
         for name, values in curves.items()
@@ -129,7 +107,7 @@ RULE = Rule(
     (SCENE, "edit.png"),
     target="edits",
     gpu=("fit",),
-    shown={"edit.png": SHOWN},
+    shown={"edit.png": CAPTION},
 )
 
 

@@ -12,7 +12,7 @@ from texgs.volume.view_settings import ViewKeys
 from texgs.workflow.edits import edited_scene
 from texgs.workflow.inputs import fitted_scene, view_settings, with_recipe
 from texgs.workflow.stage import EVERY, Config, Outcome, Rule, Stage, made, read
-from texgs.workflow.stages.edit import Settings as EditSettings
+from texgs.workflow.stages.settings import OfEdit
 
 if TYPE_CHECKING:
     from texgs.metrics.metric import Style
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(kw_only=True)
-class Settings(EditSettings):
+class Settings(OfEdit):
     """What the stage reads of the configuration."""
 
     compared: int = read("metric.views")
@@ -35,13 +35,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     from texgs.core.check import torch_device
     from texgs.metrics.metric import MeasuredScene, values_of
-    from texgs.scene.paths import PATHS
+    from texgs.scene.film import COUNTS
     from texgs.scene.scene_file import read_scene
     from texgs.volume.cameras import spiral
 
     edit, views, device = settings.edit, settings.views, torch_device(settings.fit.device)
     before, after = read_scene(inputs["before"]), read_scene(inputs["scene"])
-    path = spiral(PATHS["test"], views.lens(before.frame))  # near and far along it are angles
+    path = spiral(COUNTS["test"], views.lens(before.frame))  # near and far along it are angles
     cameras = [camera.to(device) for camera in path]
     measured = MeasuredScene(
         title=f"{settings.dataset}: {edit.name}",

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from texgs.fitting.kinds import fit_specs
 from texgs.report.results import Result
 from texgs.workflow.inputs import is_fit, view_set
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, made, read
 from texgs.workflow.stages.settings import OfTF, Recipe
-
-if TYPE_CHECKING:
-    from texgs.volume.view_set import View, ViewSet
 
 
 @dataclass(frozen=True)
@@ -46,7 +42,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     from texgs.fields.files import open_field
     from texgs.fields.surfels.model import Surfels
-    from texgs.report.fit_figure import write_fit_figure
+    from texgs.report.fit_figure import shown_views, write_fit_figure
     from texgs.volume.view_set import read_views
 
     fit, shown = settings.fit, shown_views(read_views(inputs["views"].parent))
@@ -61,12 +57,6 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         models.pop("surfels", None)
     write_fit_figure(output / "figure.png", models, shown, fit.reduce, title)
     return Outcome(FigureResult(list(shown), len(last)))
-
-
-def shown_views(views: ViewSet) -> dict[str, View]:
-    """Return two test views by the names that stand beside them; training views where there are none."""
-    split, candidates = ("test", views.test) if views.test else ("training", views.train)
-    return {f"{split} view {index}": candidates[index] for index in sorted({0, len(candidates) // 3})}
 
 
 def inputs(config: Config) -> dict[str, Path]:

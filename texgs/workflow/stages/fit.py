@@ -1,125 +1,17 @@
-"""Stages of fits in one phase, and what the phases of all fits share: rule, loop, evaluation, numbers."""
+"""Stages of fits in one phase."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed
-from texgs.core.memory import MIB
-from texgs.fitting.kinds import FitSpec, FitTask, fit_specs
-from texgs.fitting.settings import Phase
-from texgs.report.results import FitResult
+from texgs.fitting.kinds import FitSpec, fit_specs
 from texgs.workflow.inputs import is_fit_of, start_of_fit
-from texgs.workflow.stage import Outcome, Rule, Stage, read
-from texgs.workflow.stages.settings import OfTF, Recipe
-
-if TYPE_CHECKING:
-    from torch import Tensor
-
-    from texgs.fields.field import Field
-    from texgs.fields.surfels.model import Surfels
-    from texgs.fields.surfels.shading import ShadingModel
-    from texgs.fitting.attributes import Attributes
-
-PHASE = Rule("phase", "{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",), target="fits", gpu=("fit",))
-
-
-@dataclass(kw_only=True)
-class PhaseSettings(OfTF):
-    """What all phases read of the configuration."""
-
-    fit: Recipe
-
-
-class FitJob(FitTask[Recipe]):
-    """One phase of the fit of a basic TF, by its recipe: what it starts with, and how its result is told."""
-
-    @classmethod
-    def of(cls, settings: PhaseSettings, inputs: Mapping[str, Path], output: Path) -> FitJob:
-        """Return the job with the views that it reads."""
-        from texgs.core.check import torch_device
-        from texgs.volume.images import load
-        from texgs.volume.nrrd_file import open_grid
-        from texgs.volume.view_set import read_views
-
-        fit, views = settings.fit, read_views(inputs["views"].parent)
-        title = f"{settings.dataset}/{settings.tf}: {settings.stage}"
-        metadata = {"dataset": settings.dataset, "tf": settings.tf}
-        images = load(views.train, fit.reduce)
-        volume = open_grid(inputs["volume"]) if "volume" in inputs else None
-        return cls(fit, views, images, output, torch_device(fit.device), fit.seed, title, metadata, volume)
-
-    def run(
-        self,
-        parameters: Mapping[str, Tensor],
-        shading: ShadingModel,
-        phase: Phase,
-        held: Attributes | None = None,
-    ) -> tuple[Surfels, float, list[float]]:
-        """Run the loop of surfels from the last checkpoint in the folder, if there is one.
-
-        Returns:
-            The model, the seconds of all runs together, and the losses that they looked at. Surfels lie along
-            a Z curve: what a tile of a view shows is then mostly together in memory, texels above all.
-        """
-        from texgs.core.geometry import z_order_of
-        from texgs.fields.surfels.model import Surfels
-        from texgs.fitting.checkpoint import FOLDER, run_to_end
-        from texgs.fitting.densify import is_shared
-        from texgs.fitting.loop import Fit
-
-        fit = Fit(parameters, shading, self.images, phase, self.seed, held)
-        seconds = run_to_end(fit, self.output / FOLDER, self.title)
-        fitted = {name: x.detach() for name, x in fit.fitted.items()}
-        order = z_order_of(fitted["means"])
-        ordered = {name: x if is_shared(name, x) else x[order] for name, x in fitted.items()}
-        return Surfels(ordered, shading), seconds, fit.losses
-
-    def outcome(
-        self,
-        field: Field,
-        seconds: float,
-        iterations: int = 0,
-        losses: Sequence[float] = (),
-        measured: Sequence[str] = ("test",),
-        **more: Any,
-    ) -> Outcome:
-        """Return the result, with the quality on views of some splits; the checkpoint goes.
-
-        After the last phase, when training views are measured too, parts that are missing are told on stderr.
-        """
-        import torch
-
-        from texgs.fitting import checkpoint
-        from texgs.metrics.shown import what_is_lost
-        from texgs.volume.images import smaller
-
-        camera = smaller(self.views.train[0].camera, self.settings.reduce)
-        scores: dict[str, Any] = {}
-        for split in measured:
-            scores |= self.quality(field, split)
-        if "train" in measured and (lost := what_is_lost(scores.get("shown"))):
-            print(f"{self.title}: {lost}", file=sys.stderr)
-        is_gpu = self.device.type == "cuda"
-        memory = torch.cuda.max_memory_allocated(self.device) / MIB if is_gpu else None
-        checkpoint.discard(self.output / checkpoint.FOLDER)
-        seen = {"train_views": len(self.views.train), "width": camera.width, "height": camera.height}
-        told = {**(seen if measured else {}), **scores, "peak_gpu_memory_mib": memory, **more}
-        return Outcome(FitResult(seconds, len(field), iterations, list(losses), **told))
-
-    def quality(self, field: Field, split: str) -> dict[str, float]:
-        """Return PSNR and SSIM on views of a split, where there are some, as the result names them."""
-        from texgs.metrics.quality import evaluate, mean
-
-        if not (views := getattr(self.views, split)):
-            return {}
-        scores = mean(evaluate(field, views, self.settings.reduce, f"{self.title}: {split} views"))
-        return scores if split == "test" else {f"{split}_{name}": scores[name] for name in ("psnr", "ssim")}
+from texgs.workflow.stage import Outcome, Stage, read
+from texgs.workflow.stages.phase import PHASE, FitJob, PhaseSettings
 
 
 @dataclass(kw_only=True)
@@ -135,7 +27,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     It reads `views`, the transforms_train.json; where seeds come from it also `volume`, the volume.nrrd.
     """
     kind, job = fit_specs()[settings.stage], FitJob.of(settings, inputs, output)
-    if kind.settings is None or kind.fit is None:
+    if kind.settings is None:
         raise ArgumentError(f"{kind.name}: expected a kind of field that is fitted in one phase")
     keys = typed(kind.settings, settings.keys)
     fitted = kind.fit(replace(job, settings=keys))
@@ -145,7 +37,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return job.outcome(field, *told, measured=("test", "train"), sizes=field.sizes(), notes=notes)
 
 
-def stage_of(kind: FitSpec[Any]) -> Stage:
+def stage_of(kind: FitSpec) -> Stage:
     """Return the stage of a kind of field that is fitted in one phase."""
     return Stage(
         kind.name,
@@ -159,4 +51,4 @@ def stage_of(kind: FitSpec[Any]) -> Stage:
     )
 
 
-STAGES = [stage_of(kind) for kind in fit_specs().values() if kind.fit is not None]
+STAGES = [stage_of(kind) for kind in fit_specs().values() if kind.function]

@@ -85,13 +85,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 def given_rows(settings: Settings, inputs: Mapping[str, Path]) -> list[Row]:
     """Return the row of what looks of a comparison were given; none of other galleries."""
-    from texgs.report.given_row import given_row, plotted
+    from texgs.report.given_row import given_row, tf_plot
 
     if not settings.styles and not settings.instructions:
         return []
     plot = None
     if volume := inputs.get("volume"):
-        plot = plotted(volume, basic_tfs_of(volume, settings.basic_tfs, settings.tf_values))
+        plot = tf_plot(volume, basic_tfs_of(volume, settings.basic_tfs, settings.tf_values))
     return [given_row(plot, settings.styles, settings.instructions, inputs.values())]
 
 

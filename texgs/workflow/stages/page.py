@@ -5,6 +5,7 @@ from pathlib import Path
 
 from texgs.core.io import write_bytes
 from texgs.core.memory import MIB
+from texgs.core.names import PAGE
 from texgs.edit.method import methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import PageResult
@@ -35,7 +36,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     scene = read_scene(inputs["scene"])
     parts = [settings.dataset, settings.fit.name, *([settings.look] if settings.look != "none" else [])]
-    file = output / "scene.html"
+    file = output / PAGE
     page = write_page(file, scene, " ".join(parts))
     write_bytes(output / "poster.jpg", page.poster)
     mib = file.stat().st_size / MIB
@@ -63,10 +64,10 @@ STAGE = Stage(
     rule=Rule(
         "page",
         "{dataset}/scene/{fit}/pages/{edit}",
-        ("scene.html", "poster.jpg"),
+        (PAGE, "poster.jpg"),
         target="scenes",
         threads=2,
-        shown={"scene.html": SHOWN},
+        shown={PAGE: SHOWN},
     ),
     inputs=inputs,
     work=work,

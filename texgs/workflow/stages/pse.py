@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
-from statistics import fmean
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from texgs.core.progress import progress
 from texgs.fields.kinds import kinds
-from texgs.report.results import Comparison, PseResult
+from texgs.report.results import BELOW, COMPARED, Comparison, PseResult
 from texgs.workflow.inputs import has_scene, scene_and_volume
 from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfScene
@@ -19,21 +15,11 @@ from texgs.workflow.stages.settings import OfScene
 if TYPE_CHECKING:
     import numpy as np
 
-    from texgs.core.camera import Camera
-    from texgs.fields.field import Composed
-    from texgs.scene.scene import Scene
-    from texgs.scene.twin import Twin
-
 PICTURES = {
     "pse.png": "Edits of opacity, colour and light, each on top of those before it",
     "relight.png": "A light in front that moves from below to above, by its azimuth and polar angle",
 }
-BELOW = "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
-COMPARED = 3  # views around the object, one of which is shown
 CHECKED = 39  # views with lights and edits at random
-POLAR = 20.0  # of these views, degrees
-LEFT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
-SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in the paper's figure, degrees
 
 
 def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -44,6 +30,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.core.check import torch_device
     from texgs.core.figures import write_grid
     from texgs.report.check import check
+    from texgs.report.compared import POLAR, caption, chain, compare_views, light_sweep
     from texgs.scene.scene_file import read_scene, write_scene
     from texgs.scene.twin import Twin
     from texgs.volume.cameras import orbit_path
@@ -60,7 +47,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
         steps = progress(scenes.items(), len(scenes), title=f"{settings.dataset}: {group}", unit="edit")
         for title, changed in steps:
             write_scene(output / f"{group}-{len(done[group])}.yaml", changed)
-            comparison, shown = compared(title, changed, composition, twin, cameras)
+            comparison, shown = compare_views(title, changed, composition, twin, cameras)
             done[group].append(comparison)
             for name, image in shown.items():
                 rows.setdefault(name, []).append(image)
@@ -71,79 +58,6 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
         checked = check(scene, composition, twin, settings.views.lens(scene.frame), *words)
         captions["check.png"] = f"{checked.sentence} The worst of {CHECKED}."
     return Outcome(PseResult(COMPARED, done["pse"], done["relight"], checked), captions)
-
-
-def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str]) -> dict[str, Scene]:
-    """Return the scenes of the paper's figure by title: opacity, colour, strength and direction of the light.
-
-    Each is on top of those before it. What fields of a kind cannot do is left out, but for the direction of
-    the light: without shading it changes nothing.
-    """
-    from texgs.core.light import Light
-
-    names, steps = list(scene.models), {"as fitted": scene}
-    changes: list[tuple[str, Mapping[str, Mapping[str, Any]]]] = [
-        (f"+ opacity of {names[0]} x 0.4", {names[0]: {"opacity": 0.4}})
-    ]
-    if "palette" in can:
-        turned = {name: {"palette": (b, r, g)} for name, (r, g, b) in zip(names, fitted, strict=True)}
-        changes.append(("+ other colours", turned))
-    if "relight" in can:
-        magnitude = {"ambient": 0.7, "diffuse": 1.2, "specular": 2.0}
-        changes.append(("+ k_a x 0.7, k_d x 1.2, k_s x 2", dict.fromkeys(names, magnitude)))
-    for title, change in changes:
-        scene = steps[title] = edited(scene, change)
-    return {**steps, "+ light from the left": replace(scene, light=Light("directional", *LEFT))}
-
-
-def light_sweep(scene: Scene) -> dict[str, Scene]:
-    """Return the scene under a light that moves from below the object to above it, by title."""
-    from texgs.core.light import Light
-
-    return {
-        f"light at (-90°, {polar:g}°)": replace(scene, light=Light("directional", -90.0, polar))
-        for polar in SWEEP
-    }
-
-
-def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
-    """Return the scene with edits of some models changed."""
-    from texgs.scene.session import Session
-
-    session = Session(scene)
-    for part, values in changes.items():
-        for key, value in values.items():
-            session.set(part, key, value)
-    return session.scene
-
-
-def compared(
-    title: str, scene: Scene, composition: Composed, twin: Twin | None, cameras: Sequence[Camera]
-) -> tuple[Comparison, dict[str, np.ndarray]]:
-    """Return PSNR and SSIM against the volume over some views, and all pictures [H, W, 3] of the first."""
-    from texgs.metrics.quality import compare
-    from texgs.report.beside_volume import pictures
-    from texgs.scene.cut_view import beside
-    from texgs.scene.frame import frame
-
-    scores = defaultdict[str, list[float]](list)
-    if twin is None:
-        picture = frame(composition, cameras[0], scene)
-        return Comparison(title), {"scene": picture}
-    shown: dict[str, np.ndarray] = {}
-    for camera in cameras:
-        seen = beside(composition, camera, scene, twin)
-        shown = shown or pictures(*seen)
-        for name, value in compare(*seen).items():
-            scores[name].append(value)
-    means = {name: fmean(values) for name, values in scores.items()}
-    return Comparison(title, **means), shown
-
-
-def caption(entry: Comparison) -> str:
-    """Return the title of a picture, with the mean PSNR of all views where it was measured."""
-    measured = "" if entry.psnr is None else f"\nmean of {COMPARED} views: {entry.psnr:.1f} dB"
-    return entry.title + measured
 
 
 STAGE = Stage(

@@ -8,8 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from texgs.config.recipes import Edit
 from texgs.volume.basic_tfs import BasicTF
 from texgs.volume.view_settings import ViewKeys
+from texgs.workflow.edits import edit_keys, looks_of
 from texgs.workflow.inputs import is_changed, shown_tfs, sweep_of_fit, view_settings
 from texgs.workflow.stage import read
 from texgs.workflow.sweep import fit_variant
@@ -52,6 +54,26 @@ class Recipe(FitLabel):
     """The same, with what all stages of a fit read."""
 
     reduce: int = read("fit.reduce")
+
+
+@dataclass(kw_only=True)
+class EditedFit(FitLabel):
+    """Which fit an edit is of, with the variant of the edit."""
+
+    sweep: str = read("sweep.name")
+    variant: str = read("variant")
+
+
+@dataclass(kw_only=True)
+class OfEdit(OfDataset):
+    """A job of an edit; `weights` comes from the job."""
+
+    edit: Edit = read(edit_keys)
+    fit: EditedFit
+    reduce: int = read("fit.reduce")
+    fov_y: float = read("views.fov_y")  # degrees
+    weights: dict[str, str | None]
+    followed: dict[str, str] = read(looks_of)  # by model, where not as the edit says
 
 
 @dataclass(kw_only=True)

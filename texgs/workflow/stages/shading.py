@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from texgs.fitting.settings import Material, Phase
 from texgs.workflow.inputs import is_changed, is_fit_of, start_of_shading
 from texgs.workflow.stage import Outcome, Stage, read
-from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
+from texgs.workflow.stages.phase import PHASE, FitJob, PhaseSettings
 from texgs.workflow.stages.settings import Recipe
 
 if TYPE_CHECKING:

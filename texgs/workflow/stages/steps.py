@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,12 +11,11 @@ from texgs.core.memory import MIB
 from texgs.core.names import SCENE
 from texgs.core.progress import progress
 from texgs.fields.kinds import kinds
-from texgs.report.results import StepsResult
+from texgs.report.results import BELOW, COMPARED, StepsResult
 from texgs.volume.settings import VolumeKeys
 from texgs.workflow.inputs import has_scene, is_series, scene_and_volume, without
 from texgs.workflow.locate import series_files
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
-from texgs.workflow.stages.pse import BELOW, COMPARED, POLAR, caption, compared
 from texgs.workflow.stages.settings import OfScene
 
 if TYPE_CHECKING:
@@ -50,6 +48,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.core.check import torch_device
     from texgs.core.figures import write_grid
     from texgs.edit.series import make_series
+    from texgs.report.compared import caption
     from texgs.scene.scene_file import read_scene
 
     device, is_whole = torch_device(settings.fit.device), not (output / "series.json").exists()
@@ -73,6 +72,7 @@ def measured(
     """Return how close steps are to their volumes, and some pictures of them in rows."""
     import numpy as np
 
+    from texgs.report.compared import POLAR, compare_views
     from texgs.scene.twin import Twin
     from texgs.volume.cameras import orbit_path
 
@@ -82,7 +82,7 @@ def measured(
     cameras, measures, rows = orbit_path(COMPARED, POLAR, lens), [], dict[str, list[np.ndarray]]()
     for step in progress(listed, len(listed), title=title, unit="step"):
         shown = scene.at(step)
-        entry, pictures = compared(names[step], shown, shown.open(device), Twin(shown, device), cameras)
+        entry, pictures = compare_views(names[step], shown, shown.open(device), Twin(shown, device), cameras)
         measures.append(entry)
         for row, picture in pictures.items():
             rows.setdefault(row, []).append(picture)
@@ -91,16 +91,13 @@ def measured(
 
 def write_film(path: Path, scene: Scene, settings: Settings, device: torch.device) -> None:
     """Write a film of all steps, around which the camera turns."""
-    from texgs.core.movie import write_frames
-    from texgs.scene.paths import shots_of
-    from texgs.scene.session import Session
+    from texgs.report.compared import POLAR
+    from texgs.scene.film import Film, frames_of
 
-    session, size = Session(scene, device), kinds()[settings.fit.field].film_size
     count = max(FRAMES, len(scene.timeline.steps))
-    lens = settings.views.lens(scene.frame).square(size)
-    shots = shots_of(scene, session.composition, "orbit-time", count, lens, polar=POLAR)
-    frames: Iterator[np.ndarray] = (session.frame(camera, scene=shown) for camera, shown in shots)
-    write_frames(path, progress(frames, count, title=f"{settings.dataset}: film", unit="frame"))
+    film, lens = Film(what="orbit-time", frames=count, polar=POLAR), settings.views.lens(scene.frame)
+    shots = film.shots(scene, lens=lens.square(kinds()[settings.fit.field].film_size))
+    film.write(path, frames_of(scene, shots, device), title=f"{settings.dataset}: film")
 
 
 def inputs(config: Config) -> dict[str, Path]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from texgs.fitting.settings import Phase, Seeds
 from texgs.workflow.inputs import is_changed, is_fit_of, start_of_fit
 from texgs.workflow.stage import Outcome, Stage, read
-from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
+from texgs.workflow.stages.phase import PHASE, FitJob, PhaseSettings
 from texgs.workflow.stages.settings import Recipe
 
 # Keys of a recipe that later stages read.

@@ -7,7 +7,7 @@ from pathlib import Path
 from texgs.fitting.settings import TextureKeys
 from texgs.workflow.inputs import is_fit_of, model_of
 from texgs.workflow.stage import Outcome, Stage, read
-from texgs.workflow.stages.fit import PHASE, FitJob, PhaseSettings
+from texgs.workflow.stages.phase import PHASE, FitJob, PhaseSettings
 
 
 @dataclass(kw_only=True)

@@ -1,0 +1,339 @@
+"""What a page draws against what texgs renders: modes, lights, edits, cuts, functions and steps in time."""
+
+from dataclasses import replace
+from functools import cache
+from itertools import product
+from typing import get_args
+
+import numpy as np
+import pytest
+import torch
+
+from tests.fields.surfels.test_composition import ball
+from tests.scene.test_twin import HIGH
+from tests.viewer.drawing import Drawing, closeness, view_of
+from tests.viewer.drawn_scenes import (
+    BEGIN,
+    COUNT,
+    ends_of,
+    scene_of_parts,
+    scene_of_series,
+    scene_of_volume,
+    waves,
+)
+from texgs.core.camera import orbit
+from texgs.core.cuts import Box, Cuts, Plane
+from texgs.core.errors import ArgumentError
+from texgs.core.light import HEADLIGHT, Light
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.variants import write_texture
+from texgs.scene.cut_view import beside
+from texgs.scene.frame import frame
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.shot import Mode
+from texgs.scene.twin import Twin, range_of
+from texgs.viewer.frames import comparison
+from texgs.viewer.messages import Orbit, View
+from texgs.viewer.standalone import pack
+from texgs.volume.generate import sphere
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.transfer import TransferFunction, combine
+
+CAMERAS = [
+    orbit(30, 20, 3, 40, 96, 64),
+    orbit(-110, 75, 2, 50, 64, 96),
+    orbit(200, -35, 5, 20, 80, 80),
+    orbit(85, 0, 0.9, 60, 64, 48),
+    orbit(0, 90, 2.5, 30, 33, 47),
+]
+CAMERA = orbit(20, 10, 4, 30, 96, 80)
+FROM_BELOW = orbit(-130, -40, 2.5, 40, 64, 90)
+NEAR = orbit(20, 10, 3, 40, 96, 80)
+SIDE, BELOW = Light("directional", 100, 30), Light("directional", -60, -50)
+MODES = [mode for mode in get_args(Mode) if mode != "volume"]
+LEVELS = 3  # of 255: a pixel of the rasterizer ends where 1e-4 of the light is left, ours does not
+LEAST = 38.0  # dB; samples are codes of 8 bits, and steps are longer than those of the caster
+CLOSE = 50.0  # dB: the page rounds surfels and texels
+WIDE = TransferFunction(((0.1, 0), (0.2, 0.3), (0.9, 0.1)), ((0.1, 0.9, 0.2, 0.1), (0.9, 0.1, 0.9, 0.4)))
+TILTED = Cuts([Plane([1.0, 2.0, 0.5], 0.2), Plane([0.0, 0.0, -1.0], 0.3)], Box([-0.6] * 3, [0.5] * 3))
+CUTS = Cuts([Plane([1.0, 0.2, 0.0], 0.1), Plane([0.0, 1.0, 0.3], 0.2)])
+BOX = Cuts(box=Box([-0.3, -0.4, -0.2], [0.2, 0.3, 0.4]))
+VOLUMES = {"sphere": lambda: sphere(40), "waves": waves, "flat": lambda: waves((24, 2, 20), (1, 3, 1))}
+PARTS = [PartEdit(), PartEdit(palette=(0.1, 0.6, 0.2)), PartEdit(opacity=0.4, specular=3.0)]
+EDITS = {  # of the model with two segments, and of the next one
+    "hidden": (PartEdit(), PartEdit(visible=False)),
+    "faint": (PartEdit(opacity=0.15), PartEdit()),
+    "opaque": (PartEdit(opacity=20.0), PartEdit()),
+    "recoloured": (PartEdit(palette=(0.9, 0.1, 0.3)), PartEdit()),
+    "tinted": (
+        PartEdit(specular=4.0, shininess=0.2, tint=(1.0, 0.7, 0.2)),
+        PartEdit(tint=(0.2, 0.4, 1.0)),
+    ),
+    "material": (PartEdit(ambient=0.3, diffuse=1.7, specular=4.0, shininess=0.2), PartEdit()),
+}
+OF_VOLUMES = [
+    PartEdit(visible=False),
+    PartEdit(opacity=0.3),
+    PartEdit(opacity=5.0, palette=(0.1, 0.8, 0.2)),
+    PartEdit(ambient=0.2, diffuse=1.5, specular=3.0, shininess=0.3),
+    PartEdit(specular=3.0, shininess=0.3, tint=(1.0, 0.5, 0.1)),
+]
+FAINT = [PartEdit(opacity=0.1)] * 3 + [PartEdit(opacity=0.1, palette=(0.2, 0.2, 0.9)), PartEdit(opacity=0.1)]
+LATER = {  # edits of a series that hold through time
+    "light": SIDE,
+    "cuts": Cuts([Plane([0.0, 1.0, 0.2], 0.2)]),
+    "background": (0.2, 0.3, 0.5),
+    "volume": None,
+    "edits": [PartEdit(opacity=0.4, specular=3.0), PartEdit(palette=(0.9, 0.2, 0.1), opacity=2.0)],
+}
+LATER["edits"].append(PartEdit(diffuse=1.5))
+
+
+WITHOUT_FLOAT_BLEND = """() => {
+  const known = WebGL2RenderingContext.prototype.getExtension;
+  WebGL2RenderingContext.prototype.getExtension = function (name) {
+    return name === "EXT_float_blend" ? null : known.call(this, name);
+  };
+}"""
+
+
+@pytest.fixture(scope="module")
+def drawing(chromium, tmp_path_factory):
+    """The drawing of a scene by its name, each opened once."""
+
+    @cache
+    def opened(name):
+        folder = tmp_path_factory.mktemp(name)
+        if name in VOLUMES:
+            return Drawing(chromium, scene_of_volume(folder, VOLUMES[name]()), has_volume=True)
+        if name == "series":
+            return Drawing(chromium, scene_of_series(folder))
+        if name == "bright":  # texels beyond eight bits
+            model = ball(5)
+            model.parameters["texels"][::2] += 1.5
+            models = {"A": SceneModel(write_model(folder / "a.safetensors", model), PartEdit(ambient=0.2))}
+            return Drawing(chromium, Scene(models), is_exact=True)
+        script = WITHOUT_FLOAT_BLEND if name == "halves" else "() => {}"
+        return Drawing(chromium, scene_of_parts(folder), is_exact=True, script=script)
+
+    every = []
+    yield lambda name: every.append(opened(name)) or every[-1]
+    assert [each.errors for each in every if each.errors] == []
+
+
+def changed(scene, edits=(), time=None, functions=(), **fields):
+    """A scene with other edits, of its parts in their order, at a step, with functions to try."""
+    scene = scene if time is None else scene.at(time)
+    left, models = iter([*edits, *scene.edits[len(edits) :]]), {}
+    for name, entry in scene.models.items():
+        own = next(left)
+        segments = {key: replace(each, edit=next(left)) for key, each in entry.segments.items()}
+        models[name] = replace(entry, edit=own, segments=segments)
+    if functions:
+        ends = ends_of(open_grid(scene.volume.file))
+        fields["functions"] = {name: tf.scaled(*ends) for name, tf in functions}
+    return replace(scene, models=models, **fields)
+
+
+def on_volumes(change, mode, least=LEAST, camera=CAMERA):
+    """Cases of one change of each scene with a volume."""
+    return [(name, camera, mode, change, least) for name in VOLUMES]
+
+
+TRIED = (("high", WIDE), ("new", HIGH))
+CASES = [  # scene, camera, mode, what is changed, and the least PSNR in dB, or how many levels and where else
+    *(
+        ("parts", c, "shaded", {"light": light}, LEVELS)
+        for c, light in product(CAMERAS, (HEADLIGHT, SIDE, BELOW))
+    ),
+    *(("parts", CAMERAS[0], mode, {"light": SIDE}, LEVELS) for mode in MODES),
+    *(
+        ("parts", CAMERAS[1], "shaded", {"light": SIDE, "edits": [own, *PARTS[1:], other]}, LEVELS)
+        for own, other in EDITS.values()
+    ),
+    *(
+        ("parts", c, mode, {"cuts": TILTED}, "cut")
+        for c, mode in product(CAMERAS, ("shaded", "depth", "discs"))
+    ),
+    *(
+        ("parts", c, "shaded", {"light": each, "edits": FAINT}, 1)
+        for c, each in product(CAMERAS, (HEADLIGHT, SIDE))
+    ),
+    ("parts", CAMERAS[0], "depth", {"edits": [PartEdit(opacity=0.02)] * 5}, 1),  # nothing says what is near
+    *(("halves", c, "shaded", {"light": SIDE}, LEVELS) for c in CAMERAS),
+    ("halves", CAMERAS[0], "shaded", {"edits": [PartEdit(opacity=0.1)] * 5}, 1),
+    ("bright", CAMERAS[0], "shaded", {}, LEVELS),
+    *(
+        case
+        for camera, light in product((CAMERA, FROM_BELOW), (HEADLIGHT, SIDE))
+        for case in on_volumes({"light": light}, "volume", LEAST, camera)
+    ),
+    *(case for edit in OF_VOLUMES for case in on_volumes({"edits": [edit]}, "volume")),
+    *(case for mode in ("volume", "shaded") for case in on_volumes({"functions": TRIED}, mode)),
+    *(
+        case
+        for cuts, faces, mode in product((CUTS, BOX), ("shaded", "unlit"), ("volume", "shaded"))
+        for case in on_volumes({"cuts": replace(cuts, faces=faces), "light": SIDE}, mode, LEAST - 3)
+    ),
+    # A volume has one material: models with others are seen below faces.
+    *on_volumes({"edits": [PartEdit(ambient=0.2, diffuse=0.1)], "cuts": CUTS, "light": SIDE}, "shaded", 40.0),
+    *(("series", NEAR, "shaded", {"time": time}, CLOSE) for time in (4, 0, 1, BEGIN)),
+    *(("series", NEAR, "normal", {"time": time}, CLOSE - 6) for time in (4, 0, 1, BEGIN)),
+    *(("series", NEAR, "shaded", {"time": time, **LATER}, CLOSE - 12) for time in (0, 4)),
+]
+
+
+@pytest.mark.parametrize(("name", "camera", "mode", "change", "limit"), CASES)
+def test_a_page_draws_what_texgs_renders(drawing, name, camera, mode, change, limit):
+    opened = drawing(name)
+    seen = changed(opened.scene, **change)
+    expected, got = opened.render(seen, camera, mode), opened.draw(seen, camera, mode)
+    assert expected.std() > 5, "something is seen"
+    worst = np.abs(expected - got).max(axis=2)
+    if limit == "cut":
+        assert not np.array_equal(expected, opened.render(opened.scene, camera, mode))
+        assert (worst > LEVELS).mean() < 0.002, "fragments on a plane but for rounding"
+    elif isinstance(limit, int):
+        assert worst.max() <= limit
+    else:
+        assert closeness(expected, got) > limit
+
+
+def test_halves_are_used_where_floats_cannot_be_blended(drawing):
+    page = drawing("halves").page
+    assert page.evaluate("renderer._pass.target.format[0] === WebGL2RenderingContext.RGBA16F")
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+def test_cuts_with_looks_have_faces_of_the_volume_over_the_models(chromium, tmp_path, name):
+    texture, scene = (
+        write_texture(tmp_path / "look.safetensors", ball(1)),
+        scene_of_volume(tmp_path, VOLUMES[name]()),
+    )
+    models = {**scene.models, "low": replace(scene.models["low"], texture=texture)}
+    opened = Drawing(chromium, replace(scene, models=models, cuts=CUTS), has_volume=True)
+    styled = opened.scene
+    hollow = replace(styled, volume=None)
+    bare, faces = frame(hollow.open(), CAMERA, hollow), opened.render(styled, CAMERA)
+    got = closeness(opened.draw(styled, CAMERA), faces)
+    assert got > max(32.0, closeness(bare, faces) + 3), "rims have a quarter of the resolution, and 8 bits"
+    assert opened.errors == []
+
+
+@pytest.mark.parametrize("mode", ["difference", "wipe"])
+@pytest.mark.parametrize("name", VOLUMES)
+def test_scene_and_volume_beside_each_other(drawing, name, mode):
+    scene = drawing(name).scene
+    image, truth = beside(scene.open(), CAMERA, scene, Twin(scene))
+    view = View(Orbit((0, 0, 0), 20, 10, 4, 30, 96, 80), mode=mode, gain=4.0, wipe=0.4)
+    expected = comparison(view, image.color, truth.color)
+    got = drawing(name).draw(scene, CAMERA, mode, gain=4, wipe=0.4)
+    assert closeness(got, expected) > LEAST - 12 * (mode == "difference"), "differences are enlarged"
+
+
+DEPTH = """([camera, scene, mode, pixel]) => {
+  const view = { ...camera, viewmat: () => camera.viewmat, unproject: (place, depth) => depth };
+  renderer.size = () => [camera.width, camera.height];
+  return renderer.pointAt(view, scene, { mode }, pixel);
+}"""
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+def test_depths_of_the_volume_are_those_of_the_caster(drawing, name):
+    """A double click turns around what the mode shows: the volume here, or the models."""
+    opened, scene = drawing(name), drawing(name).scene
+    volume = Twin(scene)._caster.cast(combine(scene.volume.tfs), CAMERA, HEADLIGHT, ("depth",))
+    models = scene.open().render(CAMERA, HEADLIGHT, scene.edits, outputs=("depth",))
+    row, column = divmod(int(volume.rgba[..., 3].argmax()), CAMERA.width)
+    for mode, expected in (("volume", volume), ("shaded", models)):
+        words = [view_of(CAMERA), opened.describe(scene), mode, [column, row]]
+        assert opened.page.evaluate(DEPTH, words) == pytest.approx(
+            float(expected.depth[row, column]), abs=5e-3
+        )
+        assert opened.page.evaluate(DEPTH, [*words[:3], [0, 0]]) is None, "the background"
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+def test_a_point_of_a_face_is_of_the_volume(drawing, name):
+    """What is behind it may be far away, or nothing."""
+    opened, scene = drawing(name), drawing(name).scene
+    cut = replace(scene, cuts=CUTS)
+    seen = Twin(cut).render(CAMERA, cut, scene.open().palettes, range_of(CUTS, CAMERA), outputs=("depth",))
+    face = torch.where(range_of(CUTS, CAMERA).face >= 0, seen.alpha, 0.0)
+    row, column = divmod(int(face.argmax()), CAMERA.width)
+    words = [view_of(CAMERA), opened.describe(cut), "shaded", [column, row]]
+    assert opened.page.evaluate(DEPTH, words) == pytest.approx(float(seen.depth[row, column]), abs=5e-3)
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+def test_moving_pictures_have_longer_steps(drawing, name):
+    scene = drawing(name).scene
+    moving, still = (drawing(name).draw(scene, CAMERA, "volume", moving=each) for each in (True, False))
+    assert 30 < closeness(moving, still) < 80
+
+
+def test_steps_differ_and_textures_stay_on_the_card(drawing):
+    opened = drawing("series")
+    opened.page.evaluate(
+        "() => { globalThis.made = 0; const gl = renderer._gl, make = gl.createTexture;"
+        " gl.createTexture = () => { made += 1; return make.call(gl); }; }"
+    )
+    first, *_, last = [opened.draw(opened.scene.at(time), NEAR) for time in range(COUNT)]
+    assert closeness(first, last) < 30
+    assert opened.page.evaluate("made") == 0
+
+
+def test_the_background_is_that_of_the_scene(drawing):
+    opened = drawing("parts")
+    hidden = changed(opened.scene, [PartEdit(visible=False)] * 5, background=(0.2, 0.4, 0.6))
+    assert (opened.draw(hidden, CAMERAS[0]) == [51, 102, 153]).all()
+    assert (opened.draw(hidden, CAMERAS[0], "alpha") == 0).all()
+
+
+def test_surfels_are_sorted_again_where_their_order_may_be_another(drawing):
+    opened = drawing("parts")
+    opened.draw(opened.scene, CAMERAS[2])
+    opened.page.evaluate(
+        "() => { const order = renderer._order, sort = order.farToNear; globalThis.sorted = 0;"
+        " order.farToNear = () => { sorted += 1; return sort.call(order); }; }"
+    )
+    counts, half = [], PartEdit(opacity=0.5, palette=(1, 0, 0))
+    for camera, edit in (
+        (CAMERAS[0], PartEdit()),
+        (CAMERAS[0], half),
+        (CAMERAS[0], replace(half, visible=False)),
+        (CAMERAS[1], replace(half, visible=False)),
+        (CAMERAS[1], replace(half, visible=False, opacity=0.2)),
+    ):
+        opened.draw(changed(opened.scene, [*PARTS, edit]), camera)
+        counts.append(opened.page.evaluate("sorted"))
+    opened.page.evaluate("() => { delete renderer._order.farToNear; }")
+    assert np.diff([0, *counts]).tolist() == [1, 0, 1, 1, 0]
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 5000])
+def test_depths_are_sorted_exactly_and_ties_as_the_rasterizer_has_them(drawing, count):
+    depths = np.random.default_rng(count).exponential(size=count).astype(np.float32)
+    depths[::3] = depths[: len(depths[::3])].round(1) + np.float32(0.2)  # many are the same
+    order = drawing("parts").page.evaluate(
+        "depths => { const order = new DepthOrder(depths.length); depths.forEach((z, i) => order.add(i, z));"
+        " return [...order.farToNear()]; }",
+        depths.tolist(),
+    )
+    assert order == np.argsort(depths, kind="stable")[::-1].tolist()
+
+
+def test_half_precision_is_read_exactly(drawing):
+    halves = np.arange(2**16, dtype=np.uint16).view(np.float16)
+    finite = np.isfinite(halves)
+    values = drawing("parts").page.evaluate("bits => bits.map(halfToFloat)", np.flatnonzero(finite).tolist())
+    assert np.array_equal(np.array(values, np.float32), halves[finite].astype(np.float32))
+
+
+def test_texels_that_no_page_can_hold_are_refused(tmp_path):
+    model = ball(5)
+    model.parameters["texels"][3, 1] = 300
+    scene = Scene({"A": SceneModel(write_model(tmp_path / "a.safetensors", model))})
+    with pytest.raises(ArgumentError, match=r"^texels: expected at most 255.992, got 300; fit"):
+        pack(scene.open())

@@ -1,1 +1,0 @@
-"""Sparse grids of voxels."""

@@ -1,0 +1,78 @@
+"""What can be written of a scene for other programs, and the options of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from texgs.core.errors import ArgumentError
+from texgs.core.keys import key
+from texgs.core.names import EXPORTS
+
+OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
+OF_CLOUDS = ("usd", "gltf", "spz")  # of scenes, with their light
+IN_FILE = ("points", "mesh", "vtp", "gltf")  # that are in the space of the volume's file by default
+OPTIONS = {  # that count for some kinds only
+    "volume": ("html",),
+    "steps": ("html",),
+    "opacity": ("points",),
+    "voxel": ("mesh",),
+    "views": ("mesh", "compact"),
+    "size": ("mesh", "compact"),
+    "drop_unseen": ("compact",),
+    "space": ("points", "mesh", "vtp", *OF_CLOUDS),
+}
+ENDINGS = list(dict.fromkeys(ending for endings in EXPORTS.values() for ending in endings))
+
+
+@dataclass(frozen=True)
+class Export:
+    """What to write."""
+
+    kind: str | None = key(
+        None,
+        "3dgs or 2dgs for viewers of Gaussians, release as the paper's code has them, points with colours, "
+        "mesh, vtp, polygons for ParaView, compact, html, a page that shows and edits the scene, or with "
+        "light in the colours usd (OpenUSD), gltf (KHR_gaussian_splatting) or spz; default by the end",
+        choices=tuple(EXPORTS),
+    )
+    model: str | None = key(
+        None,
+        "one model of a scene, with the textures that it has there; other edits of it only in html, usd, "
+        "gltf and spz",
+    )
+    volume: float | None = key(
+        None,
+        "html: with the volume of the scene in so many MB, to show any transfer function, the volume beside "
+        "the scene, and faces of cuts",
+        above=0,
+    )
+    steps: str = key(
+        "all", "html: steps of a series that the page holds: all, one, the scene's, or a number N, each N-th"
+    )
+    opacity: float = key(0.5, "points: leave out surfels with less opacity")
+    voxel: float = key(1 / 256, "edge of a cell of a mesh", "world units", above=0)
+    views: int = key(92, "number of views that a mesh is made from", least=1)
+    size: int = key(512, "of these views", "pixels", least=1)
+    drop_unseen: bool = key(False, "compact: no texture for surfels that none of the views sees")
+    space: Literal["file", "world"] | None = key(
+        None,
+        "coordinates: those of the volume's file, such as a patient's mm (default of points, mesh, vtp and "
+        "gltf), or of the world, in which the volume is centred and its longest side is 1",
+    )
+    device: str = key("cpu", "where to compute", choices=("cpu", "cuda"))
+
+    def kind_of(self, path: Path) -> str:
+        """Return what to write into a file; require an ending and options that go with it."""
+        by_ending = (kind for kind in EXPORTS if path.suffix in EXPORTS[kind])
+        kind = self.kind or next(by_ending, None)
+        expected = ENDINGS if kind is None else EXPORTS[kind]
+        if kind is None or path.suffix not in expected:
+            raise ArgumentError(f"expected a file that ends in {' or '.join(expected)}, got {path}")
+        if kind in OF_MODELS and self.model is None:
+            raise ArgumentError(f"kind {kind}: expected one model, got a scene; export its models one by one")
+        for name, kinds in OPTIONS.items():
+            if kind not in kinds and getattr(self, name) != getattr(Export, name):
+                raise ArgumentError(f"{name}: expected kind {' or '.join(kinds)}, got {kind}; leave it out")
+        return kind

@@ -1,0 +1,43 @@
+"""Shots of a scene: from where it is seen, and what of it a picture shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from texgs.core.keys import key
+from texgs.core.lens import Frame, LensKeys
+
+if TYPE_CHECKING:
+    from texgs.core.camera import Camera
+
+Mode = Literal[
+    "shaded",
+    "volume",
+    "unshaded",
+    "normal",
+    "depth",
+    "alpha",
+    "texture",
+    "discs",
+    "ambient",
+    "diffuse",
+    "specular",
+    "shininess",
+]
+
+
+@dataclass(frozen=True)
+class Shot(LensKeys):
+    """From where a scene is seen, and what of it a picture shows."""
+
+    azimuth: float = key(30.0, "of the camera, not on path test; on an orbit of the first frame", "degrees")
+    polar: float = key(20.0, "of the camera above the horizon, not on path test", "degrees")
+    mode: Mode = key("shaded", "what a picture shows; the last four are factors of the material")
+    transparent: bool = key(False, "leave the background out: pictures have an alpha channel")
+
+    def camera(self, framed: Frame) -> Camera:
+        """Return the camera, which shows all that is framed by default."""
+        from texgs.core.camera import orbit
+
+        return orbit(self.azimuth, self.polar, *self.lens(framed))
