@@ -64,6 +64,14 @@ def test_two_variants_of_one_folder_are_refused(planned):
         planned(f"sweep.name=x {words}")
 
 
+def test_seeds_alone_repeat_the_experiment_and_its_gallery_shows_the_first(planned):
+    grid = "[{name: fits, rows: [{title: front}], columns: [{}]}]"
+    plan = planned(f'fit.seed=3,4 "gallery.grids={grid}"')
+    assert list(plan.sweeps) == ["seeds"]
+    (gallery,) = (job for job in plan.jobs.values() if job["stage"] == "gallery")
+    assert {path.split("/")[-3] for path in gallery["inputs"].values()} == {"demo-seeds-s3"}
+
+
 def test_a_gallery_of_a_sweep_of_edits_shows_the_edits_of_its_variants(planned):
     columns = "[{title: small, variant: '64'}, {title: large, variant: '128'}]"
     grid = f"{{name: sizes, rows: [{{edit: gold}}], columns: {columns}}}"
