@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import pytest
 import torch
 
 from tests.edit.scenes import RADIUS, sphere_points
@@ -32,9 +31,8 @@ def ball(count=300, degree=1):
     )
 
 
-@pytest.mark.parametrize("degree", [0, 2])
-def test_only_harmonics_change(vgg, degree):
-    model = ball(degree=degree)
+def test_only_harmonics_change(vgg):
+    model = ball(degree=2)
     before = {name: x.clone() for name, x in model.parameters.items()}
     recipe = replace(RECIPE, features=1.0)
     edited, losses = stylize_gaussians(model, cameras(3, 48), STYLE, recipe, vgg)
@@ -57,13 +55,3 @@ def test_the_first_step_goes_against_the_gradient_by_its_rate():
     rates = torch.tensor([1, HIGHER, HIGHER, HIGHER])[:, None] * RECIPE.rate
     expected = (-rates * sh.grad.sign())[clear]
     torch.testing.assert_close(step[clear], expected, rtol=1e-3, atol=1e-6)
-
-
-def test_the_loss_falls():
-    """Against Gaussians that hardly learn: patches are drawn anew in each iteration."""
-    ends = []
-    for rate in (1e-9, 0.03):
-        recipe = replace(RECIPE, iterations=40, rate=rate)
-        _, losses = stylize_gaussians(ball(), cameras(4, 48), STYLE, recipe)
-        ends.append(sum(losses["patches"][-8:]))
-    assert ends[1] < 0.7 * ends[0]

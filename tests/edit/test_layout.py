@@ -1,17 +1,16 @@
-"""Pictures laid onto surfaces: upright and mirrored on walls, unstretched on slanted ones, and spheres."""
+"""Colours that stylising starts from: pictures laid onto surfaces, and the map of colours."""
 
 import numpy as np
 import pytest
 import torch
-from torch.nn.functional import avg_pool2d, normalize
+from torch.nn.functional import normalize
 
 from tests.edit.scenes import ball
 from tests.fitting.scenes import RADIUS
-from texgs.core.camera import orbit
+from tests.refusals import refused
 from texgs.core.errors import ShapeError
-from texgs.edit.style_start import RIM, laid_out
-from texgs.fields.surfels.texels import owners, recolored
-from texgs.raster import Texture
+from texgs.edit.style_start import RIM, color_map, laid_out
+from texgs.fields.surfels.texels import owners
 
 WALL = {  # two parallel surfels with textures of different shapes, the second first in the list
     "means": torch.tensor([[0.1, 0.2, 0.3], [-0.2, 0.1, -0.1]]),
@@ -124,25 +123,6 @@ def flipped(quats):
     return torch.stack([-x, w, z, -y], 1)
 
 
-def test_a_sphere_is_seen_from_the_front():
-    """Rendered without light from +z, a ball of its size is the picture itself."""
-    model, picture = ball(6000), sphere_picture()
-    shown = recolored(model, laid_out(model.parameters, picture, RADIUS / 60, sphere=True))
-    image = front(shown)
-    inside = (picture != 1).any(0)
-    inside = avg_pool2d(inside[None].float(), 9, 1, 4)[0] > 0.99  # away from the rim
-    assert float((image - picture).abs().mean(0)[inside].mean()) < 0.02
-
-
-def front(model):
-    """The model without light from far away at +z [3, 120, 120], a ball filling it."""
-    camera = orbit(-90, 0, 200, float(np.degrees(2 * np.arctan(RADIUS / 200))), 120, 120)
-    p = model.parameters
-    colors, gain = p["colors"] + p["palette"], torch.ones_like(p["opacities"])
-    texture = Texture(colors, gain, p["texels"], p["sizes"], p["offsets"])
-    return model.rasterized(camera, texture=texture).color.permute(2, 0, 1)
-
-
 @pytest.mark.parametrize("sphere", [False, True])
 def test_a_plain_picture_gives_plain_colour(sphere):
     model = ball(500)
@@ -151,6 +131,25 @@ def test_a_plain_picture_gives_plain_colour(sphere):
     torch.testing.assert_close(colors, picture[:, 0, 0].expand_as(colors), atol=1e-6, rtol=0)
 
 
+def some_colors(seed, count, spread):
+    """Correlated colours around a mean."""
+    rng = np.random.default_rng(seed)
+    return torch.from_numpy(rng.normal(size=(count, 3)) @ rng.normal(size=(3, 3)) * spread + rng.random(3))
+
+
+def test_mean_and_covariance_become_those_of_the_style():
+    own, style = some_colors(0, 500, 0.1), some_colors(1, 900, 0.3)
+    matrix, shift = color_map(own, style)
+    moved = own @ matrix.T + shift
+    torch.testing.assert_close(moved.mean(0), style.mean(0), atol=1e-12, rtol=1e-7)
+    torch.testing.assert_close(moved.T.cov(correction=0), style.T.cov(correction=0), atol=1e-10, rtol=1e-7)
+    own = torch.full((50, 3), 0.4)
+    matrix, shift = color_map(own, style)
+    expected = style.mean(0).expand(50, 3)
+    torch.testing.assert_close(own.double() @ matrix.T + shift, expected, atol=1e-3, rtol=0)
+
+
 def test_shapes_that_do_not_fit_are_named():
-    with pytest.raises(ShapeError, match=r"picture: expected \[3, h, w\]"):
-        laid_out(WALL, torch.rand(20, 20, 3), 0.01)
+    wide, narrow = torch.rand(20, 20, 3), torch.rand(3, 8)
+    refused(lambda: laid_out(WALL, wide, 0.01), r"picture: expected \[3, h, w\]", ShapeError)
+    refused(lambda: color_map(narrow.T, narrow), r"style: expected \[N, 3\], got \[3, 8\]; did", ShapeError)

@@ -1,10 +1,11 @@
 import pytest
 import torch
 
+from tests.refusals import refused
 from texgs.core import memory
 from texgs.core.errors import OutOfMemoryError
 from texgs.edit.objective import Objective, pooled
-from texgs.edit.recipe import PRESETS, Recipe, preset
+from texgs.edit.recipe import Recipe, preset
 from texgs.edit.sliced_wasserstein import FeatureDistribution, PatchStatistics
 from texgs.edit.style_picture import StylePicture
 from texgs.models.nnfm import StyleFeatures, nnfm
@@ -38,8 +39,8 @@ def test_terms_are_the_losses_times_their_weights(vgg):
 
 def test_features_larger_than_memory_are_refused(vgg, monkeypatch):
     monkeypatch.setattr(memory, "free_memory", lambda: 2**20)
-    with pytest.raises(OutOfMemoryError, match="features of a style of 300 x 300 pixels"):
-        Objective.of(preset("default"), STYLE.scaled(300), 1, vgg, None)
+    of_style = lambda: Objective.of(preset("default"), STYLE.scaled(300), 1, vgg, None)  # noqa: E731
+    refused(of_style, "features of a style of 300 x 300 pixels", OutOfMemoryError)
 
 
 @pytest.mark.parametrize(("height", "width", "reduce"), [(3, 40, 1), (48, 1, 1), (8, 8, 3)])
@@ -80,14 +81,6 @@ def test_what_is_not_on_the_object_does_not_count(vgg):
         (gradient,) = torch.autograd.grad(sum(terms.values()), x)
         far = gradient[:, :, 46:].abs().max()  # farther than a filter or a patch reaches from the object
         assert bool(far > 1e-7 * gradient.abs().max()) == (name == "paper")  # below: rounding of convolutions
-
-
-def test_presets_say_what_they_need():
-    needs = {name: (recipe.needs_vgg, recipe.needs_clip) for name, recipe in PRESETS.items()}
-    assert needs["default"] == (True, False)
-    assert needs["patches"] == needs["preview"] == (False, False)
-    assert needs["paper"] == (True, True)
-    assert preset("paper", lambda_s=0.0).needs_vgg is False
 
 
 def test_features_see_a_reduced_image_of_a_large_view():

@@ -8,7 +8,7 @@ import torch
 from tests.edit.scenes import plain_style
 from tests.fitting.scenes import ball_images, cameras
 from tests.fitting.test_palette import SETTINGS
-from texgs.core.errors import ArgumentError
+from tests.refusals import refused
 from texgs.edit import palette_style
 from texgs.edit.methods.style_baselines import StyleRfKeys
 from texgs.edit.objective import Objective
@@ -48,9 +48,8 @@ def one_colored(field):
     return replace(field, parameters={**field.parameters, "palette.colors": colors, "mixture.0": kept})
 
 
-@pytest.mark.parametrize("rays", [100, 5000])
-def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypatch, rays):
-    monkeypatch.setattr(palette_style, "RAYS", rays)
+def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypatch):
+    monkeypatch.setattr(palette_style, "RAYS", 100)
     monkeypatch.setattr(palette_style, "LEAST_WEIGHT", -1.0)
     field, camera = one_colored(field), images.cameras[0]
     recipe = replace(RECIPE, features=1.0)
@@ -100,11 +99,10 @@ def test_free_colours_learn_those_of_the_recoloured_palette(field, images):
     assert float((before - after).abs().mean()) < 0.01
 
 
-@pytest.mark.parametrize("features", [0.0, 1.0])
-def test_only_colours_change(field, images, vgg, features):
+def test_only_colours_change(field, images, vgg):
     before = {name: x.clone() for name, x in field.parameters.items()}
-    recipe = replace(RECIPE, features=features, iterations=2)
-    edited, losses, _ = stylize_palette(field, images, [STYLE, STYLE], recipe, STEPS, VARIATION, vgg)
+    recipe = replace(RECIPE, features=1.0, iterations=2)
+    edited, losses, _ = stylize_palette(field, images, [STYLE, STYLE], recipe, 3, VARIATION, vgg)
     assert all(torch.equal(x, field.parameters[name]) for name, x in before.items()), "the field given"
     changed = {name for name, x in edited.parameters.items() if name not in before}
     assert changed == {"free.table", "free.0", "free.1", "free.2"}
@@ -112,7 +110,7 @@ def test_only_colours_change(field, images, vgg, features):
         assert torch.equal(edited.parameters[name], x) == (name != "palette.colors"), name
     assert edited.geometry is field.geometry
     assert {len(values) for values in losses.values()} == {2}
-    assert set(losses) == {"patches", "variation"} | ({"nnfm"} if features else set())
+    assert set(losses) == {"patches", "variation", "nnfm"}
     camera = images.cameras[0]
     assert torch.equal(edited.render(camera).alpha, field.render(camera).alpha)
 
@@ -127,8 +125,8 @@ def test_a_plain_style_becomes_the_colour_of_the_ball(field, images):
 
 
 def test_layers_of_palette_colours_are_apart_and_together_everything_and_each_has_a_style(field, images):
-    with pytest.raises(ArgumentError, match="styles: expected one for each of 2 palette colours, got 1"):
-        stylize_palette(field, images, [STYLE], RECIPE, STEPS, VARIATION)
+    one = lambda: stylize_palette(field, images, [STYLE], RECIPE, STEPS, VARIATION)  # noqa: E731
+    refused(one, "styles: expected one for each of 2 palette colours, got 1")
     camera = images.cameras[2]
     run = PalettePainting(field, [], [], [], 0.0, 0.0, torch.Generator())
     rays = camera_rays(camera).flatten(0, 1)

@@ -5,8 +5,10 @@ import torch
 
 from tests.edit.scenes import ball, plain_style, task, two_steps, views
 from tests.models.networks import random_weights
+from tests.refusals import refused
 from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.methods.image import ImageKeys, run
+from texgs.edit.readable import readable_factors
 from texgs.edit.recipe import PRESETS, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_start import pixel_side, start_colors
@@ -85,9 +87,7 @@ def test_iterations_lower_the_loss_on_views_not_trained_on(vgg, style):
     for name in ("nnfm", "patches"):
         values = done.losses[name]
         assert sum(values[-6:]) < 0.9 * sum(values[:6]), name
-    assert done.seconds.keys() == {
-        "start", "render", "losses", "losses, backward", "render, backward", "update"
-    }  # fmt: skip
+    assert {"start", "render", "losses", "update"} < done.seconds.keys()
 
 
 def test_without_weights_patches_alone_bring_the_colours_of_the_style(style):
@@ -184,7 +184,9 @@ def test_an_edit_starts_from_its_preview_bit_for_bit(vgg, style, start, opacity)
     def show(result):
         shown.append(result())
 
-    preview = styled(style, preset("preview", start=start), model)
+    recipe = preset("preview", start=start)
+    preview = styled(style, recipe, model)
+    assert (preview.recipe == recipe) is (opacity == 4.0), "or it is adapted"
     for name in ("default", "patches"):
         no_step = preset(name, start=start, rate=0.0, iterations=1)
         styled(style, no_step, model, vgg=vgg, show=show)
@@ -234,9 +236,8 @@ def test_views_that_do_not_show_the_model_change_nothing(vgg, style):
 
 def test_mistakes_are_named_before_any_work(vgg, style):
     cameras, lights = views()
-    shading = {
-        k: x for k, x in ball().parameters.items() if k not in ("texels", "sizes", "offsets", "palette")
-    }
+    texture = {"texels", "sizes", "offsets", "palette"}
+    shading = {name: x for name, x in ball().parameters.items() if name not in texture}
     cases = [
         ({"model": Surfels(shading)}, ArgumentError, "model: expected stage texture, got shading"),
         ({"lights": lights[:2]}, ArgumentError, "expected one for each of some cameras, got 2 for 6"),
@@ -248,41 +249,44 @@ def test_mistakes_are_named_before_any_work(vgg, style):
     ]
     given = {"model": ball(), "cameras": cameras, "lights": lights, "style": style, "recipe": short()}
     for changes, error, message in cases:
-        with pytest.raises(error, match=message):
-            stylize(**{**given, "vgg": vgg, **changes})
+        refused(lambda changes=changes: stylize(**{**given, "vgg": vgg, **changes}), message, error)
 
 
 def test_a_loss_that_is_not_finite_stops_the_edit(style):
     recipe = short(lambda_s=0.0, patches=0.0)
-    with pytest.raises(FitError, match="style: the loss is not finite in iteration 1"):
-        styled(style, recipe, clip=lambda image: image.mean() / 0)
+    infinite = lambda image: image.mean() / 0  # noqa: E731
+    refused(lambda: styled(style, recipe, clip=infinite), "the loss is not finite in iteration 1", FitError)
 
 
 @pytest.mark.parametrize(("recipe", "dtype"), [("paper", torch.float32), ("default", None)])
-def test_the_paper_computes_features_in_single_precision_on_any_machine(tmp_path, monkeypatch, recipe, dtype):
-    """The others in what VGG-16 is fastest with there."""
+def test_the_paper_keeps_opacities_and_computes_features_in_single_precision(
+    tmp_path, monkeypatch, recipe, dtype
+):
+    """The others raise opacities of faint parts, and take what VGG-16 is fastest with on a machine."""
     torch.save(random_weights(last=14), tmp_path / "vgg.pth")
     loaded, seen = Vgg.load(tmp_path / "vgg.pth"), []
+    monkeypatch.setattr(Vgg, "load", lambda device, dtype: seen.append(dtype) or loaded)
 
-    def load(device, dtype):
-        seen.append(dtype)
-        return loaded
+    def stylize(model, cameras, lights, picture, given, **options):
+        seen.append(given.opacity)
+        return Stylized(model, given, {}, {})
 
-    monkeypatch.setattr(Vgg, "load", load)
-    monkeypatch.setattr("texgs.edit.stylize.stylize", lambda *a, **o: Stylized(a[0], a[4], {}, {}))
-    scene = Scene({"ball": SceneModel(write_model(tmp_path / "ball", ball()))})
-    run(replace(task(scene, tmp_path), settings=ImageKeys(recipe=recipe, lambda_s=1.0)))
-    assert seen == [dtype]
+    monkeypatch.setattr("texgs.edit.stylize.stylize", stylize)
+    scene = Scene({"ball": SceneModel(write_model(tmp_path / "ball", ball(opacity=-2.2)))})
+    given = replace(task(scene, tmp_path), settings=ImageKeys(recipe=recipe, lambda_s=1.0))
+    shown = run(given).scene.models["ball"].edit.opacity
+    factor = 1.0 if recipe == "paper" else readable_factors(scene, ["ball"], "cpu")["ball"]
+    assert seen == [dtype, factor]
+    assert shown == factor
 
 
-@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
-def test_half_precision_learns_what_single_precision_does(tmp_path, style, dtype):
+def test_half_precision_learns_what_single_precision_does(tmp_path, style):
     """Texels after a few steps: a gradient that underflowed would leave them where they were."""
     torch.save(random_weights(last=14), tmp_path / "vgg.pth")
     recipe = short(iterations=2, patches=0.0)
     start = styled(style, preset("preview")).model.parameters["texels"]
     moves = []
-    for kind in (torch.float32, dtype):
+    for kind in (torch.float32, torch.float16):
         vgg = Vgg.load(tmp_path / "vgg.pth", dtype=kind)
         moves.append(styled(style, recipe, vgg=vgg).model.parameters["texels"] - start)
     # Adam turns noise of gradients near 0 into whole steps: not all of them agree.
@@ -300,3 +304,4 @@ def test_what_only_another_step_shows_learns_from_it(style):
     hidden = upper[surfel]
     assert torch.equal(alone[places][hidden], unmoved[places][hidden]), "no view shows them"
     assert (done != start)[places][hidden].float().mean() > 0.3
+    assert (start != unmoved)[places][hidden].float().mean() > 0.3, "the picture lies where they show"

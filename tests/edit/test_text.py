@@ -12,6 +12,7 @@ from tests.edit.guidances import Identity, Returns, Tint
 from tests.edit.scenes import around, shell
 from tests.fields.surfels.samples import sample
 from tests.raster.requirements import require_same_bits
+from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.lens import Lens
@@ -31,6 +32,7 @@ QUICK = TextRecipe("all", opacities=(1.0, 0.5), sweeps=2)
 ADAM = replace(QUICK, iterations=150, rate=0.05)
 CHANGES = {"texels", "colors"}
 TURNED = torch.diag(torch.tensor([-1.0, 1.0, -1.0, 1.0]))  # half a turn about the upright axis
+AWAY = [replace(camera, viewmat=TURNED @ camera.viewmat) for camera in around(2)]
 
 
 @pytest.fixture(scope="module")
@@ -89,14 +91,13 @@ def test_identity_changes_nothing_that_is_seen(model):
     assert (seen(model).images - seen(done).images).abs().mean() < 0.004
 
 
-def test_only_chosen_surfels_change(model):
+@pytest.mark.parametrize("is_textured", [True, False])
+def test_only_chosen_surfels_change(model, is_textured):
     upper = model.parameters["means"][:, 1] > 0
-    done = edited(model, Tint(BLUE), surfels=upper)
+    done = edited(model, Tint(BLUE), replace(QUICK, is_textured=is_textured), surfels=upper)
     place, surfel = owners(model.parameters)
-    p, q = model.parameters, done.parameters
-    assert torch.equal(p["colors"][~upper], q["colors"][~upper])
-    kept = place[~upper[surfel]]
-    assert torch.equal(p["texels"][kept], q["texels"][kept])
+    for name, kept in (("colors", ~upper), ("texels", place[~upper[surfel]])):
+        assert torch.equal(model.parameters[name][kept], done.parameters[name][kept])
     assert (bare_colors(done)[place[upper[surfel]]] - torch.tensor(BLUE)).abs().mean() < 0.02
 
 
@@ -118,21 +119,6 @@ def test_refinement_sees_the_first_result(model):
     assert missed(views, BLUE) < 0.02
     assert torch.equal(views.images, views.conditions)
     assert missed(seen(second), RED) < 0.02
-
-
-def test_refinement_keeps_some_of_the_first_style(model, monkeypatch):
-    """Dots, then blue: the dots are blue."""
-    monkeypatch.setattr("texgs.models.filters.surface.CELLS", 13.0)  # large enough for small views
-    cameras, filters = around(4), ProceduralFilters()
-    dots = edit_by_text(model, cameras, filters, "as a stipple drawing", size=96).model
-    both, plain = (edit_by_text(m, cameras, filters, "make it blue", size=96).model for m in (dots, model))
-    shown = [render_views(m, cameras, None) for m in (dots, both, plain)]
-    solid = shown[0].alphas > 0.95
-    ink, blue, alone = (views.images[solid] for views in shown)
-    assert (blue[:, 2] - blue[:, 0]).mean() > 0.2
-    pattern = torch.corrcoef(torch.stack([ink.mean(dim=1), blue.mean(dim=1)]))[0, 1]
-    assert pattern > 0.6
-    assert blue.std(dim=0).mean() > 2 * alone.std(dim=0).mean()
 
 
 def test_same_seed_same_model(model):
@@ -204,8 +190,11 @@ def squared(observation, colors):
     return (observation.image(colors) - observation.wanted).square().sum()
 
 
-@pytest.mark.parametrize("target", ["colors", "images"])
-@pytest.mark.parametrize(("recipe", "loss"), [(QUICK, squared), (ADAM, image_loss)], ids=["solve", "adam"])
+@pytest.mark.parametrize(
+    ("recipe", "loss", "target"),
+    [(QUICK, squared, "colors"), (ADAM, image_loss, "images")],
+    ids=["solve", "adam"],
+)
 def test_without_texture_each_surfel_learns_one_colour(model, recipe, loss, target):
     """It has a lower loss than the mean of the texels that would fit the edited views."""
     recipe, guidance = replace(recipe, target=target), Returns(stripes)
@@ -222,15 +211,6 @@ def test_without_texture_each_surfel_learns_one_colour(model, recipe, loss, targ
         for colors in (bare_colors(done), averaged, bare_colors(model))
     ]
     assert losses[0] < 0.99 * losses[1] < losses[2]
-
-
-def test_without_texture_surfels_that_are_not_chosen_keep_theirs(model):
-    upper = model.parameters["means"][:, 1] > 0
-    done = edited(model, Tint(BLUE), replace(QUICK, is_textured=False), surfels=upper)
-    place, surfel = owners(model.parameters)
-    for name, kept in (("colors", ~upper), ("texels", place[~upper[surfel]])):
-        assert torch.equal(model.parameters[name][kept], done.parameters[name][kept])
-    assert_close(bare_colors(done)[place[upper[surfel]]].mean(dim=0), torch.tensor(BLUE), atol=0.03, rtol=0)
 
 
 def test_at_half_the_opacity_the_papers_recipe_looks_like_the_edited_views():
@@ -278,33 +258,20 @@ def broken(views):
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [
-        (
-            {"guidance": Returns(broken)},
-            ArgumentError,
-            "images edited by broken: expected finite values, got 1 NaN",
-        ),
-        (
-            {"guidance": Returns(torch.zeros(2, 9, 9, 3))},
-            ShapeError,
-            r"images edited by broken: expected \[2, 48, 48, 3\]",
-        ),
+        ({"guidance": Returns(broken)}, ArgumentError, "images edited by broken: .* finite .* got 1 NaN"),
+        ({"guidance": Returns(torch.zeros(2, 9, 9, 3))}, ShapeError, r"by broken: expected \[2, 48, 48, 3\]"),
         ({"guidance": ProceduralFilters()}, ArgumentError, "expected one of stipple drawing"),
         ({"instruction": " "}, ArgumentError, "expected what to do in words"),
         ({"model": sample("shading")}, ArgumentError, "expected stage texture, got shading"),
         ({"surfels": torch.zeros(160) > 0}, ArgumentError, "at least one that may change as bool, got 0"),
         ({"surfels": torch.ones(3) > 0}, ShapeError, "surfels"),
         ({"recipe": RECIPES["paper"]}, ArgumentError, "cameras: expected 6 at least .*, got 2; .*views=axes"),
-        (
-            {"cameras": [replace(camera, viewmat=TURNED @ camera.viewmat) for camera in around(2)]},
-            ArgumentError,
-            "expected some that show what is to change, got none",
-        ),
+        ({"cameras": AWAY}, ArgumentError, "expected some that show what is to change, got none"),
     ],
 )
 def test_mistakes_are_reported_and_nothing_is_made_black(model, changes, error, message):
     given = {"model": model, "cameras": around(2), "guidance": Tint(BLUE), "instruction": "as van Gogh"}
-    with pytest.raises(error, match=message):
-        edit_by_text(**{**given, "recipe": QUICK, **changes})
+    refused(lambda: edit_by_text(**{**given, "recipe": QUICK, **changes}), message, error)
 
 
 FRONT, LEFT, TOP = torch.tensor([[0.0, 0, 1], [-1, 0, 0], [0, 1, 0]])  # from the object to the camera
@@ -316,7 +283,7 @@ def directions(cameras, center=0.0):
     return torch.stack([(camera.position - center) / (camera.position - center).norm() for camera in cameras])
 
 
-@pytest.mark.parametrize("size", [(64, 64), (96, 40), (30, 80)])
+@pytest.mark.parametrize("size", [(96, 40), (30, 80)])
 def test_made_views_look_along_the_axes_and_are_filled_by_the_scene(size):
     points = torch.rand(500, 3, generator=torch.Generator().manual_seed(0))
     points = points * torch.tensor([1.0, 0.4, 0.6]) + 0.3
@@ -339,17 +306,7 @@ def test_top_and_bottom_are_upright():
     cameras = axis_cameras(orbit(0, 0, 3.0, 40, 10, 10), torch.eye(3))
     assert_close(cameras[4].viewmat[1, :3], torch.tensor([0.0, 0.0, 1.0]), atol=1e-6, rtol=0)
     assert_close(cameras[0].viewmat[1, :3], torch.tensor([0.0, -1.0, 0.0]), atol=1e-6, rtol=0)
-    with pytest.raises(ArgumentError, match="expected a camera well outside of the scene"):
-        axis_cameras(orbit(0, 0, 0.5, 40, 8, 8), BOX)
-
-
-@pytest.mark.parametrize(("frequency", "degrees"), [(2, 0.0), (3, 11.64), (4, 0.0)])
-def test_training_views_nearest_to_the_axes(frequency, degrees):
-    """Of 42 and 162 views six are on the axes but for the poles; of 92 the nearest are 11.64 degrees off."""
-    chosen = nearest_to_axes(icosphere(frequency, Lens(4.0, 30.0, 8, 8)), BOX)
-    assert len({id(camera) for camera in chosen}) == 6
-    off = torch.rad2deg(torch.acos((directions(chosen) * AXES).sum(1).clamp(-1, 1)))
-    assert_close(off, torch.full((6,), degrees), atol=0.03, rtol=0)  # float32, and poles are 0.01 degrees off
+    refused(lambda: axis_cameras(orbit(0, 0, 0.5, 40, 8, 8), BOX), "a camera well outside of the scene")
 
 
 def test_each_view_is_chosen_once_and_the_sum_of_cosines_is_largest():

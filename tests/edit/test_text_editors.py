@@ -11,8 +11,8 @@ from torch.testing import assert_close
 from tests.edit.scenes import AnyViews, around, ball
 from tests.models.servers import served
 from tests.models.tiny_pipelines import save_klein, save_sdxl
+from tests.refusals import refused
 from tests.toys.editor import Editor
-from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.edit.keys import EditKeys
 from texgs.edit.methods.text import METHOD, TextKeys
@@ -56,8 +56,8 @@ def edited(folder, guidance):
         return model.parameters["texels"], done.how, np.asarray(picture)
 
 
-@pytest.mark.parametrize("name", ["sdxl-instruct-pix2pix", "flux2-klein"])
-def test_a_pipeline_edits_a_ball_by_its_name_and_by_its_folder_alike(folders, tmp_path, monkeypatch, name):
+def test_a_pipeline_edits_a_ball_by_its_name_and_by_its_folder_alike(folders, tmp_path, monkeypatch):
+    name = "flux2-klein"
     monkeypatch.setenv("TEXGS_WEIGHTS", str(folders))
     monkeypatch.setitem(PIPELINES, name, replace(PIPELINES[name], numbers={"size": 64}))
     texels, how, views = edited(tmp_path / "name", name)
@@ -125,15 +125,11 @@ def test_what_an_edit_needs_is_known_before_it_runs(folders):
 
 @pytest.mark.parametrize(
     "guidance",
-    ["flux2_klein", "someone/editor", "someone/editor@main", "ftp://example.org", "", "no/such/folder"],
+    ["flux2_klein", "someone/editor@main", "ftp://example.org", "", "no/such/folder"],
 )
 def test_what_is_no_editor_is_refused_with_all_that_there_are(guidance):
-    with pytest.raises(ArgumentError) as caught:
-        replace(KEYS, guidance=guidance).check()
-    assert str(caught.value) == (
-        "edit.text.guidance: expected instruct_pix2pix, sdxl-instruct-pix2pix, flux2-klein, qwen-image-edit, "
-        f"OWNER/NAME@REVISION (40 digits), a folder of diffusers, an address or filters, got {guidance!r}"
-    )
+    named = f"edit.text.guidance: expected instruct_pix2pix, .*@REVISION .*, got {guidance!r}"
+    refused(replace(KEYS, guidance=guidance).check, named)
 
 
 def test_weights_of_a_loss_are_no_editor(folders, monkeypatch):

@@ -1,6 +1,7 @@
 """Votes of masks against known classes of surfels."""
 
-import pytest
+from dataclasses import replace
+
 import torch
 from torch.nn.functional import interpolate
 
@@ -29,20 +30,17 @@ def counted(votes, model, of_class, change=lambda mask, seed: mask):
     return votes.selected(), total
 
 
-@pytest.mark.parametrize("number", [0, 1])
-@pytest.mark.parametrize("change", [lambda mask, seed: mask, noisy])
-def test_opaque_objects_are_told_apart(number, change):
+def test_opaque_objects_are_told_apart():
     model, numbers = two_balls()
-    selected, weights = counted(ContributionVotes(model), model, numbers == number, change)
-    assert overlap(selected, numbers == number, weights) > 0.97
+    selected, weights = counted(ContributionVotes(model), model, numbers == 0, noisy)
+    assert overlap(selected, numbers == 0, weights) > 0.97
 
 
-@pytest.mark.parametrize("change", [lambda mask, seed: mask, noisy])
-def test_a_ball_seen_through_a_shell_is_told_apart_better_than_by_centres(change):
+def test_a_ball_seen_through_a_shell_is_told_apart_better_than_by_centres():
     model, numbers = nested()
-    by_weight, weights = counted(ContributionVotes(model), model, numbers > 0, change)
-    by_centre, _ = counted(CentreVotes(model), model, numbers > 0, change)
-    plain, _ = counted(ContributionVotes(model, rounds=0), model, numbers > 0, change)
+    by_weight, weights = counted(ContributionVotes(model), model, numbers > 0, noisy)
+    by_centre, _ = counted(CentreVotes(model), model, numbers > 0, noisy)
+    plain, _ = counted(ContributionVotes(model, rounds=0), model, numbers > 0, noisy)
     iou = overlap(by_weight, numbers > 0, weights)
     assert iou >= 0.95
     assert iou > overlap(by_centre, numbers > 0, weights) + 0.02
@@ -87,11 +85,12 @@ def test_centres_vote_as_counted_by_hand():
         for view in range(10):
             votes.add(camera, everywhere & (view < inside))
         assert bool(votes.selected().all()) is expected
-    half = CentreVotes(model, threshold=0.4)
-    away = camera.crop(200, 0, 296, 96)  # sees nothing: votes -1
-    for view in range(10):
-        half.add(camera if view < 5 else away, everywhere)
-    assert not half.selected().any(), "5 of 10 views are no majority"
+    turned = replace(camera, viewmat=torch.diag(torch.tensor([-1.0, 1, -1, 1])) @ camera.viewmat)
+    for away in (camera.crop(200, 0, 296, 96), turned):  # it sees nothing: votes -1
+        half = CentreVotes(model, threshold=0.4)
+        for view in range(10):
+            half.add(camera if view < 5 else away, everywhere)
+        assert not half.selected().any(), "5 of 10 views are no majority"
 
 
 def test_nothing_is_selected_where_masks_are_empty():

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import torch
 
+from tests.refusals import refused
 from tests.volume.zarr_files import axes_of, write_image
 from texgs.config.compose import compose
 from texgs.config.dataset import Dataset
-from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.errors import ConfigError
 from texgs.core.io import read_json
 from texgs.volume.basic_tfs import BasicTF
 from texgs.volume.settings import VolumeKeys
@@ -65,22 +66,18 @@ def views_of(config, tf):
     return read_views(made("views", config, tf=tf).parent)
 
 
-@pytest.mark.parametrize(("name", "points", "channel"), [("shell", SHELL, "DAPI"), ("core", CORE, "GFP")])
-def test_views_of_a_function_are_those_of_a_data_set_of_its_channel(
-    both, image, tmp_path, name, points, channel
-):
+def test_views_of_a_function_are_those_of_a_data_set_of_its_channel(both, image, tmp_path):
     """Bit by bit; only the frame is that of both, so cameras are given."""
-    alone = config_of(
-        image, tmp_path, {name: BasicTF(**points)}, (*SMALL, "views.radius=1.5"), channel=channel
-    )
+    words = (*SMALL, "views.radius=1.5")
+    alone = config_of(image, tmp_path, {"core": BasicTF(**CORE)}, words, channel="GFP")
     both = replace(both, views=alone.views)
-    seen, expected = views_of(both, name), views_of(alone, name)
+    seen, expected = views_of(both, "core"), views_of(alone, "core")
     for split in ("train", "test", "relit"):
         for one, other in zip(getattr(seen, split), getattr(expected, split), strict=True):
             assert torch.equal(one.camera.viewmat, other.camera.viewmat)
             assert torch.equal(one.load(), other.load())
             assert one.load().any()
-    assert seen.metadata["tf"].get("channel", 0) == both.dataset.number_of(both.dataset.basic_tfs[name])
+    assert seen.metadata["tf"].get("channel", 0) == both.dataset.number_of(both.dataset.basic_tfs["core"])
 
 
 def test_the_volume_is_prepared_once_for_all_functions_and_again_for_other_channels(both):
@@ -112,22 +109,9 @@ def test_metrics_and_summary_tell_of_all_channels(both):
 @pytest.mark.parametrize(
     ("changed", "volume", "message"),
     [
-        (
-            {"core": None},
-            {},
-            r"cells: basic TF core: expected a channel, as others name theirs \(DAPI\), got none",
-        ),
-        (
-            {},
-            {"channel": "GFP"},
-            r"dataset.volume.channel: expected none, as basic TFs of cells name channels \(DAPI, 1\), "
-            "got GFP",
-        ),
-        (
-            {},
-            {"generator": "sphere"},
-            "cells: basic TFs: expected none that name channels, as the volume is generated, got DAPI",
-        ),
+        ({"core": None}, {}, r"cells: basic TF core: expected a channel, .* \(DAPI\), got none"),
+        ({}, {"channel": "GFP"}, r"dataset.volume.channel: expected none, .* \(DAPI, 1\), got GFP"),
+        ({}, {"generator": "sphere"}, "cells: basic TFs: expected none that name channels, .* got DAPI"),
     ],
 )
 def test_keys_that_do_not_fit_each_other_are_refused(both, changed, volume, message):
@@ -136,19 +120,16 @@ def test_keys_that_do_not_fit_each_other_are_refused(both, changed, volume, mess
         for name, tf in both.dataset.basic_tfs.items()
     }
     keys = replace(both.dataset.volume, **volume)
-    with pytest.raises(ConfigError, match=message):
-        check_basic_tfs(replace(both.dataset, volume=keys, basic_tfs=tfs))
+    refused(lambda: check_basic_tfs(replace(both.dataset, volume=keys, basic_tfs=tfs)), message, ConfigError)
 
 
 def test_only_functions_of_one_channel_must_not_overlap(both):
     check_basic_tfs(both.dataset)
     same = {name: replace(tf, channel="GFP") for name, tf in both.dataset.basic_tfs.items()}
-    with pytest.raises(ArgumentError, match="cells: basic TFs shell and core: expected ranges"):
-        check_basic_tfs(replace(both.dataset, basic_tfs=same))
+    refused(lambda: check_basic_tfs(replace(both.dataset, basic_tfs=same)), "cells: basic TFs shell and core")
 
 
 def test_a_channel_that_the_file_lacks_is_told(both):
     wrong = {**both.dataset.basic_tfs, "core": replace(both.dataset.basic_tfs["core"], channel="RFP")}
     config = replace(both, dataset=replace(both.dataset, basic_tfs=wrong), results=f"{both.results}/other")
-    with pytest.raises(ArgumentError, match=r"expected one of 0 \(DAPI\), 1 \(GFP\), got RFP"):
-        run("volume", config)
+    refused(lambda: run("volume", config), r"expected one of 0 \(DAPI\), 1 \(GFP\), got RFP")

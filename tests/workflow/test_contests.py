@@ -7,7 +7,6 @@ import pytest
 
 from tests.volume.test_netcdf import FIELD, write_netcdf
 from tests.volume.test_text_columns import LINES, TABLE, write_lines
-from tests.workflow.project import Project
 from texgs.cli.main import main
 from texgs.core.io import read_json
 from texgs.volume.nrrd_file import open_grid
@@ -16,7 +15,7 @@ from texgs.volume.nrrd_file import open_grid
 def contest_file(folder, name):
     """Write the file that a data set names, and return it with the samples [Z, Y, X] to expect."""
     if name == "mantle":
-        fields = {"temperature": FIELD + 9, "temperature anomaly": FIELD, "vx": FIELD - 9}
+        fields = {"temperature": FIELD + 9, "temperature anomaly": FIELD}
         return write_netcdf(folder / "spherical001.nc", fields), FIELD[::-1]  # z runs south
     return write_lines(folder / "multifield.0099.txt.gz", LINES), TABLE[:, 1].reshape(4, 5, 6)
 
@@ -38,30 +37,3 @@ def test_the_file_of_the_contest_becomes_the_volume_with_its_checksum(tmp_path, 
     assert grid.spacing == (1, 1, 1)
     identity = read_json(tmp_path / "results" / name / "volume" / ".job.json")
     assert identity["inputs"] == {"source": hashlib.sha256(path.read_bytes()).hexdigest()}
-
-
-def test_another_step_or_quantity_is_chosen_by_keys_and_a_plain_file_is_still_read(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    contest_file(tmp_path, "mantle")
-    volume = tmp_path / "results" / "mantle" / "volume" / "volume.nrrd"
-    assert main(["volume", *keys("mantle", tmp_path), "dataset.volume.variable=vx"]) == 0
-    np.testing.assert_array_equal(open_grid(volume).values, FIELD[::-1] - 9)
-    FIELD.tofile(tmp_path / "mantle.raw")
-    plain = ["file=mantle.raw", "variable=null", "dims=[6,5,4]", "dtype=float32", "up=+y"]
-    assert main(["volume", *keys("mantle", tmp_path), *(f"dataset.volume.{key}" for key in plain)]) == 0
-    np.testing.assert_array_equal(open_grid(volume).values, FIELD)
-
-
-@pytest.mark.workflow
-def test_a_plan_reads_the_file_and_notices_another(tmp_path):
-    path, _ = contest_file(tmp_path, "ionization")
-    project = Project(tmp_path)
-    wanted = {
-        "targets": ("results/ionization/volume/metrics.json",),
-        "overrides": " ".join(["dataset.volume.generator=null", *keys("ionization", tmp_path)]),
-    }
-    done = project.snakemake(**wanted)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert project.planned(**wanted) == []
-    write_lines(path, LINES[::-1])
-    assert project.planned(**wanted) == ["volume"]

@@ -48,14 +48,6 @@ def test_tracking_and_profiles_rerun_nothing(project):
     assert project.planned("--workflow-profile", str(profile), config=("tracking=mlflow",)) == []
 
 
-def test_a_gallery_of_a_sweep_is_one_job(project):
-    words = {"config": ("tracking=none", "experiment=resolution"), "overrides": "datasets=[turbulence]"}
-    planned = project.planned(targets=("galleries",), **words)
-    assert planned.count("gallery") == 1
-    assert planned.count("compose") == 3
-    assert "timing" not in planned
-
-
 def test_views_may_be_given(project, tmp_path):
     other = Project(tmp_path)
     (tmp_path / "data").mkdir()
@@ -74,17 +66,8 @@ def test_views_may_be_given(project, tmp_path):
     ("words", "message"),
     [
         ({"overrides": "views.widht=3"}, "texgs: views.widht: no such key, did you mean views.width?"),
-        (
-            {"overrides": "edits=[gold] gallery.grids=[{rows:[{edit:gols}],columns:[{}]}]"},
-            "texgs: gallery.grids.pictures.edit: expected one of none, gold, got gols, did you mean gold?",
-        ),
-        ({"overrides": "views.fov_y=wide"}, "texgs: views.fov_y: expected a number, got 'wide'"),
-        ({"config": ("dataset=engien",)}, "texgs: dataset: expected one of"),
         ({"config": ("datset=engine",)}, "texgs: --config: expected experiment, dataset"),
         ({"overrides": "dataset.basic_tfs.TF01.opacity=[[0.2,0],[0.6,1]]"}, "TF01 and TF02: expected ranges"),
-        ({"overrides": "dataset.basic_tfs.TF01.opacity=[[0.2,0],[0.3,7]]"}, "basic TF TF01: opacity[1]"),
-        ({"overrides": "tf=TF07"}, "TF07"),
-        ({"overrides": "dataset.volume.generator=null dataset.volume.file=a.raw"}, "a.raw is not there"),
     ],
 )
 def test_a_mistake_is_one_sentence_before_any_job(project, words, message):

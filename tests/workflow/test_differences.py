@@ -8,11 +8,8 @@ import yaml
 from tests.report.written import rows
 from texgs.config.compose import compose
 from texgs.config.describe import keys, value_at
-from texgs.core.errors import ConfigError
 from texgs.edit.method import methods
 from texgs.report.differences import ALL, differences, published, text
-
-STYLES = "style, style_untextured"
 
 
 def cells(table):
@@ -71,11 +68,8 @@ def test_values_of_the_paper_make_no_rows_and_others_do(tmp_path, monkeypatch):
         ([], ["style_paper", "text_paper", "lobe_paper"], set()),
         (
             [],
-            ["style_paper_untextured", "text_paper_untextured"],
-            {
-                ("edit.image.recipe.is_textured", "true", "false", "style_paper_untextured"),
-                ("edit.text.textured", "true", "false", "text_paper_untextured"),
-            },
+            ["text_paper_untextured"],
+            {("edit.text.textured", "true", "false", "text_paper_untextured")},
         ),
         (["gaussians", "quick-variant"], ["none", "arf", "of-the-user"], set()),  # nothing to compare
     ],
@@ -89,13 +83,8 @@ def test_rows_are_what_differs(recipes, edits, expected):
     [
         (["quick", "default"], [], ("fit.materials", "surfel", "shared", "quick, default")),  # they share it
         (["quick", "default"], [], ("fit.shading.iterations", "20000", "1000", "quick")),
-        (["quick", "default"], [], ("fit.shading.iterations", "20000", "4000", "default")),
-        ([], ["style", "style_untextured"], ("edit.image.recipe.iterations", "3000", "100", STYLES)),
-        ([], ["style", "style_untextured"], ("edit.image.recipe.lambda_s", "0.9", "1", STYLES)),
-        ([], ["text_quick"], ("edit.text.recipe.views", "nearest", "axes", "text_quick")),
-        ([], ["style"], ("edit.image.recipe.single_precision", "true", "false", "style")),
+        ([], ["style"], ("edit.image.recipe.lambda_s", "0.9", "1", "style")),
         ([], ["text", "text_paper"], ("edit.text.recipe.target", "images", "colors", "text")),
-        ([], ["text", "text_paper"], ("edit.text.recipe.fills", "false", "true", "text")),
         ([], ["text_quick"], ("edit.text.guidance", "instruct_pix2pix", "filters", "text_quick")),
     ],
 )
@@ -115,25 +104,11 @@ def test_what_no_key_expresses_is_always_told():
     entries = cells(differences([]))
     assert len(entries) == len(published().others) > 10
     assert all(all(row) for row in entries)
-    told = {"transfer functions", "style pictures", "text prompts", "fields of StyleRF-VolVis"}
-    assert told <= {row[0] for row in entries}
 
 
-def test_a_file_that_cannot_be_composed_is_named(tmp_path, monkeypatch):
-    folder = tmp_path / "conf" / "fit"
-    folder.mkdir(parents=True)
-    (folder / "mine.yaml").write_text("name: mine\ntextur: {}\n")
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError, match="textur"):
-        differences(["mine"])
-
-
-@pytest.mark.parametrize(
-    ("value", "expected"),
-    [(None, "null"), (True, "true"), (1.6e-4, "0.00016"), ((2.0, 0.5), "[2, 0.5]"), ("", '""'), ("a", "a")],
-)
-def test_values_are_written_as_in_files(value, expected):
-    assert text(value) == expected
+def test_values_are_written_as_in_files():
+    assert [text(value) for value in (None, True, 1.6e-4, "")] == ["null", "true", "0.00016", '""']
+    assert text((2.0, 0.5)) == "[2, 0.5]"
 
 
 def test_cells_do_not_break_tables():

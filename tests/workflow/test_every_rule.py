@@ -243,16 +243,6 @@ def test_a_truncated_report_and_a_changed_table_are_made_again(project):
     assert changed(project) == set()
 
 
-def test_a_failed_edit_keeps_the_earlier_one(project, sources):
-    folder = project.work / "results" / "sphere" / "scene" / "demo" / "edits" / "red"
-    before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    sources("texgs/edit/methods/text.py", "task.settings.opened(", "task.settings.no_guidance(")
-    failed = project.snakemake(**OPTIONS)
-    assert failed.returncode != 0
-    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
-    assert "edit" in changed(project), "the earlier result is not taken for the new one"
-
-
 def test_what_was_made_by_hand_is_not_made_again(project):
     done = project.texgs(
         "figure", "dataset=sphere", "fit=demo", "tracking=none", "variant=hand", *SMALL.split()

@@ -1,7 +1,6 @@
 """What a run would find and do, before it is started."""
 
 import re
-from dataclasses import replace
 
 import pytest
 
@@ -73,13 +72,6 @@ def test_the_doctor_tells_what_a_run_finds_and_about_how_long_it_takes(capsys, t
     assert re.search(r"jobs +\d+ to do \(.*4 views.*\), 0 done", told)
     assert re.search(r"time +about \d+ min on two cores", told)
     assert not list(tmp_path.iterdir())  # nothing is written
-
-
-def test_nothing_to_do_takes_no_time(capsys, monkeypatch):
-    done = replace(forecast.forecast(("dataset=orbital",)), to_do={}, done=3)
-    monkeypatch.setattr(forecast, "forecast", lambda words: done)
-    assert forecast.show(()) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == "jobs     0 to do (none), 3 done"
 
 
 def test_a_sweep_and_mistakes_are_those_of_a_run(capsys):

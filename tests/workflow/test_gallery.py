@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.refusals import refused
 from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
@@ -92,8 +93,7 @@ def test_without_a_volume_its_rows_and_columns_are_left_out(tmp_path):
     (tmp_path / "vortex" / "TF01" / "transforms_train.json").write_text("{}")
     ((titles, by_row),) = grids(*words, given)
     assert (titles, list(by_row)) == (["y"], ["a"])
-    with pytest.raises(ConfigError, match="expected a picture in a row and a column, got none"):
-        grids(*words, grid("[{show: volume}]"))
+    refused(lambda: grids(*words, grid("[{show: volume}]")), "expected a picture in a row", ConfigError)
 
 
 def test_a_sweep_shows_its_variants_once():
@@ -116,12 +116,10 @@ def test_a_sweep_shows_its_variants_once():
         ("gallery", ("fit=gaussians_quick",), False),  # the first one stands for all
         ("gallery", ("fit=quick", "edits=[glass]"), False),
         ("gallery", ("fit=quick", "edits=[glass]", grid("[{edit: glass}]")), True),
-        ("gallery", ("fit=quick", "edit=glass"), False),
         ("gallery", ("fit=quick", "tf=TF01"), False),
         ("comparison", ("tf=TF01", "fit=quick"), True),
         ("comparison", ("tf=TF01", "fit=gaussians_quick"), False),
         ("comparison", ("tf=TF01", "fit=quick", "fits=[quick]"), False),
-        ("comparison", ("tf=TF01", "fit=quick", "sweep=views"), False),
         ("comparison", ("tf=TF01", "fit=quick", "edit=glass"), False),
     ],
 )
@@ -143,7 +141,6 @@ def test_models_of_a_comparison_are_those_of_the_last_phases_of_all_recipes():
     ("rows", "words", "message"),
     [
         ("[{edit: glas}]", "edits=[glass]", r"\.edit: expected one of none, glass, got glas, did"),
-        ("[{edit: glass}]", "", r"\.edit: expected one of none, got glass"),
         ("[{edit: stylesplat}]", "edits=[stylesplat]", r"\.edit: stylesplat works on none of quick; add a"),
         ("[{fit: demos}]", "fits=[quick,demo]", r"\.fit: expected one of quick, demo, got demos"),
         (
@@ -155,8 +152,6 @@ def test_models_of_a_comparison_are_those_of_the_last_phases_of_all_recipes():
         ("[{light: [3]}]", "", r"\.light: expected azimuth and polar angle, .*, got \[3"),
         ("[{view: [1, 200]}]", "", r"\.view: expected .* from -90 to 90 degrees, got \[1"),
         ("[{box: [0.5, 0.5, 0.6]}]", "", r"\.box: expected left, top and side, from 0 to 1"),
-        ("[{box: [0.5, 0.5]}]", "", r"\.box: expected left, top and side, from 0 to 1, got \[0.5, 0.5\]"),
-        ("[{fov_y: 180}]", "", "fov_y: expected less than 180, got 180"),
         ("[{show: volum}]", "", "show: expected one of scene, volume, error, got volum, did you mean volume"),
         ("[{title: a}, {title: a}]", "", "expected rows with different titles, got 'a' twice"),
         ("[]", "", "expected a picture in a row and a column, got none"),
@@ -164,13 +159,12 @@ def test_models_of_a_comparison_are_those_of_the_last_phases_of_all_recipes():
         ("", "gallery.grids=[{name: a/b}]", "expected different names of files, got 'a/b'"),
         ("", "gallery.grids=[{},{}]", "expected different names of files, got 'pictures'"),
         ("", "gallery.name=sheet", "gallery.name: sheet is a folder of texgs"),
-        ("", "gallery.name=a/b", "gallery.name: expected a letter and then letters"),
     ],
 )
 def test_a_mistake_is_one_sentence(rows, words, message):
     given = (words,) if "{" in words else words.split()
-    with pytest.raises(ConfigError, match=message):
-        GALLERY.inputs(compose((*ENGINE, *given, *([grid(rows)] if rows else ()))))
+    words = (*ENGINE, *given, *([grid(rows)] if rows else ()))
+    refused(lambda: GALLERY.inputs(compose(words)), message, ConfigError)
 
 
 def test_without_an_edit_the_scene_is_shown_as_it_is_fitted():
@@ -179,10 +173,10 @@ def test_without_an_edit_the_scene_is_shown_as_it_is_fitted():
 
 
 def shown():
-    """Experiments with a gallery of their own, and their data sets."""
+    """Experiments with a gallery of their own, and a data set of each."""
     configs = {name: compose((f"experiment={name}",)) for name in members("experiment")}
     named = {name: each for name, each in configs.items() if each.gallery.name != "looks"}
-    return [(name, dataset) for name, each in named.items() for dataset in each.datasets]
+    return [(name, each.datasets[0]) for name, each in named.items()]
 
 
 @pytest.mark.parametrize(("experiment", "dataset"), shown())

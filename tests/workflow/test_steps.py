@@ -5,6 +5,7 @@ import pytest
 import yaml
 
 from tests.cli.conftest import DEMO, VIEWS, copied, hide_weights, numbers
+from tests.refusals import refused
 from tests.report.written import read
 from tests.volume.test_motion import blob
 from texgs.cli.main import main
@@ -24,6 +25,13 @@ from texgs.workflow.stage_table import jobs
 RINGS = ["dataset=rings", *VIEWS[1:], *DEMO, "fit.shading.iterations=60"]
 RINGS += ["dataset.volume.size=24", "dataset.volume.steps=3", "dataset.volume.time=1"]
 GOLD = ["edit_text", *RINGS, "edit=gold", "edit.text.size=64"]
+MINE = """\
+name: mine
+volume: {file: step_9.nrrd}
+series: [step_*.nrrd]
+basic_tfs:
+  TF01: {opacity: [[0.2, 0.0], [0.5, 0.5]], color: [[0.2, 0.8, 0.3, 0.2]]}
+"""
 
 
 @pytest.fixture(scope="module")
@@ -97,20 +105,24 @@ def test_a_job_that_was_stopped_goes_on_in_the_middle_of_the_series(rings, tmp_p
 
 @pytest.fixture
 def mine(tmp_path, monkeypatch):
-    """A data set of three files, which `texgs new` has written."""
+    """A data set of four files."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("TEXGS_DATA", str(tmp_path))
-    for number, place in enumerate((-0.06, 0.0, 0.06), start=8):
-        prepare(ArraySource(blob((place, 0, 0))), tmp_path / f"step_{number}.nrrd")
-    assert main(["new", "step_9.nrrd", "--series", "step_*.nrrd", "--name", "mine"]) == 0
+    (tmp_path / "conf" / "dataset").mkdir(parents=True)
+    (tmp_path / "conf" / "dataset" / "mine.yaml").write_text(MINE)
+    for number in (8, 9, 10, 11):
+        (tmp_path / f"step_{number}.nrrd").touch()
     return tmp_path
 
 
 def test_a_new_data_set_may_be_a_series_of_files(mine):
+    for number, place in enumerate((-0.06, 0.0, 0.06, 0.12), start=8):
+        prepare(ArraySource(blob((place, 0, 0), sizes=(16, 16, 16))), mine / f"step_{number}.nrrd")
+    assert main(["new", "step_9.nrrd", "--series", "step_*.nrrd", "--name", "mine", "--force"]) == 0
     text = yaml.safe_load((mine / "conf" / "dataset" / "mine.yaml").read_text())
     assert text["series"] == [str(mine / "step_*.nrrd")]
     config = compose(("dataset=mine", "fit=quick"))
-    assert series_files(config) == [mine / f"step_{number}.nrrd" for number in (8, 9, 10)]
+    assert series_files(config) == [mine / f"step_{number}.nrrd" for number in (8, 9, 10, 11)]
     stages = {stage.name: each for stage, each in jobs(config)}
     assert fitted_scene(config).parts[-2:] == ("steps", "scene.yaml")
     assert scene_before(config) == fitted_scene(config)
@@ -120,40 +132,22 @@ def test_a_new_data_set_may_be_a_series_of_files(mine):
 
 
 @pytest.mark.parametrize(
-    ("spoil", "error", "message"),
+    ("gone", "listed", "error", "named"),
     [
+        (9, "[step_*.nrrd]", MissingDataError, "step_9.nrrd is not there"),
+        (10, "[step_*.nrrd]", ArgumentError, "series of mine: .* got none between step_9"),
+        (8, "[other_*.nrrd]", MissingDataError, "data set mine: dataset.series: .* got .*other_"),
         (
-            lambda f: (f / "step_9.nrrd").rename(f / "step_9.nhdr"),
-            MissingDataError,
-            "step_9.nrrd is not there",
-        ),
-        (
-            lambda f: (f / "step_10.nrrd").rename(f / "step_12.nrrd"),
-            ArgumentError,
-            "series of mine: .* got none between step_9",
+            8,
+            "[step_10.nrrd,step_11.nrrd]",
+            ConfigError,
+            "of mine: expected volume.file to be one of",
         ),
     ],
 )
-def test_files_that_are_missing_are_told_before_any_job(mine, spoil, error, message):
-    spoil(mine)
-    with pytest.raises(error, match=message):
-        series_files(compose(("dataset=mine",)))
-
-
-@pytest.mark.parametrize(
-    ("listed", "error", "message"),
-    [
-        (
-            "[other_*.nrrd]",
-            MissingDataError,
-            "data set mine: dataset.series: expected files that are there, got .*other_",
-        ),
-        ("[step_8.nrrd,step_10.nrrd]", ConfigError, "series of mine: expected volume.file to be one of them"),
-    ],
-)
-def test_a_series_that_lacks_the_volume_is_refused(mine, listed, error, message):
-    with pytest.raises(error, match=message):
-        series_files(compose(("dataset=mine", f"dataset.series={listed}")))
+def test_files_that_are_missing_are_told_before_any_job(mine, gone, listed, error, named):
+    (mine / f"step_{gone}.nrrd").unlink()
+    refused(lambda: series_files(compose(("dataset=mine", f"dataset.series={listed}"))), named, error)
 
 
 @pytest.mark.parametrize(

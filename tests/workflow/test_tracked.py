@@ -119,10 +119,8 @@ class Cuda:
         ({"fit": {"device": "cuda"}}, True, "H200"),
         ({"fit": {"device": "cuda"}}, False, "CPU"),
         ({"fit": {"device": "cpu"}, "views": {"renderer": "gpu"}}, True, "CPU"),
-        ({"fit": {"device": "cpu"}, "views": {"renderer": "vtk"}}, False, "CPU"),
         ({"views": {"renderer": "gpu"}}, True, "H200"),
         ({"views": {"renderer": "vtk"}}, False, "VTK"),
-        ({"views": {"renderer": "cpu"}}, False, "CPU"),
         ({}, False, "CPU"),
     ],
 )
