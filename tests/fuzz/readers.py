@@ -29,8 +29,8 @@ from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_release_texture import release_run
 from tests.study.test_ballots import STUDY, ballot
-from tests.volume.test_dicom import write_series as write_slices
-from tests.volume.test_dicom_frames import frame, write_enhanced
+from tests.volume.dicom_files import frame, write_enhanced
+from tests.volume.dicom_files import write_series as write_slices
 from tests.volume.test_extra_axis import VALUES as STEPS
 from tests.volume.test_extra_axis import write_nrrd
 from tests.volume.test_mrc import write as write_map

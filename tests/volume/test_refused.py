@@ -13,11 +13,21 @@ import pytest
 import pyvista
 import SimpleITK as sitk
 import tifffile
-from pydicom.uid import UltrasoundMultiFrameImageStorage, generate_uid
+from pydicom.encaps import encapsulate
+from pydicom.uid import JPEG2000Lossless, UltrasoundMultiFrameImageStorage, generate_uid
 
-from tests.volume.test_dicom import write_phases, write_series, write_steps
-from tests.volume.test_dicom_frames import VALUES as FRAMES
-from tests.volume.test_dicom_frames import frame, group, new_file, nuclear, write_enhanced
+from tests.volume.dicom_files import (
+    FRAMES,
+    change,
+    frame,
+    group,
+    save,
+    write_enhanced,
+    write_nuclear,
+    write_phases,
+    write_series,
+    write_steps,
+)
 from tests.volume.test_extra_axis import write_nrrd
 from tests.volume.test_netcdf import FIELD, write_axes, write_netcdf
 from tests.volume.test_text_columns import DIMS as LINE_DIMS
@@ -36,7 +46,6 @@ PIXEL = np.dtype([("R", "u1"), ("G", "u1"), ("B", "u1")])
 POINTER = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 52428800\n"
 LOGIN = b"\n<!DOCTYPE html>\n<html><head><title>Sign in</title></head></html>"
 NRRD = "NRRD0004\ntype: {kind}\ndimension: 3\nsizes: {sizes}\nencoding: {encoding}\n{more}\n"
-TERABYTE = "100000 10000 1000"
 GZIPPED = gzip.compress(bytes(24))
 
 
@@ -180,12 +189,35 @@ def of_frames(*places, stacks=False):
 
 def film(path):
     tags = {"FrameTime": 33, "FrameIncrementPointer": 0x00181063, "SpacingBetweenSlices": 2.0}
-    new_file(FRAMES, UltrasoundMultiFrameImageStorage, **tags).save_as(path, enforce_file_format=True)
+    save(path, FRAMES, UltrasoundMultiFrameImageStorage, **tags)
+
+
+def spoilt(folder):
+    """Write slices with streams that no decoder knows."""
+
+    def spoil(data):
+        data.file_meta.TransferSyntaxUID = JPEG2000Lossless
+        data.PixelData = encapsulate([b"no such stream"])
+        data["PixelData"].is_undefined_length = True
+
+    series(folder)
+    change(folder, spoil)
 
 
 def at(*heights):
     """Write slices at places along z."""
     return in_folder(write_series, VALUES[:5], [(0, 0, z) for z in heights])
+
+
+def series_with(name, shorten):
+    """Write slices, and change the bytes of one file."""
+
+    def write(folder):
+        series(folder)
+        content = (folder / name).read_bytes() if (folder / name).exists() else b""
+        (folder / name).write_bytes(shorten(content))
+
+    return write
 
 
 def unlike(folder):
@@ -205,23 +237,21 @@ def phases(**tags):
     return in_folder(write_phases, {"SeriesDescription": lambda t: "Bone", **tags})
 
 
+series = in_folder(write_series, VALUES)
 RAW = {"dims": (13, 12, 11), "dtype": "uint16"}
 NC = partial(write_netcdf, fields={"temperature": FIELD, "vx": FIELD})
 UNEVEN = ([0, 1, 4, 9], np.arange(5), np.arange(6))
 ALL = {"series": "all"}
 STEPS = {"TemporalPositionIdentifier": lambda step, z: step}
+PHASES = {"TemporalPositionIdentifier": lambda t: t}
 PLAIN = [
     ({}, "no header; set dims and dtype, and endian"),
     ({"dims": (13, 12, 11)}, "set dtype, and endian"),
     (RAW | {"dtype": "float32"}, "6864 bytes, found 3432; dtype uint16 would fit"),
     (RAW | {"dims": (13, 12, 10), "skip": 8}, "= 3128 bytes, found 3432; correct dims"),
     (RAW | {"dtype": "short int"}, "dtype: expected a name"),
-    (RAW | {"dims": (13, 12)}, "dims: expected at least 2"),
-    (RAW | {"dims": (13, 132, 1)}, "dims: expected at least 2"),
     (RAW | {"dims": (-13, -12, 11)}, "dims: expected at least 2"),
     (RAW | {"dtype": "complex64"}, "dtype: expected integers, floats or bool, got complex64"),
-    (RAW | {"dtype": "S2"}, "dtype: expected integers"),
-    (RAW | {"spacing": (1, 1, -1)}, "spacing: expected three finite numbers"),
     (RAW | {"spacing": (1, 1, float("nan"))}, "spacing: expected three finite numbers"),
     (RAW | {"endian": ">"}, "endian: expected little or big"),
 ]
@@ -231,7 +261,6 @@ LONG = "expected an array of real numbers with three axes or more"
 COLUMNS = [
     ({}, "set dims, and column where"),
     ({"dims": LINE_DIMS}, "column: expected a number from 1 to 10, got none"),
-    ({"dims": LINE_DIMS, "column": 11}, "column: expected a number from 1 to 10, got 11"),
     ({"dims": (6, 5, 5), "column": 2}, "= 150 lines, found 120"),
     ({"dims": (6, 5, 3), "column": 2}, "= 90 lines, found more"),
     ({"dims": (6, 5, 1), "column": 2}, "dims: expected at least 2"),
@@ -252,14 +281,10 @@ REFUSED = {
         (Path.mkdir, "expected a folder or zip of Zarr"),
         (of_zarr(VALUES[0], "yx"), f"{LONG}, got / of 12 x 13 uint16"),
         (of_zarr(VALUES + 1j), f"{LONG}, got / of 11 x 12 x 13 complex128"),
-        (of_zarr(VALUES[:, :, :1]), f"{LONG}, got / of 11 x 12 x 1 uint16"),
         (of_zarr(VALUES[:0]), f"{LONG}, got / of 0 x 12 x 13 uint16"),
         (of_zarr(all_axes(VALUES)[0], "qzyx"), "three axes of space besides time and channel, got q 3"),
         (of_zarr(VALUES, "zy"), "expected a folder or zip of Zarr, got zip"),
-        *(
-            (of_zarr(VALUES, scale=[step, 1, 1]), "spacing: expected three finite numbers")
-            for step in (0, float("nan"), 1e400)
-        ),
+        (of_zarr(VALUES, scale=[float("nan"), 1, 1]), "spacing: expected three finite numbers"),
         (of_zarr(VALUES), "series: not for this format", {"series": "1"}),
     ],
     "empty": [(Path.mkdir, r"a folder of DICOM slices or TIFFs \(.tif, .tiff\), found none")],
@@ -279,17 +304,20 @@ REFUSED = {
         (of_slices("s1", more="s1.dcm"), "slices of one format, got s1.tif and s1.dcm"),
         (of_slices("s2 s4 s8"), "s4.tif and s8.tif: expected numbers 2 apart, .* got 4"),
         (of_slices("z0_c0 z0_c1 z1_c0 z1_c1 z3_c0 z3_c1"), "z1_c0.tif and z3_c0.tif: exp"),
-        (of_slices("s0 s0_mask s1 s1_mask"), f"s0.tif and s0_mask.tif{NAMES}"),
-        (of_slices("foot_0 foot_1 head_0 head_1"), f"foot_0.tif and head_0.tif{NAMES}"),
-        (of_slices("p0_z0 p0_z1 p1_z0 p1_z1"), f"p0_z0.tif and p1_z1.tif{NAMES}"),
-        (of_slices("z0_c0 z0_c1 z1_c0"), f"z0_c0.tif and z1_c0.tif{NAMES}"),
-        (of_slices("z1_t1 z2_t2 z3_t3"), f"z1_t1.tif and z3_t3.tif{NAMES}"),
-        (of_slices("s1 s01 s2"), f"s.*1.tif and s2.tif{NAMES}"),
-        (of_slices("left right"), f"left.tif and right.tif{NAMES}"),
+        *(
+            (of_slices(names), f"{pair}{NAMES}")
+            for names, pair in {
+                "s0 s0_mask s1 s1_mask": "s0.tif and s0_mask.tif",
+                "p0_z0 p0_z1 p1_z0 p1_z1": "p0_z0.tif and p1_z1.tif",
+                "z0_c0 z0_c1 z1_c0": "z0_c0.tif and z1_c0.tif",
+                "z1_t1 z2_t2 z3_t3": "z1_t1.tif and z3_t3.tif",
+                "s1 s01 s2": "s.*1.tif and s2.tif",
+                "left right": "left.tif and right.tif",
+            }.items()
+        ),
     ],
     "slices": [
         (at(0, 2, 4, 8, 10), "slices 2 mm apart, got 4 mm; complete the series"),
-        (at(0, 2, 4, 7, 9), "slices 2 mm apart, got 3 mm; complete the series"),
         (at(0, 2, 2, 4, 6), "slices at different places, got two at one"),
         (in_folder(write_series, VALUES[:5], [(0, 0.3 * z, 2.5 * z) for z in range(5)]), "correct the tilt"),
         (unlike, "expected size, spacing and orientation of"),
@@ -304,11 +332,24 @@ REFUSED = {
         (phases(SeriesNumber=lambda t: 7), "a series number in each", ALL),
         (two_lattices, "expected series on one lattice, more than on any other, got ", ALL),
         (
-            without("28-6.ima", phases(TemporalPositionIdentifier=lambda t: t)),
+            without("28-6.ima", phases(**PHASES)),
             r"as long as \d \(Bone, 5 files",
             ALL,
         ),
         (in_folder(lambda path: (path / "slices").mkdir()), "open the folder with the slices, in slices$"),
+        *(
+            (series_with(name, lambda x: x[:-100]), f"{name}: cut off, damaged")
+            for name in ("00-3.ima", "35-3.ima")
+        ),
+        (series_with("05-3.DCM", lambda x: b"no slice"), "05-3.DCM: cut off, damaged or no file of DICOM"),
+        (spoilt, "slices"),
+        (
+            in_folder(write_steps, STEPS),
+            r"dataset\.volume\.time: expected one of 0 to 2, got 3$",
+            {"time": 3},
+        ),
+        (phases(**PHASES), "or series=all for those alike, as steps in time, of "),
+        (phases(**PHASES), r"dataset\.volume\.time: expected one of 0 to 2, got 3$", ALL | {"time": 3}),
     ],
     "v.nii.gz": [
         (lambda path: path.symlink_to("../.git/annex/v"), "annex/v, which is not there; get it"),
@@ -334,14 +375,11 @@ REFUSED = {
     "v.mha": [
         (edited("plain.mha", b"1 0 0 0 1 0 0 0 1", b"1 0 0 1 0 0 0 0 1"), "three independent axes"),
         (of_meta(more="ElementSpacing = 2 x 2\n"), "could not convert string to float: 'x'"),
-        (of_meta(more="ElementSpacing = 1 0 1\n"), r"spacing: expected .*, got \[1.0, 0.0, 1.0\]"),
         (of_meta(RGB.tobytes(), "6 5 4", "ElementNumberOfChannels = 3\n"), COMPONENTS),
-        (of_meta(dims="13 12"), "expected 3 axes"),
         (of_meta(dims="13 12 11 2 2"), "expected 3 axes"),
         (of_itk(np.zeros((2, 3, 3, 3, 2)), True), "expected a scalar volume"),
     ],
     "v.nrrd": [
-        (of_pynrrd(FLAT), "expected 3 axes"),
         (of_pynrrd(FIVE), "expected 3 axes"),
         (of_pynrrd(RGB[0], kinds=["RGB-color", "domain", "domain"]), "3 components per sample"),
         (of_pynrrd(RGB, kinds=["RGB-color", *3 * ["domain"]]), COMPONENTS),
@@ -351,18 +389,12 @@ REFUSED = {
                 of_nrrd(f"1 2 3 4 5 6 7 {text}".encode(), kind, "2 2 2", "ascii"),
                 rf"expected samples of \w+, got {text}",
             )
-            for kind, text in (("short", "40000"), ("uchar", "-5"), ("uint", "-1"))
+            for kind, text in (("short", "40000"), ("uint", "-1"))
         ),
         (of_nrrd(b"1 " * 25, encoding="ascii"), "expected 24 samples, found 25"),
         (of_nrrd(b"1 2 x " + b"3 " * 21, encoding="ascii"), "an? .?n?rrd file"),
-        *(
-            (of_nrrd(encoding=encoding, more="line skip: 99999999999\n"), "line skip: expected")
-            for encoding in ("raw", "gzip", "ascii")
-        ),
-        *(
-            (of_nrrd(GZIPPED, "uchar", TERABYTE, encoding), "100000 x 10000 x 1000 .* needs")
-            for encoding in ("gzip", "bzip2")
-        ),
+        (of_nrrd(encoding="gzip", more="line skip: 99999999999\n"), "line skip: expected"),
+        (of_nrrd(GZIPPED, "uchar", "100000 10000 1000", "gzip"), "100000 x 10000 x 1000 .* needs"),
     ],
     "v.vtk": [
         (of_vtk("DATASET POLYDATA\nPOINTS 1 float\n0 0 0\n"), "expected image data .*, got PolyData"),
@@ -385,7 +417,6 @@ REFUSED = {
     ],
     "v.tif": [
         (of_tiff(RGB, photometric="rgb"), "3 components per sample"),
-        (of_tiff(RGB[0], photometric="rgb"), "3 components per sample"),
         (of_tiff(FLAT), "expected .*(axes|shape|samples along)"),
         (of_tiff(FIVE), "expected .*(axes|shape|samples along)"),
         (of_tiff(A, metadata={"axes": "XYZ"}), "expected pages with Y and X, got the axes XYZ"),
@@ -399,22 +430,18 @@ REFUSED = {
     "v.nc": [
         (NC, rf"variable: {LONG}, got none; choose one of temperature, vx$"),
         (NC, "got vy; choose one of temperature, vx", {"variable": "vy"}),
-        (NC, "got r of 5 float64; choose one of temperature, vx", {"variable": "r"}),
         (NC, "column: not for this format", {"variable": "vx", "column": 2}),
         (NC, "time: there is no such axis in lat 4 x r 5 x lon 6", {"variable": "vx", "time": 1}),
         (NC, "channel: there is no such axis", {"variable": "vx", "channel": "0"}),
         (partial(write_axes, places=UNEVEN, units=3 * ["m"]), "even distances along z; resample"),
         (data(b"CDF\x05" + bytes(2000)), "convert it: nccopy -k nc4 OLD.nc NEW.nc"),
-        *(
-            (data(start + bytes(2000)), "expected an HDF5 or NetCDF file, got .*")
-            for start in (b"\x89HDF\r\n\x1a\n", b"", b"text")
-        ),
+        (data(b"\x89HDF\r\n\x1a\n" + bytes(2000)), "expected an HDF5 or NetCDF file, got .*"),
     ],
     "v.h5": [
         (of_hdf5(table=VALUES[0]), f"{LONG}, got none; choose one of another file"),
         (of_hdf5(**{f"step{k:02}": VALUES for k in range(20)}), "one of step00, .*, step07 and 12 more"),
         (of_hdf5(v=RGB), f"{COMPONENTS}none$"),
-        *((of_hdf5(v=RGB), f"{COMPONENTS}{got}$", {"channel": got}) for got in ("3", "red", "-1")),
+        *((of_hdf5(v=RGB), f"{COMPONENTS}{got}$", {"channel": got}) for got in ("3", "-1")),
         (of_hdf5(["member", "z", "y", "x"], v=np.zeros((2, 3, 4, 5))), "three axes .*, got member 2 x z"),
         (huge_plane, "3000000 x 3000000 x 1 samples of float32: needs 33528 GiB"),
     ],
@@ -423,7 +450,7 @@ REFUSED = {
     "e.dcm": [
         (data(b"no slice"), "expected a slice with its position and orientation, found none"),
         (
-            partial(nuclear, values=FRAMES, EnergyWindowVector=[1, 1, 1, 2, 2]),
+            partial(write_nuclear, EnergyWindowVector=[1, 1, 1, 2, 2]),
             "got EnergyWindowVector, which tells none",
         ),
         (film, "of 5 frames, got FrameTime, which tells none; convert it"),
