@@ -83,11 +83,12 @@ def of_itk(values, is_vector=False):
     return lambda path: sitk.WriteImage(sitk.GetImageFromArray(values, isVector=is_vector), path)
 
 
-def of_hdf5(labels=(), **arrays):
+def of_hdf5(said=None, labels=(), **arrays):
     def write(path):
         with h5py.File(path, "w") as file:
             for name, values in arrays.items():
                 file[name] = values
+                file[name].attrs.update(said or {})
             for axis, label in zip(file["v"].dims if labels else (), labels, strict=True):
                 axis.label = label
 
@@ -159,8 +160,11 @@ def pointed(path):
     path.with_name("v.raw").write_bytes(POINTER)
 
 
+in_time = partial(write_nrrd, place=3, kind="time", encoding="raw")
+
+
 def cut_step(path):
-    write_nrrd(path, 3, "time", "raw")
+    in_time(path)
     path.write_bytes(path.read_bytes()[:-1])
 
 
@@ -384,6 +388,8 @@ REFUSED = {
         (of_pynrrd(RGB[0], kinds=["RGB-color", "domain", "domain"]), "3 components per sample"),
         (of_pynrrd(RGB, kinds=["RGB-color", *3 * ["domain"]]), COMPONENTS),
         (cut_step, "the file is cut off"),
+        (in_time, r"dataset.volume.time: expected one of 0 to 2, got 3$", {"time": 3}),
+        (in_time, "dataset.volume.channel: there is no such axis; leave it out", {"channel": "1"}),
         *(
             (
                 of_nrrd(f"1 2 3 4 5 6 7 {text}".encode(), kind, "2 2 2", "ascii"),
@@ -439,10 +445,25 @@ REFUSED = {
     ],
     "v.h5": [
         (of_hdf5(table=VALUES[0]), f"{LONG}, got none; choose one of another file"),
+        *(
+            (
+                of_hdf5(**{"a/t": VALUES, "flat": FLAT}),
+                f"{LONG}, got {got}; choose one of a/t",
+                {"variable": name},
+            )
+            for name, got in (("a", "a"), ("flat", "flat of 12 x 13 uint8"))
+        ),
+        (
+            of_hdf5({"scale_factor": "half"}, v=VALUES),
+            "scale_factor: expected a number, got half; correct the",
+        ),
         (of_hdf5(**{f"step{k:02}": VALUES for k in range(20)}), "one of step00, .*, step07 and 12 more"),
         (of_hdf5(v=RGB), f"{COMPONENTS}none$"),
         *((of_hdf5(v=RGB), f"{COMPONENTS}{got}$", {"channel": got}) for got in ("3", "-1")),
-        (of_hdf5(["member", "z", "y", "x"], v=np.zeros((2, 3, 4, 5))), "three axes .*, got member 2 x z"),
+        (
+            of_hdf5(labels=["member", "z", "y", "x"], v=np.zeros((2, 3, 4, 5))),
+            "three axes .*, got member 2 x z",
+        ),
         (huge_plane, "3000000 x 3000000 x 1 samples of float32: needs 33528 GiB"),
     ],
     "v.ima": [(one_slice, "at least 2 slices, got 1; open")],
