@@ -90,54 +90,44 @@ def test_packed_numbers_and_coordinates_of_netcdf_4(tmp_path, chunks):
     )
 
 
-CODED = {
-    "zero is a fill value and an offset": (
+def missing(where, values=VALUES):
+    return np.where(where, np.nan, values)
+
+
+V, FILL = VALUES, "_FillValue"
+CODED = [
+    # Zero is a fill value, and an offset.
+    (
         "u2",
-        {"_FillValue": np.uint16(0), "add_offset": 0.0, "scale_factor": np.array([2.0])},
-        lambda v: np.where(v == 0, np.nan, 2.0 * v),
+        {FILL: np.uint16(0), "add_offset": 0.0, "scale_factor": np.array([2.0])},
+        missing(V == 0, 2.0 * V),
     ),
-    "a fill value as h5py writes a number of Python": (
-        "f4",
-        {"_FillValue": np.float64(7) + 1e-9},
-        lambda v: np.where(v == 7, np.nan, v),
-    ),
-    "several missing values": (
-        "i4",
-        {"missing_value": np.array([3.0, 5.0])},
-        lambda v: np.where((v == 3) | (v == 5), np.nan, v),
-    ),
-    "a missing value as text": (
-        "f4",
-        {"missing_value": "7", "_FillValue": np.float64(3)},
-        lambda v: np.where((v == 3) | (v == 7), np.nan, v),
-    ),
-    "a range of floats": (
-        "i4",
-        {"valid_range": np.array([2.0, 90.0])},
-        lambda v: np.where((v < 2) | (v > 90), np.nan, v),
-    ),
-    "a least": ("f4", {"valid_min": 4}, lambda v: np.where(v < 4, np.nan, v)),
-    "a largest as text": ("i4", {"valid_max": "8e1"}, lambda v: np.where(v > 80, np.nan, v)),
-    "scales as text, and a range of whole numbers, which is of packed samples": (
+    ("f4", {FILL: np.float64(7) + 1e-9}, missing(V == 7)),  # as h5py writes a number of Python
+    ("i4", {"missing_value": np.array([3.0, 5.0])}, missing((V == 3) | (V == 5))),
+    ("f4", {"missing_value": "7", FILL: np.float64(3)}, missing((V == 3) | (V == 7))),
+    ("i4", {"valid_range": np.array([2.0, 90.0])}, missing((V < 2) | (V > 90))),
+    ("f4", {"valid_min": 4}, missing(V < 4)),
+    ("i4", {"valid_max": "8e1"}, missing(V > 80)),
+    # A range of whole numbers is of packed samples, and one end of it, too.
+    (
         "i2",
         {"scale_factor": "0.5", "add_offset": "10", "valid_range": np.array([4, 90])},
-        lambda v: np.where((v >= 4) & (v <= 90), 10 + 0.5 * v, np.nan),
+        missing((V < 4) | (V > 90), 10 + 0.5 * V),
     ),
-    "one end of such a range, and a slope below 0": (
+    (
         "i2",
         {"scale_factor": -0.5, "add_offset": 10.0, "valid_min": np.int16(40)},
-        lambda v: np.where(v >= 40, 10 - 0.5 * v, np.nan),
+        missing(V < 40, 10 - 0.5 * V),
     ),
-}
+]
 
 
-@pytest.mark.parametrize("name", CODED)
-def test_samples_are_those_that_attributes_of_cf_say(tmp_path, name):
-    dtype, said, decoded = CODED[name]
+@pytest.mark.parametrize(("dtype", "said", "expected"), CODED)
+def test_samples_are_those_that_attributes_of_cf_say(tmp_path, dtype, said, expected):
     path = write(tmp_path / "v.h5", v=VALUES.astype(dtype))
     with h5py.File(path, "a") as file:
         file["v"].attrs.update(said)
-    np.testing.assert_array_equal(whole(path), decoded(VALUES))
+    np.testing.assert_array_equal(whole(path), expected)
 
 
 @pytest.fixture

@@ -241,13 +241,15 @@ def phases(**tags):
     return in_folder(write_phases, {"SeriesDescription": lambda t: "Bone", **tags})
 
 
-series = in_folder(write_series, VALUES)
+NO_SCALARS = "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 3\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+OTHER_FILE = '<BinaryOnly MetadataFile="all.ome" UUID="urn:uuid:1"/>'
 RAW = {"dims": (13, 12, 11), "dtype": "uint16"}
 NC = partial(write_netcdf, fields={"temperature": FIELD, "vx": FIELD})
 UNEVEN = ([0, 1, 4, 9], np.arange(5), np.arange(6))
 ALL = {"series": "all"}
 STEPS = {"TemporalPositionIdentifier": lambda step, z: step}
 PHASES = {"TemporalPositionIdentifier": lambda t: t}
+series, steps = in_folder(write_series, VALUES), in_folder(write_steps, STEPS)
 PLAIN = [
     ({}, "no header; set dims and dtype, and endian"),
     ({"dims": (13, 12, 11)}, "set dtype, and endian"),
@@ -314,7 +316,6 @@ REFUSED = {
                 "s0 s0_mask s1 s1_mask": "s0.tif and s0_mask.tif",
                 "p0_z0 p0_z1 p1_z0 p1_z1": "p0_z0.tif and p1_z1.tif",
                 "z0_c0 z0_c1 z1_c0": "z0_c0.tif and z1_c0.tif",
-                "z1_t1 z2_t2 z3_t3": "z1_t1.tif and z3_t3.tif",
                 "s1 s01 s2": "s.*1.tif and s2.tif",
                 "left right": "left.tif and right.tif",
             }.items()
@@ -325,35 +326,20 @@ REFUSED = {
         (at(0, 2, 2, 4, 6), "slices at different places, got two at one"),
         (in_folder(write_series, VALUES[:5], [(0, 0.3 * z, 2.5 * z) for z in range(5)]), "correct the tilt"),
         (unlike, "expected size, spacing and orientation of"),
-        (
-            without("21-1.ima", in_folder(write_steps, STEPS)),
-            "each temporal position at .*, got 3 at 10 mm, 2",
-        ),
+        (without("21-1.ima", steps), "each temporal position at .*, got 3 at 10 mm, 2"),
         (in_folder(write_steps, {}), "got two at one, and no temporal position or trigger time"),
         (phases(TemporalPositionIdentifier=lambda t: t or ""), "a temporal position in each", ALL),
         (phases(SeriesDescription=lambda t: f"{t // 2}0%"), "a percentage in each", ALL),
         (phases(SeriesDescription=lambda t: f"{t}0%" if t else "mean"), "a percentage in each", ALL),
         (phases(SeriesNumber=lambda t: 7), "a series number in each", ALL),
         (two_lattices, "expected series on one lattice, more than on any other, got ", ALL),
-        (
-            without("28-6.ima", phases(**PHASES)),
-            r"as long as \d \(Bone, 5 files",
-            ALL,
-        ),
+        (without("28-6.ima", phases(**PHASES)), r"as long as \d \(Bone, 5 files", ALL),
         (in_folder(lambda path: (path / "slices").mkdir()), "open the folder with the slices, in slices$"),
-        *(
-            (series_with(name, lambda x: x[:-100]), f"{name}: cut off, damaged")
-            for name in ("00-3.ima", "35-3.ima")
-        ),
+        (series_with("35-3.ima", lambda x: x[:-100]), "35-3.ima: cut off, damaged"),
         (series_with("05-3.DCM", lambda x: b"no slice"), "05-3.DCM: cut off, damaged or no file of DICOM"),
         (spoilt, "slices"),
-        (
-            in_folder(write_steps, STEPS),
-            r"dataset\.volume\.time: expected one of 0 to 2, got 3$",
-            {"time": 3},
-        ),
+        (steps, r"dataset\.volume\.time: expected one of 0 to 2, got 3$", {"time": 3}),
         (phases(**PHASES), "or series=all for those alike, as steps in time, of "),
-        (phases(**PHASES), r"dataset\.volume\.time: expected one of 0 to 2, got 3$", ALL | {"time": 3}),
     ],
     "v.nii.gz": [
         (lambda path: path.symlink_to("../.git/annex/v"), "annex/v, which is not there; get it"),
@@ -390,13 +376,8 @@ REFUSED = {
         (cut_step, "the file is cut off"),
         (in_time, r"dataset.volume.time: expected one of 0 to 2, got 3$", {"time": 3}),
         (in_time, "dataset.volume.channel: there is no such axis; leave it out", {"channel": "1"}),
-        *(
-            (
-                of_nrrd(f"1 2 3 4 5 6 7 {text}".encode(), kind, "2 2 2", "ascii"),
-                rf"expected samples of \w+, got {text}",
-            )
-            for kind, text in (("short", "40000"), ("uint", "-1"))
-        ),
+        (of_nrrd(b"1 2 3 4 5 6 7 40000", "short", "2 2 2", "ascii"), "expected samples of int16, got 40000"),
+        (of_nrrd(b"1 2 3 4 5 6 7 -1", "uint", "2 2 2", "ascii"), "expected samples of uint32, got -1"),
         (of_nrrd(b"1 " * 25, encoding="ascii"), "expected 24 samples, found 25"),
         (of_nrrd(b"1 2 x " + b"3 " * 21, encoding="ascii"), "an? .?n?rrd file"),
         (of_nrrd(encoding="gzip", more="line skip: 99999999999\n"), "line skip: expected"),
@@ -404,22 +385,13 @@ REFUSED = {
     ],
     "v.vtk": [
         (of_vtk("DATASET POLYDATA\nPOINTS 1 float\n0 0 0\n"), "expected image data .*, got PolyData"),
-        (
-            of_vtk("DATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 3\nORIGIN 0 0 0\nSPACING 1 1 1\n"),
-            "scalars of points or cells, got none",
-        ),
-        (
-            edited("binary.vtk", b"DIMENSIONS 13 12 11", b"DIMENSIONS 9000 9000 9000"),
-            "9000 x 9000 x 9000 .* needs",
-        ),
+        (of_vtk(NO_SCALARS), "scalars of points or cells, got none"),
+        (edited("binary.vtk", b"S 13 12 11", b"S 9000 9000 9000"), "9000 x 9000 x 9000 .* needs"),
     ],
     "v.vts": [(curved, "expected image data .*, got StructuredGrid; resample it")],
     "v.vti": [
         (partial(WRITERS["packed.vti"], values=RGB), "3 components per sample"),
-        (
-            edited("packed.vti", b'"0 12 0 11 0 10"', b'"0 99999 0 99999 0 9999"'),
-            "100000 x 100000 x 10000 .* needs",
-        ),
+        (edited("packed.vti", b"0 12 0 11 0 10", b"0 99999 0 99999 0 9999"), "00 x 100000 x 10000 .* needs"),
     ],
     "v.tif": [
         (of_tiff(RGB, photometric="rgb"), "3 components per sample"),
@@ -428,10 +400,7 @@ REFUSED = {
         (of_tiff(A, metadata={"axes": "XYZ"}), "expected pages with Y and X, got the axes XYZ"),
         (of_tiff(A[:3], imagej=True, metadata={"axes": "CYX"}), "three axes of space .*, got T 1"),
         (huge_pages, "2000000 x 2000000 x .* samples"),
-        (
-            of_tiff(A, **ome("urn:uuid:2", '<BinaryOnly MetadataFile="all.ome" UUID="urn:uuid:1"/>')),
-            "a part of all.ome",
-        ),
+        (of_tiff(A, **ome("urn:uuid:2", OTHER_FILE)), "a part of all.ome"),
     ],
     "v.nc": [
         (NC, rf"variable: {LONG}, got none; choose one of temperature, vx$"),
@@ -453,27 +422,18 @@ REFUSED = {
             )
             for name, got in (("a", "a"), ("flat", "flat of 12 x 13 uint8"))
         ),
-        (
-            of_hdf5({"scale_factor": "half"}, v=VALUES),
-            "scale_factor: expected a number, got half; correct the",
-        ),
+        (of_hdf5({"scale_factor": "half"}, v=VALUES), "scale_factor: expected a number, got half"),
         (of_hdf5(**{f"step{k:02}": VALUES for k in range(20)}), "one of step00, .*, step07 and 12 more"),
         (of_hdf5(v=RGB), f"{COMPONENTS}none$"),
         *((of_hdf5(v=RGB), f"{COMPONENTS}{got}$", {"channel": got}) for got in ("3", "-1")),
-        (
-            of_hdf5(labels=["member", "z", "y", "x"], v=np.zeros((2, 3, 4, 5))),
-            "three axes .*, got member 2 x z",
-        ),
+        (of_hdf5(labels=["member", *"zyx"], v=np.zeros((2, 3, 4, 5))), "three axes .*, got member 2 x z"),
         (huge_plane, "3000000 x 3000000 x 1 samples of float32: needs 33528 GiB"),
     ],
     "v.ima": [(one_slice, "at least 2 slices, got 1; open")],
     "DICOMDIR": [(Path.touch, "a list of files of DICOM; open the folder")],
     "e.dcm": [
         (data(b"no slice"), "expected a slice with its position and orientation, found none"),
-        (
-            partial(write_nuclear, EnergyWindowVector=[1, 1, 1, 2, 2]),
-            "got EnergyWindowVector, which tells none",
-        ),
+        (partial(write_nuclear, EnergyWindowVector=[1, 1, 1, 2, 2]), "EnergyWindowVector, which tells none"),
         (film, "of 5 frames, got FrameTime, which tells none; convert it"),
         (of_frames(0, 1, 2, 4, 5), "frame 2 of e.dcm and frame 3 .*, got 5 mm.* dcm2niix$"),
         (of_frames(0, 0, 1, 1, 2), "slices at different places, got two at one.* dcm2niix$"),
