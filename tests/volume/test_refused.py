@@ -426,6 +426,10 @@ REFUSED = {
         (of_hdf5(**{f"step{k:02}": VALUES for k in range(20)}), "one of step00, .*, step07 and 12 more"),
         (of_hdf5(v=RGB), f"{COMPONENTS}none$"),
         *((of_hdf5(v=RGB), f"{COMPONENTS}{got}$", {"channel": got}) for got in ("3", "-1")),
+        (
+            of_hdf5(labels=["time", "height", "width"], v=VALUES),
+            "three axes of space besides time and channel",
+        ),
         (of_hdf5(labels=["member", *"zyx"], v=np.zeros((2, 3, 4, 5))), "three axes .*, got member 2 x z"),
         (huge_plane, "3000000 x 3000000 x 1 samples of float32: needs 33528 GiB"),
     ],
