@@ -142,7 +142,7 @@ VOLUMES: dict[str, Reader] = {
     "plain.mhd samples": Reader(FILES["compressed.mhd"][0], read_volume, "compressed.zraw"),
     "slices": Reader(at("v", folder_of, dict(zip("012", A, strict=False))), read_volume, "v/0.tif"),
     "dicom samples": Reader(
-        at("slices", into, write_steps, POSITIONS), partial(read_volume, time=1), "slices/07-1.ima"
+        at("slices", into, write_steps, POSITIONS), partial(read_volume, time=1), "slices/29-1.ima"
     ),
     "dicom phases samples": Reader(
         at("slices", into, write_phases, PHASES),

@@ -68,7 +68,7 @@ def write_series(folder, values, places=None, uid=SERIES, number=3, orientation=
         said |= {"InstanceNumber": z + 1, "PixelSpacing": [2.0, 0.5]}  # of rows, and of samples in a row
         said |= {"ImagePositionPatient": [*map(float, place)], "ImageOrientationPatient": list(orientation)}
         said |= {name: value(z) if callable(value) else value for name, value in tags.items()}
-        save(folder / f"{(7 * z) % 101:02}-{number}.ima", plane.astype("<u2"), CTImageStorage, **said)
+        save(folder / f"{(29 * z) % 101:02}-{number}.ima", plane.astype("<u2"), CTImageStorage, **said)
 
 
 def write_steps(folder, tags):
