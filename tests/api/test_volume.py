@@ -12,7 +12,7 @@ from PIL import Image
 from pydicom.uid import generate_uid
 
 import texgs
-from tests.volume.test_dicom import write_series
+from tests.volume.dicom_files import write_series
 from tests.volume.zarr_files import axes_of, write_image
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError

@@ -14,7 +14,7 @@ import yaml
 import texgs
 from tests.fitting.short_fits import shorten
 from tests.refusals import refused
-from tests.volume.test_dicom import write_series as write_slices
+from tests.volume.dicom_files import write_series as write_slices
 from tests.volume.test_motion import TF, blob
 from tests.volume.zarr_files import axes_of, write_image
 from texgs.cli.main import main

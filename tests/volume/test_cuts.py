@@ -80,16 +80,16 @@ def test_vtk_cuts_alike(count):
         assert psnr(seen[is_face], expected[is_face]) > 32
 
 
-@pytest.mark.parametrize("step", [0.25, 1.0])
-def test_alpha_of_even_matter_follows_the_length_that_is_left(step, device):
+@pytest.mark.parametrize(("step", "unit"), [(0.25, 0.2), (1.0, 0.2), (1.0, 0.05)])
+def test_alpha_of_even_matter_follows_the_length_that_is_left(step, unit, device):
     x, _, _ = lattice(33, 33, 33)
     generator = torch.Generator().manual_seed(0)
     depth_range = 2.3 + 0.4 * torch.rand(2, 50, 60, generator=generator)  # all in the box, where the ray is
-    look = Appearance(step=step, opacity_unit=0.2)
+    look = Appearance(step=step, opacity_unit=unit)
     camera = orbit(-60, 20, 2.5, 6, 60, 50)
     cast = Caster(Grid(x), look, device).cast(constant(0.3), camera, HEADLIGHT, depth_range=depth_range)
     length = (depth_range[1] - depth_range[0]).clamp_min(0) * camera.rays().norm(dim=-1)
-    np.testing.assert_allclose(cast.rgba[..., 3].cpu(), 1 - 0.7 ** (length / 0.2), atol=1e-4)
+    np.testing.assert_allclose(cast.rgba[..., 3].cpu(), 1 - 0.7 ** (length / unit), atol=1e-4)
 
 
 @pytest.mark.parametrize("step", [0.25, 1.5])
@@ -112,7 +112,8 @@ def test_a_range_of_everything_changes_no_bit(radius, device):
     caster = Caster(ball(40), Appearance(), device)
     expected = caster.cast(SHELLS, camera, SIDE, OUTPUTS)
     cut = planes([[0.0, 0.0, 1.0]], [9.0], camera, device)  # beyond the volume
-    for depth_range in (ranges(-torch.inf, torch.inf), cut.depth_range):
+    none = cut_range(torch.zeros(0, 3, device=device), torch.zeros(0, device=device), camera.to(device))
+    for depth_range in (ranges(-torch.inf, torch.inf), cut.depth_range, none.depth_range):
         cast = caster.cast(SHELLS, camera, SIDE, OUTPUTS, depth_range=depth_range, faces=cut)
         for name in ("rgba", *OUTPUTS):
             assert torch.equal(getattr(cast, name), getattr(expected, name))
@@ -179,30 +180,11 @@ def test_faces_beside_samples_that_are_none_are_finite(is_lit, device):
     assert cast.rgba.isfinite().all()
 
 
-def test_no_plane_cuts_nothing(device):
-    cut = cut_range(torch.zeros(0, 3, device=device), torch.zeros(0, device=device), CAMERA.to(device))
-    caster = Caster(ball(20), Appearance(), device)
-    cast = caster.cast(SHELLS, CAMERA, SIDE, depth_range=cut.depth_range, faces=cut)
-    assert torch.equal(cast.rgba, caster.cast(SHELLS, CAMERA, SIDE).rgba)
-
-
-def test_without_faces_even_matter_is_dark(device):
-    x, _, _ = lattice(17, 17, 17)
-    cut = planes(*CORNER, VIEW, device)
-    caster = Caster(Grid(0 * x), Appearance(), device)
-    rgba = caster.cast(constant(1.0, COLOR), VIEW, HEADLIGHT, depth_range=cut.depth_range).rgba.cpu()
-    seen = rgba[..., 3] > 0.99
-    torch.testing.assert_close(rgba[seen][:, :3], (0.3 * torch.tensor(COLOR)).expand(seen.sum(), 3))
-
-
 @pytest.mark.parametrize(("error", "message", "change"), [
     (ShapeError, r"depth_range: expected \[2, 50, 60\], got \[2\]", {"depth_range": torch.zeros(2)}),
-    (ArgumentError, "depth_range: expected float32", {"depth_range": torch.zeros(2, 50, 60).double()}),
     (ArgumentError, "view: expected depth ranges and planes with faces", {"depth_range": None}),
     (ShapeError, r"faces.face: expected \[50, 60\], got \[2, 2\]", {"face": torch.zeros(2, 2).int()}),
-    (ArgumentError, "faces.face: expected int32, got torch.int8", {"face": torch.zeros(50, 60).char()}),
     (ArgumentError, "faces.normals: expected float32", {"normals": torch.zeros(1, 3).double()}),
-    (ShapeError, r"faces.normals: expected \[P, 3\], got \[1, 2\]", {"normals": torch.zeros(1, 2)}),
 ])  # fmt: skip
 def test_mistakes_are_named(error, message, change):
     cut = planes([[0.0, 0.0, 1.0]], [0.0], CAMERA, "cpu")

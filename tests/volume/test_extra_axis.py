@@ -6,7 +6,6 @@ import pytest
 import SimpleITK as sitk
 
 from tests.volume.volume_files import assert_holds, sample_values, whole
-from texgs.core.errors import ArgumentError
 from texgs.volume.sources import open_source
 
 VALUES = np.stack([sample_values(), sample_values() + 100, sample_values() + 200])  # [T, Z, Y, X]
@@ -26,25 +25,18 @@ def write_nrrd(path, place, kind, encoding, **fields):
 
 
 @pytest.mark.parametrize("place", range(4))
-@pytest.mark.parametrize("encoding", ["raw", "gzip"])
-@pytest.mark.parametrize("name", ["v.nrrd", "v.nhdr"])
+@pytest.mark.parametrize(("name", "encoding"), [("v.nrrd", "raw"), ("v.nhdr", "gzip")])
 def test_one_of_the_axis_is_read_wherever_it_is(tmp_path, place, encoding, name):
     write_nrrd(tmp_path / name, place, "time", encoding)
     for time in range(3):
         assert_holds(tmp_path / name, VALUES[time], (0.5, 2, 3), (4, 5, 6), time=time)
         assert open_source(tmp_path / name, time=time).note.startswith(f"step {time} of 3")
-    with pytest.raises(ArgumentError, match=r"dataset.volume.time: expected one of 0 to 2, got 3$"):
-        open_source(tmp_path / name, time=3)
-    with pytest.raises(ArgumentError, match=r"dataset.volume.channel: there is no such axis; leave it out"):
-        open_source(tmp_path / name, channel="1")
 
 
 @pytest.mark.parametrize("kind", ["list", "vector", "RGB-color"])
-def test_channels_and_layers_have_to_be_chosen(tmp_path, kind):
+def test_a_channel_or_a_layer_is_chosen(tmp_path, kind):
     words = {"content": "an image of four", "Segment0_Name": "of a left lung"}
     write_nrrd(tmp_path / "v.seg.nrrd", 0, kind, "gzip", **words)
-    with pytest.raises(ArgumentError, match="channel: expected one of 0 to 2, got none"):
-        open_source(tmp_path / "v.seg.nrrd")
     assert_holds(tmp_path / "v.seg.nrrd", VALUES[2], (0.5, 2, 3), channel="2")
     assert open_source(tmp_path / "v.seg.nrrd", channel="2").note == ""
 
@@ -75,5 +67,3 @@ def test_steps_and_components_of_metaimage(tmp_path, name, is_compressed):
     colours = sitk.GetImageFromArray(np.moveaxis(VALUES, 0, 3).copy(), isVector=True)
     sitk.WriteImage(colours, tmp_path / name, is_compressed)
     np.testing.assert_array_equal(whole(tmp_path / name, channel="1"), VALUES[1])
-    with pytest.raises(ArgumentError, match="channel: expected one of 0 to 2, got none"):
-        open_source(tmp_path / name)

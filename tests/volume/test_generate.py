@@ -25,10 +25,7 @@ NUMBERS = [
 ]
 TABLE = {  # in Bohr radii
     (1, 0, 0): lambda x, y, z, r: np.exp(-r) / sqrt(pi),
-    (2, 0, 0): lambda x, y, z, r: (2 - r) * np.exp(-r / 2) / sqrt(32 * pi),
-    (2, 1, 0): lambda x, y, z, r: z * np.exp(-r / 2) / sqrt(32 * pi),
     (2, 1, -1): lambda x, y, z, r: y * np.exp(-r / 2) / sqrt(32 * pi),
-    (3, 2, 0): lambda x, y, z, r: (3 * z**2 - r**2) * np.exp(-r / 3) / (81 * sqrt(6 * pi)),
     (3, 2, 1): lambda x, y, z, r: sqrt(2) * x * z * np.exp(-r / 3) / (81 * sqrt(pi)),
     (3, 2, 2): lambda x, y, z, r: (x**2 - y**2) * np.exp(-r / 3) / (81 * sqrt(2 * pi)),
     (4, 3, 0): lambda x, y, z, r: z * (5 * z**2 - 3 * r**2) * np.exp(-r / 4) / (3072 * sqrt(5 * pi)),

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from texgs.core.errors import ArgumentError
 from texgs.volume import motion as motions
 from texgs.volume.grid import Grid
 from texgs.volume.motion import Motion, motion
@@ -57,11 +56,6 @@ def test_displacements_are_linear_between_points_and_constant_beyond():
     moves = Motion(displacements, torch.tensor([0.0, 0, 0]), torch.tensor([4.0, 1, 1]))
     points = torch.tensor([[0.0, 0, 0], [1, 0.5, 0.2], [4, 1, 1], [9, 0, 0], [-3, 0, 0]])
     torch.testing.assert_close(moves.at(points)[:, 0], torch.tensor([0.0, 0.5, 2.0, 2.0, 0.0]))
-
-
-def test_nothing_to_see_is_told():
-    with pytest.raises(ArgumentError, match="expected some of the volume to be visible"):
-        motion(blob((0, 0, 0)), blob((0, 0, 0), scale=0.1), TF)
 
 
 def test_missing_samples_do_not_spread():

@@ -23,7 +23,7 @@ def write(path, values, **fields):
             file.header[name] = value
 
 
-@pytest.mark.parametrize("name", ["v.mrc", "v.map", "v.MAP", "v.ccp4", "v.rec", "v.map.gz", "v.mrc.gz"])
+@pytest.mark.parametrize("name", ["v.mrc", "v.MAP", "v.ccp4", "v.rec", "v.map.gz"])
 @pytest.mark.parametrize("dtype", ["int8", "int16", "uint16", "float32", "float16"])
 def test_maps_and_their_types(tmp_path, name, dtype):
     values = sample_values(dtype)
@@ -68,16 +68,15 @@ def test_a_map_without_a_cell_says_so(tmp_path):
         ({"nz": 12}, "cut off"),
     ],
 )
-@pytest.mark.parametrize("name", ["v.mrc", "v.map.gz"])
-def test_other_maps_are_refused(tmp_path, fields, message, name):
-    write(tmp_path / name, sample_values())
-    data = bytearray((gzip.decompress if name.endswith(".gz") else bytes)((tmp_path / name).read_bytes()))
+def test_other_maps_are_refused(tmp_path, fields, message):
+    write(tmp_path / "v.mrc", sample_values())
+    data = bytearray((tmp_path / "v.mrc").read_bytes())
     header = np.frombuffer(data, mrcfile.dtypes.HEADER_DTYPE, 1)
     for field, value in fields.items():
         header[field] = value
-    (tmp_path / name).write_bytes(gzip.compress(data) if name.endswith(".gz") else bytes(data))
+    (tmp_path / "v.mrc").write_bytes(data)
     with pytest.raises(ArgumentError, match=message):
-        open_source(tmp_path / name)
+        open_source(tmp_path / "v.mrc")
 
 
 @pytest.mark.parametrize("name", ["v.mrc", "v.map.gz"])

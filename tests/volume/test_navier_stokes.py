@@ -53,21 +53,6 @@ def test_curl_and_projection_of_known_fields():
     torch.testing.assert_close(to_field(project(to_spectrum(whirl + gradient))), whirl)
 
 
-def test_a_beltrami_flow_decays_exactly():
-    # Arnold, Beltrami, Childress: the vorticity is k times the velocity, so only viscosity acts.
-    x, y, z = lattice()
-    k, viscosity, time = 2, 0.05, 1.5
-    velocity = torch.stack(
-        [
-            1.0 * torch.sin(k * z) + 0.7 * torch.cos(k * y),
-            0.4 * torch.sin(k * x) + 1.0 * torch.cos(k * z),
-            0.7 * torch.sin(k * y) + 0.4 * torch.cos(k * x),
-        ]
-    )
-    (later,) = evolve(to_spectrum(velocity), viscosity, [time])
-    torch.testing.assert_close(to_field(later), velocity * exp(-viscosity * k**2 * time), atol=1e-13, rtol=0)
-
-
 def test_a_taylor_green_vortex_is_carried_by_a_wind():
     # In two dimensions it decays in place; seen from a moving frame it travels, which only advection can do.
     x, y, z = lattice()

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.volume.functions import GREY, STEPS, TENT, functions
+from tests.volume.functions import GREY, STEPS, functions
 from texgs.volume.overlay import overlay
 from texgs.volume.transfer import TransferFunction, combine, overlapping
 
@@ -27,13 +27,6 @@ def test_two_that_do_not_overlap_are_combined():
     high = TransferFunction(((1, 0.2), (2, 0)), GREY)
     assert overlapping({"low": low, "high": high}) is None
     assert overlay({"low": low, "high": high}) == combine({"low": low, "high": high})
-
-
-def test_one_twice_has_twice_the_extinction():
-    seen = overlay({"a": TENT, "b": TENT})
-    values = np.linspace(*TENT.support, 50)
-    np.testing.assert_allclose(seen(values)[:, 3], 1 - (1 - TENT(values)[:, 3]) ** 2, atol=4e-3)
-    np.testing.assert_allclose(seen(values)[1:-1, :3], TENT(values)[1:-1, :3], atol=1e-9)
 
 
 @given(st.lists(functions(), min_size=2, max_size=4))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from texgs.core.camera import orbit
-from texgs.core.light import HEADLIGHT, Light
+from texgs.core.light import HEADLIGHT
 from texgs.volume import render
-from texgs.volume.render import Times, directions, render_views
+from texgs.volume.render import Times, render_views
 from texgs.volume.view_set import View
 
 
@@ -56,13 +56,3 @@ def test_an_interruption_loses_no_file_and_no_time(views, tmp_path, monkeypatch)
     assert [entry["is_first"] for entry in after.values()] == [True, False, False, True, False, False]
     assert times.first == [entry["ms"] for entry in after.values() if entry["is_first"]]
     assert times.others == [entry["ms"] for entry in after.values() if not entry["is_first"]]
-
-
-def test_viewer_and_lights_are_distant():
-    camera = orbit(-60, 20, 2, 40, 80, 80)
-    to_viewer, to_light = directions(camera, HEADLIGHT)
-    np.testing.assert_allclose(to_viewer, -camera.viewmat[2, :3], atol=1e-7)
-    np.testing.assert_array_equal(to_viewer, to_light)
-    to_viewer, to_light = directions(camera, Light("directional", 90, 0))
-    np.testing.assert_allclose(to_viewer, -camera.viewmat[2, :3], atol=1e-7)
-    np.testing.assert_allclose(to_light, [0, 0, -1], atol=1e-12)

@@ -122,7 +122,7 @@ def test_many_labels_are_grouped():
     assert len(suggest([5, 0, 3], 0, 1, count=4)) == 1, "there are no more values"
 
 
-@pytest.mark.parametrize("count", range(1, 9))
+@pytest.mark.parametrize("count", [1, 2, 5, 8])
 @pytest.mark.parametrize("values", [CT, RNG.exponential(1, 10_000)], ids=["CT", "simulation"])
 def test_the_count_is_kept(values, count):
     assert len(suggested(values, count)[0]) == count
@@ -191,11 +191,7 @@ def of_volume(tmp_path):
 
 
 @pytest.mark.parametrize("dtype", ["uint16", "float32"])
-@pytest.mark.parametrize(
-    "outliers",
-    [{(3, 3, 3): 4095}, {(7, 8, 9): 65535, (20, 3, 30): 60000}, {(0, 0, 0): 65535}, {(9, 40, 9): 1000}],
-    ids=["one hot pixel", "two", "in the corner", "four times as bright"],
-)
+@pytest.mark.parametrize("outliers", [{(7, 8, 9): 65535, (20, 3, 30): 60000}, {(9, 40, 9): 1000}])
 def test_outliers_do_not_change_what_is_suggested(of_volume, outliers, dtype):
     values = CELLS.astype(dtype)
     values[*np.transpose([*outliers])] = 20
@@ -246,7 +242,7 @@ def test_an_even_background_at_the_upper_end_is_left_out():
     assert numbers_at(basic, 100)
 
 
-@pytest.mark.parametrize("code", [-2000, -3024, -32768])
+@pytest.mark.parametrize("code", [-2000, -32768])
 def test_padding_of_a_ct_changes_nothing(of_volume, code):
     corners = np.hypot(*np.mgrid[:SIZE, :SIZE] - SIZE / 2) > SIZE / 2 - 1
     values = BODY.round().astype(np.int16)
@@ -288,7 +284,7 @@ def test_the_lung_of_a_ct_is_in_a_function_and_air_is_not(materials, kind):
     assert all(shown[1:6])
 
 
-@pytest.mark.parametrize("levels", [40, 49, 77, 130, 200, 255])
+@pytest.mark.parametrize("levels", [40, 77, 255])
 @pytest.mark.parametrize("values", [RNG.lognormal(0, 0.5, 300_000), RNG.gamma(4, 1, 300_000)])
 def test_bins_that_hold_no_whole_number_are_no_valleys(values, levels):
     """A peak of so few whole numbers is one peak: what is beside it is left out as of values between."""

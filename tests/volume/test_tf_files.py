@@ -101,7 +101,6 @@ class TestParaView:
         ("{", "expected JSON"),
         ("[]", 'expected a transfer function with "format": "texgs-tf" or a list of ParaView presets'),
         ('{"a": 1}', "got neither; export it from ParaView, or take a"),
-        ("3", "got neither"),
         ('["RGBPoints"]', "got neither"),
         ('{"format": "texgs-tf", "version": 2}', "version: expected 1, got 2; update texgs"),
         ('{"format": "texgs-tf", "version": 1, "opacity": []}', "expected the keys opacity, color"),
@@ -112,18 +111,11 @@ class TestParaView:
             "one preset, got 2: a, b; export",
         ),
         ('[{"RGBPoints": [0, 0, 0]}]', "RGBPoints: expected four numbers per point, got 3 numbers"),
-        ('[{"RGBPoints": []}]', "RGBPoints: expected four numbers per point, got 0"),
-        ('[{"RGBPoints": "abcd"}]', "RGBPoints: expected a list of numbers, got 'abcd'"),
         ('[{"RGBPoints": [0, 0, 0, "x"]}]', "RGBPoints: expected a list of numbers"),
-        (
-            '[{"RGBPoints": [0, 0, 0, 255, 1, 0, 0, 0]}]',
-            r"RGBPoints: expected r, g, b in \[0, 1\], got \[0, 0, 255\]",
-        ),
         (
             '[{"RGBPoints": [0, 1e19, 0, 0, 1, 0, 0, 1], "ColorSpace": "Diverging"}]',
             r"RGBPoints: expected r, g, b in \[0, 1\]",
         ),
-        ('[{"RGBPoints": [0, 0, 0, 0], "Points": [0, 1]}]', "Points: expected four numbers per point, got 2"),
         ('[{"RGBPoints": [0, 0, 0, 0], "ColorSpace": "CMYK"}]', "ColorSpace: expected one of RGB, HSV"),
     ],
 )

@@ -30,39 +30,31 @@ def positions(path: Path, **options) -> Path:
     return path
 
 
-def appended(path: Path) -> Path:
-    """Two series that know nothing of each other."""
-    for values in (A, B):
-        tifffile.imwrite(path, values, append=True, photometric="minisblack")
-    return path
-
-
 @pytest.mark.parametrize("compression", [None, "zlib"])
 def test_an_image_of_several_is_chosen_by_name_or_number(tmp_path, compression):
     path = positions(tmp_path / "v.ome.tif", compression=compression)
     for chosen, values, depth in (("left", A, 2.0), ("1", B, 4.0), ("right", B, 4.0), ("0", A, 2.0)):
         assert_holds(path, values, (0.5, 0.5, depth), image=chosen)
-    with pytest.raises(
-        ArgumentError, match=r"volume.image: expected one of 0 \(left 13 x 12 x 6\), 1 \(right"
-    ):
-        open_source(path)
-    with pytest.raises(ArgumentError, match="got middle"):
-        open_source(path, image="middle")
+    for keys, got in (({}, "none"), ({"image": "middle"}, "middle")):
+        with pytest.raises(ArgumentError, match=rf"0 \(left 13 x 12 x 6\), 1 \(right 13 .*, got {got}"):
+            open_source(path, **keys)
 
 
 def test_series_that_were_appended_are_not_one_on_top_of_the_other(tmp_path):
-    path = appended(tmp_path / "v.tif")
+    path = tmp_path / "v.tif"
+    for values in (A, B):
+        tifffile.imwrite(path, values, append=True, photometric="minisblack")
     assert_holds(path, B, image="1")
-    with pytest.raises(
-        ArgumentError, match=r"expected one of 0 \(13 x 12 x 6\), 1 \(13 x 12 x 6\), got none"
-    ):
+    with pytest.raises(ArgumentError, match=r"one of 0 \(13 x 12 x 6\), 1 \(13 x 12 x 6\), got none"):
         open_source(path)
 
 
 @pytest.mark.parametrize("reduced", [0, 1])
-def test_a_thumbnail_is_no_slice(tmp_path, reduced):
+def test_a_thumbnail_is_no_slice_and_pages_may_be_compressed_in_different_ways(tmp_path, reduced):
     with tifffile.TiffWriter(tmp_path / "v.tif") as file:
-        file.write(A, photometric="minisblack", metadata=None, compression="zlib")
+        for z, plane in enumerate(A):
+            compression = "zlib" if z % 2 else None
+            file.write(plane, photometric="minisblack", metadata=None, compression=compression)
         file.write(A[3, ::2, ::2], photometric="minisblack", metadata=None, subfiletype=reduced)
     assert_holds(tmp_path / "v.tif", A)
 
@@ -80,13 +72,6 @@ def test_the_largest_level_of_a_pyramid_is_read(tmp_path):
         file.write(A, subifds=1, tile=(16, 16), metadata={"axes": "ZYX", **UM})
         file.write(A[:, ::2, ::2], subfiletype=1, tile=(16, 16))
     assert_holds(tmp_path / "v.ome.tif", A, (0.5, 0.5, 2.0))
-
-
-def test_pages_that_are_compressed_in_different_ways_are_one_stack(tmp_path):
-    with tifffile.TiffWriter(tmp_path / "v.tif") as file:
-        for z, plane in enumerate(A):
-            file.write(plane, metadata=None, compression="zlib" if z % 2 else None)
-    assert_holds(tmp_path / "v.tif", A)
 
 
 def hyperstack(axes: str) -> np.ndarray:
@@ -111,8 +96,6 @@ def test_any_order_of_time_channels_and_slices(tmp_path, axes, compression):
     assert open_source(path, channel="0").note == "step 0 of 3; dataset.volume.time chooses another"
     with pytest.raises(ArgumentError, match=r"expected one of 0 \(DAPI\), 1 \(GFP\), got none"):
         open_source(path)
-    with pytest.raises(ArgumentError, match=r"volume.time: expected one of 0 to 2, got 3"):
-        open_source(path, channel="0", time=3)
 
 
 @pytest.mark.parametrize("compression", [None, "zlib"])
@@ -121,8 +104,6 @@ def test_a_hyperstack_of_imagej(tmp_path, compression):
     kinds = {"imagej": True, "metadata": told, "resolution": (2, 2), "compression": compression}
     tifffile.imwrite(path, hyperstack("TZCYX"), **kinds)
     assert_holds(path, hyperstack("TCZYX")[2, 1], (0.5, 0.5, 3.0), time=2, channel="1")
-    with pytest.raises(ArgumentError, match=r"channel, .*: expected one of 0 to 1, got none"):
-        open_source(path)
 
 
 def test_one_header_for_a_whole_hyperstack(tmp_path):
@@ -132,20 +113,34 @@ def test_one_header_for_a_whole_hyperstack(tmp_path):
     with tifffile.TiffFile(path) as file:
         assert len(file.pages) == 1
     assert_holds(path, hyperstack("TCZYX")[1, 1], time=1, channel="1")
-
-
-def test_a_step_that_follows_uncompressed_is_read_as_it_is(tmp_path):
-    path = tmp_path / "v.ome.tif"
-    tifffile.imwrite(path, hyperstack("TCZYX")[:, 0], ome=True, metadata={"axes": "TZYX"})
-    assert isinstance(open_source(path, time=1), RawSource)
+    tifffile.imwrite(path, hyperstack("TCZYX")[:, 0], imagej=True, metadata={"axes": "TZYX"})
+    assert isinstance(open_source(path, time=1), RawSource)  # a step that lies in one piece
     assert_holds(path, hyperstack("TCZYX")[1, 0], time=1)
 
 
 def test_steps_alone_are_taken_for_slices_and_it_is_said(tmp_path):
     tifffile.imwrite(tmp_path / "v.tif", A, imagej=True, metadata={"axes": "TYX"})
-    source = open_source(tmp_path / "v.tif")
-    np.testing.assert_array_equal(source.slices(0, 6), A)
-    assert "steps of time are taken for slices" in source.note
+    assert_holds(tmp_path / "v.tif", A)
+    assert "steps of time are taken for slices" in open_source(tmp_path / "v.tif").note
+
+
+NANOMETRES = {"PhysicalSizeX": 500, "PhysicalSizeXUnit": "nm", "PhysicalSizeY": 0.25, "PhysicalSizeZ": 3.0}
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        {"imagej": True, "resolution": (2, 4), "metadata": {"spacing": -3.0, "unit": "um", "axes": "ZYX"}},
+        {"ome": True, "metadata": {"axes": "ZYX", **NANOMETRES}},
+    ],
+)
+def test_the_spacing_that_microscopes_write(tmp_path, written):
+    tifffile.imwrite(tmp_path / "v.tif", A, photometric="minisblack", **written)
+    x, y, z = open_source(tmp_path / "v.tif").spacing
+    assert (y / x, z / x) == pytest.approx((0.5, 6.0))
+    assert open_source(tmp_path / "v.tif").note == ""
+    assert_holds(tmp_path / "v.tif", A)
+    assert open_source(tmp_path / "v.tif", spacing=(1.0, 1.0, 2.0)).spacing == (1, 1, 2)
 
 
 def ome(own: str, images: str) -> dict[str, object]:
@@ -229,9 +224,7 @@ def folder_of(folder: Path, names: dict[str, np.ndarray]) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(
-    "name", ["s{}_ch{}", "c{1}_z{0:03}", "img_channel{1:03}_position000_z{0:03}", "a{} C{}"]
-)
+@pytest.mark.parametrize("name", ["s{}_ch{}", "img_channel{1:03}_position000_z{0:03}"])
 def test_a_folder_with_channels_beside_slices(tmp_path, name):
     planes = {name.format(z, c + 1): (A, B)[c][z] for z in range(6) for c in range(2)}
     folder = folder_of(tmp_path / "v", planes)
@@ -248,7 +241,7 @@ def test_a_folder_with_steps_beside_slices(tmp_path):
     assert open_source(folder).note.startswith("step 0 of 3; dataset.volume.time chooses another; TIFF tells")
 
 
-@pytest.mark.parametrize("name", ["s{}", "s{:03}", "2026-11-30_run12_{:04}", "c{}", "{}", "t{}_2 mm"])
+@pytest.mark.parametrize("name", ["s{:03}", "2026-11-30_run12_{:04}", "{}", "t{}_2 mm"])
 def test_one_number_counts_slices_whatever_is_around_it(tmp_path, name):
     planes = {name.format(z + 8): plane for z, plane in enumerate(A)}
     assert_holds(folder_of(tmp_path / "v", planes), A)

@@ -15,10 +15,6 @@ RAMP = ((0, 0), (1, 1))
 
 
 class TestEvaluation:
-    def test_values_of_a_tent(self):
-        expected = [[1, 0, 0, 0], [5 / 6, 0, 1 / 6, 0.4], [2 / 3, 0, 1 / 3, 0.8], [0, 0, 1, 0]]
-        np.testing.assert_allclose(TENT([1, 1.5, 2, 99]), expected, atol=1e-15)
-
     @given(functions(), st.lists(st.floats(-9, 9), min_size=1))
     def test_equals_numpys_interpolation(self, tf, values):
         opacity, color = np.array(tf.opacity), np.array(tf.color)
@@ -103,28 +99,17 @@ class TestDictionary:
     ("opacity", "color", "message"),
     [
         (5, GREY, "opacity: expected a list of points"),
-        ([], GREY, "at least 2 points, got 0"),
         ([(0, 1)], GREY, "at least 2 points, got 1"),
         ([(0, 0), (1, 0)], GREY, "expected some values with opacity above 0"),
-        ([(1, 0), (1, 1)], GREY, "expected some values with opacity above 0"),
         ([(0, 0), (2, 1), (1, 0)], GREY, r"opacity\[2\]: expected ascending values, got 1 after 2"),
         ([(0, 0), (1, 0), (1, 1), (1, 0)], GREY, r"opacity\[3\]: expected at most two points .* three at 1"),
         ([(0, 0), (1, 1.5)], GREY, r"opacity\[1\]: expected opacity in \[0, 1\], got \(1.5\)"),
-        ([(0, -0.1), (1, 1)], GREY, r"opacity\[0\]: expected opacity in \[0, 1\]"),
         ([(0, 0), (math.nan, 1)], GREY, r"opacity\[1\]: expected finite numbers, got \(nan, 1\)"),
         ([(0, 0), (10**400, 1)], GREY, r"opacity\[1\]: expected finite numbers"),
-        (
-            [(0, 0), (1, 1, 1)],
-            GREY,
-            r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1, 1, 1\)",
-        ),
-        ([(0, 0), 1], GREY, r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1\)"),
         ([(0, 0), (1, "a")], GREY, r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1, 'a'\)"),
-        ("ab", GREY, r"opacity\[0\]: expected the numbers"),
         (RAMP, [], "color: expected at least 1 points, got 0"),
         (RAMP, [(0, 1, 1)], r"color\[0\]: expected the numbers \(value, r, g, b\), got \(0, 1, 1\)"),
         (RAMP, [(0, 1, 255, 1)], r"color\[0\]: expected r, g, b in \[0, 1\], got \(1, 255, 1\)"),
-        (RAMP, [(1, 0, 0, 0), (0, 0, 0, 0)], r"color\[1\]: expected ascending values"),
     ],
 )
 def test_wrong_points_are_named(opacity, color, message):

@@ -123,34 +123,24 @@ def test_directions_of_lights():
     torch.testing.assert_close(HEADLIGHT.direction(orbit(30, 40, 3, 30, 8, 8)), expected, atol=1e-6, rtol=0)
     front = Light("directional", -90, 0).direction(orbit(30, 40, 3, 30, 8, 8))
     torch.testing.assert_close(front, torch.tensor([0.0, 0, 1]).double())
-    with pytest.raises(ArgumentError, match="light: expected headlight or directional, got 'sun'"):
-        Light("sun")
 
 
 @pytest.mark.parametrize(
     ("edit", "message"),
     [
-        (lambda d: d.update(frames=[]), "transforms_train.json: expected an object with a list of frames"),
         (lambda d: d.pop("frames"), "transforms_train.json: expected an object with a list of frames"),
         (lambda d: d["frames"][1].pop("file_path"), "frame 1: file_path: expected the path of an image"),
         (lambda d: d["frames"][2].pop("transform_matrix"), r"frame 2 \(r_0002\): transform_matrix: expected"),
         (lambda d: d["frames"][2].update(transform_matrix=[[1, 2], [3]]), "four rows of four numbers"),
-        (
-            lambda d: d["frames"][2].update(transform_matrix=[[1, 2]]),
-            r"expected \[4, 4\] numbers, got \[1, 2\]",
-        ),
         (lambda d: d["frames"][0].update(transform_matrix=[[0.0] * 4] * 4), r"frame 0 .*singular, scaled"),
         (lambda d: d["frames"][0].update(transform_matrix=np.diag([1, 1, -1, 1]).tolist()), "mirrored"),
         (lambda d: d["frames"][0]["transform_matrix"][0].__setitem__(3, float("nan")), "not finite"),
-        (lambda d: d["frames"][1].update(light={"kind": "lamp"}), r"frame 1 \(r_0001\): light: .*lamp"),
         (lambda d: d["frames"][1]["light"].update(polar=400), r"frame 1 .*: light: .* degrees, got 400"),
         (lambda d: d["frames"][1]["light"].pop("polar"), r"frame 1 .*expected the key polar, found kind"),
         (lambda d: d.update(w=13), "expected 13 x 8 pixels as w and h say, got 12 x 8"),
         (lambda d: d.pop("w"), "expected the key w, found camera_angle_x, h"),
-        (lambda d: d.update(fl_y="wide"), "fl_y: expected a finite number, got 'wide'"),
         (lambda d: d.update(fl_x=0), "expected focal lengths above 0, got 0"),
         (lambda d: (d.pop("fl_x"), d.update(camera_angle_x=pi)), "expected radians between 0 and pi"),
-        (lambda d: (d.pop("fl_x"), d.pop("camera_angle_x")), "expected the key camera_angle_x"),
     ],
 )
 def test_mistakes_in_the_file_are_named(folder, edit, message):
@@ -175,5 +165,3 @@ def test_mistakes_in_the_folder_are_named(folder):
     images[1].unlink()
     images[2].unlink()
     refused(r"r_0001.png: no such image; 2 of 3")
-    (folder / "transforms_train.json").write_text("{")
-    refused(r"transforms_train.json: expected JSON")

@@ -5,7 +5,7 @@ import pytest
 import pyvista
 from vtkmodules.vtkIOParallelXML import vtkXMLPImageDataWriter
 
-from tests.volume.volume_files import SPACING, assert_holds, image_data, sample_values
+from tests.volume.volume_files import SPACING, assert_holds, image_data, sample_values, write_image
 from texgs.core.errors import ArgumentError
 from texgs.volume.sources import open_source
 
@@ -36,15 +36,20 @@ def test_samples_of_cells_lie_in_their_middles(tmp_path):
     assert_holds(tmp_path / "v.vtr", VALUES, SPACING, (10.25, 11, 11.5))
 
 
-def test_points_come_before_cells(tmp_path):
+def test_points_come_before_cells_and_vectors_are_no_field(tmp_path):
     image = cells(pyvista.ImageData(dimensions=(14, 13, 12)))
     points = np.arange(14 * 13 * 12.0)
-    image.point_data["p"] = points
+    image.point_data["velocity"] = np.stack([points] * 3, axis=1)
+    image.point_data["p"], image.point_data["q"] = points, -points
+    image.point_data.active_vectors_name = "velocity"
     image.save(tmp_path / "v.vti")
-    note = "array p; dataset.volume.variable chooses another (density)"
+    note = "array p; dataset.volume.variable chooses another (q, density)"
     assert open_source(tmp_path / "v.vti").note == note
-    assert_holds(tmp_path / "v.vti", points.reshape(12, 13, 14))
+    for keys, values in (({}, points), ({"variable": "q"}, -points)):
+        assert_holds(tmp_path / "v.vti", values.reshape(12, 13, 14), **keys)
     assert_holds(tmp_path / "v.vti", VALUES, variable="density")
+    with pytest.raises(ArgumentError, match="variable: expected one of p, q, density, got velocity"):
+        open_source(tmp_path / "v.vti", variable="velocity")
 
 
 @pytest.mark.parametrize("name", ["v.vtr", "v.vtk"])
@@ -59,13 +64,13 @@ def test_a_rectilinear_grid_has_to_be_even(tmp_path, name):
         open_source(tmp_path / name)
 
 
+def write_pieces(path):
+    """Write an image in three pieces."""
+    write_image(path, image_data(VALUES), vtkXMLPImageDataWriter, NumberOfPieces=3, EndPiece=2)
+
+
 def test_a_file_in_pieces_needs_them_all(tmp_path):
-    writer = vtkXMLPImageDataWriter()
-    writer.SetFileName(str(tmp_path / "v.pvti"))
-    writer.SetInputData(image_data(VALUES))
-    writer.SetNumberOfPieces(3)
-    writer.SetEndPiece(2)
-    writer.Write()
+    write_pieces(tmp_path / "v.pvti")
     assert_holds(tmp_path / "v.pvti", VALUES, SPACING)
     piece = tmp_path / "v_1.vti"
     whole = piece.read_bytes()

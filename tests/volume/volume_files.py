@@ -77,6 +77,16 @@ def by_h5py(path: Path, values: np.ndarray) -> None:
         file["density"] = values
 
 
+def write_slc(path: Path, values: np.ndarray) -> None:
+    """Write samples of 8 bits, a run for each row where the name says that they are packed."""
+    values, is_packed = values.astype("u1"), path.name.startswith("packed")
+    text = f"11111 13 12 11 8 1.0 1.0 2.0 1 0 0 {int(is_packed)} 2 2 X".encode() + bytes(12)
+    for plane in values:
+        runs = b"".join(bytes([0x80 | len(row)]) + row.tobytes() for row in plane) + b"\x00"
+        text += f"{len(runs)} X".encode() + runs if is_packed else plane.tobytes()
+    path.write_bytes(text)
+
+
 def page_by_page(path: Path, values: np.ndarray) -> None:
     with tifffile.TiffWriter(path) as writer:
         for page in values:
@@ -112,4 +122,5 @@ NAMES = [
     pytest.param(name, marks=pytest.mark.subprocess) if name.endswith(BY_A_PROCESS) else name
     for name in WRITERS
 ]
+READ_ON_DEMAND = ("plain.mha", "plain.mhd", "raw.nrrd", "raw.nhdr", "little.tif", "big.tiff", "rows.npy")
 HAS_SPACING = tuple(name for name in WRITERS if not name.endswith((".tif", ".tiff", ".npy", ".h5")))
