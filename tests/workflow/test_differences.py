@@ -10,7 +10,7 @@ from texgs.config.compose import compose
 from texgs.config.describe import keys, value_at
 from texgs.core.errors import ConfigError
 from texgs.edit.method import methods
-from texgs.report.differences import ALL, differences, published, text
+from texgs.report.differences import NO_KEY, differences, published, text
 
 STYLES = "style, style_untextured"
 
@@ -22,7 +22,7 @@ def cells(table):
 
 def told(*arguments, **options):
     """Rows of keys: what, the paper, here, in."""
-    return [row[:4] for row in cells(differences(*arguments, **options)) if row[3] != ALL]
+    return [row[:4] for row in cells(differences(*arguments, **options)) if row[3] != NO_KEY]
 
 
 def override(claim):

@@ -11,11 +11,11 @@ from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fitting.settings import Losses
 from texgs.raster import arguments, native
 from texgs.raster.autograd import SCENE, Gradients, Image, SurfelTensors, View
-from texgs.raster.losses import planar, scaled
+from texgs.raster.losses import planar, scale
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Target
 
-SMOOTHED = len(MATERIAL)
+MATERIAL_CHANNELS = len(MATERIAL)
 Compared = native.struct("texgs_target", "p color alpha, f l1 dssim alpha_l1 alpha_dssim normal smoothness")
 native.declare("texgs_rendered_loss", *SCENE, Image, Image, Compared, Gradients, "p")
 
@@ -51,15 +51,15 @@ def view_loss(
 
 
 def comparison(target: Target, weights: Losses) -> native.Struct:
-    """Return what the library compares a view with, and the weights of its losses."""
+    """Return the targets of a view and the weights of its losses, as a structure of the library."""
     l1 = 1 - weights.dssim
     of_alpha = (weights.alpha * l1 * weights.alpha_l1, weights.alpha * weights.dssim)
-    factors = (l1, weights.dssim, *of_alpha, weights.normal, weights.smoothness * SMOOTHED)
+    factors = (l1, weights.dssim, *of_alpha, weights.normal, weights.smoothness * MATERIAL_CHANNELS)
     return Compared(planar(target.color), target.alpha.contiguous(), *(target.share * x for x in factors))
 
 
 class _ViewLoss(torch.autograd.Function):
-    """Gradients are there with the value, before they are asked for; autograd hands them on, once."""
+    """Computes value and gradients together in the forward pass; autograd uses them once."""
 
     @staticmethod
     def forward(
@@ -78,12 +78,12 @@ class _ViewLoss(torch.autograd.Function):
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
-        gradients, ctx.gradients = ctx.gradients, None  # autograd may add to what it is handed
-        return *[None] * 4, *scaled(gradients, upstream)
+        gradients, ctx.gradients = ctx.gradients, None  # autograd may add to returned tensors
+        return *[None] * 4, *scale(gradients, upstream)
 
 
 def material_maps(parameters: Mapping[str, Tensor], shading: Shading) -> Tensor | None:
-    """Return the material of each surfel as features [N, 4]; None where all share one, or there is none."""
+    """Return the material of each surfel as features [N, 4], or None if shared or missing."""
     has_maps = "ambient" in parameters and len(parameters["ambient"]) > 1
     if not has_maps or not isinstance(shading, ShadingModel):
         return None

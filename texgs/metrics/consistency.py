@@ -12,8 +12,8 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 
-SHORT, LONG = 1, 7  # views from one to the other of a pair, as is usual for stylised scenes
-OPAQUE = 0.5  # least alpha of a pixel that has a depth
+SHORT_RANGE, LONG_RANGE = 1, 7  # views from one to the other of a pair, as is usual for stylised scenes
+OPAQUE_ALPHA = 0.5  # least alpha of a pixel that has a depth
 TOLERANCE = 0.01  # share of the depth by which two views of the same point may differ
 
 # How far an image [H, W, 3], which differs in some pixels [H, W] at most, is from a view, such as by LPIPS.
@@ -85,10 +85,10 @@ def warp(source: SeenFrame, target: SeenFrame, tolerance: float = TOLERANCE) -> 
     x, y = (pixels - 0.5).unbind(-1)
     warped = remap(source.image.permute(2, 0, 1)[None], x[None], y[None], align_corners=True)
     inside = ((pixels >= 0.5) & (pixels <= pixels.new_tensor([width - 0.5, height - 0.5]))).all(-1)
-    same = (target.alpha >= OPAQUE) & inside & (z > 0)
+    same = (target.alpha >= OPAQUE_ALPHA) & inside & (z > 0)
     column, row = (at.nan_to_num(0, 0, 0).floor().long() for at in (x, y))
     for down in (row, row + 1):
         for right in (column, column + 1):
             at = (down.clamp(0, height - 1), right.clamp(0, width - 1))
-            same &= (source.alpha[at] >= OPAQUE) & ((source.depth[at] - z).abs() <= tolerance * z)
+            same &= (source.alpha[at] >= OPAQUE_ALPHA) & ((source.depth[at] - z).abs() <= tolerance * z)
     return warped[0].permute(1, 2, 0), same

@@ -18,11 +18,11 @@ from texgs.raster.reference.losses import similarities
 from texgs.volume.images import over_white, smaller
 from texgs.volume.view_set import View
 
-BEST = 100.0  # dB, of equal images
-VISIBLE = 0.01  # alpha; pixels of an object have more in one of two images
+MAX_PSNR = 100.0  # dB, of equal images
+VISIBLE_ALPHA = 0.01  # alpha; pixels of an object have more in one of two images
 WINDOW = 3  # pixels of the side of a square whose mean alpha is compared
 KEPT_ALPHA = 0.5  # share of that mean
-WHOLE_FROM = 0.995  # fits that lose nothing have 0.997 or more, one without some leaves of a bonsai 0.991
+WHOLE_SHARE = 0.995  # fits that lose nothing have 0.997 or more, one without some leaves of a bonsai 0.991
 Item = TypeVar("Item")
 Read = TypeVar("Read")
 
@@ -31,7 +31,7 @@ def psnr(image: Tensor, target: Tensor) -> float:
     """Return the PSNR in dB of an image [H, W, C], clamped to [0, 1], over all pixels; 100 if equal."""
     from kornia.metrics import psnr as of_unit_range
 
-    return min(of_unit_range(image.clamp(0, 1), target, 1.0).item(), BEST)  # NaN stays NaN
+    return min(of_unit_range(image.clamp(0, 1), target, 1.0).item(), MAX_PSNR)  # NaN stays NaN
 
 
 def ssim(image: Tensor, target: Tensor) -> float:
@@ -55,7 +55,7 @@ def compare(image: Render, target: Render) -> dict[str, float]:
 
 def object_of(image: Render, target: Render) -> Tensor:
     """Return the pixels [H, W] in which one of two images shows something."""
-    return (image.alpha > VISIBLE) | (target.alpha > VISIBLE)
+    return (image.alpha > VISIBLE_ALPHA) | (target.alpha > VISIBLE_ALPHA)
 
 
 def shown_share(alpha: Tensor, truth: Tensor) -> float | None:
@@ -74,7 +74,7 @@ def shown_share(alpha: Tensor, truth: Tensor) -> float | None:
 
 def what_is_lost(share: float | None) -> str:
     """Return what to say of a fit that misses parts, and what to do; nothing where it does not."""
-    if share is None or share >= WHOLE_FROM:
+    if share is None or share >= WHOLE_SHARE:
         return ""
     return (
         f"the model shows {100 * share:.1f} % of what test views show, so that parts are missing; fit it in "

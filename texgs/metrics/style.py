@@ -10,7 +10,7 @@ from torch.nn import functional as F
 
 from texgs.models.nnfm import StyleFeatures, nnfm
 
-ON_OBJECT = 0.5  # mean alpha from which a feature counts
+OBJECT_ALPHA = 0.5  # mean alpha from which a feature counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class StyleTarget:
 def on_object(layers: Sequence[Tensor], share: Tensor) -> Tensor:
     """Return layers [c, h, w] as rows [n, C] of the n positions where more than half of a share [H, W] is."""
     height, width = layers[0].shape[1:]
-    where = F.adaptive_avg_pool2d(share[None], (height, width))[0] > ON_OBJECT
+    where = F.adaptive_avg_pool2d(share[None], (height, width))[0] > OBJECT_ALPHA
     return torch.cat([layer.permute(1, 2, 0)[where] for layer in layers], dim=1).float()
 
 

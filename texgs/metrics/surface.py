@@ -11,8 +11,8 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.volume.isosurface import Mesh
 
-STEEPEST = 3.0  # slope of a surface that is taken for one
-STEPS = 1 << 20  # of depth per world unit in which points of one pixel are compared
+MAX_SLOPE = 3.0  # slope of a surface that is taken for one
+DEPTH_STEPS = 1 << 20  # of depth per world unit in which points of one pixel are compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,20 +73,20 @@ def nearest(points: Tensor, camera: Camera) -> tuple[Tensor, Tensor, Tensor]:
     on_image = (z > 0) & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
     pixel = torch.where(on_image, v * camera.width + u, -1)
     index = torch.arange(len(points))
-    key = ((z * STEPS).long() << 32) + index
+    key = ((z * DEPTH_STEPS).long() << 32) + index
     first = torch.full((camera.width * camera.height,), torch.iinfo(torch.int64).max)
     first.scatter_reduce_(0, pixel[on_image], key[on_image], "amin")
     return torch.where(first < torch.iinfo(torch.int64).max, first & (2**32 - 1), -1), pixel, z
 
 
-def seen(points: Points, cameras: Sequence[Camera], tolerance: float) -> Tensor:
+def are_visible(points: Points, cameras: Sequence[Camera], tolerance: float) -> Tensor:
     """Return which points [N] bool a camera sees: nothing is nearer in their pixel, but for the tolerance."""
     is_seen = torch.zeros(len(points.places), dtype=torch.bool)
     for camera in cameras:
         first, pixel, z = nearest(points.places, camera)
         rays = camera.position.to(points.places) - points.places
         cosine = (rays * points.normals).sum(1) / rays.norm(dim=1)
-        slope = (1 / cosine.square() - 1).clamp_min(0).sqrt().clamp_max(STEEPEST)
+        slope = (1 / cosine.square() - 1).clamp_min(0).sqrt().clamp_max(MAX_SLOPE)
         in_front = z[first[pixel.clamp_min(0)].clamp_min(0)]
         # A surface that is seen from the side is at several depths in one pixel.
         margin = tolerance + 1.5 * slope * z / float(camera.K[0, 0])

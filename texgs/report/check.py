@@ -20,35 +20,41 @@ from texgs.core.light import HEADLIGHT, Light
 from texgs.core.progress import progress
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
-from texgs.metrics.quality import BEST, compare
+from texgs.metrics.quality import MAX_PSNR, compare
 from texgs.report.beside_volume import pictures
 from texgs.report.results import CheckResult
-from texgs.scene.cut_view import beside
+from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin
 
-MISSED = 0.05  # share of new views that may be farther off than the floor
-LIT, EDITED = 0.7, 0.5  # shares of views under a light from anywhere, and of opacities and palettes edited
-OPACITIES = (0.2, 1.5)  # factors
-WORST = 4  # views that are shown
+MISSED_SHARE = 0.05  # share of new views that may be farther off than the floor
+LIT_SHARE, EDITED_SHARE = (
+    0.7,
+    0.5,
+)  # shares of views under a light from anywhere, and of opacities and palettes edited
+OPACITY_FACTORS = (0.2, 1.5)  # factors
+WORST_COUNT = 4  # views that are shown
 
 
 def check(
     scene: Scene, composition: Composed, twin: Twin, lens: Lens, count: int, seed: int, file: Path
 ) -> CheckResult:
-    """Return how close `shots` of a scene are to those of its volume, and write it to a file of JSON.
+    """Return how close `random_shots` of a scene are to those of its volume, and write it to a file of JSON.
 
     The worst are drawn into a PNG beside it.
     """
-    floor_of([BEST] * count)  # refuses too few before the work
-    drawn, psnr, on_object, share = list(shots(scene, lens, count, seed)), *(list[float]() for _ in range(3))
+    floor_of([MAX_PSNR] * count)  # refuses too few before the work
+    drawn, psnr, on_object, share = (
+        list(random_shots(scene, lens, count, seed)),
+        *(list[float]() for _ in range(3)),
+    )
     for _, camera, changed in progress(drawn, title="check", unit="view"):
-        scores = compare(*beside(composition, camera, changed, twin))
+        scores = compare(*scene_and_volume(composition, camera, changed, twin))
         psnr.append(scores["psnr"])
-        on_object.append(scores.get("object_psnr", BEST))
+        on_object.append(scores.get("object_psnr", MAX_PSNR))
         share.append(scores.get("shown", 1.0))
-    worst = sorted(range(count), key=psnr.__getitem__)[:WORST]
-    shown = [pictures(*beside(composition, *drawn[index][1:], twin)) for index in worst]
+    worst = sorted(range(count), key=psnr.__getitem__)[:WORST_COUNT]
+    shown = [pictures(*scene_and_volume(composition, *drawn[index][1:], twin)) for index in worst]
     titles = [f"{drawn[index][0]}\n{psnr[index]:.1f} dB" for index in worst]
     write_grid(file.with_suffix(".png"), {name: [each[name] for each in shown] for name in shown[0]}, titles)
     part, whole, there = (floor(10 * floor_of(x)) / 10 for x in (on_object, psnr, [100 * x for x in share]))
@@ -58,12 +64,19 @@ def check(
         "lights and edits at random)."
     )
     seen = count, seed, lens.width, lens.height
-    result = CheckResult(sentence, checksum_of(scene), *seen, told(psnr), told(on_object), told(share))
+    result = CheckResult(
+        sentence,
+        checksum_of(scene),
+        *seen,
+        statistics_of(psnr),
+        statistics_of(on_object),
+        statistics_of(share),
+    )
     write_json(file, asdict(result))
     return result
 
 
-def checked(path: Path, scene: Scene) -> str:
+def found_sentence(path: Path, scene: Scene) -> str:
     """Return what a check of the models of a scene file has found: here, beside it, or by the workflow."""
     name = f"{path.stem}-check.json"
     for file in (Path(name), path.with_name(name), path.resolve().parent.with_name("pse") / "check.json"):
@@ -80,7 +93,7 @@ def checksum_of(scene: Scene) -> str:
     return combined_checksum((name, sha256(file)) for name, file in files)
 
 
-def shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str, Camera, Scene]]:
+def random_shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str, Camera, Scene]]:
     """Yield independent views with a title, from anywhere on a sphere, with lights and edits at random.
 
     They are not cut: a cut scene may show its volume itself. Opacities and palettes that are not edited are
@@ -93,13 +106,13 @@ def shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str
 
     for _ in range(count):
         azimuth, polar = anywhere()
-        light = Light("directional", *anywhere()) if random.random() < LIT else HEADLIGHT
+        light = Light("directional", *anywhere()) if random.random() < LIT_SHARE else HEADLIGHT
         models = {}
         for name, model in scene.models.items():
             edit, can = model.edit, kind_of(model.file).can
-            if random.random() < EDITED and "opacity" in can:
-                edit = replace(edit, opacity=random.uniform(*OPACITIES))
-            if random.random() < EDITED and "palette" in can:
+            if random.random() < EDITED_SHARE and "opacity" in can:
+                edit = replace(edit, opacity=random.uniform(*OPACITY_FACTORS))
+            if random.random() < EDITED_SHARE and "palette" in can:
                 edit = replace(edit, palette=(random.random(), random.random(), random.random()))
             models[name] = replace(model, edit=edit)
         lit = light.kind if light == HEADLIGHT else f"light {light.azimuth:.0f}°, {light.polar:.0f}°"
@@ -107,7 +120,7 @@ def shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str
         yield title, orbit(azimuth, polar, *lens), replace(scene, models=models, light=light, cuts=NO_CUTS)
 
 
-def told(values: Sequence[float]) -> dict[str, float]:
+def statistics_of(values: Sequence[float]) -> dict[str, float]:
     """Return what is told of the values of all views, by name."""
     low = float(np.percentile(values, 5))
     return {"mean": fmean(values), "percentile_5": low, "worst": min(values), "floor": floor_of(values)}
@@ -124,7 +137,7 @@ def floor_of(values: Sequence[float]) -> float:
     Raises:
         ArgumentError: if there are too few for k = 1.
     """
-    k = int(MISSED * (len(values) + 1))
+    k = int(MISSED_SHARE * (len(values) + 1))
     if k < 1:
-        raise ArgumentError(f"views: expected at least {round(1 / MISSED) - 1}, got {len(values)}")
+        raise ArgumentError(f"views: expected at least {round(1 / MISSED_SHARE) - 1}, got {len(values)}")
     return sorted(values)[k - 1]

@@ -14,18 +14,25 @@ from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.metrics.quality import compare, mean
 from texgs.raster import Render
-from texgs.report.beside_volume import changed, in_words, pictures, side_by_side, what_changed
-from texgs.report.results import COMPARED, Comparison
-from texgs.scene.cut_view import beside, beside_fitted
+from texgs.report.beside_volume import change_words, changes_of, pictures, score_words, side_by_side
+from texgs.report.results import COMPARED_VIEWS, ViewComparison
+from texgs.scene.cut_view import scene_and_fitted, scene_and_volume
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
 
-LARGEST_GAIN = 16.0
+MAX_GAIN = 16.0
 POLAR = 20.0  # of the views that are compared, degrees
-LEFT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
-SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in the paper's figure, degrees
+LEFT_LIGHT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
+SWEEP_ANGLES = (
+    -30.0,
+    -15.0,
+    0.0,
+    15.0,
+    30.0,
+    45.0,
+)  # polar angles of the light in the paper's figure, degrees
 
 
 def mean_scores(pairs: Iterable[tuple[Render, Render]]) -> dict[str, float]:
@@ -39,19 +46,19 @@ def mean_scores(pairs: Iterable[tuple[Render, Render]]) -> dict[str, float]:
 
 def compare_views(
     title: str, scene: Scene, composition: Composed, twin: Twin | None, cameras: Sequence[Camera]
-) -> tuple[Comparison, dict[str, np.ndarray]]:
+) -> tuple[ViewComparison, dict[str, np.ndarray]]:
     """Return PSNR and SSIM against the volume over some views, and all pictures [H, W, 3] of the first."""
     if twin is None:
-        return Comparison(title), {"scene": frame(composition, cameras[0], scene)}
+        return ViewComparison(title), {"scene": frame(composition, cameras[0], scene)}
     shown: dict[str, np.ndarray] = {}
 
     def pairs() -> Iterator[tuple[Render, Render]]:
         for camera in cameras:
-            pair = beside(composition, camera, scene, twin)
+            pair = scene_and_volume(composition, camera, scene, twin)
             shown.update({} if shown else pictures(*pair))
             yield pair
 
-    return Comparison(title, **mean_scores(pairs())), shown
+    return ViewComparison(title, **mean_scores(pairs())), shown
 
 
 class SideBySide:
@@ -64,8 +71,8 @@ class SideBySide:
     """
 
     def __init__(self, session: Session, other: str, gain: float) -> None:
-        if not 1 <= gain <= LARGEST_GAIN:
-            raise ArgumentError(f"gain: expected 1 to {LARGEST_GAIN:g}, got {gain:g}")
+        if not 1 <= gain <= MAX_GAIN:
+            raise ArgumentError(f"gain: expected 1 to {MAX_GAIN:g}, got {gain:g}")
         if session.scene.shows_volume and other == "volume":
             raise ArgumentError(
                 "compare: expected a scene of models, got a cut one that shows its volume; take cuts back by "
@@ -84,13 +91,16 @@ class SideBySide:
             picture, scores = side_by_side(image, truth, self._gain, titles)
             for name, value in scores.items():
                 self._scores[name].append(value)
-            self._changes.append(changed(image, truth))
+            self._changes.append(changes_of(image, truth))
             yield picture
 
     @property
     def sentences(self) -> list[str]:
         """Return the means of PSNR and SSIM so far, and what edits have changed."""
-        return [", ".join(in_words(mean(self._scores))), *([what_changed(self._changes)] * self._is_fitted)]
+        return [
+            ", ".join(score_words(mean(self._scores))),
+            *([change_words(self._changes)] * self._is_fitted),
+        ]
 
     def _pair(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
         """Return a view of a scene, and what it is compared with."""
@@ -99,12 +109,12 @@ class SideBySide:
         can = kind_of(next(iter(scene.models.values())).file).can
         outputs = ("depth", "normal") if "normals" in can else ("depth",)
         now, before = (self._session.composition_of(each) for each in (scene, scene.as_fitted))
-        return beside_fitted(now, before, camera, scene, outputs)
+        return scene_and_fitted(now, before, camera, scene, outputs)
 
 
-def caption(entry: Comparison) -> str:
+def caption(entry: ViewComparison) -> str:
     """Return the title of a picture, with the mean PSNR of all views where it was measured."""
-    measured = "" if entry.psnr is None else f"\nmean of {COMPARED} views: {entry.psnr:.1f} dB"
+    measured = "" if entry.psnr is None else f"\nmean of {COMPARED_VIEWS} views: {entry.psnr:.1f} dB"
     return entry.title + measured
 
 
@@ -126,14 +136,14 @@ def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str
         changes.append(("+ k_a x 0.7, k_d x 1.2, k_s x 2", dict.fromkeys(names, magnitude)))
     for title, change in changes:
         scene = steps[title] = with_edits(scene, change)
-    return {**steps, "+ light from the left": replace(scene, light=Light("directional", *LEFT))}
+    return {**steps, "+ light from the left": replace(scene, light=Light("directional", *LEFT_LIGHT))}
 
 
 def light_sweep(scene: Scene) -> dict[str, Scene]:
     """Return the scene under a light that moves from below the object to above it, by title."""
     return {
         f"light at (-90°, {polar:g}°)": replace(scene, light=Light("directional", -90.0, polar))
-        for polar in SWEEP
+        for polar in SWEEP_ANGLES
     }
 
 

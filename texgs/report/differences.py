@@ -17,7 +17,7 @@ from texgs.report.results import EditResult, FitResult, SheetResult
 from texgs.report.table import Column, Table, report_file
 
 COLUMNS = tuple(map(Column, ("what", "the paper", "here", "in", "where the paper says it")))
-ALL = "all"  # of what no key expresses
+NO_KEY = "all"  # of what no key expresses
 CAPTION = (
     "Keys whose values in conf/ are not those of the paper, for the recipes and edits of this report, and "
     "what no key expresses. What a run overrides is not told here."
@@ -86,8 +86,8 @@ def differences(
     names: dict[tuple[str, str], list[str]] = defaultdict(list)  # by key and value here
     for group, given in (("fit", recipes), ("edit", edits)):
         for name in [name for name in given if name in members(group)]:
-            for claim, here in compared(group, name):
-                if plain(here) != plain(claim.paper):
+            for claim, here in claims_and_values(group, name):
+                if plain_value(here) != plain_value(claim.paper):
                     names[claim.key, text(here)].append(name)
     rows = [
         (count.what, text(count.paper), text(here), ", ".join(some), count.where)
@@ -101,7 +101,7 @@ def differences(
         for (key, here), some in names.items()
         if key == claim.key
     ]
-    rows += [(each.what, each.paper, each.here, ALL, each.where) for each in published().others]
+    rows += [(each.what, each.paper, each.here, NO_KEY, each.where) for each in published().others]
     titles = [column.title for column in COLUMNS]
     return Table(CAPTION, COLUMNS, [dict(zip(titles, row, strict=True)) for row in rows])
 
@@ -123,7 +123,7 @@ def views_of(records: Sequence[Record[Any]]) -> dict[str, dict[int, list[str]]]:
     return {what: {n: sorted(names) for n, names in counts.items()} for what, counts in views.items()}
 
 
-def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
+def claims_and_values(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
     """Yield claims of the paper that a file of conf/ can be compared with, each with the value there."""
     config, prefix, numbers = preset(group, name), "fit.", dict[str, Any]()
     if group == "edit" and config.edit.method != NO_METHOD:
@@ -141,7 +141,7 @@ def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
             yield claim, value(claim.key)
 
 
-def plain(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
     """Return a value to compare: sequences of any kind as lists."""
     return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
 

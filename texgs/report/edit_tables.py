@@ -8,12 +8,12 @@ from texgs.fields.kinds import kinds
 from texgs.metrics.metric import Measure, metrics
 from texgs.models.pictures import PICTURES
 from texgs.report.metrics_files import Record, of
-from texgs.report.published import DATA, LABEL, THEIRS, cells, in_order, mean_rows, paper, paper_file
+from texgs.report.published import DATA, LABEL, PAPER_LABEL, cells, in_order, mean_rows, paper, paper_file
 from texgs.report.results import EditMeasures, EditResult
-from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table
+from texgs.report.table import SOURCES, UNPUBLISHED_CELL, Column, Table
 
 MINUTES = Measure("minutes", "minutes", 2, "down", "editing_min")
-LABELS = (*map(Column, (DATA, LABEL, "edit", "method")), Column("pixels", None, UNPUBLISHED))
+LABELS = (*map(Column, (DATA, LABEL, "edit", "method")), Column("pixels", None, UNPUBLISHED_CELL))
 PAPER = {  # its tables and their images, by what edits follow
     "style": ("image_npse", "800x800"),
     "instruction": ("text_npse", "512x512"),
@@ -26,12 +26,12 @@ CAPTION = (
     "Sizes are those of the paper's tables of edits, with 100 bytes for each surfel beside its texels. "
     f"{CONSISTENCY} Mean rows count no stand-ins. Edits of no comparison are in the table of all edits."
 )
-NOT_ALIKE = (
+UNLIKE_NOTE = (
     "The paper's rows are means over four data sets on an RTX 4090. It publishes neither its pictures nor "
     "its instructions nor its transfer functions, so they stand by themselves."
 )
 ADAPTS = "adapts"  # method in mean rows over data sets where it works with different things
-FOLLOWED = ("style", "instruction", "")  # what edits follow, in the order of the table of all edits
+FOLLOW_ORDER = ("style", "instruction", "")  # what edits follow, in the order of the table of all edits
 Edit = Record[EditResult]
 Rows = list[dict[str, Any]]
 
@@ -83,7 +83,7 @@ def looks(records: Iterable[Record[Any]]) -> Table:
         f"{len(PICTURES)} of texgs, by how near views are to each, less the mean over the scene's looks, two "
         f"at least: 1 is the nearest. {CONSISTENCY}"
     )
-    rows = sorted(rows_of(records), key=lambda row: FOLLOWED.index(row["kind"]))
+    rows = sorted(rows_of(records), key=lambda row: FOLLOW_ORDER.index(row["kind"]))
     labels = [*LABELS[:4], Column("follows"), Column("lambda_s", 2, "-")]
     columns = [Column(measure.title, measure.digits) for measure in measures()]
     own = notes(rows, [measure.title for measure in measures()])
@@ -97,7 +97,7 @@ def comparison(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
     means = mean_rows(rows, (LABEL, "edit", "pixels", "device"), ["method", *titles])
     means = [{**row, "method": row["method"] or ADAPTS} for row in means]
     theirs = paper_rows(follows, listed) if rows and follows else []
-    sentences = [CAPTION, NOT_ALIKE, *notes(rows, titles)] if theirs else [CAPTION, *notes(rows, titles)]
+    sentences = [CAPTION, UNLIKE_NOTE, *notes(rows, titles)] if theirs else [CAPTION, *notes(rows, titles)]
     return Table(" ".join(sentences), [*LABELS, *columns], [*rows, *means, *theirs])
 
 
@@ -172,9 +172,9 @@ def paper_rows(follows: str, listed: Sequence[Measure]) -> list[dict[str, Any]]:
     name, pixels = PAPER[follows]
     numbers = {measure.published: measure.title for measure in listed if measure.published}
     lines = paper(name, {"method": "method"}, numbers)
-    lines = lines.astype(object).where(lines.notna(), UNPUBLISHED)
-    blank = dict.fromkeys([measure.title for measure in listed], UNPUBLISHED)
-    labels = {DATA: "mean of 4", LABEL: THEIRS, "edit": UNPUBLISHED, "pixels": pixels}
+    lines = lines.astype(object).where(lines.notna(), UNPUBLISHED_CELL)
+    blank = dict.fromkeys([measure.title for measure in listed], UNPUBLISHED_CELL)
+    labels = {DATA: "mean of 4", LABEL: PAPER_LABEL, "edit": UNPUBLISHED_CELL, "pixels": pixels}
     return [{**blank, **labels, **line} for line in lines.to_dict("records")]
 
 

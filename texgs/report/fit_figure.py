@@ -20,10 +20,10 @@ from texgs.raster.shading import MATERIAL
 from texgs.volume.images import over_white, smaller
 from texgs.volume.view_set import View, ViewSet
 
-VISIBLE = 2 / 255  # alpha
-MAGNIFIED = 4  # a quarter of the range of colours has the full colour
+VISIBLE_ALPHA = 2 / 255  # alpha
+ERROR_GAIN = 4  # a quarter of the range of colours has the full colour
 DIVERGING = "bwr"  # 0 is white
-ERROR = Scale(-1 / MAGNIFIED, 1 / MAGNIFIED, DIVERGING)  # red where too bright, blue where too dark
+ERROR = Scale(-1 / ERROR_GAIN, 1 / ERROR_GAIN, DIVERGING)  # red where too bright, blue where too dark
 MARGIN = 1.06  # side of the part that is shown, in sides of what is visible
 KEY = Cell("", words="of the worst channel\nred: too bright\nblue: too dark")
 
@@ -101,15 +101,15 @@ def draw_visible(path: str | Path, rows: list[Row], visible: Tensor, title: str)
 def compare(models: Mapping[str, Field], view: View, reduce: int) -> tuple[list[Cell], Tensor]:
     """Return the cells of one view, and where it or one of its renderings shows something, [H, W]."""
     planes = over_white(view, reduce)
-    truth, visible = planes[:3].permute(1, 2, 0), planes[3] > VISIBLE
+    truth, visible = planes[:3].permute(1, 2, 0), planes[3] > VISIBLE_ALPHA
     height, width = visible.shape
     cells = [Cell("ground truth", truth, f"PSNR over {width} × {height} pixels")]
     for phase, model in models.items():
         image = model.render(smaller(view.camera, reduce).to(model.device), view.light)
         color = image.color.cpu().clamp(0, 1)
-        visible = visible | (image.alpha.cpu() > VISIBLE)
+        visible = visible | (image.alpha.cpu() > VISIBLE_ALPHA)
         cells.append(Cell(phase, color, f"PSNR {psnr(color, truth):.2f} dB"))
-    cells.append(Cell(f"error × {MAGNIFIED} ({DIVERGING})", ERROR(signed_error(color, truth)), scale=ERROR))
+    cells.append(Cell(f"error × {ERROR_GAIN} ({DIVERGING})", ERROR(signed_error(color, truth)), scale=ERROR))
     return cells, visible
 
 

@@ -7,12 +7,12 @@ from texgs.fitting.kinds import fit_specs
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import DATA, LABEL, beside_paper, cells, in_order, is_alike, rank
 from texgs.report.results import FitResult, MeshResult
-from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table, columns
+from texgs.report.table import SOURCES, UNPUBLISHED_CELL, Column, Table, columns
 
 Run = dict[str, Record[FitResult]]  # a fit by its phases
-ON_OBJECT = Column("PSNR on the object", 2)
-SHOWN = Column("share shown", 4)
-RELIT = Column("PSNR under unseen lights", 2, UNPUBLISHED)  # after the last phase
+OBJECT_PSNR = Column("PSNR on the object", 2)
+SHOWN_SHARE = Column("share shown", 4)
+RELIT_PSNR = Column("PSNR under unseen lights", 2, UNPUBLISHED_CELL)  # after the last phase
 VARIANTS = {  # heading of the variants of each sweep, and the heading in the paper's file
     "views": ("training views", "views"),
     "resolution": ("pixels", "image_px"),
@@ -30,14 +30,14 @@ def phase_rows(records: Iterable[Record[Any]]) -> list[dict[str, Any]]:
         result, gpu = record.result, record.result.peak_gpu_memory_mib
         numbers = {
             "PSNR": result.psnr,
-            ON_OBJECT.title: result.object_psnr,
-            SHOWN.title: result.shown,
+            OBJECT_PSNR.title: result.object_psnr,
+            SHOWN_SHARE.title: result.shown,
             "SSIM": result.ssim,
             "minutes": result.fit_seconds / 60,
             "CPU GiB": record.facts["peak_memory_mib"] / 1024,
             "GPU GiB": None if gpu is None else gpu / 1024,
             "primitives": result.primitives,
-            RELIT.title: result.relit_psnr,
+            RELIT_PSNR.title: result.relit_psnr,
         }
         rows.append(cells(record, phase=record.stage, alike=is_alike(record), **numbers))
     return rows
@@ -58,7 +58,7 @@ def fits(records: Iterable[Record[Any]]) -> Table:
         "show, by alpha, where the model is half as opaque at least: below 0.995 parts are missing. "
         "Minutes of the phase itself."
     )
-    return Table(caption, [*labels, ON_OBJECT, psnr, SHOWN, RELIT, *others], rows)
+    return Table(caption, [*labels, OBJECT_PSNR, psnr, SHOWN_SHARE, RELIT_PSNR, *others], rows)
 
 
 def runs_of(records: Iterable[Record[Any]]) -> list[Run]:
@@ -84,7 +84,7 @@ def measures_of(run: Run) -> dict[str, Any]:
         "SSIM, training": result.train_ssim,
         "PSNR": result.psnr,
         "SSIM": result.ssim,
-        RELIT.title: result.relit_psnr,
+        RELIT_PSNR.title: result.relit_psnr,
         "minutes": sum(part.result.fit_seconds for part in run.values()) / 60,
         "memory GiB": max(part.facts["peak_memory_mib"] for part in run.values()) / 1024,
         "primitives": result.primitives,

@@ -89,7 +89,7 @@ class GalleryRenderer:
         return image[rows[:, None], columns]
 
 
-def rendered(grid: Grid, renderer: GalleryRenderer, title: str) -> dict[str, list[RenderedCell]]:
+def render_rows(grid: Grid, renderer: GalleryRenderer, title: str) -> dict[str, list[RenderedCell]]:
     """Return the pictures of each row by its title; those of one scene are taken together."""
     places = [(row.title, column, cell) for row in grid.rows for column, cell in enumerate(row.pictures)]
     places.sort(key=lambda place: place[2].scene)

@@ -9,17 +9,30 @@ from PIL import Image
 from texgs.core.figures import as_picture, new_figure, words
 from texgs.core.io import write_bytes
 from texgs.report.metrics_files import LeftOut, Record, of
-from texgs.report.published import THEIRS, in_order
+from texgs.report.published import PAPER_LABEL, in_order
 from texgs.report.results import SECTIONS, FitResult
 from texgs.report.sections import Figure, data_uri, figures
 from texgs.report.sweep_figure import sweep_figure
 from texgs.report.table import SOURCES, Table, report_file
 from texgs.report.tables import specs, sweeps_of, tables_of
 
-JOB = ("stage", "dataset", "tf", "recipe", "edit", "variant", "seed", "seconds", "peak_memory_mib", "device")
-SOURCE = ("config_sha", "code_sha", "git_sha", "run")
-LOSSES = "Loss of single views while fields were fitted."
-SWEPT = "Means over seeds with their standard deviation, of what differs; below them the edited scenes."
+JOB_FACTS = (
+    "stage",
+    "dataset",
+    "tf",
+    "recipe",
+    "edit",
+    "variant",
+    "seed",
+    "seconds",
+    "peak_memory_mib",
+    "device",
+)
+SOURCE_FACTS = ("config_sha", "code_sha", "git_sha", "run")
+LOSS_CAPTION = "Loss of single views while fields were fitted."
+SWEEP_CAPTION = (
+    "Means over seeds with their standard deviation, of what differs; below them the edited scenes."
+)
 
 
 def write_report(
@@ -41,7 +54,7 @@ def write_report(
     pictures["fitting"] += loss_figures(records)
     for name in sweeps_of(records):
         drawn = data_uri(sweep_figure(records, name))
-        pictures["ablations"].append(Figure(f"sweep {name}", "", SWEPT, drawn, ""))
+        pictures["ablations"].append(Figure(f"sweep {name}", "", SWEEP_CAPTION, drawn, ""))
     for section, own in (more or {}).items():
         pictures[section] += own
     text = environment.from_string(template).render(
@@ -50,9 +63,9 @@ def write_report(
         jobs=[job(record.facts) for record in records],
         places={record.path: index for index, record in enumerate(records, start=1)},
         versions=versions([record.facts for record in records]),
-        headings=(*JOB, *SOURCE),
-        sources_from=len(JOB),
-        is_theirs=lambda cells: any(cell.startswith(THEIRS) for cell in cells),
+        headings=(*JOB_FACTS, *SOURCE_FACTS),
+        sources_from=len(JOB_FACTS),
+        is_theirs=lambda cells: any(cell.startswith(PAPER_LABEL) for cell in cells),
         sources=SOURCES,
     )
     return write_bytes(path, text.encode())
@@ -81,7 +94,7 @@ def loss_figures(records: Sequence[Record[Any]]) -> list[Figure]:
         if len(record.result.losses) > 1 and not record.is_swept:
             by_dataset.setdefault(record.title, []).append(record)
     drawn = {title: data_uri(curves(phases)) for title, phases in by_dataset.items()}
-    return [Figure(title, "", LOSSES, uri, "", is_narrow=True) for title, uri in drawn.items()]
+    return [Figure(title, "", LOSS_CAPTION, uri, "", is_narrow=True) for title, uri in drawn.items()]
 
 
 def curves(phases: Sequence[Record[FitResult]]) -> Image.Image:
@@ -102,7 +115,7 @@ def curves(phases: Sequence[Record[FitResult]]) -> Image.Image:
 def job(metrics: Mapping[str, Any]) -> list[str]:
     """Return the cells of one job in the list of where things came from."""
     facts = {"edit": metrics["numbers"].get("edit"), **metrics}
-    cells = [facts.get(key) for key in (*JOB, *SOURCE)]
+    cells = [facts.get(key) for key in (*JOB_FACTS, *SOURCE_FACTS)]
     return ["" if x is None else f"{x:.1f}" if isinstance(x, float) else str(x) for x in cells]
 
 

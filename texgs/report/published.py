@@ -10,22 +10,24 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from texgs.report.metrics_files import Record
 from texgs.report.results import FitResult
-from texgs.report.table import PAPER, SOURCES, UNLIKE, UNPUBLISHED, Column, Table, data_frame
+from texgs.report.table import PAPER, SOURCES, UNLIKE_CELL, UNPUBLISHED_CELL, Column, Table, data_frame
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 R = TypeVar("R", bound=Record[Any])
-THEIRS = "the paper"  # recipe in rows of its own numbers
+PAPER_LABEL = "the paper"  # recipe in rows of its own numbers
 RECIPE = "paper"  # file of conf/fit whose results may stand beside the paper's numbers
 VIEWS = 162  # training views, where the paper does not say another number
-ALIKE = (
+COMPARED_FACTS = (
     "Numbers of the paper stand beside ours where recipe, size of images and number of training views are "
-    f"the paper's; elsewhere there is {UNLIKE}, not like for like. Its transfer functions are not published: "
-    "even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
+    f"the paper's; elsewhere there is {UNLIKE_CELL}, not like for like. Its transfer functions are not "
+    "published: even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
 )
 DATA, LABEL = "data set", "recipe"  # titles of columns
-SEEN = "seen"  # size and number of views, and changes of the recipe, in rows: means are over fits of the same
+VIEWS_COLUMN = (
+    "seen"  # size and number of views, and changes of the recipe, in rows: means are over fits of the same
+)
 SCENES = Column("basic scenes", 0)
 Rows = Sequence[Mapping[str, Any]]
 
@@ -88,7 +90,7 @@ def cells(record: Record[Any], **more: Any) -> dict[str, Any]:
         LABEL: record.label,
         "rank": rank(record),
         "published": "" if record.stand_in else record.dataset,  # whose numbers stand beside
-        SEEN: (*views, bool(record.facts.get("recipe_changed"))),
+        VIEWS_COLUMN: (*views, bool(record.facts.get("recipe_changed"))),
         SOURCES: [record.path],
         **more,
     }
@@ -121,14 +123,14 @@ def beside_paper(
     titles = [column.title for column in columns.values()]
     theirs = paper(name, {"dataset": DATA, **keys}, dict(zip(columns, titles, strict=True)))
     theirs[SCENES.title] = [volumes()[dataset]["basic_scenes"] for dataset in theirs[DATA]]
-    ours = grouped(rows, (DATA, LABEL, SEEN, *keys.values()), titles, is_sum)
+    ours = grouped(rows, (DATA, LABEL, VIEWS_COLUMN, *keys.values()), titles, is_sum)
     if is_sum:
         counts = ours["published"].map(lambda name: volumes().get(name, {}).get("basic_scenes"))
         ours["alike"] &= ours[SCENES.title] == counts
     names = [*map(Column, (DATA, LABEL, *keys.values())), SCENES]
-    published = [Column(each.title + PAPER, each.digits, UNPUBLISHED) for each in columns.values()]
+    published = [Column(each.title + PAPER, each.digits, UNPUBLISHED_CELL) for each in columns.values()]
     shown = side_by_side(ours, theirs, ("published", *keys.values()), titles)
-    return Table(ALIKE, [*names, *columns.values(), *published], shown)
+    return Table(COMPARED_FACTS, [*names, *columns.values(), *published], shown)
 
 
 def grouped(rows: Rows, keys: Sequence[str], titles: Sequence[str], is_sum: bool) -> DataFrame:
@@ -160,12 +162,12 @@ def side_by_side(ours: DataFrame, theirs: DataFrame, keys: Sequence[str], titles
     is_alike = rows["alike"].astype(bool)
     for title in titles:
         cell = rows[title + PAPER]
-        rows[title + PAPER] = cell.mask(~is_alike & cell.notna(), UNLIKE)
+        rows[title + PAPER] = cell.mask(~is_alike & cell.notna(), UNLIKE_CELL)
     if any(place < len(volumes()) for place, _, _ in rows["rank"]):
         shown = set(rows.loc[is_alike, list(keys)].itertuples(index=False, name=None))
         is_left = [key not in shown for key in theirs[published].itertuples(index=False, name=None)]
         left = theirs[is_left]
-        left = left.assign(**{LABEL: THEIRS}, rank=[rank_in_paper(name) for name in left[DATA]])
+        left = left.assign(**{LABEL: PAPER_LABEL}, rank=[rank_in_paper(name) for name in left[DATA]])
         rows = pd.concat([rows, left.astype(object)], ignore_index=True)
     places = rows["rank"].tolist()
     return rows.iloc[sorted(range(len(rows)), key=places.__getitem__)]

@@ -47,7 +47,7 @@ class Result:
 
     @classmethod
     def of(cls, numbers: Mapping[str, Any]) -> Any:
-        """Return the result that `plain` made these numbers of; others are a ValueMismatch."""
+        """Read a result that `as_mapping` wrote; raise a ValueMismatch for others."""
         return typed(cls, numbers)
 
 
@@ -166,12 +166,14 @@ class SceneResult(Result, section="pse"):
     primitives: int
 
 
-COMPARED = 3  # views around the object, one of which is shown
-BELOW = "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
+COMPARED_VIEWS = 3  # views around the object, one of which is shown
+BELOW_WORDS = (
+    "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
+)
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ViewComparison:
     """An edit by numbers, against the volume with the same edit."""
 
     title: str
@@ -202,8 +204,8 @@ class PseResult(Result, section="pse"):
     """Edits by numbers, and a light that moves."""
 
     views: int
-    pse: list[Comparison]
-    relight: list[Comparison]
+    pse: list[ViewComparison]
+    relight: list[ViewComparison]
     check: CheckResult | None = None
 
 
@@ -214,7 +216,7 @@ class StepsResult(Result, section="time"):
     steps: int
     views: int  # for each step that was compared
     step_mib: float  # size that a step adds
-    compared: list[Comparison]  # some of the steps, by their names
+    compared: list[ViewComparison]  # some of the steps, by their names
     step_seconds: float | None = None  # mean, with its volume; None where an interrupted job went on
 
 
@@ -279,14 +281,14 @@ class EditMeasures(Result):
 
     @classmethod
     def of(cls, numbers: Mapping[str, Any]) -> Self:
-        """Return the measures that `plain` made these numbers of; who knows the metrics checks `values`."""
+        """Read measures that `as_mapping` wrote; `texgs.metrics` checks the `values`."""
         own = {each.name for each in fields(cls)} - {"values"}
         known = {name: value for name, value in numbers.items() if name in own}
         values = {name: value for name, value in numbers.items() if name not in own}
         return typed(cls, {**known, "values": values})
 
 
-def plain(result: Result) -> dict[str, Any]:
+def as_mapping(result: Result) -> dict[str, Any]:
     """Return a result for JSON, without what was not measured; values by name stand among the rest."""
     numbers: dict[str, Any] = asdict(result)  # type: ignore[call-overload]
     numbers |= numbers.pop("values", {})

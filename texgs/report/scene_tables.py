@@ -9,8 +9,8 @@ from texgs.report.metrics_files import Record, of
 from texgs.report.published import (
     DATA,
     LABEL,
+    PAPER_LABEL,
     SCENES,
-    THEIRS,
     cells,
     images,
     in_order,
@@ -28,7 +28,7 @@ from texgs.report.results import (
     ViewsResult,
     VolumeResult,
 )
-from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Table, columns
+from texgs.report.table import SOURCES, UNLIKE_CELL, UNPUBLISHED_CELL, Table, columns
 
 
 def datasets(records: Iterable[Record[Any]]) -> Table:
@@ -84,7 +84,7 @@ def dataset_row(
 def milliseconds_in_paper(record: Record[Any], width: int, height: int) -> Any:
     """Return the paper's time of a frame of a volume, or the sign that it is of another size."""
     time = volumes().get("" if record.stand_in else record.dataset, {}).get("dvr_ms")
-    return time if time is None or (width, height) == (images(record.dataset),) * 2 else UNLIKE
+    return time if time is None or (width, height) == (images(record.dataset),) * 2 else UNLIKE_CELL
 
 
 def rendering(records: Iterable[Record[Any]]) -> Table:
@@ -122,8 +122,13 @@ def published_time(driven: str, pixels: str) -> dict[str, Any]:
     """Return the paper's times of its own scenes, from its table of edits by images or by texts."""
     numbers = {"primitives": "primitives", "render_mean_ms": "mean ms", "render_max_ms": "max ms"}
     lines = paper(f"{driven}_npse", {"method": "method"}, numbers).set_index("method")
-    labels = {DATA: "mean of 4", LABEL: f"{THEIRS}, {driven}-driven", "pixels": pixels, "device": "RTX 4090"}
-    others = dict.fromkeys([*columns("rendering")][8:], UNPUBLISHED)
+    labels = {
+        DATA: "mean of 4",
+        LABEL: f"{PAPER_LABEL}, {driven}-driven",
+        "pixels": pixels,
+        "device": "RTX 4090",
+    }
+    others = dict.fromkeys([*columns("rendering")][8:], UNPUBLISHED_CELL)
     return {**labels, **lines.loc["TexGS-VolVis"], **others}
 
 

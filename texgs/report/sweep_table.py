@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.errors import ArgumentError
 from texgs.metrics.metric import Measure
 from texgs.report.edit_tables import measured_cells, measures, pairs_of
-from texgs.report.fit_tables import RELIT, Run, measures_of, runs_of
+from texgs.report.fit_tables import RELIT_PSNR, Run, measures_of, runs_of
 from texgs.report.metrics_files import Record
 from texgs.report.published import DATA, LABEL
 from texgs.report.table import SOURCES, Column, Table, data_frame
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 # Columns of measures of fits, with the digits that they are written with.
-OF_FITS = {"PSNR, training": 2, "PSNR": 2, "SSIM": 4, "minutes": 2, "memory GiB": 2, "primitives": 0}
+FIT_DIGITS = {"PSNR, training": 2, "PSNR": 2, "SSIM": 4, "minutes": 2, "memory GiB": 2, "primitives": 0}
 MATERIAL = {"k_a": "ambient", "k_d": "diffuse", "k_s": "specular", "beta": "shininess"}
 SERIES = [DATA, "TF", LABEL, "edit"]  # what variants are of; empty where a run has none
 SEEDS = "Means over seeds, ± their standard deviation."
@@ -59,7 +59,7 @@ def sweep_runs(records: Iterable[Record[Any]], name: str) -> DataFrame:
         raise ArgumentError(f"sweep {name}: no fit or edit of it among the metrics files; run it first")
     runs.sort(key=lambda run: natural(run["variant"]))
     runs.sort(key=lambda run: (run[DATA], bool(run["edit"]), *(run[key] for key in SERIES[1:])))
-    numbers = [*OF_FITS, RELIT.title, *MATERIAL, *(measure.title for measure in edit_measures())]
+    numbers = [*FIT_DIGITS, RELIT_PSNR.title, *MATERIAL, *(measure.title for measure in edit_measures())]
     return data_frame(runs, [*SERIES, "variant", "series", "is_done", SOURCES, *dict.fromkeys(numbers)])
 
 
@@ -94,8 +94,8 @@ def edit_measures() -> list[Measure]:
 
 def measured_titles(runs: DataFrame) -> dict[str, int]:
     """Return the digits of what is measured of fits, where there are some, and of edits, by titles."""
-    relit = {RELIT.title: 2} if runs[RELIT.title].notna().any() else {}
-    of_fits = {**OF_FITS, **relit, **dict.fromkeys(MATERIAL, 2)} if (runs["edit"] == "").any() else {}
+    relit = {RELIT_PSNR.title: 2} if runs[RELIT_PSNR.title].notna().any() else {}
+    of_fits = {**FIT_DIGITS, **relit, **dict.fromkeys(MATERIAL, 2)} if (runs["edit"] == "").any() else {}
     of_edits = {measure.title: measure.digits or 0 for measure in edit_measures()}
     return of_fits | ({"minutes": 2, **of_edits} if runs["edit"].any() else {})
 

@@ -17,16 +17,16 @@ from texgs.core.plain_yaml import parse_yaml
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-MISSING = "not measured"
+MISSING_CELL = "not measured"
 SOURCES = "metrics files"  # column of the paths that a row was read from
-UNPUBLISHED = "-"  # cell of a number that the paper does not have
+UNPUBLISHED_CELL = "-"  # cell of a number that the paper does not have
 PAPER = " (paper)"  # end of the titles of these columns
-UNLIKE = "≠"  # cell of a number of the paper that is not like for like
+UNLIKE_CELL = "≠"  # cell of a number of the paper that is not like for like
 FORMATS = ("csv", "md", "tex")
 DOCUMENT = "tables.tex"
 FORMULAS = r"""± \pm  × \times  ° ^\circ  · \cdot  ≠ \neq  ≤ \leq  ≥ \geq  → \rightarrow  ↑ \uparrow
   ↓ \downarrow  − -  ² ^2  ³ ^3  α \alpha  β \beta  λ \lambda  µ \mu  μ \mu  σ \sigma"""
-SPECIAL = {  # letters that LaTeX takes for something else, or has other names for
+LATEX_LETTERS = {  # letters that LaTeX takes for something else, or has other names for
     **{letter: f"${formula}$" for letter, formula in re.findall(r"(\S) (\S+)", FORMULAS)},
     **{letter: f"\\{letter}" for letter in "&%$#_{}"},
     **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "…": r"\ldots{}"},
@@ -53,7 +53,7 @@ class Column:
 
     title: str
     digits: int | None = None  # after the point; None: as they are
-    missing: str = MISSING  # in place of a cell that has no value
+    missing: str = MISSING_CELL  # in place of a cell that has no value
 
     @property
     def is_number(self) -> bool:
@@ -126,7 +126,7 @@ class Table:
         """Return comma separated values, numbers in full; an empty cell has no number of its own."""
         sources = [" ".join(path.as_posix() for path in paths) for paths in self.frame[SOURCES]]
         frame = self.frame.assign(**{SOURCES: sources})
-        return frame.where(frame != UNLIKE, None).to_csv(index=False, lineterminator="\n")
+        return frame.where(frame != UNLIKE_CELL, None).to_csv(index=False, lineterminator="\n")
 
     def markdown(self) -> str:
         """Return a Markdown table, numbers to the right."""
@@ -170,13 +170,13 @@ def write_tables(folder: str | Path, tables: Mapping[str, Table]) -> None:
 
 def escape(text: str) -> str:
     """Return text as LaTeX prints it, in one line; what the fonts of pdflatex may not have by its code."""
-    return "".join(map(printed, one_line(text)))
+    return "".join(map(latex_letter, one_line(text)))
 
 
-def printed(letter: str) -> str:
+def latex_letter(letter: str) -> str:
     """Return a letter as LaTeX prints it."""
-    if letter in SPECIAL:
-        return SPECIAL[letter]
+    if letter in LATEX_LETTERS:
+        return LATEX_LETTERS[letter]
     is_accented = "LATIN" in unicodedata.name(letter, "") and ord(letter) <= 0x17F  # the encoding T1 has it
     return letter if letter.isascii() or is_accented else rf"\texttt{{U+{ord(letter):04X}}}"
 

@@ -10,8 +10,8 @@ from texgs.core.io import reading
 from texgs.study.questions import Question, Study, read_key
 
 COLUMNS = ["study", "ballot", "question", "option", "rank"]
-MOST_BYTES = 1 << 20
-WHAT, ADVICE = "a ballot", "ask the voter for the file that the page saves"
+MAX_BYTES = 1 << 20
+FILE_WORDS, ADVICE = "a ballot", "ask the voter for the file that the page saves"
 
 
 @dataclass(frozen=True)
@@ -83,13 +83,15 @@ def read_ballot(study: Study, path: Path) -> Ballot:
 
 def rows_of(path: Path) -> list[dict[str, str]]:
     """Return the lines of a ballot by column, at least one."""
-    with reading(path, WHAT, ADVICE):
-        if path.stat().st_size > MOST_BYTES:
-            raise ArgumentError(f"{path}: expected {WHAT} of at most {MOST_BYTES} bytes; is it another file?")
+    with reading(path, FILE_WORDS, ADVICE):
+        if path.stat().st_size > MAX_BYTES:
+            raise ArgumentError(
+                f"{path}: expected {FILE_WORDS} of at most {MAX_BYTES} bytes; is it another file?"
+            )
         lines = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
     header, *rows = lines or [[]]
     if header != COLUMNS or any(len(row) != len(COLUMNS) for row in rows) or not rows:
-        raise ArgumentError(f"{path}: expected {WHAT} with the columns {', '.join(COLUMNS)}; {ADVICE}")
+        raise ArgumentError(f"{path}: expected {FILE_WORDS} with the columns {', '.join(COLUMNS)}; {ADVICE}")
     return [dict(zip(COLUMNS, row, strict=True)) for row in rows]
 
 

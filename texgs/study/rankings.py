@@ -43,7 +43,7 @@ class Rankings:
         return Rankings(methods, self.counts[order], None if self.ranks is None else self.ranks[:, order])
 
 
-def pooled(several: Sequence[Rankings]) -> Rankings:
+def pool(several: Sequence[Rankings]) -> Rankings:
     """Return all votes of rankings of the same methods in the same order."""
     known = [each.ranks for each in several if each.ranks is not None]
     ranks = np.concatenate(known) if len(known) == len(several) else None

@@ -29,9 +29,9 @@ LETTERS = {"X": "x", "longitude": "x", "Y": "y", "latitude": "y", "Z": "z", "ver
 # Attributes of CF: codes of missing samples, scaling of packed ones, bounds of valid ones, and labels.
 CODES, PACKED = ("_FillValue", "missing_value"), {"scale_factor": 1.0, "add_offset": 0.0}
 NUMBERS = (*CODES, *PACKED, "valid_min", "valid_max", "valid_range")
-UNSIGNED = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
-CF = (*NUMBERS, UNSIGNED, "axis", "standard_name", "long_name", "units", "positive")
-CF += ("cartesian_axis", "grads_dim", "_CoordinateAxisType")  # of others, known to cf_xarray
+UNSIGNED_KEY = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
+CF_KEYS = (*NUMBERS, UNSIGNED_KEY, "axis", "standard_name", "long_name", "units", "positive")
+CF_KEYS += ("cartesian_axis", "grads_dim", "_CoordinateAxisType")  # of others, known to cf_xarray
 PRESSURES = ("Pa", "hPa", "kPa", "mbar", "millibar", "dbar", "decibar", "bar")
 
 
@@ -67,7 +67,7 @@ class Axis:
 
 def attributes_of(array: Any) -> dict[str, Any]:
     """Return the attributes of CF that an array of h5py, Zarr or xarray has, with bytes as text."""
-    said = {key: np.ravel(array.attrs[key]) for key in CF if key in array.attrs}
+    said = {key: np.ravel(array.attrs[key]) for key in CF_KEYS if key in array.attrs}
     is_text = {key for key, values in said.items() if values.dtype.kind in "SUO" and values.size == 1}
     words = {key: said[key][0] for key in is_text}
     return said | {k: v.decode(errors="replace") if isinstance(v, bytes) else v for k, v in words.items()}

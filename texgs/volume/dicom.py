@@ -17,7 +17,7 @@ from pydicom.uid import MultiFrameGrayscaleWordSecondaryCaptureImageStorage as C
 from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Axis, place_on
 from texgs.volume.dicom_series import ALL, FileSeries, choose_series, phases_of, series_in
-from texgs.volume.dicom_slice import CONVERT, TIMES, Slice, slices_in
+from texgs.volume.dicom_slice import CONVERT_ADVICE, TIMES, Slice, slices_in
 from texgs.volume.grid import dims_of, require_room
 from texgs.volume.itk_image import sentence
 from texgs.volume.space import LPS
@@ -97,7 +97,7 @@ def time_tag(places: list[list[Slice]]) -> tuple[int, str]:
     first, second = next(place for place in places if len(place) > 1)[:2]
     raise ArgumentError(
         f"{first.name} and {second.name}: expected slices at different places, got two at one, and "
-        f"no {' or '.join(TIMES)} in all that tells such slices apart; {CONVERT}"
+        f"no {' or '.join(TIMES)} in all that tells such slices apart; {CONVERT_ADVICE}"
     )
 
 
@@ -110,7 +110,7 @@ def slice_distance(slices: list[Slice]) -> float:
         is_like = each.sizes == first.sizes and np.allclose(each.spacing, first.spacing)
         if not is_like or not np.allclose(each.directions, first.directions, atol=1e-3):
             raise ArgumentError(
-                f"{each.name}: expected size, spacing and orientation of {first.name}; {CONVERT}"
+                f"{each.name}: expected size, spacing and orientation of {first.name}; {CONVERT_ADVICE}"
             )
         shift = np.abs(first.directions[:2] @ (each.place - first.place)).max()
         if shift > TILT_TOLERANCE * (each.height - first.height) + ROUNDING:
@@ -124,7 +124,7 @@ def slice_distance(slices: list[Slice]) -> float:
     if abs(gaps[worst] - step) > GAP_TOLERANCE * step:
         raise ArgumentError(
             f"{slices[worst].name} and {slices[worst + 1].name}: expected slices {step:.6g} mm apart, got "
-            f"{gaps[worst]:.6g} mm; complete the series, or {CONVERT}"
+            f"{gaps[worst]:.6g} mm; complete the series, or {CONVERT_ADVICE}"
         )
     return float(slices[-1].height - first.height) / len(gaps)
 

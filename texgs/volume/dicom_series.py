@@ -13,7 +13,7 @@ from texgs.core.errors import ArgumentError
 from texgs.volume.dicom_slice import slices_in, values_in
 
 ALL = "all"  # in place of the number of a series
-OF_SERIES = ["SeriesNumber", "SeriesDescription", "TemporalPositionIdentifier", "Modality"]
+SERIES_TAGS = ["SeriesNumber", "SeriesDescription", "TemporalPositionIdentifier", "Modality"]
 MAGIC, PIXELS = b"DICM", b"\xe0\x7f\x10\x00"  # of a file with 128 bytes before it; the tag of its samples
 # What orders series, and how it stands in them: the first counts that is not the same in all.
 ORDERS = {
@@ -42,9 +42,9 @@ def series_in(folder: Path) -> list[FileSeries]:
     every, reader = [], sitk.ImageSeriesReader
     for uid in reader.GetGDCMSeriesIDs(str(folder)):
         files = reader.GetGDCMSeriesFileNames(str(folder), uid)
-        header = pydicom.dcmread(files[0], stop_before_pixels=True, force=True, specific_tags=OF_SERIES)
+        header = pydicom.dcmread(files[0], stop_before_pixels=True, force=True, specific_tags=SERIES_TAGS)
         first = values_in([header])
-        number, description, position, kind = (str(first.get(each, "")) for each in OF_SERIES)
+        number, description, position, kind = (str(first.get(each, "")) for each in SERIES_TAGS)
         lattice = lattice_of(Path(files[0]), len(files))
         every.append(FileSeries(files, uid, number, description or kind, position, lattice))
     names = {Path(file).name for each in every for file in each.files}

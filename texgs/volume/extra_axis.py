@@ -13,7 +13,7 @@ from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Axis, place_on
 from texgs.volume.headers import METAIMAGE, NRRD, read_fields
 
-OF_SPACE = ("domain", "space")  # kinds of axes of NRRD
+SPACE_KINDS = ("domain", "space")  # kinds of axes of NRRD
 SEQUENCE = ".seq.nrrd"  # of 3D Slicer, whose list is one of steps in time
 WORD = re.compile(r'\([^)]*\)|"[^"]*"|\S+')  # of a field of NRRD; a vector or a quoted text is one word
 TEXTS = ("type", "color")  # fields whose four words are not of four axes
@@ -55,7 +55,7 @@ def axis_of(path: Path) -> ExtraAxis | None:
         return ExtraAxis(3, int(sizes[3]), "time") if len(sizes) == 4 else None
     sizes = fields.get("sizes", "").split()
     kinds = fields.get("kinds", "").split() or WORD.findall(fields.get("spacedirections", ""))
-    others = [k for k, kind in enumerate(kinds) if kind not in OF_SPACE and kind[0] != "("]
+    others = [k for k, kind in enumerate(kinds) if kind not in SPACE_KINDS and kind[0] != "("]
     if len(sizes) != 4 or len(others) > 1:
         return None
     place = others[0] if others else 3

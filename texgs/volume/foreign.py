@@ -36,7 +36,7 @@ from texgs.volume.samples import StoredSamples, stored_samples, unpack
 from texgs.volume.slabs import ArraySource, RawSource, Source, step_note
 from texgs.volume.space import LEFT_HANDED, RIGHT_HANDED, Space
 
-BY_VTK = (".vti", ".vtr", ".vts", ".pvti", ".pvtr", ".vtk", ".slc")
+VTK_SUFFIXES = (".vti", ".vtr", ".vts", ".pvti", ".pvtr", ".vtk", ".slc")
 DICOM = (".dcm", ".ima")  # suffixes; slices may have none, and are read by their folder
 MIN_SECONDS = 60.0  # that reading may take, of a file of any size
 BYTES_PER_SECOND = 1e6  # that reading has to keep up with, of a large file
@@ -173,7 +173,7 @@ def image_of(
     path: Path, keys: dict[str, Any], is_header_only: bool
 ) -> tuple[dict[str, Any], np.ndarray | None]:
     """Read the lattice, and samples [Z, Y, X] unless only the header is asked for."""
-    if path.suffix.lower() in BY_VTK:
+    if path.suffix.lower() in VTK_SUFFIXES:
         from texgs.volume.vtk_image import read_vtk
 
         return read_vtk(path, keys.get("variable"))

@@ -223,7 +223,7 @@ GENERATORS: dict[str, Callable[..., Grid]] = {
     "jets": jets,
 }
 SERIES: dict[str, Callable[..., Grid]] = {"rings": rings, "flame": flame}
-RANDOM = ("turbulence", "jets", "flame")  # those that a seed changes, also of series
+RANDOM_GENERATORS = ("turbulence", "jets", "flame")  # those that a seed changes, also of series
 
 
 def series(name: str, size: int, steps: int) -> list[Grid]:

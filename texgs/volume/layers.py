@@ -22,7 +22,7 @@ from texgs.volume.axes import (
     METRES,
     NUMBERS,
     PACKED,
-    UNSIGNED,
+    UNSIGNED_KEY,
     Axis,
     axes_of,
     choose_places,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 MEMORY_PARTS = 4  # a layer takes at most a quarter of the free memory
 MAX_LISTED = 8  # arrays in a message
-EVERYTHING = (-np.inf, np.inf)
+ALL_VALUES = (-np.inf, np.inf)
 
 
 class LayerSource(Source):
@@ -128,9 +128,9 @@ def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> tuple[dict[str,
             said[key] = values.astype(dtype) if key in CODES and dtype.kind == "f" else values
     coding: dict[str, Any] = {key: said[key] for key in CODES if key in said}
     coding |= {key: float(said[key][0]) for key in PACKED if key in said}
-    if str(attributes.get(UNSIGNED, "")).lower() == "true" and dtype.kind == "i":
-        coding[UNSIGNED] = "true"
-    low, high = said.get("valid_range", EVERYTHING)
+    if str(attributes.get(UNSIGNED_KEY, "")).lower() == "true" and dtype.kind == "i":
+        coding[UNSIGNED_KEY] = "true"
+    low, high = said.get("valid_range", ALL_VALUES)
     low, high = said.get("valid_min", [low])[0], said.get("valid_max", [high])[0]
     if coding.keys() & PACKED and any(np.asarray(end).dtype.kind in "iu" for end in (low, high)):
         scale, offset = (coding.get(key, default) for key, default in PACKED.items())
@@ -149,7 +149,7 @@ def decode(values: np.ndarray, coding: Mapping[str, Any], valid: tuple[float, fl
     with warnings.catch_warnings(), np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
         warnings.simplefilter("ignore", xarray.SerializationWarning)  # of several codes
         samples = xarray.conventions.decode_cf_variable("field", stored, decode_times=False).values
-        if valid != EVERYTHING:
+        if valid != ALL_VALUES:
             samples = np.where((samples < valid[0]) | (samples > valid[1]), np.nan, samples)
         is_new = samples.dtype.kind == "f" != values.dtype.kind
         return samples.astype(np.float32) if is_new else samples

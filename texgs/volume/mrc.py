@@ -21,7 +21,7 @@ from texgs.volume.grid import (
 from texgs.volume.slabs import ArraySource, RawSource, Source
 from texgs.volume.space import Space
 
-MAPS = (".mrc", ".map", ".ccp4", ".rec")  # suffixes
+MAP_SUFFIXES = (".mrc", ".map", ".ccp4", ".rec")  # suffixes
 VERSIONS = (20140, 20141)  # of MRC, in which bytes have a sign
 IMOD = 1146047817  # a word of headers by IMOD, with flags behind it
 

@@ -82,11 +82,11 @@ def prepare_fields(
 
 def generated_field(volume: VolumeKeys) -> Source:
     """Return the field of a generator, at its time where it changes."""
-    from texgs.volume.generate import GENERATORS, RANDOM, SERIES
+    from texgs.volume.generate import GENERATORS, RANDOM_GENERATORS, SERIES
     from texgs.volume.slabs import ArraySource
 
     name, last = str(volume.generator), volume.steps - 1
-    options: dict[str, Any] = {"seed": volume.seed} if name in RANDOM else {}
+    options: dict[str, Any] = {"seed": volume.seed} if name in RANDOM_GENERATORS else {}
     if volume.time > last or (last and name not in SERIES):
         expected = f"a step from 0 to {last}" if name in SERIES else "steps=1"
         raise ArgumentError(

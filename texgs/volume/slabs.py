@@ -9,7 +9,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Axis, Channel
 from texgs.volume.grid import ONES, ZEROS, Dims, Grid, Triple, byte_count, check_lattice
-from texgs.volume.space import UNTOLD, Space
+from texgs.volume.space import UNKNOWN_SPACE, Space
 
 SLAB_BYTES = 1 << 23  # reads of this size run at the disk's speed, and memory stays small
 
@@ -21,7 +21,7 @@ class Source(ABC):
     n_steps = 1  # of time, one of which this is
     channels: Sequence[Channel] = ()  # of the file, one of which this is
     channel: Channel | None = None
-    space = UNTOLD
+    space = UNKNOWN_SPACE
 
     def __init__(self, name: str, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> None:
         check_lattice(dims, dtype, spacing, origin)
@@ -69,7 +69,7 @@ class RawSource(Source):
         offset: int = 0,
         spacing: Triple = ONES,
         origin: Triple = ZEROS,
-        space: Space = UNTOLD,
+        space: Space = UNKNOWN_SPACE,
     ) -> None:
         super().__init__(path.name, dims, stored, spacing, origin)
         self.space = space

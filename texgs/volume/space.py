@@ -79,4 +79,4 @@ class Space:
         return dict(zip("XYZ" + ahead + behind, [*unit, *unit, *-unit], strict=False)).get(letter)
 
 
-UNTOLD = Space()
+UNKNOWN_SPACE = Space()

@@ -37,7 +37,7 @@ TAIL_AREA = 0.03  # width (of the range) times share (of the foreground) that ma
 LOW_SHARE = 0.1  # of the foreground's voxels, that makes values below the background worth showing
 
 
-def suggested(
+def suggest(
     known: Mapping[str, Any], count: int | None = None, channel: Channel | None = None
 ) -> dict[str, TransferFunction]:
     """Propose basic transfer functions with disjoint supports: TF01, TF02, ... in ascending order of value.

@@ -12,7 +12,7 @@ import numpy as np
 from texgs.core.io import read_json, write_json
 from texgs.volume.grid import Dims, Triple
 from texgs.volume.slabs import Source, slab_bounds
-from texgs.volume.space import UNTOLD, Space
+from texgs.volume.space import UNKNOWN_SPACE, Space
 from texgs.volume.suggest import looks_like_labels
 
 Counted = dict[str, Any]  # minimum, maximum, histogram, and its scale: "linear" or "log"
@@ -39,7 +39,7 @@ class Summary:
     maximum: float
     histogram: tuple[int, ...]  # counts in 256 equal bins over [minimum, maximum]
     robust: Counted | None = None  # what functions are suggested from, where that is another histogram
-    space: Space = UNTOLD
+    space: Space = UNKNOWN_SPACE
 
     @property
     def voxels(self) -> int:

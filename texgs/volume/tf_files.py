@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import read_json, reading_as, write_json
 from texgs.core.names import is_number
 from texgs.volume.transfer import TransferFunction
@@ -30,7 +30,7 @@ def read_tf(path: str | Path) -> TransferFunction:
     given over [0, 1]: see `TransferFunction.scaled`.
     """
     data = read_json(path)
-    with located(path), reading_as("a transfer function"):
+    with errors_at(path), reading_as("a transfer function"):
         if isinstance(data, dict) and data.get("format") == FORMAT:
             return _from_ours(data)
         presets = data if isinstance(data, list) else [data]

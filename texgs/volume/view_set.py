@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.image import open_picture, read_rgba
 from texgs.core.io import read_json, reading_as, write_json
 from texgs.core.light import HEADLIGHT, Light
@@ -141,7 +141,7 @@ def _light(where: str, frame: Mapping[str, Any]) -> Light:
         raise ArgumentError(f"{where}: light: expected the kind headlight or directional, got {light!r}")
     if light["kind"] == "headlight":
         return HEADLIGHT
-    with located(where):
+    with errors_at(where):
         return Light("directional", _number(where, light, "azimuth"), _number(where, light, "polar"))
 
 

@@ -13,7 +13,7 @@ from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline 
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import dims_of, require_room
 
-IN_XML = (".vti", ".vtr", ".vts", ".pvti", ".pvtr")  # suffixes
+XML_SUFFIXES = (".vti", ".vtr", ".vts", ".pvti", ".pvtr")  # suffixes
 TAIL = 1024  # bytes; more than the end tag and whatever blanks an editor left behind it
 SPACING_TOLERANCE = 0.01  # of a distance: coordinates are often rounded to float32
 
@@ -23,7 +23,7 @@ def read_vtk(path: Path, variable: str | None = None) -> tuple[dict[str, Any], n
     window = vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(window)
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    if path.suffix.lower() in IN_XML:
+    if path.suffix.lower() in XML_SUFFIXES:
         require_whole(path)
     reader = pyvista.get_reader(str(path))
     reader.reader.UpdateInformation()

@@ -48,11 +48,11 @@ class Pairs:
         return SeenFrame(shown.color.clamp(0, 1), getattr(surface, self.depth), surface.alpha, camera)
 
     def see(self, view: SeenView) -> None:
-        """Compare a view with those on the path that are `SHORT` and `LONG` views later."""
-        from texgs.metrics.consistency import LONG, SHORT, difference
+        """Compare a view with those on the path that are `SHORT_RANGE` and `LONG_RANGE` views later."""
+        from texgs.metrics.consistency import LONG_RANGE, SHORT_RANGE, difference
 
         distance = partial(self.lpips.changed, view.layers) if self.lpips else None
-        for name, apart in (("short", SHORT), ("long", LONG)):
+        for name, apart in (("short", SHORT_RANGE), ("long", LONG_RANGE)):
             if view.place + apart < len(self.measured.cameras):
                 first, second = self.frame(view.place), self.frame(view.place + apart)
                 compared = difference(first, second, distance)

@@ -12,13 +12,13 @@ from texgs.metrics.metric import Measure, MeasuredScene, Metric
 
 def run(measured: MeasuredScene) -> dict[str, Any]:
     """Measure distances of the scene as it is shown; nothing without weights, or where it shows nothing."""
-    from texgs.metrics.retrieval import known, scene_likeness
+    from texgs.metrics.retrieval import scene_likeness, style_likeness
     from texgs.models.pictures import PICTURES
 
     seen = measured.vgg and scene_likeness(measured.after, measured.shown, measured.vgg)
     if not seen:
         return {}
-    far = seen.distances(known(measured.shown.device))
+    far = seen.distances(style_likeness(measured.shown.device))
     return {f"far_by_{kind}": dict(zip(PICTURES, each.tolist(), strict=True)) for kind, each in far.items()}
 
 
