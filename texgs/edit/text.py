@@ -24,10 +24,7 @@ from texgs.models.instruction import require_instruction
 
 SIZE = 512  # pixels along the longer side of the views, as in the training of InstructPix2Pix
 BYTES_PER_PIXEL = 64  # of a view: input and output of the guidance, and the colours there
-BYTES_PER_SHOT_PIXEL, BYTES_PER_SHOT_SURFEL = (
-    24,
-    28,
-)  # in a view at one opacity
+BYTES_PER_SHOT_PIXEL, BYTES_PER_SHOT_SURFEL = 24, 28  # in a view at one opacity
 # Azimuth and polar angle of cameras at the front (+z), back, left, right, top and bottom, degrees.
 AXES = ((-90, 0), (90, 0), (180, 0), (0, 0), (-90, 90), (-90, -90))
 ANY_FOV = 45.0  # degrees; arbitrary, only the directions of these cameras count

@@ -8,7 +8,7 @@ from texgs.core.names import is_number
 from texgs.fields.kinds import kinds
 
 MAX_FACTOR = 1000.0  # a larger factor is a typing error
-MAX_OPACITY = 1 - 1e-6  # has a logit
+MAX_OPACITY = 1 - 1e-6  # opacity with a finite logit
 # Capability of a field that each value of an edit requires; all other values are factors of a material.
 NEEDS = {"visible": "opacity", "opacity": "opacity", "palette": "palette"}
 

@@ -35,10 +35,8 @@ RATES = Rates(**{name: RATE_FACTOR * getattr(PHASE.rates, name) for name in MOVI
 PLANTED_SHARE = 0.1  # share of surfels, the least visible, to plant where most is missing
 MIN_PLANTED = 4  # surfels to plant; for fewer the size is unknown, see `surfels_at`
 HIDDEN_LOGIT = -12.0  # raw opacity of surfels at an invisible step
-MAX_DISPLACEMENT, MAX_STRETCH = (
-    0.05,
-    2.0,
-)  # world units at which the ends of axes are carried; and how much they stretch
+# World units at which the ends of axes are carried; and how much they stretch.
+MAX_DISPLACEMENT, MAX_STRETCH = 0.05, 2.0
 
 
 class Follower:

@@ -1,6 +1,6 @@
-"""How far views are from pictures as a whole, by features that no loss uses: what they would be taken for.
+"""Distances of views from whole pictures, by features that no loss uses: which picture they resemble.
 
-Only the object counts. Views are compared with colours, and by the pattern alone.
+Only the object counts. Views are compared by colours, and by pattern alone.
 """
 
 from collections.abc import Iterable
@@ -19,24 +19,22 @@ from texgs.scene.scene import Scene
 from texgs.volume.cameras import spiral
 
 LAYERS = ("relu4_3", "relu5_3")
-VIEWS = 8  # of a scene
+VIEWS = 8  # views of a scene
 SIZE = 256  # pixels of the longer side of views and pictures
-SCALES = (1.0, 0.5)  # of pictures against views: a pattern may be laid on at any size
-MIN_COVERAGE = 0.7  # share of what a feature sees that is on the object, for it to count
-MIN_FEATURES = 8  # features: where fewer count, those that are a little on the object count too
-BINS = 6  # of a channel, in the histogram
-HISTOGRAM = 0.5  # weight of the histograms against a layer
-CONTRAST_SIGMA = (
-    1 / 16
-)  # standard deviation of what is around a pixel, in image sides: its contrast becomes 1
-MIN_CONTRAST = 0.02  # contrast that is not made larger
+SCALES = (1.0, 0.5)  # of pictures relative to views, as a pattern may have any size
+MIN_COVERAGE = 0.7  # least share of a feature's window on the object
+MIN_FEATURES = 8  # with fewer features, those partly on the object count too
+BINS = 6  # per channel of the histogram
+HISTOGRAM = 0.5  # weight of the histograms relative to a layer
+CONTRAST_SIGMA = 1 / 16  # of the window that normalises contrast, in image sides
+MIN_CONTRAST = 0.02  # smallest contrast to normalise
 LUMINANCE = (0.299, 0.587, 0.114)
 LIKENESS_FILE = files(__package__) / "likeness.safetensors"  # by `python -m tools.style_likeness`
 
 
 @dataclass(frozen=True, eq=False)
 class Likeness:
-    """What views or pictures [...] are compared by."""
+    """Features of views or pictures [...] for comparison."""
 
     colors: Tensor  # [..., C] means and deviations of features
     pattern: Tensor  # [..., C] the same without colours and with one contrast
@@ -44,7 +42,7 @@ class Likeness:
 
     @classmethod
     def stacked(cls, several: "Iterable[Likeness]") -> Self:
-        """Return many as one, along a new first dimension."""
+        """Stack several along a new first dimension."""
         listed = list(several)
         return cls(*(torch.stack([vars(each)[name] for each in listed]) for name in vars(listed[0])))
 

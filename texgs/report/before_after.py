@@ -1,4 +1,4 @@
-"""Pictures of an edit: the scene before and after it, and the losses on the way."""
+"""Pictures of an edit: the scene before and after, and the losses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +17,7 @@ from texgs.scene.scene import Scene
 from texgs.volume.cameras import FRONT, orbit_path
 
 POLAR = 20.0  # degrees
-VIEW_COUNT = 3  # views around the object
+VIEW_COUNT = 3  # around the object
 SIDE_LIGHT = Light("directional", -30.0, 40.0)  # a light that no edit has seen
 SIZE = 512  # pixels of a picture
 TURNTABLE_FRAMES = 36  # frames of the turntable
@@ -52,7 +52,7 @@ def write_before_and_after(
 
 
 def write_convergence(path: str | Path, curves: Mapping[str, Mapping[str, Sequence[float]]]) -> Path:
-    """Write a PNG with the weighted losses of an edit over its iterations, by term, by what was edited."""
+    """Write a PNG of an edit's weighted losses over its iterations, by part and term."""
     figure = new_figure(8, 3.2, 120)
     axes = figure.subplots()
     axes.set(xlabel="iterations, one view each", ylabel="loss of one view")

@@ -1,4 +1,4 @@
-"""A view of a scene beside its volume, or as fitted: both, their difference, and how close they are."""
+"""A view of a scene beside its volume or its fit: both pictures, their difference, and scores."""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,7 +13,7 @@ KEPT_IMAGES = {
     "depth": "depth",
     "normal": "normal",
     "opacity": "alpha",
-}  # what new looks leave alone, in a render
+}  # images that new looks do not change, in a render
 
 
 def pictures(image: Render, truth: Render, gain: float = ERROR_GAIN) -> dict[str, np.ndarray]:
@@ -28,7 +28,7 @@ def pictures(image: Render, truth: Render, gain: float = ERROR_GAIN) -> dict[str
 
 
 def scale_of(gain: float) -> Scale:
-    """Return which colours stand for which errors."""
+    """Return the colour scale of errors."""
     return Scale(-1 / gain, 1 / gain, DIVERGING)
 
 
@@ -49,7 +49,7 @@ def side_by_side(
 
 
 def score_words(scores: Mapping[str, float]) -> tuple[str, str]:
-    """Return the scores of `compare`: on the object, if there is one, and of the whole picture."""
+    """Format the scores of `compare`: on the object, if any, and of the whole picture."""
     whole = "whole picture: {psnr:.2f} dB, SSIM {ssim:.4f}".format(**scores)
     if "object_psnr" not in scores:
         return "no object in view", whole
@@ -57,7 +57,7 @@ def score_words(scores: Mapping[str, float]) -> tuple[str, str]:
 
 
 def changes_of(image: Render, fitted: Render) -> dict[str, float]:
-    """Return the largest difference of a colour, and in how many pixels depth, normals, opacity differ."""
+    """Return the largest difference of a colour, and numbers of pixels with other depth, normal, opacity."""
     told = {"colour": float((image.color - fitted.color).abs().max())}
     for title, name in KEPT_IMAGES.items():
         now, before = getattr(image, name), getattr(fitted, name)
@@ -67,7 +67,7 @@ def changes_of(image: Render, fitted: Render) -> dict[str, float]:
 
 
 def change_words(told: Sequence[Mapping[str, float]]) -> str:
-    """Say what edits changed of all views; see `changes_of`."""
+    """Describe the changes of all views by edits; see `changes_of`."""
     total = {title: sum(view[title] for view in told) for title in KEPT_IMAGES if title in told[0]}
     kept = ", ".join(title for title, pixels in total.items() if not pixels)
     other = [f"{pixels:.0f} pixels have another {title}" for title, pixels in total.items() if pixels]

@@ -1,4 +1,4 @@
-"""How far a scene is from its volume: over seeded views, lights and edits, with a floor for new ones."""
+"""Check a scene against its volume: over seeded views, lights and edits, with a floor for new ones."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
@@ -27,23 +27,20 @@ from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin
 
-MISSED_SHARE = 0.05  # share of new views that may be farther off than the floor
-LIT_SHARE, EDITED_SHARE = (
-    0.7,
-    0.5,
-)  # shares of views under a light from anywhere, and of opacities and palettes edited
+MISSED_SHARE = 0.05  # share of new views that may fall below the floor
+LIT_SHARE, EDITED_SHARE = 0.7, 0.5  # shares: views under a random light, edited opacities and palettes
 OPACITY_FACTORS = (0.2, 1.5)  # factors
-WORST_COUNT = 4  # views that are shown
+WORST_COUNT = 4  # worst views to show
 
 
 def check(
     scene: Scene, composition: Composed, twin: Twin, lens: Lens, count: int, seed: int, file: Path
 ) -> CheckResult:
-    """Return how close `random_shots` of a scene are to those of its volume, and write it to a file of JSON.
+    """Compare `random_shots` of a scene with its volume, and write the result to a JSON file.
 
     The worst are drawn into a PNG beside it.
     """
-    floor_of([MAX_PSNR] * count)  # refuses too few before the work
+    floor_of([MAX_PSNR] * count)  # refuses too few views before the work
     drawn, psnr, on_object, share = (
         list(random_shots(scene, lens, count, seed)),
         *(list[float]() for _ in range(3)),
@@ -77,7 +74,7 @@ def check(
 
 
 def found_sentence(path: Path, scene: Scene) -> str:
-    """Return what a check of the models of a scene file has found: here, beside it, or by the workflow."""
+    """Return the sentence of an earlier check of a scene's models, here, beside its file or in results."""
     name = f"{path.stem}-check.json"
     for file in (Path(name), path.with_name(name), path.resolve().parent.with_name("pse") / "check.json"):
         if file.is_file():
@@ -88,7 +85,7 @@ def found_sentence(path: Path, scene: Scene) -> str:
 
 
 def checksum_of(scene: Scene) -> str:
-    """Return a checksum of the models with their looks, whatever else is edited."""
+    """Return a checksum of the models with their looks, independent of other edits."""
     files = [(name, file) for name, model in scene.models.items() for file in model.files if file]
     return combined_checksum((name, sha256(file)) for name, file in files)
 
@@ -121,13 +118,13 @@ def random_shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tu
 
 
 def statistics_of(values: Sequence[float]) -> dict[str, float]:
-    """Return what is told of the values of all views, by name."""
+    """Return statistics of the values of all views, by name."""
     low = float(np.percentile(values, 5))
     return {"mean": fmean(values), "percentile_5": low, "worst": min(values), "floor": floor_of(values)}
 
 
 def floor_of(values: Sequence[float]) -> float:
-    """Return what a new value reaches with a probability of 1 - MISSED at least: split conformal prediction.
+    """Return the value that a new one reaches with probability 1 - MISSED_SHARE: split conformal prediction.
 
     It is the k-th smallest of n values, k = floor(MISSED (n + 1)): of 64 the third. Proof: the new value and
     the n are exchangeable, so that its rank among all n + 1, ties broken at random, is uniform. If it is

@@ -23,20 +23,14 @@ from texgs.scene.session import Session
 from texgs.scene.twin import Twin
 
 MAX_GAIN = 16.0
-POLAR = 20.0  # of the views that are compared, degrees
+POLAR = 20.0  # polar angle of compared views, degrees
 LEFT_LIGHT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
-SWEEP_ANGLES = (
-    -30.0,
-    -15.0,
-    0.0,
-    15.0,
-    30.0,
-    45.0,
-)  # polar angles of the light in the paper's figure, degrees
+# Polar angles of the light in the paper's figure, degrees.
+SWEEP_ANGLES = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)
 
 
 def mean_scores(pairs: Iterable[tuple[Render, Render]]) -> dict[str, float]:
-    """Return the means over pairs of pictures of what `texgs.metrics.quality.compare` measures."""
+    """Return the means of `texgs.metrics.quality.compare` over pairs of pictures."""
     measured = defaultdict[str, list[float]](list)
     for image, truth in pairs:
         for name, value in compare(image, truth).items():
@@ -62,7 +56,7 @@ def compare_views(
 
 
 class SideBySide:
-    """Frames of a scene, its volume or what it was as fitted, and their difference; and what differs in all.
+    """Frames of a scene, its volume or its fit, and their difference; and a summary of all differences.
 
     Args:
         session: of the scene.
@@ -79,7 +73,7 @@ class SideBySide:
                 "texgs edit, or compare it with what was fitted"
             )
         if other == "volume":
-            session.twin_of(session.scene)  # what is wrong with its volume is told now
+            session.twin_of(session.scene)  # reports errors of its volume now
         self._session, self._gain, self._is_fitted = session, gain, other == "fitted"
         self._scores, self._changes = defaultdict[str, list[float]](list), list[dict[str, float]]()
 
@@ -96,14 +90,14 @@ class SideBySide:
 
     @property
     def sentences(self) -> list[str]:
-        """Return the means of PSNR and SSIM so far, and what edits have changed."""
+        """Return the means of PSNR and SSIM so far, and the changes by edits."""
         return [
             ", ".join(score_words(mean(self._scores))),
             *([change_words(self._changes)] * self._is_fitted),
         ]
 
     def _pair(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
-        """Return a view of a scene, and what it is compared with."""
+        """Render a view of a scene, and its counterpart."""
         if not self._is_fitted:
             return self._session.beside(camera, scene)
         can = kind_of(next(iter(scene.models.values())).file).can
@@ -113,7 +107,7 @@ class SideBySide:
 
 
 def caption(entry: ViewComparison) -> str:
-    """Return the title of a picture, with the mean PSNR of all views where it was measured."""
+    """Return the title of a picture, with the mean PSNR of all views, if measured."""
     measured = "" if entry.psnr is None else f"\nmean of {COMPARED_VIEWS} views: {entry.psnr:.1f} dB"
     return entry.title + measured
 
@@ -148,7 +142,7 @@ def light_sweep(scene: Scene) -> dict[str, Scene]:
 
 
 def with_edits(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
-    """Return the scene with edits of some models changed."""
+    """Return the scene with changed edits of some models."""
     session = Session(scene)
     for part, values in changes.items():
         for key, value in values.items():

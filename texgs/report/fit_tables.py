@@ -20,7 +20,7 @@ VARIANTS = {  # heading of the variants of each sweep, and the heading in the pa
 
 
 def phase_rows(records: Iterable[Record[Any]]) -> list[dict[str, Any]]:
-    """Return the phases of fits that are of no sweep, by data set, label and order; unknown ones last."""
+    """Return the phases of fits outside of sweeps, by data set, label and order; unknown ones last."""
     phases = [phase for kind in fit_specs().values() for phase in kind.phases]
     order = {phase: place for place, phase in enumerate(phases)}
     unswept = [record for record in of(FitResult, records) if not record.is_swept]
@@ -70,12 +70,12 @@ def runs_of(records: Iterable[Record[Any]]) -> list[Run]:
 
 
 def end_of(run: Run) -> Record[FitResult] | None:
-    """Return the last phase of a fit; None where one is missing, or its kind of field is not known here."""
+    """Return the last phase of a fit, or None if a phase is missing or the kind of field is unknown."""
     return next((run[kind.phases[-1]] for kind in fit_specs().values() if set(kind.phases) <= set(run)), None)
 
 
 def measures_of(run: Run) -> dict[str, Any]:
-    """Return what is measured of a fit after its last phase, with the minutes of all phases, by titles."""
+    """Return the measures of a fit after its last phase, with the minutes of all phases, by title."""
     if (end := end_of(run)) is None:
         return {}
     result = end.result
@@ -92,7 +92,7 @@ def measures_of(run: Run) -> dict[str, Any]:
 
 
 def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
-    """Return the table of one of `VARIANTS`, and of sweeps whose names begin so, such as `views_quick`."""
+    """Return the table of one of `VARIANTS`, including sweeps with that prefix, such as `views_quick`."""
     variant, heading = VARIANTS[sweep]
     own = [each for each in records if each.sweep == sweep or each.sweep.startswith(f"{sweep}_")]
     rows = []
@@ -108,7 +108,7 @@ def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
 
 
 def model_size(records: Iterable[Record[Any]]) -> Table:
-    """Return the sizes of the models of a data set together, as the paper's appendix counts them."""
+    """Return the total sizes of a data set's models, counted as in the paper's appendix."""
     rows = []
     for record in in_order(of(FitResult, records)):
         if record.result.sizes and not record.is_swept:

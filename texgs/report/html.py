@@ -1,4 +1,4 @@
-"""One HTML file with all that a run has to show: tables, pictures, curves, and where each came from."""
+"""One HTML report of a run: tables, pictures, curves, and the origin of each."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -42,7 +42,7 @@ def write_report(
     given: Mapping[str, Table] | None = None,
     more: Mapping[str, Sequence[Figure]] | None = None,
 ) -> Path:
-    """Write a report that needs no other file than pages of scenes that are too large for it.
+    """Write a report that needs no other files, except pages of scenes too large to embed.
 
     Tables by name and figures by section that need more than records are `given` and `more`.
     """
@@ -74,7 +74,7 @@ def write_report(
 def sections(
     records: Sequence[Record[Any]], tables: Mapping[str, Table], pictures: Mapping[str, list[Figure]]
 ) -> list[dict[str, Any]]:
-    """Return the sections that have something to show, with tables by name and figures by data set."""
+    """Return the non-empty sections, with tables by name and figures by data set."""
     places = {spec.name: spec.section for spec in specs(sweeps_of(records))}
     shown = []
     for key, title in SECTIONS.items():
@@ -88,7 +88,7 @@ def sections(
 
 
 def loss_figures(records: Sequence[Record[Any]]) -> list[Figure]:
-    """Draw curves of the phases that recorded their loss more than once, without those of sweeps."""
+    """Draw curves of all phases outside of sweeps that recorded several losses."""
     by_dataset: dict[str, list[Record[FitResult]]] = {}
     for record in in_order(of(FitResult, records)):
         if len(record.result.losses) > 1 and not record.is_swept:
@@ -113,12 +113,12 @@ def curves(phases: Sequence[Record[FitResult]]) -> Image.Image:
 
 
 def job(metrics: Mapping[str, Any]) -> list[str]:
-    """Return the cells of one job in the list of where things came from."""
+    """Return the cells of one job in the list of origins."""
     facts = {"edit": metrics["numbers"].get("edit"), **metrics}
     cells = [facts.get(key) for key in (*JOB_FACTS, *SOURCE_FACTS)]
     return ["" if x is None else f"{x:.1f}" if isinstance(x, float) else str(x) for x in cells]
 
 
 def versions(jobs: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what the jobs ran with, each combination once."""
+    """Return the versions that jobs ran with, each combination once."""
     return sorted({", ".join(f"{name} {v}" for name, v in metrics["versions"].items()) for metrics in jobs})

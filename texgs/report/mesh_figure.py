@@ -1,4 +1,4 @@
-"""Figure of a mesh: the surface that it should be, the mesh, and how far it is from that surface."""
+"""Figure of a mesh: the true surface, the mesh, and its distance from the surface."""
 
 from pathlib import Path
 
@@ -15,17 +15,17 @@ from texgs.report.fit_figure import VISIBLE_ALPHA, draw_visible
 from texgs.volume.cameras import orbit_path
 from texgs.volume.isosurface import Mesh
 
-DISCS = 300_000  # discs that a surface is drawn with
+DISCS = 300_000  # discs to draw a surface with
 VIEW_SIZE = 640  # pixels
 POLAR = 20.0  # polar angle of the cameras, degrees
 MAX_ERROR = 0.02  # world units, the brightest colour of an error
-CLAY, AMBIENT = 0.8, 0.2  # colour of a surface, and its share without light
+CLAY, AMBIENT = 0.8, 0.2  # colour of a surface, and its ambient share
 
 
 def write_mesh_figure(
     path: str | Path, mesh: Mesh, reference: Mesh, surface: Points, lens: Lens, title: str
 ) -> Path:
-    """Draw a mesh beside the surface that it should be as PNG, in one step, from two sides.
+    """Draw a mesh beside the true surface from two sides, as PNG, in one step.
 
     Errors are distances from `surface`, points on what counts of the reference.
     """

@@ -1,4 +1,4 @@
-"""The figure of a sweep: what was measured over the swept value, and a picture of each edited scene."""
+"""The figure of a sweep: measures over the swept value, and a picture of each edited scene."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PANELS_PER_ROW, WIDTH = 4, 2.6  # panels in a row, and inches of each
 HEIGHT, BAR = 2.2, 0.22  # inches of a panel over numbers, and of each bar
 PICTURE_SIZE = 400  # pixels
-LOGARITHMIC_RATIO = 30.0  # ratio of the ends of an axis from which it is logarithmic
+LOGARITHMIC_RATIO = 30.0  # ratio of the ends that makes an axis logarithmic
 
 
 def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
@@ -56,7 +56,7 @@ def stack(pictures: Sequence[Image.Image]) -> Image.Image:
 
 
 def titles_that_differ(runs: DataFrame) -> dict[str, int]:
-    """Return the measures that differ between runs with their digits; all that there are, where none does."""
+    """Return the measures that differ between runs, with digits; all measures if none differs."""
     titles = measured_titles(runs)
     counts = runs[list(titles)].nunique()
     for least in (1, 0):
@@ -97,7 +97,7 @@ def draw_panels(
 def draw_line(
     axes: Axes, at: Sequence[float], means: Sequence[float], spread: Sequence[float], label: str
 ) -> None:
-    """Draw means over the swept value, with their standard deviation where there are several seeds."""
+    """Draw means over the swept value, with standard deviations for several seeds."""
     axes.errorbar(at, means, spread, label=words(label), marker="o", markersize=3, linewidth=1, capsize=2)
     if at and min(at) > 0 and max(at) / min(at) > LOGARITHMIC_RATIO:
         axes.set_xscale("log")

@@ -17,12 +17,12 @@ from texgs.report.table import SOURCES, Column, Table, data_frame
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-# Columns of measures of fits, with the digits that they are written with.
+# Columns of measures of fits, with their digits.
 FIT_DIGITS = {"PSNR, training": 2, "PSNR": 2, "SSIM": 4, "minutes": 2, "memory GiB": 2, "primitives": 0}
 MATERIAL = {"k_a": "ambient", "k_d": "diffuse", "k_s": "specular", "beta": "shininess"}
-SERIES = [DATA, "TF", LABEL, "edit"]  # what variants are of; empty where a run has none
+SERIES = [DATA, "TF", LABEL, "edit"]  # subjects of variants; empty for runs without them
 SEEDS = "Means over seeds, ± their standard deviation."
-CAPTIONS = {  # by the measures that they are about
+CAPTIONS = {  # by measure
     "PSNR": "Fits: test views after the last phase; minutes of all phases; medians of the material.",
     "NNFM": "Edits: minutes of the edit alone; distances to the style in views that it was not learned from.",
 }
@@ -74,7 +74,7 @@ def fit_run(run: Run) -> dict[str, Any]:
 
 
 def edit_runs(records: Sequence[Record[Any]]) -> list[dict[str, Any]]:
-    """Return the rows of edits, with what was measured of those with a new look."""
+    """Return the rows of edits, with measures for new looks."""
     return [
         {**_names(edit, "", edit.result.edit), "is_done": True, **measured_cells(edit_measures(), edit, seen)}
         for edit, seen in pairs_of(records)
@@ -82,7 +82,7 @@ def edit_runs(records: Sequence[Record[Any]]) -> list[dict[str, Any]]:
 
 
 def _names(record: Record[Any], tf: str, edit: str) -> dict[str, Any]:
-    """Return what a run is called."""
+    """Return the names of a run."""
     names = {DATA: record.dataset, "TF": tf, LABEL: record.recipe, "edit": edit}
     return {**names, "variant": record.variant, "series": " ".join(filter(None, names.values()))}
 
@@ -93,7 +93,7 @@ def edit_measures() -> list[Measure]:
 
 
 def measured_titles(runs: DataFrame) -> dict[str, int]:
-    """Return the digits of what is measured of fits, where there are some, and of edits, by titles."""
+    """Return the digits of measures of fits, if any, and of edits, by title."""
     relit = {RELIT_PSNR.title: 2} if runs[RELIT_PSNR.title].notna().any() else {}
     of_fits = {**FIT_DIGITS, **relit, **dict.fromkeys(MATERIAL, 2)} if (runs["edit"] == "").any() else {}
     of_edits = {measure.title: measure.digits or 0 for measure in edit_measures()}
@@ -101,7 +101,7 @@ def measured_titles(runs: DataFrame) -> dict[str, int]:
 
 
 def variants(runs: DataFrame) -> DataFrame:
-    """Return a row for each variant: means over the seeds that are done, and their standard deviations.
+    """Return a row for each variant: means over finished seeds, and standard deviations.
 
     They are None where a value is missing, or there are too few.
     """
@@ -124,7 +124,7 @@ def natural(name: str) -> tuple[float, str]:
 
 
 def number(name: str) -> float | None:
-    """Return the value that a variant is named after; None where that is no number."""
+    """Return the number in a variant's name, or None."""
     try:
         return float(name) if name[:1] in "-.0123456789" else None
     except ValueError:

@@ -17,10 +17,7 @@ from texgs.scene.twin import Twin, range_of
 from texgs.volume.images import smaller
 
 SLAB_UNITS = 36.0  # thickness of the slab behind a face, opacity units; it hides most of the rest
-FACE_UNITS, FACE_ALPHA = (
-    3.0,
-    0.05,
-)  # a face is where so many opacity units behind a cut have at least this alpha
+FACE_UNITS, FACE_ALPHA = 3.0, 0.05  # a face has this alpha within so many opacity units behind a cut
 RIM = 0.01  # width of the slab's rim around a face, in shorter sides of the picture
 HIDDEN_ALPHA = 0.998  # alpha of a slab that hides models, half a level of 255 from opaque
 STEP = 0.5  # voxels between the samples of a slab

@@ -20,9 +20,8 @@ from texgs.scene.twin import Twin
 
 BLACK_MODES = ("alpha", *MATERIAL)
 SHININESS = 100.0  # displayed as white
-BYTES_PER_PIXEL = (
-    64  # of memory for a pixel: the images of the rasterizer, over a background, clamped and rounded
-)
+# Of memory for a pixel: the images of the rasterizer, over a background, clamped and rounded.
+BYTES_PER_PIXEL = 64
 FAINT_ALPHA = 0.1  # alpha below which a pixel counts as background
 HOLLOW_MODES = {"normal", "depth", *get_args(Look)} - {"shaded"}  # modes without faces of cuts
 

@@ -1,4 +1,4 @@
-"""Ballots that voters send, read and checked: CSV files that the page of a study saves."""
+"""Read and check ballots: CSV files that the page of a study saves."""
 
 import csv
 from collections.abc import Iterable, Sequence
@@ -16,7 +16,7 @@ FILE_WORDS, ADVICE = "a ballot", "ask the voter for the file that the page saves
 
 @dataclass(frozen=True)
 class Ballot:
-    """What one voter has ranked."""
+    """The ranks given by one voter."""
 
     ballot: str  # random id
     ranks: Sequence[Sequence[int]]  # by question, by option; 1 is the best
@@ -82,7 +82,7 @@ def read_ballot(study: Study, path: Path) -> Ballot:
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
-    """Return the lines of a ballot by column, at least one."""
+    """Return the lines of a ballot by column; at least one is required."""
     with reading(path, FILE_WORDS, ADVICE):
         if path.stat().st_size > MAX_BYTES:
             raise ArgumentError(
@@ -96,7 +96,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 
 def ranks_of(where: str, question: Question, given: Sequence[tuple[str, str]]) -> list[int]:
-    """Return the rank of each option of a question, of which a ballot has options and ranks."""
+    """Return the rank of each option of a question, from a ballot's options and ranks."""
     count, ranks = len(question.letters), dict(given)
     expected = sorted(str(rank) for rank in range(1, count + 1))
     if sorted(option for option, _ in given) != list(question.letters) or sorted(ranks.values()) != expected:

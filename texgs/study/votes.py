@@ -1,4 +1,4 @@
-"""Table and figure of a user study: how people rank methods, beside the votes in the paper's appendix."""
+"""Table and figure of a user study: ranks of methods beside the votes in the paper's appendix."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from texgs.study.rankings import CONFIDENCE, Rankings, firsts, friedman, interva
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-METHODS = {"style": "image_npse", "instruction": "text_npse"}  # the paper's files that name those of a kind
+METHODS = {"style": "image_npse", "instruction": "text_npse"}  # the paper's files of methods, by kind
 PAPER_COLUMNS = ("best", "second_best", "second_worst", "worst")  # columns of the paper's file
 LABELS = ("kind", "data set", "follows", "recipe", "edit", "method")
 STATISTICS = (
@@ -38,11 +38,11 @@ STATISTICS = (
     Column("chi2 (Friedman)", 2, UNPUBLISHED_CELL),
     Column("p (Friedman)", None, UNPUBLISHED_CELL),
 )
-PAPER_LABEL = "the paper"  # edit in rows of its votes
+PAPER_LABEL = "the paper"  # edit column in rows of the paper's votes
 NO_BALLOTS_NOTE = "only counts are published"
 TOO_FEW_NOTE = "needs three methods"
 WIDTH, DPI = 5.0, 150  # inches of a chart
-BAR_HEIGHT, CHART_MARGIN = 0.35, 1.0  # inches of a bar, and of what is above and below all of a chart
+BAR_HEIGHT, CHART_MARGIN = 0.35, 1.0  # inches: a bar, and the space above and below a chart
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +55,14 @@ class Panel:
 
 
 def study_table(records: Sequence[Record[Any]], votes: Votes | None) -> Table:
-    """Return the table of a study; without votes the paper's, where some jobs edit data sets of it."""
+    """Return the table of a study; without votes, the paper's table if jobs edit its data sets."""
     is_shown = votes or any(intended_dataset(edit) in volumes() for edit in of(EditResult, records))
     table = user_study(votes)
     return table if is_shown else replace(table, rows=[])
 
 
 def user_study(votes: Votes | None) -> Table:
-    """Return the table of a study; without votes only those of the paper.
+    """Return the table of a study; without votes, only the paper's votes.
 
     Votes are added up over the data sets on which the same methods were compared.
     """
@@ -75,7 +75,7 @@ def user_study(votes: Votes | None) -> Table:
 
 
 def panels_by_kind(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
-    """Return kinds of questions, each with all that compare the same methods; the paper's follow ours."""
+    """Return the questions by kind and compared methods; the paper's follow ours."""
     ours, theirs = panels_of_study(votes) if votes else {}, panels_of_paper()
     return [
         (KINDS[follows], panels)
@@ -86,7 +86,7 @@ def panels_by_kind(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
 
 
 def panels_of_study(votes: Votes) -> dict[str, list[Panel]]:
-    """Return the votes of each question, by what methods follow there."""
+    """Return the votes of each question, by kind."""
     panels: dict[str, list[Panel]] = defaultdict(list)
     for place, question in enumerate(votes.study.questions):
         methods = [option.compared for option in question.options]
@@ -97,7 +97,7 @@ def panels_of_study(votes: Votes) -> dict[str, list[Panel]]:
 
 
 def panels_of_paper() -> dict[str, list[Panel]]:
-    """Return the paper's votes, by what its methods follow."""
+    """Return the paper's votes, by kind."""
     keys, numbers = ({name: name for name in names} for names in (("dataset", "method"), PAPER_COLUMNS))
     votes = paper("user_study", keys, numbers)
     panels: dict[str, list[Panel]] = {follows: [] for follows in METHODS}
@@ -112,7 +112,7 @@ def panels_of_paper() -> dict[str, list[Panel]]:
 
 
 def alike(panels: Iterable[Panel]) -> list[list[Panel]]:
-    """Return the questions with the same methods together."""
+    """Group the questions with the same methods."""
     groups: dict[tuple[object, ...], list[Panel]] = defaultdict(list)
     for panel in panels:
         groups[tuple(panel.votes.methods)].append(panel)
@@ -160,7 +160,7 @@ def method_rows(votes: Rankings) -> list[dict[str, Any]]:
 
 
 def caption(votes: Votes | None) -> str:
-    """Return what the columns are, and whose votes these are."""
+    """Return the caption: the columns, and the voters."""
     ours = f"Study {votes.study.study}, {len(votes.ballots)} ballots." if votes else ""
     whose = ours or "No votes but the paper's."
     return (
@@ -183,14 +183,14 @@ def write_votes(path: str | Path, votes: Votes | None) -> Path:
 
 
 def votes_figure(votes: Votes | None) -> Figure:
-    """Return the figure as a report has it."""
+    """Return the figure for the report."""
     with TemporaryDirectory() as folder, Image.open(write_votes(Path(folder, "votes.png"), votes)) as picture:
         command = "texgs votes" if votes else ""
         return Figure("votes", "", "Votes for each rank.", data_uri(picture), command, is_narrow=True)
 
 
 def draw(axes: Axes, kind: str, panels: Sequence[Panel]) -> None:
-    """Draw a bar for each method, of its votes from the best rank to the worst."""
+    """Draw a stacked bar for each method, with its votes from the best rank to the worst."""
     from matplotlib import colormaps  # slow to import
 
     votes = total(panels)
@@ -211,5 +211,5 @@ def draw(axes: Axes, kind: str, panels: Sequence[Panel]) -> None:
 
 
 def name_of(method: Compared) -> str:
-    """Return what a bar is called."""
+    """Return the label of a bar."""
     return method.method if method.edit == PAPER_LABEL else f"{method.edit}\n{method.recipe}"
