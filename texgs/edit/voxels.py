@@ -23,7 +23,7 @@ from texgs.raster.shading import Y00
 from texgs.raster.voxel_grid import GREY, VoxelGrid, drop_sh, recolor
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import Rays, Samples, camera_rays
-from texgs.volume.images import Box, Images
+from texgs.volume.images import Images, PixelBox
 
 RAYS, RUN_LENGTH = 5000, 2  # rays per step of ARF's first phase, in runs of neighbours
 RATE, LAST_RATE, RATE_STEPS = 0.1, 0.01, 250_000  # ARF's rates for coefficients, log-linear
@@ -206,7 +206,7 @@ class VoxelLearner:
         return loss
 
 
-def corner(box: Box, side: int, size: tuple[int, int], generator: torch.Generator) -> tuple[int, int]:
+def corner(box: PixelBox, side: int, size: tuple[int, int], generator: torch.Generator) -> tuple[int, int]:
     """Draw left and top of a patch inside of an image of this width and height, its middle from a box."""
     low, high = torch.tensor(box[:2]), torch.tensor(box[2:])
     middle = low + (torch.rand(2, generator=generator) * (high - low)).long()

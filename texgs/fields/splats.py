@@ -14,7 +14,7 @@ from texgs.fields.field import Role
 from texgs.raster import Options, Render, Texture, native, rasterize
 from texgs.raster.shading import Y00
 from texgs.raster.types import are_gaussians
-from texgs.volume.images import Box, Images, Target
+from texgs.volume.images import Images, PixelBox, Target
 
 GEOMETRY = ("means", "quats", "scales", "opacities")
 REACH = 3.34  # standard deviations at which opacity 1 falls to 1/255, the threshold of drawing
@@ -124,24 +124,24 @@ def join(parameters: Mapping[str, Tensor], degree: int | None = None) -> dict[st
 
 
 @torch.no_grad()
-def screen_box(parameters: Mapping[str, Tensor], options: Options, camera: Camera) -> Box:
+def screen_box(parameters: Mapping[str, Tensor], options: Options, camera: Camera) -> PixelBox:
     """Return a box around the projected bounding spheres of all splats. Waits for a GPU once.
 
     It is the whole image where a sphere reaches behind the camera, or a value is not finite.
     """
     means, scales = parameters["means"].contiguous(), parameters["scales"].contiguous()
     if not len(means):
-        return Box(camera.width // 2, camera.height // 2, camera.width // 2, camera.height // 2)
+        return PixelBox(camera.width // 2, camera.height // 2, camera.width // 2, camera.height // 2)
     bounds, viewmat = means.new_empty(5), camera.viewmat.to(means.device).contiguous()
     spheres = (*scales.shape, means, scales, viewmat)
     native.call("texgs_screen_bounds", *spheres, REACH, bounds, device=means.device)
     nearest, left, right, top, bottom = bounds.tolist()
     if nearest <= 0:
-        return Box(0, 0, camera.width, camera.height)
+        return PixelBox(0, 0, camera.width, camera.height)
     (fx, _, cx), (_, fy, cy), _ = camera.K.tolist()
     variance = options.dilation if are_gaussians(scales) else 1 / max(options.low_pass, 1e-6)
     disc = REACH * variance**0.5  # of the low-pass filter, pixels
-    return Box(
+    return PixelBox(
         floor(fx * left + cx - disc),
         floor(fy * top + cy - disc),
         ceil(fx * right + cx + disc),

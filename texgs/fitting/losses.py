@@ -10,7 +10,7 @@ from texgs.fields.splats import GEOMETRY, Shading
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fitting.settings import Losses
 from texgs.raster import arguments, native
-from texgs.raster.autograd import SCENE, Gradients, Image, SurfelTensors, View
+from texgs.raster.autograd import SCENE, Gradients, Image, RasterView, SurfelTensors
 from texgs.raster.losses import planar, scale
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Target
@@ -43,7 +43,7 @@ def view_loss(
     outputs = ("normal", "depth") if weights.normal > 0 and iteration > weights.normal_from else ()
     seen = (camera.viewmat.contiguous(), camera.K.contiguous(), camera.width, camera.height)
     background = features.new_tensor([1.0] * 3 + [0.0] * (surfels.channels - 3))  # white behind colours
-    view = View(*seen, frozenset(outputs), shading.options, background, raw=True)
+    view = RasterView(*seen, frozenset(outputs), shading.options, background, raw=True)
     tensors = (*surfels[:4], surfels.features)
     wanted = [torch.is_grad_enabled() and x is not None and x.requires_grad for x in tensors]
     observed = (shift_gradient, weights.alpha > 0)
@@ -63,7 +63,7 @@ class _ViewLoss(torch.autograd.Function):
 
     @staticmethod
     def forward(
-        ctx: Any, view: View, target: native.Struct, observed: tuple, wanted: list, *tensors: Tensor
+        ctx: Any, view: RasterView, target: native.Struct, observed: tuple, wanted: list, *tensors: Tensor
     ) -> Tensor:
         surfels = SurfelTensors._make((*tensors[:4], None, tensors[4], *[None] * 3))
         images = view.images(surfels)

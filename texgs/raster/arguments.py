@@ -10,7 +10,7 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.errors import ArgumentError, DeviceError
 from texgs.raster import native
-from texgs.raster.autograd import SurfelTensors, View
+from texgs.raster.autograd import RasterView, SurfelTensors
 from texgs.raster.types import OUTPUTS, Options, Texture, check_primitive
 
 MAX_CHANNELS = 32
@@ -135,7 +135,7 @@ def view(
     texture: Texture | None,
     outputs: Collection[str],
     options: Options,
-) -> View:
+) -> RasterView:
     """Check camera and image; `camera` is viewmat, K, background and depth range, `size` (width, height)."""
     viewmat, K, background, depth_range = camera
     constant = {
@@ -167,7 +167,7 @@ def view(
     matrices = (viewmat.detach().contiguous(), K.detach().contiguous())
     layout = (None, None) if texture is None else (texture.sizes, texture.offsets)
     rest = (None if x is None else x.detach().contiguous() for x in (background, *layout, depth_range))
-    return View(*matrices, width, height, wanted, options, *rest)
+    return RasterView(*matrices, width, height, wanted, options, *rest)
 
 
 def pinhole(viewmat: Tensor, K: Tensor) -> None:

@@ -55,7 +55,7 @@ class SurfelTensors(NamedTuple):
 
 
 @dataclass(frozen=True)
-class View:
+class RasterView:
     """All constants of a call: camera, options, texture layout, wanted outputs."""
 
     viewmat: Tensor  # [4, 4]
@@ -94,7 +94,7 @@ class View:
         return scene, Camera(self.viewmat, self.K, self.width, self.height, self.depth_range), options
 
 
-def bin_surfels(surfels: SurfelTensors, view: View, images: dict[str, Tensor]) -> native.Handle:
+def bin_surfels(surfels: SurfelTensors, view: RasterView, images: dict[str, Tensor]) -> native.Handle:
     """Project, sort and bin the surfels, and render into `images` where it has a "color"."""
     device = surfels.means.device
     frame = native.Handle("texgs_release", device)
@@ -104,7 +104,7 @@ def bin_surfels(surfels: SurfelTensors, view: View, images: dict[str, Tensor]) -
 
 
 def contribute(
-    frame: native.Handle, surfels: SurfelTensors, view: View, image: Tensor | None
+    frame: native.Handle, surfels: SurfelTensors, view: RasterView, image: Tensor | None
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Return sums [N, C] of weight * image [C, H, W]; sum of weights, largest weight, pixels [N]."""
     means = surfels.means
@@ -120,7 +120,7 @@ class RasterizeFunction(torch.autograd.Function):
     """Surfel tensors to images; the images are planar, [C, H, W] and [H, W]."""
 
     @staticmethod
-    def forward(ctx: Any, view: View, extra: dict, *tensors: Any) -> tuple[Tensor | None, ...]:
+    def forward(ctx: Any, view: RasterView, extra: dict, *tensors: Any) -> tuple[Tensor | None, ...]:
         """Render; `extra` receives the statistics."""
         surfels = SurfelTensors(*tensors)
         means = surfels.means

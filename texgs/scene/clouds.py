@@ -17,7 +17,7 @@ from texgs.fields.field import Field
 from texgs.fields.gaussians import Gaussians
 from texgs.fields.part_edit import PartEdit, opacity_factors
 from texgs.fields.splats import geometry
-from texgs.fields.surfels.composition import Part
+from texgs.fields.surfels.composition import EditableModel
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import FAR_DISTANCE
 from texgs.fields.surfels.texels import with_single_texels
@@ -88,7 +88,7 @@ def place_cloud(cloud: Cloud, space: Space) -> Cloud:
 def cloud_of(
     name: str, opened: tuple[Field, Sequence[Tensor]], edits: Sequence[PartEdit], light: Light
 ) -> Cloud:
-    """Return the visible cloud of a model from `SceneModel.open`; edits are as in `Part`."""
+    """Return the visible cloud of a model from `SceneModel.open`; edits are as in `EditableModel`."""
     model, masks = cast("Surfels | Gaussians", opened[0]), opened[1]
     means, quats, scales, opacities = geometry(model.parameters)
     is_flat = isinstance(model, Surfels)
@@ -114,7 +114,7 @@ def light_harmonics(
     """
     model = with_single_texels(model) if model.stage == "texture" else model
     texels = model.parameters.get("texels", torch.zeros_like(model.parameters["colors"]))
-    part = Part(model, masks)
+    part = EditableModel(model, masks)
     edited = part.apply(edits)
     cameras = icosphere_of(DIRECTIONS, Lens(radius=FAR_DISTANCE))
     views = normalize(torch.stack([-camera.position for camera in cameras]).double(), dim=1)  # [M, 3]

@@ -22,7 +22,7 @@ RIM = 0.01  # width of the slab's rim around a face, in shorter sides of the pic
 HIDDEN_ALPHA = 0.998  # alpha of a slab that hides models, half a level of 255 from opaque
 STEP = 0.5  # voxels between the samples of a slab
 COARSE_PIXELS = 4  # step of the search for faces, pixels
-Part = tuple[slice, slice]  # rows and columns of a picture
+Crop = tuple[slice, slice]  # rows and columns of a picture
 
 
 def cut_view(
@@ -84,7 +84,7 @@ def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut:
     return blend_over(seen, models, part)
 
 
-def blend_over(front: Tensor, behind: Render, part: Part) -> Render:
+def blend_over(front: Tensor, behind: Render, part: Crop) -> Render:
     """Blend premultiplied RGBA [h, w, 4] over a part of a render in place, and return the render."""
     clear = 1 - front[..., 3]
     for seen, plane in zip(front.unbind(-1), (*behind.color.unbind(-1), behind.alpha), strict=True):
@@ -93,7 +93,7 @@ def blend_over(front: Tensor, behind: Render, part: Part) -> Render:
     return behind
 
 
-def slab_thickness(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> tuple[Tensor, Part]:
+def slab_thickness(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> tuple[Tensor, Crop]:
     """Return the thickness [h, w] of the slab in camera z, and the part of the picture that it covers.
 
     It falls to 0 softly around faces.
@@ -115,7 +115,7 @@ def slab_thickness(composed: Composed, camera: Camera, scene: Scene, twin: Twin)
     return thickness[: rows.stop - rows.start, : columns.stop - columns.start], (rows, columns)
 
 
-def bounding_part(weights: Tensor) -> Part:
+def bounding_part(weights: Tensor) -> Crop:
     """Return the bounding box of nonzero weights [H, W], at least one pixel, with a margin of one."""
     places = [weights.any(dim).nonzero()[:, 0].tolist() or [0] for dim in (1, 0)]
     rows, columns = (slice(max(0, each[0] - 1), each[-1] + 2) for each in places)

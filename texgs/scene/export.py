@@ -22,7 +22,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.ply_columns import Told, colored_points, write_columns
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.compact import seen_surfels, write_compact
-from texgs.fields.surfels.composition import Composition, Part
+from texgs.fields.surfels.composition import Composition, EditableModel
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.ply import write_ply as write_surfels
 from texgs.raster import Render
@@ -164,7 +164,7 @@ def _write(path: Path, keys: Export, model: Surfels, known: Space | None) -> Pat
         return write_compact(path, model, seen_surfels(model, cameras) if cameras else None)
     if keys.kind not in ("vtp", "points"):
         return write_surfels(path, model, str(keys.kind), facts)
-    plain = join_surfels([Part(model)], [PartEdit()]) if model.stage != "surfels" else model
+    plain = join_surfels([EditableModel(model)], [PartEdit()]) if model.stage != "surfels" else model
     if keys.kind == "vtp":
         return write_vtp(path, plain, target_of(keys, known), facts)
     return _write_points(path, plain, keys, known)

@@ -17,7 +17,7 @@ from texgs.core.io import write_bytes
 from texgs.fields.part_edit import MAX_OPACITY, PartEdit
 from texgs.fields.ply_columns import Told
 from texgs.fields.splats import geometry
-from texgs.fields.surfels.composition import Part, by_part
+from texgs.fields.surfels.composition import EditableModel, by_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import mean_texels
 from texgs.raster.shading import Y00
@@ -29,7 +29,7 @@ SIDES = 6  # of the polygon for a surfel
 REACH = 1.5  # standard deviations from its middle to its corners
 
 
-def join_surfels(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
+def join_surfels(parts: Sequence[EditableModel], edits: Sequence[PartEdit]) -> Surfels:
     """Join the visible surfels of a scene into one unlit model of stage surfels.
 
     Edits are one for each part, and behind it those of its segments; palette, opacity and visibility count.
@@ -44,7 +44,7 @@ def join_surfels(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
     return Surfels(together, parts[0].model.shading)
 
 
-def _surfels(part: Part, edits: Sequence[PartEdit], has_normals: bool) -> dict[str, Tensor]:
+def _surfels(part: EditableModel, edits: Sequence[PartEdit], has_normals: bool) -> dict[str, Tensor]:
     """Return the raw parameters of a part's visible surfels, on request with separate normals."""
     p = part.model.parameters
     colors = part.colored(edits).double()

@@ -22,9 +22,9 @@ from texgs.volume.grid import dims_of, require_room
 from texgs.volume.itk_image import sentence
 from texgs.volume.space import LPS
 
-GAP_TOLERANCE = 0.05  # of the distance of slices: places are rounded in files
-TILT_TOLERANCE = 0.01  # of the distance to the first slice: how far one may lie beside it
-ROUNDING = 0.01  # mm; and of the widest gap: slices that are closer are at one place
+GAP_TOLERANCE = 0.05  # tolerance in slice distances, as files round positions
+TILT_TOLERANCE = 0.01  # sideways tolerance, relative to the distance to the first slice
+ROUNDING = 0.01  # mm, and share of the widest gap; closer slices share a position
 
 
 def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any], np.ndarray]:
@@ -52,7 +52,7 @@ def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any
 
 
 def step_at(path: Path, series: str | None, time: int) -> tuple[list[Slice], int, str]:
-    """Return the slices of a step, how many steps there are, and what to say of them."""
+    """Return the slices of a step, the number of steps, and a note about them."""
     every = series_in(path) if path.is_dir() else [FileSeries([str(path)])]
     if series == ALL and len(every) > 1:
         phases, note = phases_of(every)
@@ -89,7 +89,7 @@ def steps_of(slices: list[Slice]) -> list[list[Slice]]:
 
 
 def time_tag(places: list[list[Slice]]) -> tuple[int, str]:
-    """Return index and name of the tag that tells all slices at one place apart."""
+    """Return index and name of the tag that distinguishes all slices at one position."""
     for index, name in enumerate(TIMES):
         values = [[each.times[index] for each in place] for place in places]
         if all("" not in some and len({*map(float, some)}) == len(some) for some in values):
@@ -151,7 +151,7 @@ def samples_of_frames(slices: Sequence[Slice]) -> np.ndarray:
 
 
 def stored_frames(path: Path) -> np.ndarray:
-    """Return samples [frames, Y, X] of a file as they are stored."""
+    """Return stored samples [frames, Y, X] of a file."""
     data = pydicom.dcmread(path, force=True)
     if not data.file_meta.TransferSyntaxUID.is_encapsulated:
         return data.pixel_array.reshape(-1, data.Rows, data.Columns)

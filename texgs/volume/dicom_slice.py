@@ -1,4 +1,4 @@
-"""Slices of DICOM, files or frames of one: what headers say of them.
+"""Slices of DICOM, files or frames of one: the facts in their headers.
 
 By pydicom: GDCM knows neither frames that are no even stack, nor slopes that differ from frame to frame, nor
 doses.
@@ -27,7 +27,7 @@ PADDING = ("PixelPaddingValue", "PixelPaddingRangeLimit")
 # Of files whose frames have no places of their own.
 OFFSETS, DISTANCE, ORDER = "GridFrameOffsetVector", "SpacingBetweenSlices", "SliceVector"
 AS_STORED = {PLACE: (0, 0, 0), ORIENTATION: (1, 0, 0, 0, 1, 0)}
-CONVERT_ADVICE = "convert it: dcm2niix"  # what to do where frames or slices are no even stack
+CONVERT_ADVICE = "convert it: dcm2niix"  # advice for frames or slices without even spacing
 
 
 class Slice(NamedTuple):
@@ -39,7 +39,7 @@ class Slice(NamedTuple):
     spacing: tuple[float, float]
     place: np.ndarray  # [3] of the first sample, mm: to the left, the back and the head
     directions: np.ndarray  # [3, 3] in rows: along a row of samples, along a column, and from slice to slice
-    times: tuple[str, ...]  # what it says for `TIMES`
+    times: tuple[str, ...]  # its values for `TIMES`
     scale: tuple[float, float]  # slope and intercept
     padding: tuple[int, int] | None  # the range of stored samples that stand for none
     note: str  # for the user
@@ -87,7 +87,7 @@ def first_items(group: Iterable[Any]) -> list[Any]:
 
 
 def place_frames(said: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """Return what is said of frames without groups of their own: doses, and slices of nuclear medicine."""
+    """Return facts about frames without own groups: doses, and slices of nuclear medicine."""
     pointers = {keyword_for_tag(int(each)) for each in np.ravel(said.get("FrameIncrementPointer", ()))}
     if OFFSETS in said:
         heights = np.ravel(said[OFFSETS]).astype(float)
@@ -107,7 +107,7 @@ def place_frames(said: dict[str, Any], count: int) -> list[dict[str, Any]]:
 
 
 def slice_of(path: Path, said: dict[str, Any], frame: int | None) -> Slice:
-    """Return a slice by what is said of it."""
+    """Make a slice from facts about it."""
     place, axes = (np.ravel(said.get(name, ())).astype(float) for name in (PLACE, ORIENTATION))
     if (place.size, axes.size) != (3, 6):
         raise ArgumentError(

@@ -1,4 +1,4 @@
-"""The axis that NRRD and MetaImage may have besides x, y and z: time, channels, or layers of labels."""
+"""The extra axis of NRRD and MetaImage besides x, y and z: time, channels, or layers of labels."""
 
 import re
 from collections.abc import Iterator
@@ -14,9 +14,9 @@ from texgs.volume.axes import Axis, place_on
 from texgs.volume.headers import METAIMAGE, NRRD, read_fields
 
 SPACE_KINDS = ("domain", "space")  # kinds of axes of NRRD
-SEQUENCE = ".seq.nrrd"  # of 3D Slicer, whose list is one of steps in time
-WORD = re.compile(r'\([^)]*\)|"[^"]*"|\S+')  # of a field of NRRD; a vector or a quoted text is one word
-TEXTS = ("type", "color")  # fields whose four words are not of four axes
+SEQUENCE = ".seq.nrrd"  # of 3D Slicer; its list axis is time
+WORD = re.compile(r'\([^)]*\)|"[^"]*"|\S+')  # in a field of NRRD; a vector or a quoted text is one word
+TEXTS = ("type", "color")  # fields whose four words do not describe four axes
 
 
 class ExtraAxis(NamedTuple):
@@ -35,7 +35,7 @@ class ExtraAxis(NamedTuple):
 
 
 def extra_axis(path: Path, time: int | None, channel: str | None) -> tuple[ExtraAxis | None, int]:
-    """Return the axis besides those of space, and the chosen place on it, by default the first step."""
+    """Return the extra axis, and the chosen place on it, by default the first step."""
     axis = axis_of(path)
     for key, wanted in (("time", time), ("channel", channel)):
         if wanted is not None and (axis is None or axis.key != key):
@@ -46,7 +46,7 @@ def extra_axis(path: Path, time: int | None, channel: str | None) -> tuple[Extra
 
 
 def axis_of(path: Path) -> ExtraAxis | None:
-    """Return the one axis that a file has besides those of space; None if it has none, or several."""
+    """Return the only extra axis of a file, or None if there are none or several."""
     fields, _ = read_fields(path)
     if path.suffix.lower() in METAIMAGE:
         count, sizes = int(fields.get("elementnumberofchannels", "1")), fields.get("dimsize", "").split()
@@ -65,7 +65,7 @@ def axis_of(path: Path) -> ExtraAxis | None:
 
 @contextmanager
 def one_volume(path: Path, axis: ExtraAxis | None) -> Iterator[Path]:
-    """Yield a header without the extra axis, for ITK, which has other rules for a fourth axis."""
+    """Yield a header without the extra axis, for ITK, which treats a fourth axis differently."""
     if axis is None:
         yield path
         return

@@ -91,7 +91,7 @@ class LayerSource(Source):
         self._first, self._kept = -1, np.empty(0)  # first slice of the layer in memory, and its samples
 
     def slices(self, start: int, stop: int) -> np.ndarray:
-        """Return samples [stop - start, Y, X], NaN where they are missing."""
+        """Return samples [stop - start, Y, X]; missing ones are NaN."""
         (sign, *signs), size = self._signs, self.dims[2]
         low, high = (start, stop) if sign > 0 else (size - stop, size - start)  # as stored
         firsts = range(low - low % self._depth, high, self._depth)[::sign]
@@ -146,7 +146,7 @@ def decode(values: np.ndarray, coding: Mapping[str, Any], valid: tuple[float, fl
     import xarray
 
     stored = xarray.Variable([*map(str, range(values.ndim))], values, coding)
-    with warnings.catch_warnings(), np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
+    with warnings.catch_warnings(), np.errstate(over="ignore"):  # `prepare` reports samples that do not fit
         warnings.simplefilter("ignore", xarray.SerializationWarning)  # of several codes
         samples = xarray.conventions.decode_cf_variable("field", stored, decode_times=False).values
         if valid != ALL_VALUES:

@@ -14,7 +14,7 @@ from texgs.volume.space import RAS, RIGHT_HANDED, Space
 
 NIBABEL_SUFFIXES = (".nii", ".nii.gz", ".hdr", ".img", ".mgh", ".mgz")
 ORIENTATION_FIELDS = ("sform_code", "qform_code", "goodRASFlag")  # fields of headers; 0: no orientation
-UNITS = {"meter": "m", "micron": "um"}  # mm if the file tells none
+UNITS = {"meter": "m", "micron": "um"}  # default mm
 
 
 def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: int = 0) -> Source:
@@ -57,7 +57,7 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: 
 
 
 def _space_of(image: Any) -> tuple[np.ndarray, str, str, str]:
-    """Return the matrix [4, 4] from indices to places, name and unit of their space, and what is not told."""
+    """Return the matrix [4, 4] from indices to space, its name and unit, and a note on missing facts."""
     from nibabel import Nifti1Pair
 
     header, is_nifti = image.header, isinstance(image, Nifti1Pair)

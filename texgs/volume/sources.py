@@ -44,7 +44,7 @@ class Format(NamedTuple):
 def open_source(
     path: str | Path, *, spacing: Triple | None = None, origin: Triple | None = None, **keys: Any
 ) -> Source:
-    """Open a volume without reading its samples where the format allows that.
+    """Open a volume, if possible without reading its samples.
 
     Formats: .raw, .bin, .dat (plain samples, described by the arguments); .npy, .npz (an array [Z, Y, X]);
     .tif, .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs that numbers count; a
@@ -113,13 +113,13 @@ def holds_arrays(path: Path) -> bool:
 
 
 def tells_superior(path: Path) -> bool:
-    """Return whether the format has z point to the head, as NIfTI and DICOM have."""
+    """Return whether z points to the head in the format, as in NIfTI and DICOM."""
     kind = _format(path)
     return kind is not None and kind.is_superior
 
 
 def _format(path: Path) -> Format | None:
-    """Return the format of a file by its suffix, or of a folder by what is in it."""
+    """Return the format of a file by its suffix, or of a folder by its contents."""
     if not path.is_dir():
         return FORMATS.get(_suffix(path))
     if is_zarr(path) or _suffix(path) == ".zarr":

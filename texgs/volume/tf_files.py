@@ -17,7 +17,7 @@ Point = tuple[float, float, float, float]
 FORMAT, VERSION = "texgs-tf", 1
 SPACES = ("RGB", "HSV", "Lab", "Diverging", "Lab/CIEDE2000", "Step")  # at VTK's number of each
 SAMPLES = 256  # shared by the segments of a function that is not linear, four each at least
-LINEAR_POINTS = 64  # points of colour, from which on its space makes no difference between two of them
+LINEAR_POINTS = 64  # points of colour; with more, the colour space makes no difference
 END_OFFSET = 1e-6  # of a segment: how close to its ends it is sampled
 
 
@@ -122,7 +122,7 @@ def _sampled_color(points: Sequence[Point], space: int, wrap: bool) -> Any:
 
 
 def _sampled_opacity(nodes: Sequence[Point]) -> Any:
-    """Return points of opacities that have midpoints or sharpnesses."""
+    """Return points of opacities with midpoints or sharpnesses."""
     from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 
     function = vtkPiecewiseFunction()

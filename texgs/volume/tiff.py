@@ -29,7 +29,7 @@ from texgs.volume.tiff_images import (
 
 # None, deflate, packbits and LZMA: others need imagecodecs.
 READABLE_COMPRESSIONS = (1, 8, 32773, 32946, 34925)
-PAGES_IN_MEMORY = 2  # one as it is decoded, and its place in the slab
+PAGES_IN_MEMORY = 2  # one being decoded, and its place in the slab
 LOSS_WORDS = ("subset", "incompletely")  # words of warnings about lost samples
 NO_SPACING = "TIFF tells no spacing, so that samples are 1 apart; dataset.volume.spacing sets it"
 

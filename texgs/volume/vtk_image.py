@@ -69,7 +69,7 @@ def field_of(image: Any, variable: str | None = None) -> tuple[dict[str, Any], n
 
 
 def choose_array(image: Any, variable: str | None) -> tuple[np.ndarray, bool, str]:
-    """Return the array to take, whether it is one of cells, and what to tell of others.
+    """Return the array to read, whether it has cell data, and a note about other arrays.
 
     Those of points come first, also where cells have one of that name.
     """
@@ -107,7 +107,7 @@ def require_whole(path: Path) -> None:
 
 
 def check_claim(reader: Any) -> None:
-    """Require that what a header claims fits into memory; only headers of XML are read before samples."""
+    """Require that the claims of a header fit into memory; only XML headers are read before samples."""
     information = reader.GetOutputInformation(0)
     if information is not None and information.Has(Pipeline.WHOLE_EXTENT()):
         extent = np.array(information.Get(Pipeline.WHOLE_EXTENT()), np.int64)
@@ -117,11 +117,11 @@ def check_claim(reader: Any) -> None:
 
 
 def first_message(window: Any) -> str:
-    """Return the first error or warning that VTK has printed instead of raising it; empty for none.
+    """Return the first error or warning that VTK printed instead of raising it, or "".
 
     Without the place in VTK's source, and the address of the object.
     """
-    output = window.GetOutput()  # bytes where a damaged file is quoted that is no text
+    output = window.GetOutput()  # bytes if a damaged file is quoted
     text = output.decode(errors="replace") if isinstance(output, bytes) else output
     message = next(filter(str.strip, text.split("\n\n")), "")
     bare = " ".join(re.sub(r"(?m)^(ERROR|(Generic )?Warning): In.*", "", message).split())

@@ -22,8 +22,8 @@ from texgs.fields.field import Asked, Role, UnlitField, UnlitScene, require_dept
 from texgs.fields.palette.networks import Parameters, free_color, light, network_shapes, palette_color
 from texgs.fields.palette.rendering import (
     RAYS,
+    DensePoints,
     Geometry,
-    RayPoints,
     merge_points,
     points_on,
     view_harmonics,
@@ -78,7 +78,7 @@ class PaletteField(UnlitField):
             return {"grid": self.geometry.grid.rows, **placed}
         return {name: x for name, x in self.parameters.items() if name not in placed}
 
-    def color(self, points: RayPoints, harmonics: Tensor) -> Tensor:
+    def color(self, points: DensePoints, harmonics: Tensor) -> Tensor:
         """Return lit colours [n, 3] of points: free colours if there are any, otherwise palette colours.
 
         `harmonics` [n, 16] are those of the directions of their rays.

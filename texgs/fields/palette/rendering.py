@@ -38,7 +38,7 @@ class Geometry:
         return (points - points.new_tensor(self.grid.lower)) / side
 
 
-class RayPoints(NamedTuple):
+class DensePoints(NamedTuple):
     """Points on rays, ray by ray and front to back."""
 
     at: Tensor  # [n, 3] in the unit cube
@@ -47,15 +47,15 @@ class RayPoints(NamedTuple):
     depth: Tensor  # [n] optical: density times length
     features: Tensor  # [n, 15] of the density network
 
-    def take(self, chosen: Tensor) -> "RayPoints":
+    def take(self, chosen: Tensor) -> "DensePoints":
         """Select some points."""
-        return RayPoints(*(x[chosen] for x in self))
+        return DensePoints(*(x[chosen] for x in self))
 
 
 class VisiblePoints(NamedTuple):
     """The points with enough weight in their rays."""
 
-    points: RayPoints  # n of them
+    points: DensePoints  # n of them
     weights: Tensor  # [n] blending weights
     chosen: Tensor  # bool, mask of all points
 
@@ -65,14 +65,14 @@ class VisiblePoints(NamedTuple):
         return values.new_zeros(n_rays, values.shape[1]).index_add_(0, self.points.ray, weighted)
 
 
-def points_on(rays: Tensor, geometry: Geometry, parameters: Parameters) -> RayPoints:
+def points_on(rays: Tensor, geometry: Geometry, parameters: Parameters) -> DensePoints:
     """Return all points on rays [N, 6] inside the grid's dense cells, with their densities."""
     points, ray = ray_points(geometry.grid, rays, geometry.march)
     origin, direction = rays[ray].split(3, dim=1)
     distance = ((points - origin) * direction).sum(1) / direction.square().sum(1)
     at = geometry.unit(points)
     sigma, features = density(at, parameters, geometry.levels)
-    return RayPoints(at, ray, distance, geometry.length * sigma, features)
+    return DensePoints(at, ray, distance, geometry.length * sigma, features)
 
 
 def blending_weights(depth: Tensor, ray: Tensor) -> Tensor:
@@ -91,7 +91,7 @@ def blending_weights(depth: Tensor, ray: Tensor) -> Tensor:
     return (torch.exp(-passed) * -torch.expm1(-depth)).float()
 
 
-def visible_points(points: RayPoints, weight_min: float) -> VisiblePoints:
+def visible_points(points: DensePoints, weight_min: float) -> VisiblePoints:
     """Choose the points with a weight above `weight_min`."""
     weights = blending_weights(points.depth, points.ray)
     chosen = weights > weight_min
@@ -103,12 +103,12 @@ def view_harmonics(rays: Tensor) -> Tensor:
     return harmonics(normalize(rays[:, 3:], dim=1))
 
 
-def merge_points(several: list[RayPoints]) -> tuple[RayPoints, Tensor]:
+def merge_points(several: list[DensePoints]) -> tuple[DensePoints, Tensor]:
     """Merge the points of several fields in the order of rays; return also the field [n] of each.
 
     Densities of fields add up: a ray meets the points of all of them, each with its own depth.
     """
-    points = RayPoints(*map(torch.cat, zip(*several, strict=True)))
+    points = DensePoints(*map(torch.cat, zip(*several, strict=True)))
     field = torch.repeat_interleave(torch.arange(len(several)), torch.tensor([len(p.ray) for p in several]))
     order = points.distance.argsort(stable=True)
     order = order[points.ray[order].argsort(stable=True)]

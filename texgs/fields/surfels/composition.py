@@ -38,7 +38,7 @@ class Edited:
     tint: Tensor | None  # [N, 3] or [3] colour of highlights; None: white
 
 
-class Part:
+class EditableModel:
     """The attributes of one relightable model that edits and lights change.
 
     Masks [N] bool are those of its segments. Methods take the edit of what no segment holds, and one for each
@@ -117,7 +117,7 @@ class Composition(Composed):
         if len(passes) > 1:
             raise ArgumentError(f"models: expected one low_pass, got {passes}; fit them by one recipe")
         masks = [()] * len(models) if segments is None else segments
-        self.parts = [Part(model, own) for model, own in zip(models, masks, strict=True)]
+        self.parts = [EditableModel(model, own) for model, own in zip(models, masks, strict=True)]
         self.options = models[0].shading.options
         geometries = [geometry(model.parameters)[:3] for model in models]
         self.means, self.quats, self.scales = (torch.cat(x) for x in zip(*geometries, strict=True))
@@ -174,7 +174,7 @@ class Composition(Composed):
         return latest[1:]
 
 
-def by_part(parts: Sequence[Part], edits: Sequence[PartEdit] | None) -> list[Sequence[PartEdit]]:
+def by_part(parts: Sequence[EditableModel], edits: Sequence[PartEdit] | None) -> list[Sequence[PartEdit]]:
     """Return the edits of each model: its own, then one for each segment. None changes nothing."""
     counts = [1 + part.segments for part in parts]
     edits = [PartEdit()] * sum(counts) if edits is None else edits
