@@ -126,8 +126,8 @@ def statistics_of(values: Sequence[float]) -> dict[str, float]:
 def floor_of(values: Sequence[float]) -> float:
     """Return the value that a new one reaches with probability 1 - MISSED_SHARE: split conformal prediction.
 
-    It is the k-th smallest of n values, k = floor(MISSED_SHARE (n + 1)): of 64 the third. Proof: the new value and
-    the n are exchangeable, so that its rank among all n + 1, ties broken at random, is uniform. If it is
+    It is the k-th smallest of n values, k = floor(MISSED_SHARE (n + 1)): of 64 the third. Proof: the new
+    value and the n are exchangeable, so its rank among all n + 1, ties broken at random, is uniform. If it is
     below the k-th smallest of the others, at most k - 1 of them are not above it, and its rank is k at most,
     which has the probability k / (n + 1) <= MISSED_SHARE (Vovk, Gammerman and Shafer 2005).
 
