@@ -12,6 +12,7 @@ from texgs.workflow.locate import tf_names
 from texgs.workflow.plan import make
 from texgs.workflow.stage import fit_folder
 from texgs.workflow.stage_table import STAGES
+from texgs.workflow.sweep import as_sweep
 
 
 def nothing(_config):
@@ -117,6 +118,31 @@ def test_experiments_and_unions_can_aim_words(project):
     for later, width in (((), 99), (("dataset.wood.image=77",), 77)):
         listed = configs(BOTH, "fit=quick", *later)
         assert {each.dataset.name for each in listed if each.views.width == width} == {"wood"}
+
+
+def test_words_of_the_user_win_over_those_of_an_experiment_for_one_data_set(project):
+    wood = {
+        each.views.width
+        for each in configs(BOTH, "fit=quick", "dataset.image=50")
+        if "wood" in str(each.dataset.name)
+    }
+    assert wood == {50}
+    reduce = {each.fit.reduce for each in configs("experiment=paper_scenes_quick", "fit.reduce=4")}
+    assert reduce == {4}
+
+
+def test_a_recipe_that_does_not_replace_the_list_of_an_experiment_is_noted(project):
+    left_out = [each.what for each in cases_of((PICTURES, "fit=demo"), nothing).left_out]
+    assert left_out == ["fit=demo"]
+    assert not cases_of((PICTURES, "fit=quick"), nothing).left_out
+    assert not cases_of((PICTURES, "fits=[demo]"), nothing).left_out
+
+
+def test_seeds_repeat_the_sweep_that_an_experiment_has():
+    by_sweep = cases_of(("experiment=resolution_quick", *as_sweep(("fit.seed=0,1",))), nothing).by_sweep
+    assert {name: {case.config.fit.seed for case in some} for name, some in by_sweep.items()} == {
+        "resolution_quick": {0, 1}
+    }
 
 
 def test_a_union_runs_each_of_its_experiments(project):

@@ -12,6 +12,7 @@ from texgs.workflow import plan
 from texgs.workflow.graph import Graph
 from texgs.workflow.notes import note_results
 from texgs.workflow.plan import make, words_of
+from texgs.workflow.stage_table import RULES
 from texgs.workflow.tracked import WHOLE, owner
 
 FITS = {"dataset": "sphere", "fit": "demo", "tracking": "none"}
@@ -60,7 +61,9 @@ def test_a_run_of_a_sweep_makes_what_it_shows_and_what_that_needs():
     """All else that it plans stays as an earlier run left it, and in tables and report."""
 
     def job(place, *inputs):
-        return SimpleNamespace(stage=SimpleNamespace(place=place), inputs=dict(enumerate(map(Path, inputs))))
+        return SimpleNamespace(
+            stage=SimpleNamespace(rule=RULES[place]), inputs=dict(enumerate(map(Path, inputs)))
+        )
 
     jobs = {
         "r/views": job("views", "data/volume.nrrd"),
@@ -85,6 +88,14 @@ def test_two_variants_of_one_folder_are_refused(planned):
     words = " ".join(f'"+sweep.variants.{name}={listed}"' for name, listed in given.items())
     with pytest.raises(ConfigError, match=r"two jobs go there, which differ in .*; give both the same"):
         planned(f"sweep.name=x {words}")
+
+
+def test_seeds_alone_repeat_the_experiment_and_its_gallery_shows_the_first(planned):
+    grid = "[{name: fits, rows: [{title: front}], columns: [{}]}]"
+    plan = planned(f'fit.seed=3,4 "gallery.grids={grid}"')
+    assert list(plan.sweeps) == ["seeds"]
+    (gallery,) = (job for job in plan.jobs.values() if job["stage"] == "gallery")
+    assert {path.split("/")[-3] for path in gallery["inputs"].values()} == {"demo-seeds-s3"}
 
 
 def test_a_gallery_of_a_sweep_of_edits_shows_the_edits_of_its_variants(planned):

@@ -2,9 +2,9 @@
 
 Importing torch and MLflow takes longer than many a job: forking saves 2 s of each, 4 s of a tracked one. A
 forked job is the process of a job in all else: its own memory, threads, working directory, environment and
-exit code. It belongs to the process group of the run, so that Ctrl-C and a kill of the group reach it, and it
-ends where the server or its client is killed. Linux only: elsewhere a fork of a process with such libraries
-is not safe, and jobs are programs.
+exit code. It belongs to the process group of the run, so that Ctrl-C and a kill of the group reach it; where
+only Snakemake is killed, it goes on. Linux only: elsewhere a fork of a process with such libraries is not
+safe, and jobs are programs.
 """
 
 import atexit

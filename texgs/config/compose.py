@@ -54,7 +54,8 @@ def _composed(overrides: Words, places: tuple[Path, ...], _data_folder: str | No
     if not places[-1].is_dir():
         raise ConfigError(f"{places[-1]}: no configuration there; install texgs again")
     with texgs_errors():
-        config = with_lights_of_field(typed(Config, composition(overrides, places)))
+        config = typed(Config, composition(overrides, places))
+        config = with_lights_of_field(replace(config, sweep=config.sweep.named))
     check_names(config)
     check_basic_tfs(config)
     check_chosen(overrides, config)

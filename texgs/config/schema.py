@@ -1,10 +1,10 @@
 """The typed schema of conf/: every key with its type, default, unit and meaning.
 
 Files of conf/ become instances of these classes, so an unknown key or a value of the wrong type is an error
-that names the key; `texgs views --help` prints this file.
+that names the key. `texgs views --help` lists all keys with their defaults.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from texgs.config.dataset import Dataset, MeshKeys
@@ -15,6 +15,7 @@ from texgs.models.catalogue import CLIP_BACKBONES
 from texgs.volume.view_settings import ViewKeys
 
 NO_SWEEP = "none"  # name of the sweep without variants
+ONLY_SEEDS = "seeds"  # name of a sweep over nothing but seeds, and of its only variant
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,13 @@ class Sweep:
         [], "edits that are made of each variant, unless `edits=` names some; default those of the experiment"
     )
 
+    @property
+    def named(self) -> "Sweep":
+        """The sweep with a name, where several seeds alone make it one."""
+        is_of_seeds = len(self.seeds) > 1 or len(self.edit_seeds) > 1
+        is_nameless = self.name == NO_SWEEP and not self.variants and not self.over
+        return replace(self, name=ONLY_SEEDS) if is_nameless and is_of_seeds else self
+
 
 @dataclass(frozen=True)
 class StandIns:
@@ -99,7 +107,9 @@ class Config:
     dataset: Dataset = key(Dataset, "the data set")
     datasets: list[str] = key([], "data sets of a whole experiment; default the one of `dataset`")
     experiments: list[str] = key([], "files of conf/experiment that are one run together")
-    per_dataset: dict[str, list[str]] = key(dict, "overrides that hold for one data set alone, by its name")
+    per_dataset: dict[str, list[str]] = key(
+        dict, "overrides that hold for one data set alone, by its name; those of the command win"
+    )
     common_overrides: list[str] = key(
         [], "overrides that hold for each of `experiments`, before those of the command"
     )

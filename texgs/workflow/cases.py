@@ -42,11 +42,16 @@ class LeftOut:
 class Cases:
     """The cases of a run by the name of their sweep, and what it goes on without."""
 
-    config: Config  # of the user's words alone
+    case: Case  # the user's words alone
     lacking: Lacking
     skips: bool  # whether cases that lack something are left out
     by_sweep: dict[str, list[Case]] = field(default_factory=lambda: defaultdict(list))  # "": of no sweep
     left_out: dict[LeftOut, dict[str, None]] = field(default_factory=dict)  # with the places of its jobs
+
+    @property
+    def config(self) -> Config:
+        """The configuration of the user's words alone, such as where results go."""
+        return self.case.config
 
     @property
     def configs(self) -> list[Config]:
@@ -63,7 +68,8 @@ class Cases:
         """
         config = case.config
         check_lists(config)
-        listed, aimed = named(case) or config.datasets, merged(config.per_dataset, aimed)
+        self.note_lists(case, config)
+        listed, aimed = named(case) or config.datasets, merged(self.unsaid(config.per_dataset), aimed)
 
         def of(name: str) -> Case:
             return case.but(f"dataset={name}", *aimed.get(name, ()))
@@ -91,6 +97,22 @@ class Cases:
             words = f"dataset={name}", *aimed.get(name, ()), f"sweep={sweep}"
             self.add_recipe(case.without("sweep.name", "sweep.over").but("edit=none", "edits=[]", *words))
         return {*choices, *of_sweeps.values()}
+
+    def unsaid(self, per_dataset: Mapping[str, Sequence[str]]) -> WordsOf:
+        """Return the words of an experiment for single data sets, without keys that the user's words set."""
+        return {
+            name: tuple(word for word in words if self.case.says(word.partition("=")[0]) is None)
+            for name, words in per_dataset.items()
+        }
+
+    def note_lists(self, case: Case, config: Config) -> None:
+        """Note a single recipe or edit of the user that does not replace the list of an experiment."""
+        for key, listed in (("fit", config.fits), ("edit", config.edits)):
+            name = self.case.says(key)
+            if listed and name not in (None, "none", *listed) and self.case.says(f"{key}s") is None:
+                of = case.says("experiment") or "this experiment"
+                why = f"{of} lists {', '.join(listed)} in `{key}s`; {key}s=[{name}] replaces them"
+                self.left_out.setdefault(LeftOut(f"{key}={name}", why), {})
 
     def note_choices(self, datasets: Sequence[Choice], edits: Sequence[Choice]) -> Words:
         """Note what is replaced because it lacks something; return words for the edits and captions."""
@@ -162,8 +184,9 @@ def cases_of(words: Words, lacking: Lacking) -> Cases:
     case, aimed = apart(words)
     config, wanted = case.config, named(case)
     skips = config.on_missing == "skip" and (not wanted or case.says("on_missing") is not None)
-    cases, names = Cases(config, lacking, skips), set[str]()
-    per_dataset = merged(config.per_dataset if config.experiments else {}, aimed)  # of a union, for all parts
+    cases, names = Cases(case, lacking, skips), set[str]()
+    of_union = cases.unsaid(config.per_dataset) if config.experiments else {}
+    per_dataset = merged(of_union, aimed)
     for experiment in experiments_of(case):
         names |= cases.add_experiment(experiment, wanted, per_dataset)
     if not names:

@@ -138,12 +138,13 @@ def fit_of(config: Config, shot: ShotKeys, where: str) -> Config:
     if not able:
         raise ConfigError(f"{where}.edit: {shot.edit} works on none of {', '.join(recipes)}; add a recipe")
     variants = list(changes(config))
-    if (shot.variant or "") not in (variants or [""]):
+    variant = shot.variant or (variants[0] if len(variants) == 1 else "")
+    if variant not in (variants or [""]):
         expected = f"one of {', '.join(variants)}" if variants else "none without a sweep"
         hint = close(shot.variant or "", variants)
         raise ConfigError(f"{where}.variant: expected {expected}, got {shot.variant or 'none'}{hint}")
     of_fit = with_recipe(config, shot.fit or able[0]) if config.fits else config
-    return replace(of_fit, variant=shot.variant or of_fit.variant)
+    return replace(of_fit, variant=variant or of_fit.variant)
 
 
 def recipes_of(config: Config) -> list[str]:

@@ -20,7 +20,7 @@ from texgs.workflow.checks import check_basic_tfs, check_edit, check_fit
 from texgs.workflow.job import Job
 from texgs.workflow.missing import lacking, missing_weights
 from texgs.workflow.result import damaged, fingerprint, is_complete, stamped
-from texgs.workflow.stage_table import STAGES, SWEPT
+from texgs.workflow.stage_table import STAGES
 from texgs.workflow.stage_table import jobs as jobs_of
 
 
@@ -37,7 +37,7 @@ class Graph:
     def run(self) -> dict[str, Job]:
         """The jobs that a run goes through: of a sweep what is shown, and what that needs."""
         of_sweeps = [folder for sweep, listed in self.sweeps.items() if sweep for folder in listed]
-        shown = [folder for folder in of_sweeps if self.jobs[folder].stage.place in SWEPT]
+        shown = [folder for folder in of_sweeps if self.jobs[folder].stage.rule.swept]
         waiting, folders = [*self.sweeps.get("", ()), *shown], set[str]()
         while waiting:
             folder = waiting.pop()

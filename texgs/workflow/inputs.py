@@ -144,7 +144,9 @@ def sweep_of_fit(config: Config) -> str:
 
 
 def is_changed(fit: Any, later: Sequence[str] = ()) -> bool:
-    """Return whether a recipe is not that of the file with its name, but for its seed and for some keys.
+    """Return whether a recipe is not that of the file with its name.
+
+    Its seed does not count, nor do the keys of other kinds of field.
 
     Args:
         fit: recipe of a job.
@@ -152,7 +154,7 @@ def is_changed(fit: Any, later: Sequence[str] = ()) -> bool:
     """
     if fit.name not in members("fit"):
         return True
-    file, ignored = preset("fit", fit.name).fit, ("seed", *later)
+    file, ignored = preset("fit", fit.name).fit, {"seed", *later, *fit_specs()} - {fit.field}
     names = (key.name for key in fields(file) if key.name not in ignored)
     return any(getattr(fit, name) != getattr(file, name) for name in names)
 

@@ -17,14 +17,14 @@ from texgs.config.project import ROOT, folders
 from texgs.config.schema import Config
 from texgs.core.cache import Checksums, checksum_of_folders, digest, keep, recall
 from texgs.core.errors import ConfigError
-from texgs.core.io import write_bytes
+from texgs.core.io import read_json, write_bytes
 from texgs.volume.settings import cached_volume
 from texgs.workflow.cases import LeftOut
 from texgs.workflow.graph import earlier, graph_of
 from texgs.workflow.job import Job, settings_file
 from texgs.workflow.notes import note_results, note_tables
 from texgs.workflow.stage import Rule, edit_folder, fit_folder
-from texgs.workflow.stage_table import RULES, STAGES, SWEPT
+from texgs.workflow.stage_table import RULES, STAGES
 from texgs.workflow.sweep import as_sweep
 
 GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
@@ -36,27 +36,32 @@ class Plan:
 
     results: str
     tracking: str | None  # URI of the store
-    experiment: str  # of the store
+    experiment: str  # of MLflow
     gpu: list[str]  # what GPUs are for: "views", "fit" or both
-    jobs: dict[str, dict[str, Any]]  # by folder, see `plain`
+    jobs: dict[str, dict[str, Any]]  # by folder, see `plain`; a run goes through those that its targets need
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
-    wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
+    wildcards: dict[str, list[str]]  # values of those in folders of rules, such as `dataset`
     left_out: str  # file that tells what the run goes on without
     earlier: dict[str, str]  # metrics files of other runs with the same results, and their digests
     replaced: list[str]  # folders with results of other settings, in whose place the run puts its own
     notes: dict[str, str]  # files that tables and the report read: whether somebody else has changed them
 
-    def warning(self) -> str:
-        """Return what a user should know before the run begins; empty where there is nothing."""
-        if not self.replaced:
-            return ""
-        others = len(self.replaced) - 1
-        verb = f"and {others} more hold" if others else "holds"
-        return (
-            f"{self.replaced[0]} {verb} results of other settings, which this run replaces; "
-            "results=FOLDER keeps both"
-        )
+    def warnings(self) -> list[str]:
+        """Return what a user should know before the run begins, a sentence each."""
+        sentences = []
+        if left_out := read_json(Path(self.left_out)):
+            first, others = left_out[0], len(left_out) - 1
+            end = f" (and {others} more: the report and texgs doctor list them)" if others else ""
+            sentences.append(f"left out or replaced: {first['what']}: {first['why']}{end}")
+        if self.replaced:
+            others = len(self.replaced) - 1
+            verb = f"and {others} more hold" if others else "holds"
+            sentences.append(
+                f"{self.replaced[0]} {verb} results of other settings, which this run replaces; "
+                "results=FOLDER keeps both"
+            )
+        return sentences
 
     def target(self, name: str) -> list[str]:
         """Return the metrics files of all jobs of a target; of galleries also those of sweeps."""
@@ -70,7 +75,8 @@ class Plan:
 
     def told(self, *places: str) -> list[str]:
         """Return the metrics files that tables read, of some places, and all that is shown of sweeps."""
-        of_sweeps = [file for name in self.swept() for file in self.done(*SWEPT, sweep=name)]
+        swept = [rule.name for rule in RULES.values() if rule.swept]
+        of_sweeps = [file for name in self.swept() for file in self.done(*swept, sweep=name)]
         return sorted({*self.done(*places), *of_sweeps})
 
     def gpus(self, rule: Rule) -> int:

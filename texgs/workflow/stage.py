@@ -36,6 +36,7 @@ class Rule:
     target: str = ""  # what `texgs run` calls all its jobs, together with those of some other rules
     threads: int = 4
     gpu: tuple[Literal["views", "fit"], ...] = ()  # what a GPU is for, where the configuration asks for one
+    swept: bool = False  # whether a sweep makes it of each variant; what these read is made anyway
     shown: Mapping[str, str] = field(default_factory=dict)  # captions of files in the report of Snakemake
 
 

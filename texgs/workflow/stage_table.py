@@ -19,7 +19,6 @@ from texgs.workflow.stage import RULES, Stage
 
 PACKAGE = "texgs.workflow.stages"
 WILDCARDS = ("dataset", "tf", "views", "fit", "phase", "edit", "gallery")  # of the folders of rules
-SWEPT = ("volume", "views", "phase", "edit", "edit_metrics", "gallery")  # places shown of a sweep
 
 
 def discovered() -> Iterator[Stage]:

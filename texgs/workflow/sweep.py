@@ -13,16 +13,15 @@ from itertools import product
 from texgs.config.case import Case
 from texgs.config.describe import value_at
 from texgs.config.project import Words
-from texgs.config.schema import NO_SWEEP, Config
+from texgs.config.schema import NO_SWEEP, ONLY_SEEDS, Config
 from texgs.core.errors import ConfigError
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import NO_METHOD
 
 OF_FITS = ("views", "fit", "device")  # groups of keys that change fits
 OF_EDITS = "edit"
-SEEDS = {"fit.seed": "seeds", "edit.seed": "edit_seeds"}  # keys of `sweep` with the values of others
+SEEDS = {"fit.seed": "seeds", "edit.seed": "edit_seeds"}  # for each key the list in `sweep` with its values
 OF_NUMBERS, OF_KINDS = "views", "kinds_of_views"  # the paper's sweep over numbers, and views=ONE,OTHER
-ONLY_SEEDS = "seeds"  # name of a sweep over nothing else, and of its only variant
 ELSEWHERE = {  # keys whose values have a list of their own
     **{key: f"sweep.{listed}" for key, listed in SEEDS.items()},
     **dict.fromkeys(("edit", "edit.name", "edits"), "edits=[...]"),
@@ -50,7 +49,8 @@ def label(value: str) -> str:
 def as_sweep(words: Words) -> Words:
     """Return the words, with those that give a key several values as a sweep, named after the keys.
 
-    Each combination of values is a variant. Seeds make none: they are what means are over.
+    Each combination of values is a variant. Seeds make none: they repeat each variant, and without another
+    sweep the fits or edits themselves, see `Sweep.named`.
     """
     from texgs.config.composition import has_several, quoted, several
 
@@ -61,10 +61,10 @@ def as_sweep(words: Words) -> Words:
     chosen = [word for word in rest if key_of(word) == "sweep" and word != "sweep=none"]
     if over and chosen:
         raise ConfigError(f"{over[0]}: {chosen[0]} has variants of its own; leave out one of the two")
-    if chosen or not swept:
+    if not over:
         return (*rest, *seeds)
     keys = [key_of(word) for word in over]
-    name = "-".join((key.partition(".")[2] or key).replace(".", "_") for key in keys) or ONLY_SEEDS
+    name = "-".join((key.partition(".")[2] or key).replace(".", "_") for key in keys)
     name = OF_KINDS if name == OF_NUMBERS else name
     listed = ",".join(map(quoted, over))
     return (*rest, *seeds, f"sweep.name={name}", f"sweep.over=[{listed}]")
@@ -105,19 +105,19 @@ def changes(config: Config) -> Mapping[str, Words]:
 
 
 def is_of_edits(config: Config) -> bool:
-    """Return whether the variants of the sweep have edits that differ."""
+    """Return whether the variants change edits, by keys or seeds; their folders are then named after them."""
     variants = changes(config)
     named = any(group_of(change) == OF_EDITS for listed in variants.values() for change in listed)
     return bool(variants) and (named or len(config.sweep.edit_seeds) > 1)
 
 
 def fit_variant(config: Config) -> str:
-    """Return what the variant is called by its fits; empty for fits that all variants of edits share."""
+    """Return the variant in the folder of a fit: `6` of `quick-6`; empty where all variants share fits."""
     return own_name(config, config.variant, OF_FITS) if is_of_edits(config) else config.variant
 
 
 def edit_variant(config: Config) -> str:
-    """Return the variant that an edit is of; empty where all have the same edits, of different fits."""
+    """Return the variant in the folder of an edit: `0.5` of `style-0.5`; empty where only the fits differ."""
     return config.variant if is_of_edits(config) else ""
 
 

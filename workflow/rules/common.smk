@@ -37,8 +37,8 @@ if MISSING:
     if not any(re.fullmatch(NOTHING_IS_MADE, word) for word in sys.argv):
         sys.exit(2)
 
-if workflow.is_main_process and (warning := PLAN.warning()):
-    print(f"texgs: {warning}", file=sys.stderr)
+if workflow.is_main_process:
+    print("".join(f"texgs: {line}\n" for line in PLAN.warnings()), end="", file=sys.stderr)
 
 JOBS = RuleJobs(PLAN)
 RESULTS = PLAN.results

@@ -108,6 +108,7 @@ RULE = Rule(
     target="edits",
     gpu=("fit",),
     shown={"edit.png": CAPTION},
+    swept=True,
 )
 
 

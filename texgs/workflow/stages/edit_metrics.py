@@ -105,6 +105,7 @@ STAGE = Stage(
         target="edits",
         threads=EVERY,  # it measures frames, too
         gpu=("fit",),
+        swept=True,
     ),
     inputs=inputs,
     work=work,

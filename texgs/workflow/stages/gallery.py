@@ -111,7 +111,7 @@ STAGE = Stage(
     "gallery",
     order=170,
     help="show all looks of a data set side by side",
-    rule=Rule("gallery", "{dataset}/gallery/{gallery}", target="galleries", gpu=("fit",)),
+    rule=Rule("gallery", "{dataset}/gallery/{gallery}", target="galleries", gpu=("fit",), swept=True),
     inputs=gallery_inputs,
     work=work,
     applies=applies,

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from texgs.fields.surfels.shading import ShadingModel
     from texgs.fitting.attributes import Attributes
 
-PHASE = Rule("phase", "{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",), target="fits", gpu=("fit",))
+PHASE = Rule(
+    "phase", "{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",), target="fits", gpu=("fit",), swept=True
+)
 
 
 @dataclass(kw_only=True)

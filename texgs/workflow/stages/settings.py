@@ -6,7 +6,6 @@ The module of a stage adds its own in a dataclass `Settings`. Each field says wh
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from texgs.config.recipes import Edit
 from texgs.volume.basic_tfs import BasicTF
@@ -15,9 +14,6 @@ from texgs.workflow.edits import edit_keys, looks_of
 from texgs.workflow.inputs import is_changed, shown_tfs, sweep_of_fit, view_settings
 from texgs.workflow.stage import read
 from texgs.workflow.sweep import fit_variant
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(kw_only=True)

@@ -137,6 +137,7 @@ STAGE = Stage(
         "{dataset}/{tf}/{views}",
         ("transforms_train.json", "transforms_test.json", "turntable.png"),
         gpu=("views",),
+        swept=True,
     ),
     inputs=prepared_volume,
     work=work,

@@ -68,7 +68,7 @@ STAGE = Stage(
     "volume",
     order=10,
     help="make or read the volume of a data set, and check it",
-    rule=Rule("volume", "{dataset}/volume", ("volume.nrrd", "volume.json"), threads=1),
+    rule=Rule("volume", "{dataset}/volume", ("volume.nrrd", "volume.json"), threads=1, swept=True),
     inputs=inputs,
     work=work,
     applies=has_volume,
