@@ -10,7 +10,7 @@ from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from texgs.core.memory import keep_freed_memory
 from texgs.models.networks import fast_dtype
-from texgs.models.vgg import STYLE_LAYERS, Vgg, by_torch, channels, rectified
+from texgs.models.vgg import STYLE_LAYERS, Vgg, by_torch, channels, rectified_convolution
 
 LAYERS = ("relu1_1", "relu1_2", "relu2_1", "relu2_2", *STYLE_LAYERS)
 
@@ -54,6 +54,6 @@ def random_vgg(device: torch.device, dtype: torch.dtype, is_torch: bool = False)
     for inputs, outputs in pairwise([3, *map(channels, LAYERS)]):
         weight = (2 / (9 * inputs)) ** 0.5 * torch.randn(outputs, inputs, 3, 3, generator=generator)
         bias = torch.zeros(outputs, device=device, dtype=dtype)
-        convolve = by_torch if is_torch else rectified
+        convolve = by_torch if is_torch else rectified_convolution
         convolutions.append(convolve(weight.to(device, dtype), bias))
     return Vgg(tuple(convolutions), LAYERS, STYLE_LAYERS, dtype)

@@ -21,7 +21,7 @@ from texgs.core.cuts import Cuts, Plane
 from texgs.fields.surfels.composition import Composition
 from texgs.metrics.quality import psnr
 from texgs.report.compared import chain
-from texgs.scene.cut_view import OPAQUE, cut_view, face_alpha, slab_view
+from texgs.scene.cut_view import FACE_ALPHA, cut_view, face_alpha, slab_view
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene
 from texgs.scene.twin import Twin, range_of
@@ -108,7 +108,7 @@ def without_centres(composed: Composition, cut: Scene) -> Composition:
 
 def places(composed: Composition, twin: Twin, camera: Camera, cut: Scene) -> dict[str, torch.Tensor]:
     """Return pixels [H, W] bool: all, those of a face, and a band along the edge of the face."""
-    face = face_alpha(composed, camera, cut, twin, range_of(cut.cuts, camera)) >= OPAQUE
+    face = face_alpha(composed, camera, cut, twin, range_of(cut.cuts, camera)) >= FACE_ALPHA
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * BAND + 1, 2 * BAND + 1))
     edge = cv2.morphologyEx(face.numpy().astype("uint8"), cv2.MORPH_GRADIENT, disc)
     return {"whole": torch.ones_like(face), "face": face, "band": torch.from_numpy(edge).bool()}

@@ -10,7 +10,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 from torch.nn import functional as F
 
-from texgs.metrics.retrieval import KNOWN, LAYERS, SCALES, SIZE, Likeness, likeness
+from texgs.metrics.retrieval import LAYERS, LIKENESS_FILE, SCALES, SIZE, Likeness, likeness
 from texgs.models.pictures import PICTURES, picture
 from texgs.models.vgg import Vgg
 
@@ -31,7 +31,7 @@ def picture_likeness(image: Tensor, vgg: Vgg) -> Likeness:
 def write_known(vgg: Vgg) -> Path:
     """Describe all pictures of texgs in the file that the metric `retrieval` reads; return the file."""
     described = Likeness.stacked(picture_likeness(picture(name), vgg) for name in PICTURES)
-    file = Path(str(KNOWN))
+    file = Path(str(LIKENESS_FILE))
     save_file({name: x.half().contiguous() for name, x in vars(described).items()}, file)
     return file
 

@@ -40,7 +40,8 @@ def at(tmp_path_factory):
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(folder)
             hide_weights(patch, folder)
-            patch.setattr("texgs.report.before_after.TURN", 4)  # frames of palette fields take long
+            # Frames of palette fields take long.
+            patch.setattr("texgs.report.before_after.TURNTABLE_FRAMES", 4)
             for words in verbs:
                 assert main(words) == 0
         return folder / "results"

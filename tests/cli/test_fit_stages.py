@@ -138,7 +138,7 @@ def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
             if done == 50:
                 raise KeyboardInterrupt
 
-    monkeypatch.setattr(checkpoint, "SAVED_EVERY", 0.0)
+    monkeypatch.setattr(checkpoint, "SAVE_INTERVAL", 0.0)
     monkeypatch.setattr(Fit, "run", interrupted)
     assert main(["shading", *TINY]) == 130
     monkeypatch.setattr(Fit, "run", run)

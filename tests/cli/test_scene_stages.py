@@ -13,8 +13,8 @@ from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.image import read_rgba, to_pillow
 from texgs.metrics.quality import compare
-from texgs.report.check import checked
-from texgs.scene.cut_view import beside
+from texgs.report.check import found_sentence
+from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.twin import Twin
 from texgs.volume.view_set import read_views
@@ -55,7 +55,7 @@ def test_a_view_beside_its_volume(results, tmp_path, monkeypatch, capsys):
     path, size = results / "compose" / "scene.yaml", ["--width", "48", "--radius", "2.5", "--azimuth", "10"]
     assert main(["render", str(path), "--compare", "--gain", "8", *size, "--output", "c.png"]) == 0
     scene = read_scene(path)
-    told = compare(*beside(scene.open(), orbit(10, 20, 2.5, 30, 48, 48), scene, Twin(scene)))
+    told = compare(*scene_and_volume(scene.open(), orbit(10, 20, 2.5, 30, 48, 48), scene, Twin(scene)))
     assert capsys.readouterr().out.startswith(
         f"PSNR on the object {told['object_psnr']:.2f} dB, SSIM {told['object_ssim']:.4f}, "
         f"whole picture: {told['psnr']:.2f} dB"
@@ -129,7 +129,7 @@ def test_edits_are_compared_with_the_volume(results):
     check, told = metrics["check"], json.loads((results / "pse" / "metrics.json").read_text())
     assert check["psnr"]["worst"] <= check["psnr"]["floor"] <= check["psnr"]["mean"]
     composed = results / "compose" / "scene.yaml"
-    assert checked(composed, read_scene(composed)) == check["sentence"]
+    assert found_sentence(composed, read_scene(composed)) == check["sentence"]
     assert "in 95 of 100 such views" in told["pictures"]["check.png"]
     last = read_scene(results / "pse" / "pse-4.yaml")
     edit = last.models["TF01"].edit

@@ -91,7 +91,7 @@ def test_a_damaged_cache_is_an_empty_one(path, cache, content):
 
 
 def test_the_latest_files_are_kept(tmp_path, cache, monkeypatch):
-    monkeypatch.setattr(checksum, "MOST_CHECKSUMS", 2)
+    monkeypatch.setattr(checksum, "MAX_CHECKSUMS", 2)
     checksums = Checksums.load()
     for name in "abc":
         (tmp_path / name).write_text(name)

@@ -14,7 +14,7 @@ from safetensors.torch import load_file
 
 from tests.refusals import refused
 from texgs.core import io
-from texgs.core.errors import LONGEST, ArgumentError, TexgsError, printable
+from texgs.core.errors import MAX_LETTERS, ArgumentError, TexgsError, printable
 from texgs.core.image import read_rgba
 from texgs.core.io import read_json, write_bytes
 from texgs.core.tensor_file import DTYPES, read_tensor_file, write_tensor_file, write_tensors
@@ -96,7 +96,7 @@ def test_a_named_pipe_a_folder_and_a_device_are_no_files(tmp_path):
 def test_a_message_is_one_line_of_bounded_length_that_a_terminal_can_show():
     name = "a\x1b[2J\u202eb\n\udcff"
     assert str(TexgsError(f"{name}: no")) == "a\\x1b[2J\\u202eb \\udcff: no"
-    assert len(str(TexgsError("x" * 10**6 + "; do this"))) <= LONGEST + 5 <= 605
+    assert len(str(TexgsError("x" * 10**6 + "; do this"))) <= MAX_LETTERS + 5 <= 605
     assert str(TexgsError("x" * 10**6 + "; do this")).endswith("; do this")
     assert printable("naïve 体积 ½") == "naïve 体积 ½"
     assert str(TexgsError(name)).isprintable()

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from texgs.core import progress as module
-from texgs.core.progress import progress, watched
+from texgs.core.progress import progress, watching
 
 
 class Terminal(io.StringIO):
@@ -117,7 +117,7 @@ def test_a_watch_is_told_of_each_item_and_may_end_the_loop():
         if done == 2:
             raise RuntimeError("enough")
 
-    with watched(watch), pytest.raises(RuntimeError, match="enough"):
+    with watching(watch), pytest.raises(RuntimeError, match="enough"):
         seen.extend(progress("abc", title="letters", unit="letter"))
     assert told == [("letters", 1, 3), ("letters", 2, 3)]
     assert list(progress("abc", title="letters", unit="letter")) == ["a", "b", "c"]

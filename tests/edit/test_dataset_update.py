@@ -20,7 +20,7 @@ from texgs.edit.voxels import corner
 from texgs.fields.optimizer import Rate
 from texgs.fitting.settings import CommonRates
 from texgs.raster.losses import ssim
-from texgs.volume.images import Box
+from texgs.volume.images import PixelBox
 
 COLOR = (0.8, 0.3, 0.1)
 RATES = CommonRates(means=1e-4, sh=0.05, sh_rest=0.0025, means_final=1.0, final=1.0)
@@ -169,7 +169,7 @@ def test_radii_are_those_of_a_sphere_on_the_axis():
 
 def test_patches_lie_inside_of_the_image_and_around_what_is_visible():
     generator = torch.Generator().manual_seed(0)
-    corners = torch.tensor([corner(Box(30, 2, 40, 8), 16, (48, 64), generator) for _ in range(400)])
+    corners = torch.tensor([corner(PixelBox(30, 2, 40, 8), 16, (48, 64), generator) for _ in range(400)])
     assert (corners >= 0).all()
     assert (corners[:, 0] <= 48 - 16).all()
     assert int(corners[:, 0].min()) == 30 - 8

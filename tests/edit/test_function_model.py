@@ -12,7 +12,7 @@ from tests.scene.test_twin import HIGH, LOW, peak, sphere_volume
 from tests.viewer.pages import on_page
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
-from texgs.edit.function_model import fit_function, overlap_of, tried, with_model
+from texgs.edit.function_model import fit_function, overlap_of, tried_function, with_model
 from texgs.fields.gaussians import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
@@ -40,7 +40,12 @@ def test_a_model_takes_the_place_of_its_function(scene_file):
     low = replace(scene.models["low"], edit=PartEdit(opacity=0.5))
     scene = replace(scene, models={**scene.models, "low": low})
     file = scene.models["high"].file
-    made = with_model(with_model(scene, "new", file, tried(scene, "new")), "low", file, tried(scene, "low"))
+    made = with_model(
+        with_model(scene, "new", file, tried_function(scene, "new")),
+        "low",
+        file,
+        tried_function(scene, "low"),
+    )
     assert list(made.models) == ["low", "high", "new"]
     assert made.models["low"] == SceneModel(file, PartEdit(opacity=0.5))
     assert (made.functions, made.volume.tfs["new"]) == ({}, scene.functions["new"])

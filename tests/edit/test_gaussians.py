@@ -6,7 +6,7 @@ import torch
 
 from tests.edit.scenes import RADIUS, sphere_points
 from tests.fitting.scenes import cameras
-from texgs.edit.gaussians import HIGHER, stylize_gaussians
+from texgs.edit.gaussians import HIGHER_RATE, stylize_gaussians
 from texgs.edit.methods.style_baselines import StyleSplatKeys
 from texgs.edit.objective import Objective
 from texgs.edit.style_picture import StylePicture
@@ -52,6 +52,6 @@ def test_the_first_step_goes_against_the_gradient_by_its_rate():
     objective = Objective.of(RECIPE, STYLE.scaled(48), 1, None, None)
     sum(objective.terms(shown.color.permute(2, 0, 1), shown.alpha.detach(), 0).values()).backward()
     step, clear = edited.parameters["sh"] - model.parameters["sh"], sh.grad.abs() > 1e-7
-    rates = torch.tensor([1, HIGHER, HIGHER, HIGHER])[:, None] * RECIPE.rate
+    rates = torch.tensor([1, HIGHER_RATE, HIGHER_RATE, HIGHER_RATE])[:, None] * RECIPE.rate
     expected = (-rates * sh.grad.sign())[clear]
     torch.testing.assert_close(step[clear], expected, rtol=1e-3, atol=1e-6)

@@ -9,7 +9,7 @@ from tests.edit.scenes import ball
 from tests.fitting.scenes import RADIUS
 from tests.refusals import refused
 from texgs.core.errors import ShapeError
-from texgs.edit.style_start import RIM, color_map, laid_out
+from texgs.edit.style_start import RIM, color_map, projected_colors
 from texgs.fields.surfels.texels import owners
 
 WALL = {  # two parallel surfels with textures of different shapes, the second first in the list
@@ -34,7 +34,7 @@ def test_a_wall_that_faces_z_shows_the_picture_upright():
     size, pixel = 200, 0.01
     x, y = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="xy")
     picture = torch.stack([x / size, y / size, torch.zeros_like(x)])
-    texels = laid_out(WALL, picture, pixel)
+    texels = projected_colors(WALL, picture, pixel)
     for n, (across, along) in enumerate(WALL["sizes"].tolist()):
         for i, j in ((0, 0), (across - 1, along - 1), (1, 2)):
             at = place(n, i, j) / pixel
@@ -47,7 +47,7 @@ def test_contrast_is_the_same_whichever_way_a_surface_faces():
     p = ball(20_000).parameters
     noise = torch.rand(1, 300, 300, generator=torch.Generator().manual_seed(0))
     places, surfel = owners(p)
-    texels = laid_out(p, noise.expand(3, -1, -1), 0.01)[places, 0]
+    texels = projected_colors(p, noise.expand(3, -1, -1), 0.01)[places, 0]
     steepest = normalize(p["means"], dim=1).abs().amax(dim=1)[surfel]
     slanted, straight = texels[steepest < 0.65].std(), texels[steepest > 0.95].std()
     assert slanted == pytest.approx(float(straight), rel=0.1)
@@ -56,7 +56,9 @@ def test_contrast_is_the_same_whichever_way_a_surface_faces():
 def test_beyond_its_edges_the_picture_is_mirrored():
     picture = torch.rand(3, 6, 6, generator=torch.Generator().manual_seed(1))
     tiled = torch.from_numpy(np.pad(picture.numpy(), ((0, 0), (24, 24), (24, 24)), mode="symmetric"))
-    torch.testing.assert_close(laid_out(WALL, picture, 0.01), laid_out(WALL, tiled, 0.01), atol=1e-4, rtol=0)
+    torch.testing.assert_close(
+        projected_colors(WALL, picture, 0.01), projected_colors(WALL, tiled, 0.01), atol=1e-4, rtol=0
+    )
 
 
 def turned(degrees, count=40, seed=0):
@@ -85,7 +87,7 @@ def test_a_slanted_wall_shows_the_picture_unstretched(degrees):
     size, pixel = 200, 0.02  # four times the wall: one chunk
     x, y = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="xy")
     shifted = {**p, "means": p["means"] + 1.0}  # the wall is in one cell
-    read = laid_out(shifted, torch.stack([x / size, y / size, 0 * x]), pixel)
+    read = projected_colors(shifted, torch.stack([x / size, y / size, 0 * x]), pixel)
     middles = read.view(-1, 2, 3).mean(1)[:, :2] * size * pixel
     torch.testing.assert_close(torch.cdist(middles, middles), torch.cdist(flat, flat), atol=2e-3, rtol=0)
 
@@ -106,7 +108,7 @@ def test_a_ball_gives_back_a_sphere(pixel):
     model = ball(3000)
     p = {**model.parameters}
     p["quats"] = torch.where(torch.arange(3000)[:, None] % 2 == 0, p["quats"], flipped(p["quats"]))
-    colors = laid_out(p, sphere_picture(), pixel, sphere=True)
+    colors = projected_colors(p, sphere_picture(), pixel, sphere=True)
     places, surfel = owners(p)
     mean = torch.zeros(3000, 3).index_add_(0, surfel, colors[places]) / 25
     normals = normalize(p["means"], dim=1)
@@ -127,7 +129,7 @@ def flipped(quats):
 def test_a_plain_picture_gives_plain_colour(sphere):
     model = ball(500)
     picture = torch.tensor([0.2, 0.5, 0.9])[:, None, None].expand(3, 40, 40)
-    colors = laid_out(model.parameters, picture, 0.01, sphere)
+    colors = projected_colors(model.parameters, picture, 0.01, sphere)
     torch.testing.assert_close(colors, picture[:, 0, 0].expand_as(colors), atol=1e-6, rtol=0)
 
 
@@ -151,5 +153,5 @@ def test_mean_and_covariance_become_those_of_the_style():
 
 def test_shapes_that_do_not_fit_are_named():
     wide, narrow = torch.rand(20, 20, 3), torch.rand(3, 8)
-    refused(lambda: laid_out(WALL, wide, 0.01), r"picture: expected \[3, h, w\]", ShapeError)
+    refused(lambda: projected_colors(WALL, wide, 0.01), r"picture: expected \[3, h, w\]", ShapeError)
     refused(lambda: color_map(narrow.T, narrow), r"style: expected \[N, 3\], got \[3, 8\]; did", ShapeError)

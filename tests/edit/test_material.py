@@ -14,7 +14,7 @@ from texgs.edit.keys import EditKeys
 from texgs.edit.methods.text import METHOD, TextKeys
 from texgs.edit.readable import MATERIALS, highlights_of
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.composition import Part
+from texgs.fields.surfels.composition import EditableModel
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.changes import apply_all
@@ -38,7 +38,7 @@ def test_the_middle_of_a_part_gets_the_highlights_of_the_material(name):
     model = Surfels({**model.parameters, "specular": raw}, model.shading)
     outer = torch.arange(151) < 75
     edit = PartEdit(**highlights_of(f"make it {name}", model, outer))
-    _, _, specular, shininess = Part(model).apply([edit]).material
+    _, _, specular, shininess = EditableModel(model).apply([edit]).material
     assert float(specular[outer].median()) == pytest.approx(MATERIALS[name].specular)
     assert float(shininess[outer].median()) == pytest.approx(MATERIALS[name].shininess)
     assert edit.tint == MATERIALS[name].tint

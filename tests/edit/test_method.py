@@ -8,7 +8,7 @@ from tests.toys.fade import METHOD
 from texgs.core.errors import ConfigError
 from texgs.core.keys import key
 from texgs.edit.method import MethodKeys
-from texgs.edit.task import edited_by
+from texgs.edit.task import run_method
 
 
 @dataclass(frozen=True)
@@ -45,4 +45,4 @@ def test_what_a_method_says_of_itself_is_checked(changes, message):
 
 def test_what_a_method_returns_is_checked():
     with pytest.raises(ConfigError, match="method fade: expected an EditedScene, got str"):
-        edited_by(replace(METHOD, run=lambda task: "done"), 1)
+        run_method(replace(METHOD, run=lambda task: "done"), 1)

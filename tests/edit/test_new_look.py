@@ -5,7 +5,7 @@ import torch
 
 from tests.scene.balls import write_balls
 from texgs.core.errors import ArgumentError
-from texgs.core.progress import watched
+from texgs.core.progress import watching
 from texgs.edit.new_look import give_look, look_task, settings_of
 from texgs.scene.session import Session
 
@@ -39,7 +39,7 @@ def test_a_look_that_is_stopped_when_all_is_learned_leaves_what_was_there(sessio
     before, there = session.scene, tmp_path / "there"
     there.mkdir()
     for folder in (there / "look", tmp_path / "new" / "look"):
-        with watched(stop), pytest.raises(Cancelled):
+        with watching(stop), pytest.raises(Cancelled):
             give_look(session, dots(session, folder), "dots")
     assert session.scene is before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["balls", "there"]

@@ -4,7 +4,7 @@ import torch
 from tests.refusals import refused
 from texgs.core import memory
 from texgs.core.errors import OutOfMemoryError
-from texgs.edit.objective import Objective, pooled
+from texgs.edit.objective import Objective, object_features
 from texgs.edit.recipe import Recipe, preset
 from texgs.edit.sliced_wasserstein import FeatureDistribution, PatchStatistics
 from texgs.edit.style_picture import StylePicture
@@ -19,7 +19,7 @@ def test_terms_are_the_losses_times_their_weights(vgg):
     image, share = torch.rand(3, 48, 40), torch.rand(48, 40).round()
     recipe = preset("default", features=2.0, lambda_s=0.75, distribution=0.5, patches=3.0, **EXACT)
     terms = Objective.of(recipe, STYLE, 1, vgg, lambda x: x[0, 0, 0]).terms(image, share, 5)
-    where = pooled(share, 4, torch.Size((12, 10)))
+    where = object_features(share, 4, torch.Size((12, 10)))
     exact = nnfm(vgg.features(image), StyleFeatures.of(vgg.features(STYLE.image)), where)
     assert float(terms["nnfm"]) == pytest.approx(2 * 0.75 * float(exact), rel=1e-5)
     layers = ("relu1_2", "relu2_2")
@@ -27,7 +27,9 @@ def test_terms_are_the_losses_times_their_weights(vgg):
     ours.append(vgg.features(image))
     others.append(vgg.features(STYLE.image))
     distances = [
-        FeatureDistribution.of(other).distance(our, pooled(share, 48 // our.shape[1], our.shape[1:]), 5, 5)
+        FeatureDistribution.of(other).distance(
+            our, object_features(share, 48 // our.shape[1], our.shape[1:]), 5, 5
+        )
         for our, other in zip(ours, others, strict=True)
     ]
     mean = sum(map(float, distances)) / 3

@@ -50,7 +50,7 @@ def one_colored(field):
 
 def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypatch):
     monkeypatch.setattr(palette_style, "RAYS", 100)
-    monkeypatch.setattr(palette_style, "LEAST_WEIGHT", -1.0)
+    monkeypatch.setattr(palette_style, "MIN_WEIGHT", -1.0)
     field, camera = one_colored(field), images.cameras[0]
     recipe = replace(RECIPE, features=1.0)
     objective = Objective.of(recipe, STYLE.scaled(48), 2, vgg, None)

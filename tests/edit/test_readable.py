@@ -11,7 +11,7 @@ from texgs.edit.methods.image import ImageKeys
 from texgs.edit.methods.text import TextKeys
 from texgs.edit.readable import (
     KEPT_SHARE,
-    LARGEST_FACTOR,
+    MAX_READABLE_FACTOR,
     READABLE_ALPHA,
     SHOWN_SHARE,
     SIZE,
@@ -82,7 +82,7 @@ def alpha_of(scene, factors):
 def test_a_faint_part_becomes_as_opaque_as_is_readable_and_not_more(tmp_path):
     scene = scene_of(tmp_path, shell=ball(opacity=FAINT))
     (factor,) = readable_factors(scene, ["shell"], "cpu").values()
-    assert 1.5 < factor < LARGEST_FACTOR
+    assert 1.5 < factor < MAX_READABLE_FACTOR
     assert (
         alpha_of(scene, {"shell": factor / 1.15}) < READABLE_ALPHA < alpha_of(scene, {"shell": 1.05 * factor})
     )
@@ -92,7 +92,7 @@ def test_an_opaque_part_stays_as_it_is_and_one_that_never_is_readable_gets_the_l
     scene = scene_of(tmp_path, solid=ball(), veil=ball(opacity=-5.0))
     assert readable_factors(scene, ["solid"], "cpu") == {"solid": 1.0}
     assert readable_factors(scene_of(tmp_path, veil=ball(opacity=-5.0)), ["veil"], "cpu") == {
-        "veil": LARGEST_FACTOR
+        "veil": MAX_READABLE_FACTOR
     }
 
 

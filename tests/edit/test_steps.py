@@ -7,7 +7,7 @@ from torch.testing import assert_close
 
 from tests.edit.guidances import Returns, Tint
 from tests.edit.scenes import ball, task, two_steps, views
-from texgs.edit.steps import placed, shots_of, weights_of, where_shown
+from texgs.edit.steps import model_at_step, shots_of, weights_of, where_shown
 from texgs.edit.text import RECIPES, edit_by_text
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.step_file import write_step
@@ -116,9 +116,9 @@ def test_the_most_telling_views_come_first():
     assert own.surfels.all()
     known = torch.stack([weights_of(key, [camera]) for camera in cameras[::2]]).amax(0)
     for number, shot in enumerate(others):
-        shows = weights_of(placed(key, step), shot.cameras)
+        shows = weights_of(model_at_step(key, step), shot.cameras)
         assert torch.equal(shot.surfels, shows > 4 * known)
         if number == 0:
-            every = [weights_of(placed(key, step), [camera]) for camera in cameras[::2]]
+            every = [weights_of(model_at_step(key, step), [camera]) for camera in cameras[::2]]
             assert_close((shows - 4 * known).relu().sum(), max((w - 4 * known).relu().sum() for w in every))
         known = known.maximum(shows)

@@ -18,7 +18,7 @@ from texgs.fields.splats import GEOMETRY
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.texels import lean, owners
+from texgs.fields.surfels.texels import owners, reduce_constant_textures
 from texgs.models.pictures import picture
 from texgs.models.vgg import Vgg
 from texgs.raster.shading import MATERIAL
@@ -143,7 +143,7 @@ def test_without_texture_each_surfel_has_one_colour_that_learns(style):
     done = styled(style, short("patches", is_textured=False)).model
     for model in (start, done):
         assert model.parameters["texels"].abs().max() < 1e-6, "the colour is that of the surfel"
-        assert len(lean(model).parameters["texels"]) == len(model)
+        assert len(reduce_constant_textures(model).parameters["texels"]) == len(model)
     assert (done.parameters["colors"] - start.parameters["colors"]).abs().max() > 0.01
 
 

@@ -13,7 +13,7 @@ from texgs.fields.optimizer import Rate
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
-from texgs.fields.surfels.texels import bare_colors, owners, recolored
+from texgs.fields.surfels.texels import bare_colors, owners, with_colors
 from texgs.raster import Texture, reference
 from texgs.raster.losses import l1_dssim
 from texgs.raster.reference.losses import l1_dssim as l1_dssim_by_definition
@@ -64,7 +64,7 @@ def few():
     model = shell(count=24, texels=3, opacity=2.0)
     views = render_views(model, around(4, 24), None)
     known = torch.rand(len(model.parameters["texels"]), 3, generator=torch.Generator().manual_seed(5))
-    edited = render_views(recolored(model, known), around(4, 24), None).images
+    edited = render_views(with_colors(model, known), around(4, 24), None).images
     return model, flat(observe(model, views, edited, None, (1.0,))), known
 
 

@@ -22,7 +22,14 @@ from texgs.edit.texel_solver import image_loss
 from texgs.edit.text import RECIPES, TextRecipe, axis_cameras, edit_by_text, nearest_to_axes
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texels import bare_colors, lean, owners, recolored, spread, untextured
+from texgs.fields.surfels.texels import (
+    bare_colors,
+    owners,
+    reduce_constant_textures,
+    spread_colors,
+    with_colors,
+    with_single_texels,
+)
 from texgs.models.filters import ProceduralFilters
 from texgs.raster import Texture
 from texgs.volume.cameras import icosphere
@@ -73,7 +80,7 @@ def test_threads_change_nothing(model, recipe):
 def test_light_falls_on_what_was_edited_bare(model):
     """Under any light the edited scene is shaded as a scene of that colour is."""
     done = edited(model, Tint(BLUE))
-    plain = recolored(model, torch.tensor(BLUE).expand(len(model.parameters["texels"]), 3))
+    plain = with_colors(model, torch.tensor(BLUE).expand(len(model.parameters["texels"]), 3))
     for light in (HEADLIGHT, Light("directional", 70, 20)):
         color, expected = (Composition([m]).render(around(3)[1], light).color for m in (done, plain))
         assert_close(color, expected, atol=0.03, rtol=0)
@@ -106,7 +113,7 @@ def test_highlights_keep_their_colour():
     bright = shell(opacity=6.0)
     p = {**bright.parameters, "specular": torch.tensor([3.0])}
     colors = torch.tensor([[1.0, 1.0, 0.1]]).expand(len(p["texels"]), 3)
-    done = edited(recolored(type(bright)(p, bright.shading), colors), Tint((0.1, 0.1, 0.1)))
+    done = edited(with_colors(type(bright)(p, bright.shading), colors), Tint((0.1, 0.1, 0.1)))
     shown = Composition([done]).render(around(6)[3]).color[20:28, 20:28]
     assert shown.max() > 0.6
     assert (shown.amax(dim=-1) - shown.amin(dim=-1)).max() < 0.05
@@ -201,11 +208,13 @@ def test_without_texture_each_surfel_learns_one_colour(model, recipe, loss, targ
     done = edited(model, guidance, replace(recipe, is_textured=False))
     texels = done.parameters["texels"]
     assert texels.shape == model.parameters["texels"].shape, "it can be saved as a texture of the model"
-    assert len(lean(done).parameters["texels"]) == len(model)
+    assert len(reduce_constant_textures(done).parameters["texels"]) == len(model)
     views = render_views(model, around(6), HEADLIGHT)
     rows = observe(model, views, stripes(views), HEADLIGHT, recipe.opacities, target=target)
     averaged = bare_colors(edited(model, guidance, recipe))
-    averaged = spread(bare_colors(untextured(recolored(model, averaged))), untextured(model), model)
+    averaged = spread_colors(
+        bare_colors(with_single_texels(with_colors(model, averaged))), with_single_texels(model), model
+    )
     losses = [
         sum(float(loss(observation, colors)) for row in rows for observation in row)
         for colors in (bare_colors(done), averaged, bare_colors(model))
@@ -216,7 +225,9 @@ def test_without_texture_each_surfel_learns_one_colour(model, recipe, loss, targ
 def test_at_half_the_opacity_the_papers_recipe_looks_like_the_edited_views():
     """The other one keeps the colours of the edit, which are paler then."""
     model, recipe = shell(opacity=0.5), TextRecipe("all", opacities=(0.5,), iterations=150, rate=0.05)
-    wanted = render_views(recolored(model, torch.full_like(model.parameters["texels"], 0.4)), around(6), None)
+    wanted = render_views(
+        with_colors(model, torch.full_like(model.parameters["texels"], 0.4)), around(6), None
+    )
     error = {}
     for target in ("colors", "images"):
         done = edited(model, Returns(wanted.images), replace(recipe, target=target))

@@ -11,13 +11,13 @@ from texgs.core.camera import orbit
 from texgs.fields.splats import REACH, screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
-from texgs.volume.images import MARGIN, Box, content_box
+from texgs.volume.images import MARGIN, PixelBox, content_box
 
 
 def box_of(seen):
     """The smallest box of a mask [H, W]."""
     rows, columns = seen.any(dim=1).nonzero(), seen.any(dim=0).nonzero()
-    return Box(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+    return PixelBox(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
 
 
 def is_inside(box, other):
@@ -67,7 +67,7 @@ def test_the_box_is_that_of_all_spheres(count, axes, device):  # noqa: F811
     box = with_threads(2, lambda: [screen_box({k: x.to(device) for k, x in p.items()}, options, camera)])[0]
     for side, edge in zip(box, edges, strict=True):
         assert abs(side - edge) <= 1.01
-    assert is_inside(Box(*map(round, edges)), box)
+    assert is_inside(PixelBox(*map(round, edges)), box)
 
 
 @pytest.mark.parametrize("name", ["means", "scales"])
@@ -76,7 +76,7 @@ def test_a_value_that_is_not_finite_needs_the_whole_image(name, value, device): 
     p = random_surfels(0, 40, 0.1, 0.1)
     p[name][17, 1] = value
     camera = cameras(1)[0]
-    assert screen_box(p, ShadingModel().options, camera) == Box(0, 0, camera.width, camera.height)
+    assert screen_box(p, ShadingModel().options, camera) == PixelBox(0, 0, camera.width, camera.height)
 
 
 @pytest.mark.parametrize("mean", [(0.0, 0.0, 1.0), (0.0, 0.0, torch.nan)])
@@ -84,9 +84,9 @@ def test_a_surfel_around_the_camera_or_nowhere_needs_the_whole_image(mean):
     p = random_surfels(0, 4, 0.0, 0.1)
     camera = cameras(1)[0]
     p["means"][0] = camera.position if mean[2] == 1 else torch.tensor(mean)
-    assert screen_box(p, ShadingModel().options, camera) == Box(0, 0, camera.width, camera.height)
+    assert screen_box(p, ShadingModel().options, camera) == PixelBox(0, 0, camera.width, camera.height)
     none = {name: x[:0] for name, x in p.items()}
-    assert screen_box(none, ShadingModel().options, camera) == Box(16, 16, 16, 16), "one place"
+    assert screen_box(none, ShadingModel().options, camera) == PixelBox(16, 16, 16, 16), "one place"
 
 
 def test_content_is_what_is_not_white():
@@ -96,13 +96,15 @@ def test_content_is_what_is_not_white():
     assert (empty.left, empty.top) == (empty.right, empty.bottom)
     planes[1, 5, 7] = 254
     planes[3, 11, 22] = 1
-    assert content_box(planes.numpy()) == Box(7, 5, 23, 12)
+    assert content_box(planes.numpy()) == PixelBox(7, 5, 23, 12)
 
 
 def test_a_box_gets_a_margin_but_stays_in_the_image_with_a_pixel_at_least():
-    assert Box(30, 40, 45, 50).within(100, 100) == Box(30 - MARGIN, 40 - MARGIN, 45 + MARGIN, 50 + MARGIN)
-    assert Box(2, -50, 99, 300).within(100, 80) == Box(0, 0, 100, 80)
-    for box in (Box(-90, -90, -80, -80), Box(500, 500, 600, 600)):
+    assert PixelBox(30, 40, 45, 50).within(100, 100) == PixelBox(
+        30 - MARGIN, 40 - MARGIN, 45 + MARGIN, 50 + MARGIN
+    )
+    assert PixelBox(2, -50, 99, 300).within(100, 80) == PixelBox(0, 0, 100, 80)
+    for box in (PixelBox(-90, -90, -80, -80), PixelBox(500, 500, 600, 600)):
         left, top, right, bottom = box.within(100, 80)
         assert 0 <= left < right <= 100
         assert 0 <= top < bottom <= 80
@@ -118,6 +120,6 @@ def test_the_camera_of_a_part_sees_that_part():
 def test_the_part_keeps_the_light_and_moves_the_principal_point():
     camera = cameras(1, size=64)[0]
     images = images_of([torch.zeros(4, 64, 64)], [camera])
-    target = images.target(0, around=Box(0, 0, 1, 1))
+    target = images.target(0, around=PixelBox(0, 0, 1, 1))
     assert target.share == 1
     assert torch.equal(target.camera.K, camera.K)

@@ -9,7 +9,7 @@ from tests.raster.requirements import require_equal
 from tests.volume.scenes import SHELLS, ball
 from texgs.core.geometry import quats_to_matrices
 from texgs.fields.surfels.shading import material
-from texgs.fitting.attributes import HOLD, Attributes, coherence
+from texgs.fitting.attributes import FULL_HOLD, Attributes, coherence
 from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
 from texgs.volume.lookup import Lookup
@@ -46,7 +46,7 @@ def test_normals_are_the_radii_of_spheres_and_colors_those_of_the_function():
 def test_surfels_are_held_where_normals_are_alike_and_not_in_noise():
     smooth, rough = held_to(ball()), held_to(noise())
     assert smooth.coherence > 0.98
-    assert smooth.hold == HOLD
+    assert smooth.hold == FULL_HOLD
     assert rough.coherence < 0.6  # that of random directions is 0.5
     assert rough.hold == 0
     assert rough.held is None

@@ -5,7 +5,7 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from texgs.fields.optimizer import Optimizer, Rate
-from texgs.fitting.densify import RESET_OPACITY, SHRINK, DensityControl
+from texgs.fitting.densify import RESET_OPACITY, SHRINK_FACTOR, DensityControl
 from texgs.fitting.settings import Densify
 
 from .scenes import logit
@@ -71,7 +71,7 @@ def test_large_surfels_above_the_threshold_are_split():
     optimizer = surfels([LARGE, SMALL, LARGE])
     assert step(optimizer, [1e-3, 0.0, 0.0]) == [1, 2, 0, 0]
     p = optimizer.parameters
-    torch.testing.assert_close(p["scales"][2:].exp(), torch.full((2, 2), LARGE / SHRINK))
+    torch.testing.assert_close(p["scales"][2:].exp(), torch.full((2, 2), LARGE / SHRINK_FACTOR))
     normal = torch.tensor([math.sin(1.0), 0.0, math.cos(1.0)])  # z turned by 1 radian about y
     torch.testing.assert_close(p["means"][2:] @ normal, torch.zeros(2), atol=1e-6, rtol=0)
     assert not torch.equal(p["means"][2], p["means"][3])
@@ -89,7 +89,7 @@ def test_children_are_drawn_from_their_parent(deviations):
     step(optimizer, [1.0] * n, cap=2 * n)
     p = optimizer.parameters
     assert len(p["means"]) == 2 * n
-    torch.testing.assert_close(p["scales"][0].exp(), scales / SHRINK)
+    torch.testing.assert_close(p["scales"][0].exp(), scales / SHRINK_FACTOR)
     axes = torch.from_numpy(Rotation.from_quat(quat.double().numpy(), scalar_first=True).as_matrix())
     axes = axes[:, : len(deviations)]
     covariance = axes @ torch.diag(scales.double() ** 2) @ axes.T

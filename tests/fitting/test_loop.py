@@ -10,7 +10,7 @@ from texgs.core.errors import FitError
 from texgs.core.image import write_png
 from texgs.fields.surfels.shading import raw_material
 from texgs.fitting import checkpoint
-from texgs.fitting.checkpoint import CHECKED_EVERY
+from texgs.fitting.checkpoint import CHECK_INTERVAL
 from texgs.fitting.loop import extent
 from texgs.fitting.seeds import seed_surfels
 from texgs.fitting.settings import Densify, Losses, Rates, Seeds
@@ -80,11 +80,11 @@ def test_a_rate_of_zero_keeps_a_parameter():
 
 
 def test_progress_is_told_after_every_iteration():
-    fit, losses = new_fit(iterations=CHECKED_EVERY + 5, densify=Densify(stop=0)), {}
+    fit, losses = new_fit(iterations=CHECK_INTERVAL + 5, densify=Densify(stop=0)), {}
     for iteration, done in enumerate(fit.run(), 1):
         assert iteration == done
         losses.setdefault(len(fit.losses), done)
-    assert losses == {0: 1, 1: CHECKED_EVERY, 2: CHECKED_EVERY + 5}
+    assert losses == {0: 1, 1: CHECK_INTERVAL, 2: CHECK_INTERVAL + 5}
 
 
 def test_the_extent_is_that_of_the_cameras_or_four_times_that_of_the_surfels():
@@ -160,7 +160,7 @@ def test_a_material_for_each_surfel_stays_finite_and_smooth():
 
 
 def test_a_loss_that_is_not_finite_ends_the_run_and_keeps_the_checkpoint(tmp_path):
-    fit = run(new_fit(iterations=CHECKED_EVERY, densify=Densify(stop=0)), 20)
+    fit = run(new_fit(iterations=CHECK_INTERVAL, densify=Densify(stop=0)), 20)
     checkpoint.save(tmp_path, fit)
     with torch.no_grad():
         fit.parameters["colors"].fill_(torch.nan)
@@ -172,6 +172,6 @@ def test_a_loss_that_is_not_finite_ends_the_run_and_keeps_the_checkpoint(tmp_pat
 
 def test_rates_that_are_far_too_high_end_in_an_error_or_a_finite_model():
     rates = Rates(means=1e6, scales=50.0, quats=1e3, colors=1e4)
-    fit = new_fit(rates=rates, iterations=CHECKED_EVERY, densify=Densify(stop=0))
+    fit = new_fit(rates=rates, iterations=CHECK_INTERVAL, densify=Densify(stop=0))
     with suppress(FitError):
         assert is_finite(run(fit).state())

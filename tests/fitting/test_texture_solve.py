@@ -26,7 +26,7 @@ from texgs.fields.surfels.shading import ShadingModel, material, raw_material
 from texgs.fields.surfels.texels import owners
 from texgs.fitting.settings import Densify, TextureKeys
 from texgs.fitting.texels import add_texture, gather_sight, sizes_for_budget, texturize, without_offset
-from texgs.fitting.texture_solve import FARTHEST_TEXEL, curvature, refine, share_of, solve, texel_map
+from texgs.fitting.texture_solve import MAX_TEXEL_CHANGE, curvature, refine, share_of, solve, texel_map
 from texgs.raster import Texture, rasterize, reference
 from texgs.raster.losses import l1_dssim
 from texgs.raster.reference import shading
@@ -321,5 +321,5 @@ def test_lights_from_many_sides_do_not_drive_texels_away(start):
     images = replace(images_of(planes, views), lights=lights)
     solved = solved_from(model, images, sweeps=4)
     texels = solved.parameters["texels"]
-    assert 0 < float(texels.abs().max()) <= FARTHEST_TEXEL
+    assert 0 < float(texels.abs().max()) <= MAX_TEXEL_CHANGE
     assert squared(solved, images) < 0.7 * squared(model, images)

@@ -16,7 +16,7 @@ from texgs.fitting import checkpoint
 from texgs.fitting.checkpoint import run_to_end
 from texgs.fitting.hull import hull_box
 from texgs.fitting.ray_settings import Decay, GridStage, VoxelKeys
-from texgs.fitting.rays import AROUND, curve, training_rays, widened
+from texgs.fitting.rays import MARGIN, curve, training_rays, widen
 from texgs.fitting.voxels import VoxelFit, dilate, hull_grid, refine_grid, seen_voxels
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays
@@ -106,7 +106,7 @@ def test_training_rays_pass_through_their_pixels(images):
     ids = torch.arange(len(rays))
     all_rays, colors = rays.take(ids)
     start = int((rays.views == 0).sum())
-    near = widened(images.planes[1, 3], AROUND)
+    near = widen(images.planes[1, 3], MARGIN)
     inside = rays.views[start:] == 1
     assert int(inside.sum()) == int(near.sum())
     expected = torch.cat([camera_rays(images.cameras[1])[near], images.target(1).color[near]], dim=1)

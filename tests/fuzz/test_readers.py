@@ -14,7 +14,7 @@ import pytest
 
 from tests.fuzz.child import run
 from tests.fuzz.readers import READERS
-from texgs.core.errors import LONGEST
+from texgs.core.errors import MAX_LETTERS
 
 pytestmark = pytest.mark.subprocess
 
@@ -56,5 +56,5 @@ def test_damage_is_told_or_harmless(tmp_path, context, name):
     outcomes = [line for line in lines if len(line) > 1]
     assert len(outcomes) == cases
     assert [line for line in outcomes if line[1] not in ("valid", "refused")] == []
-    assert [line for line in outcomes if not line[2].isprintable() or len(line[2]) > 1.2 * LONGEST] == []
+    assert [line for line in outcomes if not line[2].isprintable() or len(line[2]) > 1.2 * MAX_LETTERS] == []
     assert any(line[1] == "refused" for line in outcomes), "no damage was found at all"

@@ -13,7 +13,7 @@ from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import Light
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.voxels import VoxelScene
-from texgs.metrics.consistency import OPAQUE, TOLERANCE, SeenFrame, difference, mean_differences, warp
+from texgs.metrics.consistency import OPAQUE_ALPHA, TOLERANCE, SeenFrame, difference, mean_differences, warp
 
 SIZE = 64
 
@@ -55,7 +55,7 @@ def consistency(frames, apart=1, tolerance=TOLERANCE):
 def covered(frames, apart=1, tolerance=TOLERANCE):
     """The smallest share of the pixels of an object that such a pair compares."""
     pairs = zip(frames, frames[apart:], strict=False)
-    return min(float(warp(b, a, tolerance)[1].sum() / (a.alpha >= OPAQUE).sum()) for a, b in pairs)
+    return min(float(warp(b, a, tolerance)[1].sum() / (a.alpha >= OPAQUE_ALPHA).sum()) for a, b in pairs)
 
 
 def frames_of(scene, cameras, light, depth="median", **more):

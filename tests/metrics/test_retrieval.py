@@ -9,7 +9,7 @@ from tests.metrics.test_edit_metrics import MISSING, scenes, subject  # noqa: F4
 from tests.models.networks import random_weights
 from tests.real_data import real_data
 from texgs.metrics.edits import retrieval
-from texgs.metrics.retrieval import LAYERS, LUMINANCE, Likeness, contrast, known, likeness
+from texgs.metrics.retrieval import LAYERS, LUMINANCE, Likeness, contrast, likeness, style_likeness
 from texgs.models.pictures import PICTURES, picture
 from texgs.models.vgg import Vgg
 from tools.style_likeness import picture_likeness
@@ -29,7 +29,7 @@ def everywhere(image):
 
 def test_shipped_descriptions_are_those_of_the_pictures():
     vgg = Vgg.load(real_data("weights/vgg16_features_fp16.safetensors"), layers=LAYERS, dtype=torch.float32)
-    shipped = known()
+    shipped = style_likeness()
     assert len(shipped.colors) == len(PICTURES) == 24
     for index in (0, 11, 23):
         now = picture_likeness(picture(PICTURES[index]), vgg)
@@ -38,7 +38,7 @@ def test_shipped_descriptions_are_those_of_the_pictures():
 
 
 def test_each_picture_is_nearest_to_itself():
-    pictures = known()
+    pictures = style_likeness()
     for index in range(len(PICTURES)):
         own = Likeness(*(x[index, 0] for x in vars(pictures).values()))
         for far in own.distances(pictures).values():

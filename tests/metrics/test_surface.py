@@ -6,7 +6,7 @@ import torch
 
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
-from texgs.metrics.surface import Points, compare, distances, nearest, sample, seen
+from texgs.metrics.surface import Points, are_visible, compare, distances, nearest, sample
 from texgs.volume.cameras import icosphere
 from texgs.volume.isosurface import Mesh
 
@@ -67,11 +67,11 @@ def test_the_angle_between_normals():
 def test_what_is_inside_of_another_surface_is_not_seen():
     outer, inner = sphere(RADIUS, 200_000), sphere(0.2, 50_000)
     both = Points(torch.cat([outer.places, inner.places]), torch.cat([outer.normals, inner.normals]))
-    visible = seen(both, CAMERAS, tolerance=0.02)
+    visible = are_visible(both, CAMERAS, tolerance=0.02)
     assert visible[:200_000].double().mean() > 0.99
     assert not visible[200_000:].any()
-    assert seen(inner, CAMERAS, tolerance=0.02).double().mean() > 0.99
-    one = seen(outer, CAMERAS[:1], tolerance=0.02)
+    assert are_visible(inner, CAMERAS, tolerance=0.02).double().mean() > 0.99
+    one = are_visible(outer, CAMERAS[:1], tolerance=0.02)
     assert 0.4 < one.double().mean() < 0.5, "from a distance of ten radii not quite a half"
 
 

@@ -12,7 +12,7 @@ from tests.metrics.test_edit_metrics import CAMERAS, MISSING, scenes, subject  #
 from tests.metrics.test_style import rows
 from tests.models.test_lpips import files  # noqa: F401
 from texgs.fields.surfels.model_file import write_model
-from texgs.metrics.consistency import LONG, SHORT, SeenFrame, difference
+from texgs.metrics.consistency import LONG_RANGE, SHORT_RANGE, SeenFrame, difference
 from texgs.metrics.edits import consistency, style, views
 from texgs.metrics.metric import Style, metrics, values_of
 from texgs.metrics.style import StyleTarget
@@ -53,7 +53,7 @@ def test_all_views_make_the_means_over_all_pairs_and_views(given, monkeypatch):
     """The oracle runs VGG on whole images, each time anew."""
     monkeypatch.setattr(style, "QUERIES", None)
     measured, frames, network = values_of(given), list(seen(given)), lpips.Lpips.load()
-    for name, apart in (("short", SHORT), ("long", LONG)):
+    for name, apart in (("short", SHORT_RANGE), ("long", LONG_RANGE)):
         found = []
         for first, second in zip(frames, frames[apart:], strict=False):
             distance = lambda image, where, first=first: float(network.distance(first.image, image))  # noqa: E731

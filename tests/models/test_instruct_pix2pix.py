@@ -27,7 +27,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """Work at 64 pixels instead of 512."""
-    monkeypatch.setattr(instruct_pix2pix, "LONGEST", 64)
+    monkeypatch.setattr(instruct_pix2pix, "MAX_SIDE", 64)
 
 
 def seeded(seed=0):

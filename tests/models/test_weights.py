@@ -11,7 +11,7 @@ from texgs.core.cache import Checksums
 from texgs.core.errors import ArgumentError, MissingDataError
 from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
 from texgs.models.networks import read_tensors
-from texgs.models.weights import checksum, find, locate, pipeline_files, titled, unusable
+from texgs.models.weights import checksum, find, locate, missing_advice, pipeline_files, title_of
 
 CONTENT = b"weights of a model"
 CHECKSUM = hashlib.sha256(CONTENT).hexdigest()
@@ -76,32 +76,32 @@ def test_another_revision_in_the_cache_of_the_hub_is_found_and_named_and_the_pin
     for revision in ("f" * 40, "a" * 40):
         put(folder / "hub" / "models--texgs--none" / "snapshots" / revision / "config.json")
     assert find("hub") is None, "both lack a file"
-    assert titled("hub") == "hub"
+    assert title_of("hub") == "hub"
     other = put(folder / "hub" / "models--texgs--none" / "snapshots" / ("f" * 40) / "model.safetensors")
     assert locate("hub") == other.parent
-    assert titled("hub") == "hub (revision ffffffffffff, not 000000000000)"
+    assert title_of("hub") == "hub (revision ffffffffffff, not 000000000000)"
     of_other = checksum("hub", Checksums())
     for name in ("config.json", "model.safetensors"):
         put(folder / "hub" / "models--texgs--none" / "snapshots" / ("0" * 40) / name, b"pinned")
-    assert (find("hub").name, titled("hub")) == ("0" * 40, "hub")
+    assert (find("hub").name, title_of("hub")) == ("0" * 40, "hub")
     assert checksum("hub", Checksums()) != of_other
     for name in ("config.json", "model.safetensors"):
         put(folder / "weights" / "hub" / name)
-    assert (find("hub"), titled("hub")) == (folder / "weights" / "hub", "hub"), "the folder is asked first"
+    assert (find("hub"), title_of("hub")) == (folder / "weights" / "hub", "hub"), "the folder is asked first"
 
 
 def test_weights_without_the_package_that_reads_them_are_of_no_use(folder, monkeypatch):
-    assert "`texgs weights hub`" in unusable("hub")
+    assert "`texgs weights hub`" in missing_advice("hub")
     for name in ("config.json", "model.safetensors"):
         put(folder / "weights" / "hub" / name)
     monkeypatch.setitem(sys.modules, "transformers", None)
-    assert "pip install '.[models]'" in unusable("hub")
+    assert "pip install '.[models]'" in missing_advice("hub")
     assert checksum("hub", Checksums()) is None
     put(folder / "weights" / "tiny.bin")
-    assert unusable("tiny") == "", "a file needs none"
+    assert missing_advice("tiny") == "", "a file needs none"
     monkeypatch.delitem(sys.modules, "transformers")
     if find_spec("transformers"):
-        assert unusable("hub") == ""
+        assert missing_advice("hub") == ""
         assert checksum("hub", Checksums())
 
 
@@ -155,10 +155,10 @@ def test_a_pipeline_is_found_once_it_has_all_that_its_index_names(pipeline):
     for name, text in files.items():
         assert find(PINNED) is None, name
         put(pipeline / name, text.encode())
-    assert (locate(PINNED), titled(PINNED)) == (pipeline, PINNED)
+    assert (locate(PINNED), title_of(PINNED)) == (pipeline, PINNED)
     present = {each for names in pipeline_files(pipeline) for each in names if (pipeline / each).is_file()}
     assert present == set(files)
-    if not unusable(PINNED):
+    if not missing_advice(PINNED):
         before = checksum(PINNED, Checksums())
         put(pipeline / "unet/part-2.safetensors", b"3")
         assert checksum(PINNED, Checksums()) != before

@@ -14,7 +14,7 @@ from tests.refusals import refused
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
 from texgs.raster import autograd, native
 from texgs.raster.api import rasterize
-from texgs.raster.autograd import SurfelTensors, View, bin_surfels
+from texgs.raster.autograd import RasterView, SurfelTensors, bin_surfels
 from texgs.raster.reference import rasterize as reference
 from texgs.raster.types import Options, Texture
 
@@ -138,7 +138,7 @@ def tensors_of(scene, **changes):
     """Return the primitives of a scene for the library, which checks for itself, and what is around them."""
     leaves = scene.leaves() | changes
     layout = {} if scene.texture is None else {"sizes": scene.texture.sizes, "offsets": scene.texture.offsets}
-    return SurfelTensors(**leaves), View(scene.viewmat, scene.K, 8, 8, **layout)
+    return SurfelTensors(**leaves), RasterView(scene.viewmat, scene.K, 8, 8, **layout)
 
 
 def test_library_refuses_what_gaussians_do_not_have():

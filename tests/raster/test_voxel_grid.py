@@ -9,7 +9,7 @@ from tests.raster.voxel_scenes import LOWER, SPACING, voxel_scene
 from tests.refusals import refused
 from texgs.core.errors import DeviceError, ShapeError
 from texgs.raster.reference.voxels import interpolate
-from texgs.raster.voxel_grid import drop_sh, interpolate_rows, pack_rows, recolored, unpack_rows, voxel_grid
+from texgs.raster.voxel_grid import drop_sh, interpolate_rows, pack_rows, recolor, unpack_rows, voxel_grid
 from texgs.raster.voxel_optimizer import (
     EPSILON,
     VoxelOptimizer,
@@ -71,14 +71,14 @@ def test_an_affine_map_of_colours(degree, device):
     quads[:, :, :3] *= 0.1  # colours near 0.5, that no map clamps
     quads[:, 1:4, 3] *= 0.1
     matrix, offset = MATRIX.to(device), OFFSET.to(device)
-    changed = recolored(grid, matrix, offset)
+    changed = recolor(grid, matrix, offset)
     before = render_rays(grid, scene.rays, March((0.0, 0.0, 0.0)))
     after = render_rays(changed, scene.rays, March((0.0, 0.0, 0.0)))
     expected = before.color @ matrix.T + before.alpha[:, None] * offset
     assert before.alpha.max() > 0.9
     torch.testing.assert_close(after.color, expected, rtol=1e-5, atol=2e-6)
     assert torch.equal(after.alpha, before.alpha)
-    same = recolored(grid, torch.eye(3).to(matrix), torch.zeros_like(offset))
+    same = recolor(grid, torch.eye(3).to(matrix), torch.zeros_like(offset))
     torch.testing.assert_close(same.rows, grid.rows)
 
 
@@ -104,8 +104,8 @@ def test_what_makes_no_grid():
     refused(lambda: grid.with_rows(grid.rows.to("meta")), "rows: ", DeviceError)
     for rows in (torch.zeros(3, 32), torch.zeros(len(grid.rows), 8)):
         refused(lambda rows=rows: grid.with_rows(rows), "rows: ", ShapeError)
-    refused(lambda: recolored(grid, wide, OFFSET), "matrix: ", ShapeError)
-    refused(lambda: recolored(grid, MATRIX, torch.zeros(1)), "offset: ", ShapeError)
+    refused(lambda: recolor(grid, wide, OFFSET), "matrix: ", ShapeError)
+    refused(lambda: recolor(grid, MATRIX, torch.zeros(1)), "offset: ", ShapeError)
 
 
 RATES = VoxelRates(density=3.0, base=0.2, sh=0.05)

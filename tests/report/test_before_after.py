@@ -23,7 +23,7 @@ SURFELS = kinds()["surfels"]
 def test_only_what_can_be_relit_is_shown_under_another_light(kind, columns, tmp_path, monkeypatch, capsys):
     write_model(tmp_path / "ball.safetensors", ball(1))
     scene = Scene({"ball": SceneModel(tmp_path / "ball.safetensors")})
-    monkeypatch.setattr(before_after, "TURN", 3)
+    monkeypatch.setattr(before_after, "TURNTABLE_FRAMES", 3)
     grids = []
     monkeypatch.setattr(before_after, "write_grid", lambda path, rows, titles: grids.append((rows, titles)))
     write_before_and_after(scene, scene, kind, Lens(), tmp_path, torch.device("cpu"), "ball")

@@ -19,8 +19,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.fields.surfels.model_file import write_model
 from texgs.metrics.quality import compare
-from texgs.report.check import LIT, check, checked, floor_of, shots
-from texgs.scene.cut_view import beside
+from texgs.report.check import LIT_SHARE, check, floor_of, found_sentence, random_shots
+from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 from texgs.scene.twin import Twin
@@ -55,11 +55,11 @@ def test_new_values_reach_the_floor():
 
 
 def test_views_lights_and_edits_are_drawn_from_a_seed(scene):
-    drawn = list(shots(scene, LENS, 400, 5))
-    assert [title for title, *_ in drawn] == [title for title, *_ in shots(scene, LENS, 400, 5)]
-    assert drawn[0][0] != next(shots(scene, LENS, 1, 6))[0]
+    drawn = list(random_shots(scene, LENS, 400, 5))
+    assert [title for title, *_ in drawn] == [title for title, *_ in random_shots(scene, LENS, 400, 5)]
+    assert drawn[0][0] != next(random_shots(scene, LENS, 1, 6))[0]
     kinds = Counter(changed.light.kind for *_, changed in drawn)
-    assert kinds["directional"] / 400 == pytest.approx(LIT, abs=0.1)
+    assert kinds["directional"] / 400 == pytest.approx(LIT_SHARE, abs=0.1)
     edits = [model.edit for *_, changed in drawn for model in changed.models.values()]
     assert np.mean([edit.palette is not None for edit in edits]) == pytest.approx(0.5, abs=0.1)
     assert np.mean([edit.opacity != 1 for edit in edits]) == pytest.approx(0.5, abs=0.1)
@@ -72,7 +72,7 @@ def test_views_lights_and_edits_are_drawn_from_a_seed(scene):
 def test_a_check_tells_what_its_views_have(scene, tmp_path):
     twin, composition = Twin(scene), scene.open()
     result = check(scene, composition, twin, LENS, 19, 7, tmp_path / "worst.json")
-    views = [compare(*beside(composition, *x[1:], twin)) for x in shots(scene, LENS, 19, 7)]
+    views = [compare(*scene_and_volume(composition, *x[1:], twin)) for x in random_shots(scene, LENS, 19, 7)]
     psnr = [each["psnr"] for each in views]
     assert result.psnr["mean"] == pytest.approx(np.mean(psnr))
     assert result.psnr["worst"] == result.psnr["floor"] == min(psnr)
@@ -106,7 +106,7 @@ def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, cap
     assert told["sentence"] in capsys.readouterr().out
     assert (told["views"], told["seed"], told["width"], told["height"]) == (19, 2, 24, 24)
     assert (tmp_path / "ball-check.png").exists()
-    assert checked(Path("ball.yaml"), scene) == told["sentence"], "here"
+    assert found_sentence(Path("ball.yaml"), scene) == told["sentence"], "here"
     frames = ["--width", "200", "--path", "orbit", "--frames", "2"]
     assert main(["render", "ball.yaml", "--width", "200", "--caption", "--output", "ball.png"]) == 0
     for name in ("turn.gif", "turn.mp4"):
@@ -118,7 +118,7 @@ def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, cap
     assert main(["check", "cut.yaml", *words]) == 0
     assert "cut.yaml: its cuts are left out, as their faces show the volume" in capsys.readouterr().err
     other = Scene({"a": scene.models["a"]})
-    assert checked(Path("ball.yaml"), other) == "", "of other models"
+    assert found_sentence(Path("ball.yaml"), other) == "", "of other models"
     write_scene("other.yaml", other)
     assert main(["render", "other.yaml", "--caption"]) == 2
     assert "run texgs check other.yaml first" in capsys.readouterr().err

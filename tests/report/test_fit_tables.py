@@ -7,7 +7,7 @@ import pytest
 from tests.report.written import lines, metrics, records, rows, sources
 from texgs.report.fit_tables import ablation, fits, fitting, model_size
 from texgs.report.results import FitResult
-from texgs.report.table import UNLIKE, columns
+from texgs.report.table import UNLIKE_CELL, columns
 
 DATASETS = {line["dataset"]: line for line in lines("datasets")}
 ENGINE = next(line for line in lines("fitting") if line["dataset"] == "engine")
@@ -77,7 +77,7 @@ def test_other_recipes_and_sizes_have_a_sign_and_the_paper_rows_of_its_own(tmp_p
     metrics(tmp_path, "surfels", result, tf="TF01", **{"recipe": "paper"} | facts)
     table = fitting(records(tmp_path))
     (own,), theirs = parted(table)
-    assert (own["PSNR"], own["PSNR (paper)"]) == (ENGINE["psnr"], UNLIKE)
+    assert (own["PSNR"], own["PSNR (paper)"]) == (ENGINE["psnr"], UNLIKE_CELL)
     assert len(theirs) == 24
     assert [row["PSNR"] for row in theirs if row["data set"] == "engine"] == [30.15, 33.25, 33.29]
     assert "not like for like" in table.caption
@@ -147,7 +147,7 @@ def test_means_of_the_papers_basic_scenes_and_seeds_are_the_papers_rows(tmp_path
 def test_what_is_not_like_for_like_stands_above_the_papers_rows(tmp_path, changed):
     write_fit(tmp_path, lines("views")[0], **changed)
     (own,), theirs = parted(ablation(records(tmp_path), "views"))
-    assert own["PSNR (paper)"] in (UNLIKE, None)
+    assert own["PSNR (paper)"] in (UNLIKE_CELL, None)
     assert [row["training views"] for row in theirs] == ["42", "92", "162", "252"]
     assert [row["PSNR"] for row in theirs] == [29.33, 30.95, 31.64, 31.71]
 
@@ -158,7 +158,7 @@ def test_a_fit_with_a_missing_phase_is_not_measured(tmp_path):
     max(tmp_path.iterdir()).unlink()
     own = rows(ablation(records(tmp_path), "views"))[0]
     assert {own[column.title] for column in columns("views").values()} == {None}
-    assert own["PSNR (paper)"] == UNLIKE
+    assert own["PSNR (paper)"] == UNLIKE_CELL
 
 
 def test_other_sweeps_do_not_count_but_for_their_like(tmp_path):
@@ -192,7 +192,7 @@ def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
     (first, second), theirs = parted(table)
     assert [first["recipe"], second["recipe"]] == ["quick", "quick-s1"]
     assert (first["basic scenes"], first["primitives"], first["texture MiB"]) == (2, 2000, 16.0)
-    assert first["texture MiB (paper)"] == UNLIKE
+    assert first["texture MiB (paper)"] == UNLIKE_CELL
     assert {row["data set"]: row for row in theirs}["wood"]["texture MiB"] == 114.5
 
 

@@ -2,16 +2,16 @@ from dataclasses import replace
 
 from tests.report.written import lines, metrics, records, rows, sources
 from texgs.report.results import (
-    Comparison,
     PseResult,
     SheetResult,
     StepsResult,
     TimingResult,
+    ViewComparison,
     ViewsResult,
     VolumeResult,
 )
 from texgs.report.scene_tables import datasets, edits, rendering, steps
-from texgs.report.table import UNLIKE
+from texgs.report.table import UNLIKE_CELL
 
 LATTICE = {"spacing": [1.0] * 3, "origin": [0.0] * 3, "minimum": 0.0, "maximum": 1.0, "voxels": 120}
 ALONE = TimingResult(4.0, 5.0, 4.0, primitives=9, width=8, height=6, threads=2)
@@ -38,14 +38,14 @@ def test_frames_have_means_without_stand_ins_and_the_volumes_of_the_paper_at_its
 
 
 def test_edits_with_and_without_a_volume(tmp_path):
-    metrics(tmp_path, "pse", PseResult(6, [Comparison("a", 30.0, 0.9)], [Comparison("b")]))
+    metrics(tmp_path, "pse", PseResult(6, [ViewComparison("a", 30.0, 0.9)], [ViewComparison("b")]))
     first, second = rows(edits(records(tmp_path)))
     assert (first["edit"], first["views"], first["PSNR"]) == ("a", 6, 30.0)
     assert (second["edit"], second["PSNR"]) == ("b", None)
 
 
 def test_steps_of_sweeps_are_not_among_those_of_data_sets(tmp_path):
-    result = StepsResult(20, 6, 0.5, [Comparison("a", 34.0, 0.9), Comparison("b", 36.0, 0.9)], 3.0)
+    result = StepsResult(20, 6, 0.5, [ViewComparison("a", 34.0, 0.9), ViewComparison("b", 36.0, 0.9)], 3.0)
     metrics(tmp_path, "steps", result)
     metrics(tmp_path, "steps", replace(result, step_mib=9.0), sweep="mine", variant="a")
     (row,) = rows(steps(records(tmp_path)))
@@ -64,7 +64,7 @@ def test_data_sets_by_size_of_their_views(tmp_path):
     assert (small["VTK, ms / frame"], large["VTK, ms / frame"]) == (600.0, 15000.0)
     assert (small["volume, samples"], small["volume MiB"]) == ("4x5x6", 2.5)
     assert (small["samples (paper)"], small["MiB (paper)"]) == ("256x256x128", 32.0)
-    assert (small["ms / frame (paper)"], large["ms / frame (paper)"]) == (UNLIKE, 16.14)
+    assert (small["ms / frame (paper)"], large["ms / frame (paper)"]) == (UNLIKE_CELL, 16.14)
     files = [[path.stem for path in paths] for paths in sources(table)]
     assert sorted(files) == [["0000", "0001", "0002"], ["0000", "0003"]]
 

@@ -6,7 +6,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.figures import CELL, DPI
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.results import EditMeasures, EditResult, FitResult
-from texgs.report.sweep_figure import ACROSS, WIDTH, sweep_figure
+from texgs.report.sweep_figure import PANELS_PER_ROW, WIDTH, sweep_figure
 from texgs.report.sweep_table import sweep
 from texgs.report.table import SOURCES, Table
 from texgs.scene.scene import Scene, SceneModel
@@ -83,7 +83,7 @@ def test_the_figure_has_a_panel_for_each_measure_that_differs(tmp_path):
     assert width == pytest.approx(2 * WIDTH * DPI, abs=1), "PSNR, and that of training views"
     named = run(tmp_path, "a", 0, 30.0, sweep="b") + run(tmp_path, "c", 0, 30.0, sweep="b")
     width, _ = sweep_figure(read(named), "b").size
-    assert width == pytest.approx(ACROSS * WIDTH * DPI, abs=1), "all, where none differs"
+    assert width == pytest.approx(PANELS_PER_ROW * WIDTH * DPI, abs=1), "all, where none differs"
 
 
 def test_the_figure_shows_the_scenes_of_edits(tmp_path):

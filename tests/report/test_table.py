@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from texgs.report.table import SOURCES, UNLIKE, Column, Table, escape, write_tables
+from texgs.report.table import SOURCES, UNLIKE_CELL, Column, Table, escape, write_tables
 
 TABLE = Table(
     "A caption.",
@@ -36,7 +36,7 @@ def test_csv_keeps_all_digits_and_leaves_gaps():
         ["five_jets", "36.834", "a/metrics.json"],
         ["wood | stone", "", ""],
     ]
-    unlike = Table("", TABLE.columns, [{"name": "a", "dB": UNLIKE}])
+    unlike = Table("", TABLE.columns, [{"name": "a", "dB": UNLIKE_CELL}])
     assert unlike.csv().splitlines()[1] == "a,,", "columns of numbers stay such"
 
 

@@ -8,7 +8,7 @@ from importlib.resources import files
 from PIL import Image
 
 from texgs.report.metrics_files import read_known
-from texgs.report.results import plain
+from texgs.report.results import as_mapping
 from texgs.report.table import SOURCES
 
 
@@ -23,7 +23,7 @@ def metrics(folder, stage, result, dataset="engine", tf=None, recipe="quick", na
     record = {"stage": stage, "dataset": dataset, "tf": tf, "recipe": recipe, "field": "surfels"}
     record |= {"device": "CPU", "peak_memory_mib": 1024.0, "variant": "", "sweep": "none", "seed": 0}
     record |= {"seconds": 1.0, "versions": {"python": "3"}}
-    told = {"result": type(result).__name__, "numbers": plain(result)}
+    told = {"result": type(result).__name__, "numbers": as_mapping(result)}
     path.write_text(json.dumps({**record, **facts, **told}))
     return path
 

@@ -15,15 +15,15 @@ from texgs.core.cuts import Box, Cuts, Plane
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.changes import apply_all
 from texgs.scene.cut_view import (
-    HIDDEN,
-    OPAQUE,
-    SLAB,
+    FACE_ALPHA,
+    FACE_UNITS,
+    HIDDEN_ALPHA,
+    SLAB_UNITS,
     STEP,
-    UNITS,
     cut_view,
+    grow_softly,
     slab_of,
     slab_thickness,
-    softly_grown,
 )
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
@@ -92,9 +92,9 @@ def test_a_look_lies_beyond_a_slab_of_the_volume(styled):
     twin, composed = Twin(styled), styled.open()
     seen = cut_view(composed, CAMERA, styled, twin).color
     cut = range_of(styled.cuts, CAMERA)
-    soon = slab(styled, cut, UNITS)
-    is_face = twin.render(CAMERA, styled, composed.palettes, soon).alpha >= OPAQUE
-    deep = slab(styled, cut, SLAB)
+    soon = slab(styled, cut, FACE_UNITS)
+    is_face = twin.render(CAMERA, styled, composed.palettes, soon).alpha >= FACE_ALPHA
+    deep = slab(styled, cut, SLAB_UNITS)
     is_opaque = is_face & (twin.render(CAMERA, styled, composed.palettes, deep).alpha > 0.99)
     volume = twin.render(CAMERA, styled, composed.palettes)
     away = distance_transform_cdt(~is_face.numpy(), "chessboard")
@@ -116,13 +116,13 @@ def slab(scene, cut, units):
 def test_weights_grow_and_then_fall_softly():
     mask = torch.zeros(40, 50)
     mask[20, 25] = mask[0, 0] = 1
-    weights = softly_grown(mask, 3).numpy()
+    weights = grow_softly(mask, 3).numpy()
     away = distance_transform_cdt(mask.numpy() == 0, "chessboard")
     assert np.allclose(weights[away <= 3], 1)
     assert not weights[away > 6].any()
     assert ((weights > 0) & (weights < 1))[(away > 3) & (away <= 6)].all()
     assert np.abs(np.diff(weights, axis=0)).max() <= 1 / 4 + 1e-6  # a quarter a pixel
-    assert torch.equal(softly_grown(mask, 0), mask)
+    assert torch.equal(grow_softly(mask, 0), mask)
 
 
 def test_the_slab_fades_out_where_matter_becomes_faint(styled):
@@ -130,7 +130,7 @@ def test_the_slab_fades_out_where_matter_becomes_faint(styled):
     twin, composed = Twin(styled), styled.open()
     thickness, part = slab_thickness(composed, CAMERA, styled, twin)
     weights = torch.zeros(CAMERA.height, CAMERA.width)
-    weights[part] = thickness * CAMERA.ray_lengths()[part] / (SLAB * twin.opacity_unit)
+    weights[part] = thickness * CAMERA.ray_lengths()[part] / (SLAB_UNITS * twin.opacity_unit)
     steps = torch.maximum(weights.diff(dim=0).abs()[:, :-1], weights.diff(dim=1).abs()[:-1])
     assert (float(weights.min()), float(weights.max())) == pytest.approx((0, 1), abs=1e-3)
     assert steps.max() < 0.35  # a rim of one coarse pixel falls over two of them
@@ -148,7 +148,7 @@ def test_only_the_part_with_faces_is_cast_and_nothing_else_changes(styled, box):
     slab = slab_of(cut, whole)
     front = twin.with_step(STEP).cast(camera, styled, composed.palettes, slab).rgba
     behind, far = slab.depth_range[1], cut.depth_range[1]
-    beyond = torch.stack([behind, torch.where(front[..., 3] < HIDDEN, far, behind)])
+    beyond = torch.stack([behind, torch.where(front[..., 3] < HIDDEN_ALPHA, far, behind)])
     options = {"background": torch.tensor(styled.background), "depth_range": beyond}
     models = composed.render(camera, styled.light, styled.edits, **options).color
     expected = front[..., :3] + (1 - front[..., 3:]) * models

@@ -15,7 +15,7 @@ from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texels import mean_texels, owners
 from texgs.scene.export import export_model
 from texgs.scene.export_keys import Export
-from texgs.scene.joined import joined, polydata_of
+from texgs.scene.joined import join_surfels, polydata_of
 
 EDITS = [PartEdit(palette=(0.9, 0.1, 0.4), opacity=0.6), PartEdit(visible=False), PartEdit(opacity=3.0)]
 
@@ -32,11 +32,11 @@ def test_normals_of_their_own_stay_in_a_scene():
     one, other = ball(1), ball(2)
     own = torch.randn(len(one), 4, generator=torch.Generator().manual_seed(0))
     lit = Surfels({**one.parameters, "normals": own}, one.shading)
-    surfels = joined(Composition([lit, other]).parts, [PartEdit(), PartEdit()])
+    surfels = join_surfels(Composition([lit, other]).parts, [PartEdit(), PartEdit()])
     assert torch.equal(surfels.parameters["normals"], torch.cat([own, other.parameters["quats"]]))
     expected = quats_to_matrices(surfels.parameters["normals"])[..., 2]
     assert_close(torch.from_numpy(polydata_of(surfels).cell_data["Normals"]), expected)
-    assert "normals" not in joined(Composition([other]).parts, [PartEdit()]).parameters
+    assert "normals" not in join_surfels(Composition([other]).parts, [PartEdit()]).parameters
 
 
 def test_owners_and_means_by_brute_force():
@@ -60,7 +60,7 @@ def test_joined_surfels_look_like_the_edited_scene_without_light():
     models = [plain(1), plain(2), ball(3, stage="shading", middle=0.1)]
     scene = Composition(models)
     expected = scene.render(CAMERA, edits=EDITS, look="unshaded")
-    surfels = joined(scene.parts, EDITS)
+    surfels = join_surfels(scene.parts, EDITS)
     assert (len(surfels), surfels.stage) == (300, "surfels")
     rendered = surfels.render(CAMERA)
     assert_close(rendered.alpha, expected.alpha, atol=1e-5, rtol=0)
@@ -68,7 +68,7 @@ def test_joined_surfels_look_like_the_edited_scene_without_light():
 
 
 def test_a_scene_goes_through_a_file_of_gaussians(tmp_path):
-    surfels = joined(Composition([plain(1), plain(2)]).parts, [PartEdit(), PartEdit(opacity=0.5)])
+    surfels = join_surfels(Composition([plain(1), plain(2)]).parts, [PartEdit(), PartEdit(opacity=0.5)])
     back = read_ply(write_ply(tmp_path / "scene.ply", surfels, "3dgs"))
     for name, values in surfels.parameters.items():
         assert torch.equal(back.parameters[name], values), name
@@ -78,9 +78,9 @@ def test_nothing_visible_is_refused():
     parts = Composition([ball(1)]).parts
     for edit in (PartEdit(visible=False), PartEdit(opacity=0)):
         with pytest.raises(ArgumentError, match="expected at least one visible surfel, got none"):
-            joined(parts, [edit])
+            join_surfels(parts, [edit])
     with pytest.raises(ArgumentError, match="edits: expected one for each of 1 models, got 2"):
-        joined(parts, EDITS[:2])
+        join_surfels(parts, EDITS[:2])
 
 
 def test_points_are_means_and_mean_colors_of_opaque_surfels(tmp_path):

@@ -21,7 +21,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.raster.reference.shading import harmonics
 from texgs.scene.changes import apply_all
-from texgs.scene.clouds import Cloud, placed
+from texgs.scene.clouds import Cloud, place_cloud
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.session import Session
@@ -169,7 +169,7 @@ def test_a_gaussian_is_turned_with_its_colours(sign, count):
         np.ones(5, np.float32),
         random.normal(size=(5, count, 3)).astype(np.float32),
     )
-    moved = placed(cloud, space)
+    moved = place_cloud(cloud, space)
 
     def covariances(each):
         turns = quats_to_matrices(torch.from_numpy(each.quats)).double().numpy()
@@ -187,7 +187,7 @@ def test_a_gaussian_is_turned_with_its_colours(sign, count):
     np.testing.assert_allclose(seen(moved, ways @ torch.from_numpy(turn.T)), seen(cloud, ways), atol=1e-5)
     sheared = Space("3D-right-handed", "", [[1.0, 0.3, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
     with pytest.raises(ArgumentError, match="expected axes at right angles, got oblique ones; export to the"):
-        placed(cloud, sheared)
+        place_cloud(cloud, sheared)
 
 
 def test_what_knows_no_space_stays_in_the_world_and_says_so(placed_scene, tmp_path, capsys):

@@ -19,7 +19,7 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.session import Session
-from texgs.scene.twin import Twin, edited
+from texgs.scene.twin import Twin, edit_function
 from texgs.volume.caster import Caster
 from texgs.volume.generate import sphere
 from texgs.volume.nrrd_file import open_grid
@@ -70,16 +70,16 @@ def render(twin, light=Light("headlight"), **edits):  # noqa: B008
 
 
 def test_opacity_and_colour_of_a_transfer_function():
-    tf = edited(TF, PartEdit(opacity=1.5, palette=(0.5, 0.5, 0.5)), (0.3, 0.5, 0.9))
+    tf = edit_function(TF, PartEdit(opacity=1.5, palette=(0.5, 0.5, 0.5)), (0.3, 0.5, 0.9))
     np.testing.assert_allclose(tf.opacity, [(0, 0), (1, 0.75), (17 / 12, 1), (2, 1)], err_msg="at most 1")
     np.testing.assert_allclose(tf.color, [(0, 0.4, 0.4, 0.2), (2, 0.6, 0.6, 0.4)])
-    assert edited(TF, PartEdit(), ()) == TF
+    assert edit_function(TF, PartEdit(), ()) == TF
 
 
 def test_what_an_edit_cuts_off_is_cut_off_at_every_value():
     """Also between points: the product is at most 1 there, and no lower."""
     values = np.linspace(0, 2, 41)
-    tf = edited(TF, PartEdit(opacity=3.0, palette=(1.0, 0.0, 0.5)), (0.3, 0.5, 0.9))
+    tf = edit_function(TF, PartEdit(opacity=3.0, palette=(1.0, 0.0, 0.5)), (0.3, 0.5, 0.9))
     color, alpha = TF(values)[:, :3] + [0.7, -0.5, -0.4], 3 * TF(values)[:, 3]
     np.testing.assert_allclose(tf(values), np.clip(np.column_stack([color, alpha]), 0, 1), atol=1e-12)
 

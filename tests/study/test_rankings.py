@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import friedmanchisquare
 
-from texgs.study.rankings import Rankings, firsts, friedman, interval, pooled
+from texgs.study.rankings import Rankings, firsts, friedman, interval, pool
 
 METHODS = tuple("abcd")
 WEIGHTS = np.array([4.0, 2.0, 1.0, 0.5])
@@ -60,7 +60,7 @@ def test_two_methods_or_counts_alone_have_no_friedman_test():
 def test_votes_are_put_together_in_one_order():
     one = Rankings.of("ab", np.array([[1, 2]]))
     other = Rankings.of("ba", np.array([[1, 2]])).sorted("ab")
-    both = pooled([one, other])
+    both = pool([one, other])
     assert both.counts.tolist() == [[1, 1], [1, 1]]
     assert both.ranks.tolist() == [[1, 2], [2, 1]]
-    assert pooled([one, Rankings("ab", np.eye(2, dtype=int))]).ranks is None
+    assert pool([one, Rankings("ab", np.eye(2, dtype=int))]).ranks is None

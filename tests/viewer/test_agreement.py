@@ -28,7 +28,7 @@ from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
-from texgs.scene.cut_view import beside
+from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.shot import Mode
@@ -225,7 +225,7 @@ def test_cuts_with_looks_have_faces_of_the_volume_over_the_models(chromium, tmp_
 @pytest.mark.parametrize("name", VOLUMES)
 def test_scene_and_volume_beside_each_other(drawing, name, mode):
     scene = drawing(name).scene
-    image, truth = beside(scene.open(), CAMERA, scene, Twin(scene))
+    image, truth = scene_and_volume(scene.open(), CAMERA, scene, Twin(scene))
     view = View(Orbit((0, 0, 0), 20, 10, 4, 30, 96, 80), mode=mode, gain=4.0, wipe=0.4)
     expected = comparison(view, image.color, truth.color)
     got = drawing(name).draw(scene, CAMERA, mode, gain=4, wipe=0.4)

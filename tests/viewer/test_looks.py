@@ -33,7 +33,7 @@ def quick(monkeypatch, tmp_path_factory):
     monkeypatch.setattr("texgs.edit.new_look.SIDE", 96)
     monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path_factory.mktemp("none")))
     monkeypatch.setenv("TEXGS_CACHE", str(tmp_path_factory.mktemp("cache")))
-    monkeypatch.setattr("texgs.viewer.looks.unusable", lambda name: "they are missing")
+    monkeypatch.setattr("texgs.viewer.looks.missing_advice", lambda name: "they are missing")
 
 
 async def picture(browser, **view):
@@ -114,7 +114,7 @@ async def test_words_are_tried_from_one_side_and_change_nothing(browser, client)
 
 
 def test_previews_of_words_are_made_by_filters_all_else_by_a_network_that_is_there(monkeypatch, tmp_path):
-    monkeypatch.setattr("texgs.viewer.looks.unusable", lambda name: None)
+    monkeypatch.setattr("texgs.viewer.looks.missing_advice", lambda name: None)
     looks = Looks(Styles(tmp_path), tmp_path)
     full, tried, side = (
         looks.recipe_of(Look(instruction="gold", preview=preview, camera=camera))

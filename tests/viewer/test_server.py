@@ -18,8 +18,8 @@ from texgs.cli.main import main
 from texgs.core.cuts import NO_CUTS
 from texgs.core.io import write_json
 from texgs.report.check import checksum_of
-from texgs.scene.parts import replaced
-from texgs.scene.scene import MOST_FUNCTIONS
+from texgs.scene.parts import replace_entry
+from texgs.scene.scene import MAX_FUNCTIONS
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.viewer import guard
 from texgs.viewer.messages import parse
@@ -367,7 +367,7 @@ async def test_a_step_to_a_model_that_is_gone_is_refused_and_taken_back(browser,
     edits, models = client.server_side.edits, scene_file.parent
     copy(models / "TF02.safetensors", finer := models / "finer.safetensors")
     entry = replace(edits.scene.models["TF01"], file=finer)
-    edits.session.set_scene(replaced(edits.scene, "TF01", entry))
+    edits.session.set_scene(replace_entry(edits.scene, "TF01", entry))
     (models / "TF01.safetensors").unlink()
     await browser.send(type="undo")
     assert "TF01.safetensors: no such file, which the scene needs" in (await browser.next("notice"))["text"]
@@ -381,9 +381,9 @@ async def test_a_step_to_a_model_that_is_gone_is_refused_and_taken_back(browser,
 async def test_a_scene_may_have_all_the_functions_that_it_can_hold(browser, client):
     points = [[x / 255, 0.123456789] for x in range(256)]
     colors = [[x / 255, *[0.123456789] * 3] for x in range(256)]
-    functions = {f"f{n}": {"opacity": points, "color": colors} for n in range(MOST_FUNCTIONS)}
+    functions = {f"f{n}": {"opacity": points, "color": colors} for n in range(MAX_FUNCTIONS)}
     await browser.send(type="edit", part="", key="functions", value=functions)
-    while len(client.server_side.edits.scene.functions) < MOST_FUNCTIONS:
+    while len(client.server_side.edits.scene.functions) < MAX_FUNCTIONS:
         await browser.next("scene")
 
 

@@ -11,7 +11,7 @@ from texgs.volume.grid import Grid
 from texgs.volume.nrrd_file import ALIGNMENT, NRRD_TYPES, open_grid, write_header
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
-from texgs.volume.space import UNTOLD
+from texgs.volume.space import UNKNOWN_SPACE
 
 ORIGIN = (-1.5, 1e-9, 1 / 3)
 
@@ -43,7 +43,7 @@ def test_round_trip_is_exact_and_mapped_and_other_readers_agree(tmp_path, dtype)
 def test_header_is_padded_for_every_length():
     for width in range(1, 130):
         file = io.BytesIO()
-        length = write_header(file, (10**width, 2, 2), np.dtype("uint8"), SPACING, ORIGIN, UNTOLD, 1)
+        length = write_header(file, (10**width, 2, 2), np.dtype("uint8"), SPACING, ORIGIN, UNKNOWN_SPACE, 1)
         assert length == len(file.getvalue())
         assert length % ALIGNMENT == 0
         assert file.getvalue().endswith(b"\n\n")
@@ -69,7 +69,7 @@ def test_mistakes_are_named(tmp_path):
 def test_opening_reads_nothing_but_the_header(tmp_path):
     path = tmp_path / "v.nrrd"
     with path.open("wb") as file:
-        length = write_header(file, (2048, 2048, 2048), np.dtype("uint8"), SPACING, ORIGIN, UNTOLD, 1)
+        length = write_header(file, (2048, 2048, 2048), np.dtype("uint8"), SPACING, ORIGIN, UNKNOWN_SPACE, 1)
         file.truncate(length + 2048**3)  # sparse: takes no room on the disk
     grid = open_grid(path)
     assert grid.dims == (2048, 2048, 2048)

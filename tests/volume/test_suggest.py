@@ -9,7 +9,7 @@ from texgs.volume.axes import Channel
 from texgs.volume.grid import Grid
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
-from texgs.volume.suggest import suggested as of_summary
+from texgs.volume.suggest import suggest as of_summary
 from texgs.volume.transfer import check_disjoint
 
 RNG = np.random.default_rng(0)

@@ -14,7 +14,7 @@ from tests.volume.volume_files import assert_holds, sample_values, whole
 from texgs.core.errors import ArgumentError
 from texgs.volume.slabs import RawSource
 from texgs.volume.sources import open_source
-from texgs.volume.tiff import complaints_raised
+from texgs.volume.tiff import raise_complaints
 
 A = sample_values()[:6]  # [6, 12, 13]
 B = A[::-1] + 1000
@@ -203,7 +203,7 @@ def test_an_ome_tiff_in_several_files_is_whole_from_any_of_them_and_from_their_f
 
 def test_what_tifffile_only_warns_of_is_an_error_where_samples_are_lost():
     expected = pytest.raises(ArgumentError, match=r"cut off, tifffile says: MMStack series is missing files")
-    with expected, complaints_raised():
+    with expected, raise_complaints():
         tifffile.logger().warning("MMStack series is missing files. Returning subset (1, 2) of (2, 2)")
 
 

@@ -9,7 +9,7 @@ from tests.report.written import rows
 from texgs.config.compose import compose
 from texgs.config.describe import keys, value_at
 from texgs.edit.method import methods
-from texgs.report.differences import ALL, differences, published, text
+from texgs.report.differences import NO_KEY, differences, published, text
 
 
 def cells(table):
@@ -19,7 +19,7 @@ def cells(table):
 
 def told(*arguments, **options):
     """Rows of keys: what, the paper, here, in."""
-    return [row[:4] for row in cells(differences(*arguments, **options)) if row[3] != ALL]
+    return [row[:4] for row in cells(differences(*arguments, **options)) if row[3] != NO_KEY]
 
 
 def override(claim):

@@ -41,7 +41,7 @@ def rings(tmp_path_factory):
         folder = tmp_path_factory.mktemp("rings")
         patch.chdir(folder)
         hide_weights(patch, folder)
-        patch.setattr("texgs.report.before_after.TURN", 4)
+        patch.setattr("texgs.report.before_after.TURNTABLE_FRAMES", 4)
         for name, value in {"VIEW_SIZE": 32, "ROUNDS": 1}.items():
             patch.setattr(series, name, value)
         for words in (["steps", *RINGS], GOLD, ["page", *RINGS]):

@@ -10,7 +10,15 @@ import pytest
 
 from texgs.config.case import Case
 from texgs.core.cache import Checksums
-from texgs.report.results import Comparison, EditResult, FitResult, GalleryResult, PseResult, Shown, plain
+from texgs.report.results import (
+    EditResult,
+    FitResult,
+    GalleryResult,
+    PseResult,
+    Shown,
+    ViewComparison,
+    as_mapping,
+)
 from texgs.workflow.job import Job
 from texgs.workflow.provenance import device, seed
 from texgs.workflow.runs import PARENT
@@ -65,15 +73,15 @@ def test_nested_parameters_become_dotted_names_and_text():
 
 def test_losses_are_a_curve_over_iterations_and_times_one_over_frames():
     fit = FitResult(1.0, 10, iterations=30, losses=[0.3, 0.2, 0.1])
-    assert not list(curves(plain(fit))), "told while it ran"
+    assert not list(curves(as_mapping(fit))), "told while it ran"
     edit = EditResult("glass", "image", "patches", 1.0, iterations=4, losses={"TF01/NNFM": [0.5, 0.25]})
-    assert list(curves(plain(edit))) == [(2, {"loss/TF01/NNFM": 0.5}), (4, {"loss/TF01/NNFM": 0.25})]
+    assert list(curves(as_mapping(edit))) == [(2, {"loss/TF01/NNFM": 0.5}), (4, {"loss/TF01/NNFM": 0.25})]
     assert list(curves({"frames_ms": [4, 5]})) == [(0, {"frames_ms": 4.0}), (1, {"frames_ms": 5.0})]
 
 
 def test_edits_by_numbers_and_pictures_of_a_gallery_have_a_metric_each_and_their_mean():
-    compared = [Comparison("as fitted", 30.0, 0.9), Comparison("other colours", 20.0, 0.8)]
-    metrics = scalars(plain(PseResult(2, compared, [Comparison("light")])))
+    compared = [ViewComparison("as fitted", 30.0, 0.9), ViewComparison("other colours", 20.0, 0.8)]
+    metrics = scalars(as_mapping(PseResult(2, compared, [ViewComparison("light")])))
     assert metrics == {
         "views": 2.0,
         "pse_psnr": 25.0,
@@ -85,7 +93,7 @@ def test_edits_by_numbers_and_pictures_of_a_gallery_have_a_metric_each_and_their
     }
     shown = [Shown("polar", "error", "0°", psnr=30.0), Shown("polar", "error", "30°", psnr=20.0)]
     result = GalleryResult("relight", [Shown("polar", "as fitted", "0°"), *shown])
-    assert scalars(plain(result)) == {
+    assert scalars(as_mapping(result)) == {
         "shown_psnr/polar/error/0°": 30.0,
         "shown_psnr/polar/error/30°": 20.0,
         "shown_psnr": 25.0,

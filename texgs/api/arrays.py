@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from texgs.api.display import as_python
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.names import check_count
 from texgs.volume.grid import ONES, ZEROS, Grid, Triple
 from texgs.volume.layers import labelled_source
 from texgs.volume.slabs import ArraySource, Source
-from texgs.volume.space import UNTOLD, Space
+from texgs.volume.space import UNKNOWN_SPACE, Space
 
 
 def source_of(
@@ -39,12 +39,12 @@ def source_of(
             got = ", ".join(map(str, data.dims)) or "none"
             advice = "select one of each other, as by .isel(time=0)"
             raise ArgumentError(f"DataArray: expected three dimensions, got {got}; {advice}")
-        with located("DataArray"):
+        with errors_at("DataArray"):
             return labelled_source("DataArray", data, said)
     if hasattr(data, "GetFieldData"):  # of VTK
         values, steps, first, space = of_image_data(data)
     else:
-        values, steps, first, space = of_array(data), ONES, ZEROS, UNTOLD
+        values, steps, first, space = of_array(data), ONES, ZEROS, UNKNOWN_SPACE
     return ArraySource(Grid(values, said[0] or steps, said[1] or first, space=space), name)
 
 

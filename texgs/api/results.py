@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from texgs.core.errors import ArgumentError
 from texgs.report.metrics_files import require_apart
-from texgs.report.results import plain
+from texgs.report.results import as_mapping
 from texgs.workflow.graph import current_records
 
 if TYPE_CHECKING:
@@ -40,6 +40,6 @@ def results(folder: str | Path = "results") -> pandas.DataFrame:
     for record in records:
         facts = {name: getattr(record, name) for name in FACTS}
         facts |= {"edit": record.facts.get("edit"), "job_seconds": record.facts.get("seconds")}
-        numbers = plain(record.result)
+        numbers = as_mapping(record.result)
         rows.append(facts | {key: x for key, x in numbers.items() if isinstance(x, int | float | str)})
     return pandas.DataFrame(rows)

@@ -127,12 +127,12 @@ class Scene(Editing):
     def to_pyvista(self) -> pyvista.PolyData:
         """Return the visible surfels as polygons of PyVista; see `texgs.scene.joined.polydata_of`."""
         from texgs.fields.surfels.composition import Composition
-        from texgs.scene.joined import joined, polydata_of
+        from texgs.scene.joined import join_surfels, polydata_of
 
         scene, composed = self.session.scene, self.session.composition
         if not isinstance(composed, Composition):
             raise ArgumentError("to_pyvista: expected a scene of surfels, got another kind; fit surfels")
-        return polydata_of(joined(composed.parts, scene.edits), scene.space)
+        return polydata_of(join_surfels(composed.parts, scene.edits), scene.space)
 
     def __repr__(self) -> str:
         """Return the parts, and what is edited about them."""

@@ -20,7 +20,7 @@ from texgs.config.project import check_name, name_of
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.names import close
 from texgs.fields.part_edit import color
-from texgs.scene.frame import quantized
+from texgs.scene.frame import quantize
 from texgs.scene.scene import WHITE
 from texgs.scene.scene_file import light_of
 from texgs.scene.shot import Shot
@@ -32,7 +32,7 @@ from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import Source
 from texgs.volume.sources import open_source, tells_superior
-from texgs.volume.suggest import suggested
+from texgs.volume.suggest import suggest
 from texgs.volume.summaries import Summary, write_summaries
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ class Volume:
 
     def suggest(self, count: int | None = None) -> Functions:
         """Return basic transfer functions by name: `count` of the histogram, what shows, or a channel's."""
-        return Functions(suggested(vars(self.summary), count, self._channel), self.summary)
+        return Functions(suggest(vars(self.summary), count, self._channel), self.summary)
 
     def render(
         self,
@@ -173,7 +173,7 @@ class Volume:
         view = Shot(width, height, azimuth=azimuth, polar=polar).camera(frame_of(self.grid, tfs.values()))
         rgba = caster.cast(overlays(tfs), view, light_of(as_python(light))).rgba
         behind = rgba.new_tensor(color("background", as_python(background)))
-        return picture_of(quantized(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))
+        return picture_of(quantize(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))
 
     def to_pyvista(self) -> pyvista.ImageData:
         """Return image data of PyVista in the space of the volume's file; the samples are not copied."""

@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the numbers and the picture."""
     from texgs.core.check import torch_device
-    from texgs.core.errors import ArgumentError, located
+    from texgs.core.errors import ArgumentError, errors_at
     from texgs.core.io import require_place
     from texgs.report.check import check
     from texgs.scene.scene_file import read_scene, scene_path
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     scene, device = read_scene(arguments.scene), torch_device(arguments.device)
     if scene.cuts:
         print(f"{arguments.scene}: its cuts are left out, as their faces show the volume", file=sys.stderr)
-    with located(arguments.scene):
+    with errors_at(arguments.scene):
         composition, twin = scene.open(device), Twin(scene, device)
     seen = (
         keys_of(arguments, LensKeys).lens(scene.framed(composition)),

@@ -202,10 +202,10 @@ def cache() -> Finding:
 def weights() -> Finding:
     """Find weights of pretrained models on this machine; edits say what works without any."""
     from texgs.models.catalogue import CATALOGUE
-    from texgs.models.weights import find, titled
+    from texgs.models.weights import find, title_of
 
     try:
-        there = {name: titled(name) for name in CATALOGUE if find(name)}
+        there = {name: title_of(name) for name in CATALOGUE if find(name)}
     except TexgsError as error:
         return replace(finding_of(error), state="warning")
     lacking = ", ".join(name for name in CATALOGUE if name not in there)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from texgs.cli.options import require_own_place
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.names import SCENES
 
 
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_scene(arguments.output)
     session = Session.open(arguments.scene)
     apply_all(session, arguments.overrides)
-    with located(arguments.scene):
+    with errors_at(arguments.scene):
         _ = session.composition  # raises what is wrong with its models, before anything is written
     print(session.save(arguments.output))
     return 0

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from texgs.cli.edit import require_scene
 from texgs.cli.options import add_device, option, require_only_files
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.names import new_part_file, require_name
 
 LEAST_SIZE = 16  # pixels
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.size < LEAST_SIZE:
         raise ArgumentError(f"--size: expected at least {LEAST_SIZE}, got {arguments.size}")
     file = partial(new_part_file, "model", output.parent, output.stem, name)
-    with located(arguments.scene):
+    with errors_at(arguments.scene):
         list(fit_function(session, name, file, torch_device(arguments.device), arguments.size, soon=False))
     print(f"{session.save(output)}{overlap_of(session.scene, name)}")
     return 0
@@ -72,7 +72,7 @@ def run_series(arguments: argparse.Namespace) -> int:
     from texgs.volume.moments import matching
 
     require_only_files(arguments.files)
-    with located("--files"):
+    with errors_at("--files"):
         files = matching(arguments.files)
     words = [f"dataset.volume.{word.removeprefix('dataset.volume.')}" for word in arguments.overrides]
     settings = compose(("dataset.volume.generator=null", *words)).dataset.volume if words else None

@@ -14,7 +14,7 @@ from texgs.cli.new_tfs import with_tfs
 from texgs.cli.options import require_only_files
 from texgs.config.compose import compose
 from texgs.config.dataset_text import as_yaml, plain_tf, require_read
-from texgs.config.project import NO_NAME, check_name, name_of
+from texgs.config.project import FORBIDDEN_LETTERS, check_name, name_of
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import is_there, write_bytes
 from texgs.core.memory import room_for_volume
@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Make a data set of the volume, with all its channels, and say what comes next."""
-    from texgs.config.project import members, own_folder, shown
+    from texgs.config.project import members, own_folder, short_path
     from texgs.edit.series import moments_of
     from texgs.volume.sources import tells_superior
     from texgs.workflow.locate import series_files
@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
     count, picture = len(dataset.basic_tfs), Path(given.results, name, "transfer", "transfer.png")
     of = f" of the channels {', '.join(channels)}" if dataset.channels else ""
     functions = "transfer function" if count == 1 else "transfer functions"
-    print(f"{shown(target)}: {count} {functions}{of} to edit; {picture} shows them")
+    print(f"{short_path(target)}: {count} {functions}{of} to edit; {picture} shows them")
     print(f"then: texgs run dataset={name} fit=quick")
     return 0
 
@@ -155,7 +155,7 @@ def channels_of(volume: VolumeKeys, field: Source | None) -> dict[str, Channel |
     if field is None or volume.channel or len(field.channels) < 2:
         return {"": None if field is None else field.channel}
     keys = [channel.label for channel in field.channels]
-    if "" in keys or len({NO_NAME.sub("_", key) for key in keys}) < len(keys):
+    if "" in keys or len({FORBIDDEN_LETTERS.sub("_", key) for key in keys}) < len(keys):
         keys = [str(number) for number in range(len(keys))]
     return dict(zip(keys, field.channels, strict=True))
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.project import NO_NAME, check_name
+from texgs.config.project import FORBIDDEN_LETTERS, check_name
 from texgs.core.errors import ArgumentError, ConfigError, TexgsError
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def of_each(
 
 def tf_names(labels: list[str]) -> list[str]:
     """Return names of TFs like the labels of channels, or with their numbers where these cannot be names."""
-    names = [NO_NAME.sub("_", label) for label in labels]
+    names = [FORBIDDEN_LETTERS.sub("_", label) for label in labels]
     names = [name if name[:1].isalpha() else f"channel_{name}" for name in names]
     try:
         for name in names:
@@ -94,7 +94,7 @@ def basic_tfs(
     """Return TFs from files, or suggested for a channel or from the histogram in a summary."""
     import numpy as np
 
-    from texgs.volume.suggest import looks_like_labels, suggested
+    from texgs.volume.suggest import looks_like_labels, suggest
     from texgs.volume.tf_files import read_tf
 
     low, high = summary["minimum"], summary["maximum"]
@@ -107,7 +107,7 @@ def basic_tfs(
                 "thin shells. If one stands for missing samples, write NaN in its place and add "
                 "nan_value=...\n"
             )
-        return suggested(summary, count, channel)
+        return suggest(summary, count, channel)
     basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
     for path, tf in zip(files, basic.values(), strict=True):
         first, last = tf.support

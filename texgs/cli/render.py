@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from texgs.cli.options import add_device, add_keys, keys_of, option, require_own_place
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.scene.film import Film
 
 
@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Render and write."""
     from texgs.core.check import torch_device
     from texgs.core.image import with_caption
-    from texgs.report.check import checked
+    from texgs.report.check import found_sentence
     from texgs.report.compared import SideBySide
     from texgs.scene.scene_file import read_scene, scene_path
     from texgs.scene.session import Session
@@ -44,22 +44,22 @@ def run(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(f"{arguments.scene.stem}{ending}")
     require_own_place(output)
     session = Session(scene, torch_device(arguments.device))
-    with located(arguments.scene):
+    with errors_at(arguments.scene):
         composition = session.composition
     shots, beside = film.shots(scene, composition), None
     if arguments.compare:
         if film.mode != "shaded":
             raise ArgumentError(f"--compare: expected --mode shaded, got {film.mode}; leave one of them out")
-        with located(arguments.scene):
+        with errors_at(arguments.scene):
             beside = SideBySide(session, arguments.compare, arguments.gain)
         frames = beside.frames(shots)
     else:
-        with located(arguments.scene):
+        with errors_at(arguments.scene):
             if needs_twin(scene, film.mode):
                 session.twin_of(scene)
         shows = partial(session.frame, mode=film.mode, transparent=film.transparent)
         frames = (shows(camera, scene=shown) for camera, shown in shots)
-    words = checked(arguments.scene, scene)
+    words = found_sentence(arguments.scene, scene)
     if arguments.caption:
         require_checked(arguments.scene, words)
         frames = (with_caption(each, words) for each in frames)

@@ -17,14 +17,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Download what is named; then list all with their sizes and places."""
     from texgs.models.catalogue import CATALOGUE, entry_of
-    from texgs.models.weights import find, locate, titled
+    from texgs.models.weights import find, locate, title_of
 
     for name in arguments.names:
         locate(name)
     for name in dict.fromkeys((*CATALOGUE, *arguments.names)):
         entry = entry_of(name)
         place = find(name) or f"not here; {entry.source}"
-        print(f"{titled(name):24} {entry.megabytes:6.0f} MB  {place}")
+        print(f"{title_of(name):24} {entry.megabytes:6.0f} MB  {place}")
     return 0
 
 

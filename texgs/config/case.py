@@ -20,11 +20,11 @@ class Case:
 
     @property
     def config(self) -> Config:
-        """The composed configuration; ConfigError names the word that is wrong."""
+        """Compose the configuration; a ConfigError names the wrong word."""
         return compose(self.words)
 
     def but(self, *words: str) -> "Case":
-        """Return the case with more words, which win over earlier ones."""
+        """Return the case with more words; they override earlier ones."""
         return Case((*self.words, *words))
 
     def without(self, *keys: str) -> "Case":
@@ -41,6 +41,6 @@ class Case:
         return self if self.config.edit.method == NO_METHOD else self.edited("none")
 
     def says(self, key: str) -> str | None:
-        """Return the last value that the words give a key; None where they do not name it."""
+        """Return the last value that the words give a key, or None."""
         values = [word.partition("=")[2] for word in self.words if word.partition("=")[0] == key]
         return values[-1] if values else None

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from texgs.config.project import LONGEST_NAME, Words, check_name, folders, is_scene_file
+from texgs.config.project import MAX_NAME_LETTERS, Words, check_name, folders, is_scene_file
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.core.keys import mismatch, typed
@@ -17,8 +17,8 @@ from texgs.core.names import close
 from texgs.fields.kinds import kinds
 from texgs.volume.view_settings import LightKeys
 
-ONE_LIGHT = "-one-light"  # end of the names of folders of views for fields that cannot be relit
-NAMED_GROUPS = ("dataset", "fit", "edit")  # groups whose files have names, which folders of results get
+ONE_LIGHT = "-one-light"  # suffix of folders with views for fields that cannot be relit
+NAMED_GROUPS = ("dataset", "fit", "edit")  # groups whose file names become names of result folders
 
 
 def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> Config:
@@ -37,23 +37,23 @@ def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> Confi
 
 
 def recompose(overrides: Words) -> Config:
-    """Return the same of files that may have changed since this process has read them."""
+    """Do as `compose`, but read again files that may have changed since."""
     return _composed.__wrapped__(overrides, folders(), os.environ.get("TEXGS_DATA"))
 
 
 def preset(group: str, name: str) -> Config:
-    """Return the configuration with one file of conf/, such as `fit` and `quick`, and nothing else chosen."""
+    """Return the configuration with a single choice from conf/, such as `quick` of the group `fit`."""
     return compose((f"{group}={name}",))
 
 
 @lru_cache(maxsize=1024)
 def _composed(overrides: Words, places: tuple[Path, ...], _data_folder: str | None) -> Config:
     from texgs.config.composition import composition
-    from texgs.config.mistakes import translated
+    from texgs.config.mistakes import texgs_errors
 
     if not places[-1].is_dir():
         raise ConfigError(f"{places[-1]}: no configuration there; install texgs again")
-    with translated():
+    with texgs_errors():
         config = typed(Config, composition(overrides, places))
         config = with_lights_of_field(replace(config, sweep=config.sweep.named))
     check_names(config)
@@ -75,7 +75,7 @@ def with_lights_of_field(config: Config) -> Config:
 
 
 def check_names(config: Config) -> None:
-    """Require names that folders can have, other than those that texgs gives its own folders there."""
+    """Require names that are valid for folders and that texgs does not use for its own folders."""
     for key in ("fit.name", "edit.name", "gallery.name", "dataset.name", "views.name"):
         group, _, _ = key.partition(".")
         check_name(key, name := getattr(config, group).name)
@@ -89,8 +89,8 @@ def check_names(config: Config) -> None:
         ("views.name", config.views.name, "views(-.*)?", "views or views-..."),
         ("sweep.name", config.sweep.name, r"[A-Za-z0-9_-]*", "letters, digits, _ or -"),
         (
-            *("variant", config.variant, rf"([A-Za-z0-9_-][A-Za-z0-9_.-]{{,{LONGEST_NAME - 1}}})?"),
-            f"at most {LONGEST_NAME} letters, digits, _, - or .",
+            *("variant", config.variant, rf"([A-Za-z0-9_-][A-Za-z0-9_.-]{{,{MAX_NAME_LETTERS - 1}}})?"),
+            f"at most {MAX_NAME_LETTERS} letters, digits, _, - or .",
         ),
     ):
         if not re.fullmatch(pattern, value):
@@ -98,7 +98,7 @@ def check_names(config: Config) -> None:
 
 
 def check_basic_tfs(config: Config) -> None:
-    """Require of basic TFs that are named that the data set has them, and of meshes a volume beside them."""
+    """Require that the data set has the basic TFs that are named, and a volume if there are meshes."""
     known = list(config.dataset.basic_tfs)
     if config.mesh.tfs and config.dataset.views_folder is not None:
         raise ConfigError(
@@ -112,7 +112,7 @@ def check_basic_tfs(config: Config) -> None:
 
 
 def check_chosen(overrides: Words, config: Config) -> None:
-    """Require of chosen files that they have their own names: results would go to the folder of another."""
+    """Require that a chosen file carries its own name; otherwise results would go to another one's folder."""
     for group in NAMED_GROUPS:
         chosen = [word.partition("=")[2].strip("'\"") for word in overrides if word.startswith(f"{group}=")]
         if any(re.match(rf"[+]*{group}\.name=", word) for word in overrides) or not chosen:

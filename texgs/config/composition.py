@@ -28,7 +28,7 @@ from hydra.plugins.config_source import ConfigResult
 from omegaconf import OmegaConf
 
 from texgs.config.describe import keys
-from texgs.config.mistakes import MISTAKES, misread
+from texgs.config.mistakes import MISTAKES, unreadable_file
 from texgs.config.project import Words
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
@@ -43,11 +43,11 @@ SEPARATE_GROUPS = (
     "sweep",
 )  # whose files a run combines
 REFERENCE = re.compile(r"(?<!\\)\$\{(\.*)([\w.-]+)\}")
-MOST_REFERENCES = 20  # references that refer to another one
+MAX_REFERENCES = 20  # length of a chain of references
 
 
 class Repository(ConfigRepository):
-    """The files of some folders; one that cannot be read is told with its line."""
+    """Configuration files of several folders; errors name the line that cannot be read."""
 
     def __init__(self, places: Places) -> None:
         Plugins.instance()  # registers what reads files
@@ -58,7 +58,7 @@ class Repository(ConfigRepository):
         self.places = places
 
     def load_config(self, config_path: str) -> ConfigResult | None:
-        """Return what a file holds, such as `fit/quick`."""
+        """Read a file such as `fit/quick`."""
         try:
             return super().load_config(config_path)
         except MISTAKES as error:
@@ -66,12 +66,12 @@ class Repository(ConfigRepository):
             path = next((each for each in paths if each.is_file()), None)
             if path is None:
                 raise
-            raise misread(path, error) from error
+            raise unreadable_file(path, error) from error
 
 
 @lru_cache(maxsize=16)
 def repository_of(places: Places, _changed: tuple[int, ...]) -> CachingConfigRepository:
-    """Return the files of some folders as they are since their last change."""
+    """Return the repository of some folders in the state of their last change."""
     return CachingConfigRepository(Repository(places))
 
 
@@ -87,7 +87,7 @@ def defaults_of(files: CachingConfigRepository, name: str, choices: Words = ()) 
 
 
 def files_of_choices(files: CachingConfigRepository, choices: Words) -> list[tuple[str, str]]:
-    """Return names and packages of the files that some words choose, those that count most at the end.
+    """Return names and packages of the files that some words choose, in rising order of priority.
 
     What a data set, a recipe or an edit consists of does not depend on other choices, unless its files
     override them: a run, which needs all combinations, lists each once.
@@ -128,7 +128,7 @@ def values_of(files: CachingConfigRepository, name: str, package: str) -> dict[s
 
 
 def composition(words: Words, places: Places) -> dict[str, Any]:
-    """Return the values of all keys; of files with the same name, that of the first place counts."""
+    """Return the values of all keys; among files with the same name, the first place wins."""
     paths = (path for place in places for path in sorted(place.rglob("*.yaml")))
     files = repository_of(places, tuple(path.stat().st_mtime_ns for path in paths if path.is_file()))
     choices: Words = ()
@@ -156,7 +156,7 @@ def defaults() -> dict[str, Any]:
 
 
 def require_name(override: Override) -> None:
-    """Require of the choice of a group that it is the name of a file, not a list or another value."""
+    """Require that the choice of a group is the name of a file."""
     group, value = override.key_or_group, override.value()
     if isinstance(value, list):
         hint = f"; several go to {group}s" if f"{group}s" in Config.__dataclass_fields__ else ""
@@ -168,7 +168,7 @@ def require_name(override: Override) -> None:
 
 
 def merge(table: dict[str, Any], later: Mapping[str, Any]) -> None:
-    """Put values into a table, in place of those that it has; tables are merged, lists replaced."""
+    """Update a table with new values; tables are merged, lists replaced."""
     for name, value in later.items():
         if isinstance(value, dict) and isinstance(table.get(name), dict):
             merge(table[name], value)
@@ -178,7 +178,7 @@ def merge(table: dict[str, Any], later: Mapping[str, Any]) -> None:
 
 @cache
 def override_of(word: str) -> Override:
-    """Return a word as Hydra reads it; OverrideParseException for a word that is none."""
+    """Parse a word as a Hydra override; raise OverrideParseException if it is not one."""
     return _parser().parse_overrides([word])[0]
 
 
@@ -191,12 +191,12 @@ def has_several(word: str) -> bool:
     """Return whether a word gives its key several values."""
     try:
         return bool(override_of(word).is_sweep_override())
-    except HydraException:  # which `compose` tells
+    except HydraException:  # `compose` reports it
         return False
 
 
 def several(word: str) -> list[str]:
-    """Return the values that a word gives its key, as people write them.
+    """Return the values that a word gives its key, in the spelling of the user.
 
     That is true instead of Hydra's True, and 100000 instead of 1e5 where an integer is expected.
     """
@@ -221,7 +221,7 @@ def quoted(word: str) -> str:
 
 
 def apply(values: dict[str, Any], override: Override) -> None:
-    """Do what a word says, to the values of all files."""
+    """Apply a word to the values of all files."""
     key, value = override.key_or_group, override.value()
     *parents, last = key.split(".")
     is_added = override.is_add() or override.is_force_add()
@@ -243,7 +243,7 @@ def apply(values: dict[str, Any], override: Override) -> None:
 
 
 def index_of(part: str, table: Any, key: str) -> str | int:
-    """Return where a part of a key is: the name in a table, or the position in a list."""
+    """Return the name in a table, or the position in a list, that a part of a key addresses."""
     if isinstance(table, dict) and part in table:
         return part
     if isinstance(table, list) and part.isdecimal() and int(part) < len(table):
@@ -252,9 +252,9 @@ def index_of(part: str, table: Any, key: str) -> str | int:
 
 
 def several_values(word: str) -> str:
-    """Return what to say about a key with several values."""
+    """Return the error for a key with several values."""
     key, _, values = word.partition("=")
-    is_list = "." in key and "(" not in values  # names of groups are no lists
+    is_list = "." in key and "(" not in values  # a group takes no list
     brackets = f", as in '{key}=[{values}]'" if is_list else ""
     return (
         f"{word}: expected one value, got several; a list stands in brackets{brackets}, "
@@ -271,7 +271,7 @@ def resolve(values: dict[str, Any]) -> dict[str, Any]:
     if any("${" in REFERENCE.sub("", text) for _, _, _, text in texts):
         return cast(dict[str, Any], OmegaConf.to_container(OmegaConf.create(values), resolve=True))
     for table, name, path, text in texts:
-        table[name] = _value(values, text, path, MOST_REFERENCES)
+        table[name] = _value(values, text, path, MAX_REFERENCES)
     return values
 
 
@@ -286,7 +286,7 @@ def _texts(table: Any, path: Words) -> Iterator[tuple[Any, Any, Words, str]]:
 
 
 def _value(values: dict[str, Any], text: str, path: Words, left: int) -> Any:
-    """Return what a text with references stands for; a text that is one reference alone, of any type."""
+    """Resolve the references in a text; a text that is a single reference may become any type."""
 
     def target(match: re.Match[str]) -> Any:
         dots, name = match.groups()

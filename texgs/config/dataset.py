@@ -1,4 +1,4 @@
-"""The schema of conf/dataset: a volume with its basic transfer functions, and of the meshes of these."""
+"""The schema of conf/dataset: a volume with its basic transfer functions and their meshes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from texgs.volume.view_settings import LARGEST
 
 @dataclass(frozen=True)
 class LookKeys:
-    """What the edits of a whole experiment make of a basic scene."""
+    """Looks of a basic scene in the edits of a whole experiment."""
 
     style: str = key("strokes", "style of edits by a picture: one that texgs paints, or a picture file")
     instruction: str = key("make it gold", "instruction of edits by an instruction")
@@ -64,24 +64,24 @@ class Dataset:
 
     @property
     def framing(self) -> list[str]:
-        """Return the names of the basic TFs that frame the views of all."""
+        """Return the names of the basic TFs that determine the frame of all views."""
         return self.framed_by or list(self.basic_tfs)
 
     @property
     def channels(self) -> list[str]:
-        """Return the channels that basic TFs name, in their order; none where `volume.channel` says which."""
+        """Return the channels that basic TFs name, in order; empty if `volume.channel` chooses one."""
         named = dict.fromkeys(tf.channel for tf in self.basic_tfs.values())
         return [channel for channel in named if channel is not None]
 
     def number_of(self, tf: BasicTF) -> int:
-        """Return the number of a basic TF's channel among those that are prepared."""
+        """Return the index of a basic TF's channel among the prepared ones."""
         return 0 if tf.channel is None else self.channels.index(tf.channel)
 
 
 def dataset_of(
     name: str, file: str | Path, basic_tfs: Mapping[str, BasicTF] | None = None, **volume: Any
 ) -> Dataset:
-    """Return the data set of one volume file, which is read as `VolumeKeys` say."""
+    """Return the data set of one volume file, read with the settings of `VolumeKeys`."""
     keys = VolumeKeys(**{**volume, "file": str(file)})
     return Dataset(name=name, title=name, volume=keys, basic_tfs=dict(basic_tfs or {}))
 

@@ -1,4 +1,4 @@
-"""The text of a data set's file: as texgs writes it, and with one more basic transfer function."""
+"""The text of a data set's file, and the same text with another basic transfer function."""
 
 import re
 import tempfile
@@ -17,7 +17,7 @@ from texgs.volume.basic_tfs import BasicTF
 
 
 def with_basic_tf(text: str, name: str, points: BasicTF, framed_by: list[str]) -> str:
-    """Return the text of a data set with one more basic TF, and the key `framed_by` if it is to say that."""
+    """Return the text of a data set with another basic TF, and the key `framed_by` if asked for."""
     text = text if text.endswith("\n") else f"{text}\n"
     entries = {key.value: (key, value) for key, value in yaml.compose(text, yaml.SafeLoader).value}
     key, value = entries.get("basic_tfs", (None, None))
@@ -35,14 +35,14 @@ def with_basic_tf(text: str, name: str, points: BasicTF, framed_by: list[str]) -
 
 
 def plain_tf(points: BasicTF) -> dict[str, Any]:
-    """Return a basic TF as files have it: with its channel, if it names one."""
+    """Return a basic TF as plain values, with its channel if it names one."""
     return {
         key: value for key in ("channel", "opacity", "color") if (value := getattr(points, key)) is not None
     }
 
 
 def as_yaml(values: Mapping[str, Any]) -> str:
-    """Return YAML with a line per list."""
+    """Return YAML with each list on one line."""
 
     class Dumper(yaml.SafeDumper):
         """Lists on one line each."""
@@ -54,7 +54,7 @@ def as_yaml(values: Mapping[str, Any]) -> str:
 
 
 def require_read(text: str, dataset: Dataset) -> None:
-    """Require that the configuration reads a text as the data set that it was written for."""
+    """Require that a text reads back as the data set it was written for."""
     name = dataset.name
     with tempfile.TemporaryDirectory() as folder:
         write_bytes(Path(folder, "dataset", f"{name}.yaml"), text.encode())

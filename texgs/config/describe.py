@@ -42,7 +42,7 @@ def describe(config: Config) -> str:
 
 
 def value_at(config: Config, name: str) -> Any:
-    """Return the value of a key, through tables, lists and tables of any names."""
+    """Return the value of a dotted key in nested tables and lists."""
     value: Any = config
     for part in name.split("."):
         if isinstance(value, list):
@@ -53,7 +53,7 @@ def value_at(config: Config, name: str) -> Any:
 
 
 def _walk(table: type, prefix: str) -> Iterator[Key]:
-    """Yield the keys of a dataclass, and of those in its lists and tables."""
+    """Yield the keys of a dataclass and of the dataclasses in its lists and tables."""
     hints = typing.get_type_hints(table)
     for field in dataclasses.fields(table):
         name, hint = f"{prefix}{field.name}", hints[field.name]
@@ -67,7 +67,7 @@ def _walk(table: type, prefix: str) -> Iterator[Key]:
 
 
 def _type(hint: Any) -> str:
-    """Return a type in words."""
+    """Describe a type in words."""
     if isinstance(hint, UnionType):
         return " or ".join(_type(argument) for argument in typing.get_args(hint))
     if hint is type(None):

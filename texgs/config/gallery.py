@@ -1,22 +1,22 @@
-"""The schema of galleries, pictures of a data set's scenes in rows and columns, and what it comes to."""
+"""The schema of galleries, pictures of a data set's scenes in rows and columns, and their cells."""
 
 from dataclasses import dataclass
 
 from texgs.core.keys import key
 
 SECTIONS = ("pse", "relight", "image", "text", "parts", "ablations", "more")  # of the report
-AS_FITTED = "none"  # the edit of a scene that nothing has edited
+NO_EDIT = "none"  # edit of an unedited scene
 
 
 @dataclass(frozen=True)
 class ShotKeys:
-    """What the pictures of a row or of a column have in common; where both say something, the column counts.
+    """What the pictures of a row or a column have in common; the column overrides the row.
 
     Changes of both are made, those of the row first.
     """
 
     title: str = key("", "title beside the row, or above the column")
-    edit: str | None = key(None, f"edit whose scene is shown; {AS_FITTED} or null: the scene as fitted")
+    edit: str | None = key(None, f"edit whose scene is shown; {NO_EDIT} or null: the scene as fitted")
     fit: str | None = key(None, "recipe of the scene; default the first of `fits` that the edit works on")
     variant: str | None = key(None, "variant of the sweep whose fits are shown")
     show: str | None = key(
@@ -55,7 +55,7 @@ class GridKeys:
 
 @dataclass(frozen=True)
 class GalleryKeys:
-    """What a data set's scenes are shown in; by default all new looks of the experiment."""
+    """Pictures of a data set's scenes; by default all new looks of the experiment."""
 
     name: str = key(
         "looks", "name of its folder, and that of fits side by side; as its file in conf/experiment"
@@ -68,7 +68,7 @@ class GalleryKeys:
 
 @dataclass
 class GalleryCell:
-    """What the configuration says of one picture, see `ShotKeys`."""
+    """Settings of one picture, see `ShotKeys`."""
 
     scene: str  # its name among the inputs
     show: str  # scene, volume, error, or "" for nothing

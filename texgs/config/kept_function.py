@@ -6,8 +6,8 @@ from pathlib import Path
 
 from texgs.config.compose import recompose
 from texgs.config.dataset_text import require_read, with_basic_tf
-from texgs.config.project import ROOT, check_name, own_folder, shown
-from texgs.core.errors import ArgumentError, ConfigError, located
+from texgs.config.project import ROOT, check_name, own_folder, short_path
+from texgs.core.errors import ArgumentError, ConfigError, errors_at
 from texgs.core.io import read_json, write_bytes
 from texgs.core.names import METRICS
 from texgs.scene.scene import Scene
@@ -19,7 +19,7 @@ from texgs.volume.transfer import TransferFunction, check_disjoint
 
 
 def keep(scene: Scene, name: str) -> str:
-    """Write a function of a scene into the file of its data set, and return what that means, in sentences.
+    """Write a function of a scene into the file of its data set; return sentences about the consequences.
 
     Views stay framed as they are, so that the workflow makes those of the function and refits nothing else.
     """
@@ -33,7 +33,7 @@ def keep(scene: Scene, name: str) -> str:
     ends = [(each["minimum"], each["maximum"]) for each in read_summaries(volume.file).values()]
     channel, channels = known[name].channel, dataset.channels
     low, high = ends[channel]
-    with located(shown(file)):
+    with errors_at(short_path(file)):
         if name in dataset.basic_tfs:
             raise ArgumentError(f"basic_tfs: {name} is there already; copy the function, or edit the file")
         tf = known[name].rounded(low, high)
@@ -46,20 +46,20 @@ def keep(scene: Scene, name: str) -> str:
             for key, points in basic_tfs.items()
         }
         tfs = {key: tf.scaled(*ends[tf.channel]) for key, tf in tfs.items()} if is_scaled else tfs
-        with located("basic_tfs"):
+        with errors_at("basic_tfs"):
             check_disjoint(tfs)
         framing, grid = dataset.framing, open_grid(volume.file)
         far = out_of_frame(grid, tfs[name], frame_of(grid, [tfs[key] for key in framing]))
         text = with_basic_tf(text, name, basic_tfs[name], [] if dataset.framed_by else framing)
         require_read(text, replace(dataset, basic_tfs=basic_tfs, framed_by=framing))
     write_bytes(file, text.encode())
-    done = f"{shown(file)}: {name} is a basic transfer function; then: texgs run dataset={dataset.name}"
+    done = f"{short_path(file)}: {name} is a basic transfer function; then: texgs run dataset={dataset.name}"
     return f"{done}. It {far}." if far else done
 
 
 def file_of(volume: Path) -> Path:
-    """Return the file of the data set of a prepared volume: one of this project, that can be written."""
-    with located("volume: expected one that texgs volume has made of a data set"):
+    """Return the file of a prepared volume's data set; it must belong to this project and be writable."""
+    with errors_at("volume: expected one that texgs volume has made of a data set"):
         facts = read_json(volume.with_name(METRICS))
         check_name("its name", name := str(facts.get("dataset") if isinstance(facts, dict) else facts))
     file, shipped = (folder / "dataset" / f"{name}.yaml" for folder in (own_folder(), ROOT / "conf"))
@@ -69,9 +69,11 @@ def file_of(volume: Path) -> Path:
             if shipped.is_file()
             else "none; start in the folder of the project"
         )
-        raise ConfigError(f"{shown(file)}: expected the data set of the scene in this project, got {got}")
+        raise ConfigError(
+            f"{short_path(file)}: expected the data set of the scene in this project, got {got}"
+        )
     if not (os.access(file, os.W_OK) and os.access(file.parent, os.W_OK)):
         raise ConfigError(
-            f"{shown(file)}: expected a file that can be written, got a read-only one; allow it"
+            f"{short_path(file)}: expected a file that can be written, got a read-only one; allow it"
         )
     return file

@@ -1,4 +1,4 @@
-"""What is wrong with a configuration, in one sentence: the key, or the file of conf/ and its line."""
+"""Mistakes in a configuration as one sentence, with the key, or the file of conf/ and its line."""
 
 import dataclasses
 import re
@@ -12,13 +12,13 @@ from hydra.errors import HydraException, MissingConfigException, OverrideParseEx
 from omegaconf.errors import OmegaConfBaseException
 
 from texgs.config.describe import keys
-from texgs.config.project import folders, members, shown
+from texgs.config.project import folders, members, short_path
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.core.keys import MissingKey, UnknownKey, ValueMismatch
 from texgs.core.names import close
 
-RENAMED = {  # keys of the version before; what they are called now
+RENAMED_KEYS = {  # new names of keys from the previous version
     "aimed": "per_dataset",
     "each": "common_overrides",
     "missing": "on_missing",
@@ -30,12 +30,12 @@ MISTAKES = (
     *(HydraException, OmegaConfBaseException, yaml.YAMLError),
     *(ArithmeticError, OSError, RecursionError, TypeError, ValueError),
 )
-LONGEST_TEXT = 200  # characters of what Hydra or OmegaConf says
+MAX_TEXT_LETTERS = 200  # characters of what Hydra or OmegaConf says
 
 
 @contextmanager
-def translated() -> Iterator[None]:
-    """Make one ConfigError of what Hydra, OmegaConf and `typed` raise."""
+def texgs_errors() -> Iterator[None]:
+    """Turn the exceptions of Hydra, OmegaConf and `typed` into a ConfigError."""
     try:
         yield
     except ConfigError:
@@ -50,7 +50,7 @@ def translated() -> Iterator[None]:
 
 
 def sentence(error: Exception) -> str:
-    """Return what is wrong, from an exception of Hydra or OmegaConf."""
+    """Return the mistake behind an exception of Hydra or OmegaConf, as a sentence."""
     if isinstance(error, MissingConfigException) and error.missing_cfg_file:
         where = re.match(r"In '(?!config')[^']+': ", str(error))
         group, _, name = error.missing_cfg_file.partition("/")
@@ -66,31 +66,31 @@ def sentence(error: Exception) -> str:
     return one_line(error)
 
 
-def misread(path: Path, error: Exception) -> ConfigError:
-    """Return that a file cannot be read, with the line that YAML names, or the key that OmegaConf does."""
+def unreadable_file(path: Path, error: Exception) -> ConfigError:
+    """Return the error for an unreadable file, with YAML's line or OmegaConf's key."""
     mark = getattr(error, "problem_mark", None)
     key = getattr(error, "full_key", None)
-    where = f"{shown(path)}{f':{mark.line + 1}' if mark else ''}: {f'{key}: ' if key else ''}"
+    where = f"{short_path(path)}{f':{mark.line + 1}' if mark else ''}: {f'{key}: ' if key else ''}"
     if isinstance(error, UnicodeDecodeError):
         return ConfigError(f"{where}expected text in UTF-8; save it as UTF-8")
     return ConfigError(f"{where}{getattr(error, 'problem', None) or one_line(error)}")
 
 
 def no_such_key(name: str) -> str:
-    """Return what to say about a key that the schema does not have."""
-    if name in RENAMED:
-        return f"{name}: this key is called {RENAMED[name]} now"
+    """Return the error for an unknown key."""
+    if name in RENAMED_KEYS:
+        return f"{name}: this key is called {RENAMED_KEYS[name]} now"
     names = [entry.name for entry in keys()]
     groups = dict.fromkeys(each.partition(".")[0] for each in names)
     return f"{name}: no such key{close(name, [*groups, *names])}; texgs views --help lists all"
 
 
 def origin(key: str, value: Any) -> str:
-    """Return the file and line that a wrong value is from, in front of a sentence; empty for an override."""
+    """Return the file and line of a wrong value, to begin a sentence; empty for an override."""
     group, *below = key.split(".")
     groups = [each.name for each in dataclasses.fields(Config)]
     for path in (path for folder in folders() for path in sorted(folder.rglob("*.yaml")) if path.is_file()):
-        is_of_group = path.parent.name in groups  # whose files leave its name out
+        is_of_group = path.parent.name in groups  # its files omit the group's name
         if is_of_group and path.parent.name != group:
             continue
         try:
@@ -100,7 +100,7 @@ def origin(key: str, value: Any) -> str:
         for name in below if is_of_group else (group, *below):
             node = children(node).get(name)
         if node is not None and str(yaml.SafeLoader("").construct_document(node)) == str(value):
-            return f"{shown(path)}:{node.start_mark.line + 1}: "
+            return f"{short_path(path)}:{node.start_mark.line + 1}: "
     return ""
 
 
@@ -113,6 +113,6 @@ def children(node: yaml.Node | None) -> dict[str, yaml.Node]:
 
 
 def one_line(error: object) -> str:
-    """Return what an exception says in one line, cut where it is too long for a sentence."""
+    """Return the message of an exception in one line, shortened to fit a sentence."""
     text = " ".join(str(error).partition("\n    full_key: ")[0].split()) or type(error).__name__
-    return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}... ({len(text)} characters)"
+    return text if len(text) <= MAX_TEXT_LETTERS else f"{text[:MAX_TEXT_LETTERS]}... ({len(text)} characters)"

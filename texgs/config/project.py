@@ -11,25 +11,29 @@ from texgs.core.keys import mismatch
 
 Words = tuple[str, ...]  # overrides of the configuration, in Hydra's syntax
 PACKAGE = Path(__file__).parents[1]
-INSTALLED = PACKAGE / "_project"  # where a wheel puts them, see CMakeLists.txt
-ROOT = INSTALLED if INSTALLED.is_dir() else PACKAGE.parent  # holds Snakefile, conf/ and workflow/
+INSTALLED_FOLDER = PACKAGE / "_project"  # where a wheel puts them, see CMakeLists.txt
+ROOT = (
+    INSTALLED_FOLDER if INSTALLED_FOLDER.is_dir() else PACKAGE.parent
+)  # holds Snakefile, conf/ and workflow/
 SNAKEFILE = ROOT / "Snakefile"
 PROFILES = ROOT / "workflow" / "profiles"
 
 # Folders below `results`.
-RESERVED = ("volume", "transfer", "gallery", "logs", "mlartifacts", "tables", "scene", "study")
-LONGEST_NAME = 100  # characters of a name: it becomes that of files and folders
-NO_NAME = re.compile(r"[^A-Za-z0-9_]+")  # what a name of a data set or of a TF cannot have
-NOT_TEXT = re.compile("null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNORECASE)  # to YAML or Hydra
+RESERVED_FOLDERS = ("volume", "transfer", "gallery", "logs", "mlartifacts", "tables", "scene", "study")
+MAX_NAME_LETTERS = 100  # of a name, which becomes part of file and folder names
+FORBIDDEN_LETTERS = re.compile(r"[^A-Za-z0-9_]+")  # in names of data sets and TFs
+NON_TEXT_WORDS = re.compile(
+    "null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNORECASE
+)  # to YAML or Hydra
 
 
 def own_folder() -> Path:
-    """Return the user's configurations: `conf/` of the working directory, which may not be there."""
+    """Return the user's configuration folder, `conf/` of the working directory; it may not exist."""
     return Path.cwd() / "conf"
 
 
 def folders() -> tuple[Path, ...]:
-    """Return folders with configurations; of files with the same name, that of the first folder counts."""
+    """Return the configuration folders; among files with the same name, the first folder wins."""
     own, shipped = own_folder(), ROOT / "conf"
     return (own, shipped) if own.is_dir() and own.resolve() != shipped.resolve() else (shipped,)
 
@@ -41,19 +45,19 @@ def members(group: str) -> list[str]:
 
 
 def groups() -> str:
-    """Return the groups of conf/ with their members, a line each."""
+    """List the groups of conf/ with their members, one line each."""
     names = {path.name for folder in folders() for path in folder.iterdir() if path.is_dir()}
     return "\n".join(f"  {name}={'|'.join(members(name))}" for name in sorted(names) if members(name))
 
 
-def shown(path: Path) -> str:
+def short_path(path: Path) -> str:
     """Return a path as the user would write it."""
     return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
 
 
 def name_of(file: Path) -> str:
-    """Return the name that a file gives to its data set; `check_name` may refuse it."""
-    return NO_NAME.sub("_", file.name.split(".")[0])
+    """Return the data set's name from a file name; `check_name` may refuse it."""
+    return FORBIDDEN_LETTERS.sub("_", file.name.split(".")[0])
 
 
 def check_name(key: str, name: str) -> None:
@@ -64,18 +68,18 @@ def check_name(key: str, name: str) -> None:
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
         raise ConfigError(str(mismatch(key, "a letter and then letters, digits, _ or -", name)))
-    if len(name) > LONGEST_NAME:
+    if len(name) > MAX_NAME_LETTERS:
         raise ConfigError(
-            f"{key}: expected at most {LONGEST_NAME} characters, got {len(name)}; choose a shorter one"
+            f"{key}: expected at most {MAX_NAME_LETTERS} characters, got {len(name)}; choose a shorter one"
         )
-    if NOT_TEXT.fullmatch(name):
+    if NON_TEXT_WORDS.fullmatch(name):
         raise ConfigError(
             f"{key}: {name} is a word that YAML or Hydra does not read as text; choose another name"
         )
-    if name.lower() in RESERVED:  # also where upper and lower case are one
+    if name.lower() in RESERVED_FOLDERS:  # some file systems ignore case
         raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
 
 
 def is_scene_file(base: str) -> bool:
-    """Return whether what an edit starts from is the file of a scene, not the name of another edit."""
+    """Return whether an edit starts from a scene file rather than from another edit."""
     return base.endswith((".yaml", ".yml"))

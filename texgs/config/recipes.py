@@ -1,4 +1,4 @@
-"""The schema of conf/fit and conf/edit: what all fits and edits have, and tables of kinds and methods.
+"""The schema of conf/fit and conf/edit: common keys, and a table for each kind or method.
 
 The names of presets in conf/fit stand in every table.
 """
@@ -16,7 +16,7 @@ from texgs.fitting.settings import Material, Phase, Seeds, TextureKeys
 
 @dataclass(frozen=True)
 class FitKeys:
-    """A recipe. The keys of other fields than surfels stand in tables of their own."""
+    """A recipe. Fields other than surfels have tables of their own."""
 
     name: str = key("default", "name of the preset, as in tables")
     field: str = key("surfels", "kind of field that is fitted", choices=tuple(fit_specs()))
@@ -58,7 +58,7 @@ class FitKeys:
 
 
 def _with_tables(name: str, base: type, owners: Iterable[Any]) -> Any:
-    """Return a dataclass with the keys of another one, and a table of keys for each kind or method."""
+    """Extend a dataclass by a table of keys for each kind or method."""
     tables = [(each.name, each.settings, key(each.settings, each.summary)) for each in owners]
     return make_dataclass(name, tables, bases=(base,), frozen=True, namespace={"__doc__": base.__doc__})
 

@@ -40,7 +40,7 @@ class Device:
 
 @dataclass(frozen=True)
 class Metric:
-    """What volumes and edited scenes are measured with, besides what needs no weights."""
+    """Metrics of volumes and edited scenes that need weights or extra time."""
 
     clip: str = key(
         CLIP_BACKBONES[0],
@@ -86,14 +86,14 @@ class Sweep:
 
 @dataclass(frozen=True)
 class StandIns:
-    """What an experiment takes in place of data sets and edits. What is taken may have a stand-in itself."""
+    """Replacements for data sets and edits of an experiment; a replacement may have one itself."""
 
     taken: str = key("missing", "where data or weights are missing, or always", choices=("missing", "always"))
     datasets: dict[str, str] = key(dict, "data sets by the names of those that they stand in for")
     edits: dict[str, str] = key(dict, "edits by the names of those that they stand in for")
 
     def of(self, group: Literal["datasets", "edits"], name: str) -> list[str]:
-        """Return what stands in for a name, and for that, one after another."""
+        """Return the replacement of a name, following chains to the end."""
         table, listed = getattr(self, group), [name]
         while (following := table.get(listed[-1], name)) not in listed:
             listed.append(following)

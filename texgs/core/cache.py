@@ -1,4 +1,4 @@
-"""What is kept outside the project: its folders, values that were worked out once, and checksums of files."""
+"""Files kept outside the project: cache folders, cached values, and checksums."""
 
 import hashlib
 import json
@@ -12,11 +12,11 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
 
 CHECKSUMS_FILE = "checksums.json"  # in the cache folder
-MOST_CHECKSUMS = 20_000  # of the latest files
+MAX_CHECKSUMS = 20_000  # most recent files
 
 
 def cache_folder() -> Path:
-    """Return the folder for what is worth keeping: TEXGS_CACHE, else texgs in the user's cache."""
+    """Return the cache folder: TEXGS_CACHE, or texgs in the user's cache."""
     try:
         if chosen := os.environ.get("TEXGS_CACHE"):
             return Path(chosen).expanduser()
@@ -28,28 +28,28 @@ def cache_folder() -> Path:
 
 
 def weights_folder() -> Path:
-    """Return the folder of pretrained weights: TEXGS_WEIGHTS, else weights in the cache folder."""
+    """Return the folder of pretrained weights: TEXGS_WEIGHTS, or weights in the cache folder."""
     chosen = os.environ.get("TEXGS_WEIGHTS")
     return Path(chosen).expanduser() if chosen else cache_folder() / "weights"
 
 
 def recall(path: Path, key: str) -> Any | None:
-    """Return what `keep` wrote to a file for the same key; None if it did not."""
+    """Return the value that `keep` wrote to a file for the same key, or None."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
         return kept["value"] if kept["key"] == key else None
-    except (OSError, ValueError, KeyError, TypeError):  # not there, damaged, or of something else
+    except (OSError, ValueError, KeyError, TypeError):  # missing, damaged, or a different kind of file
         return None
 
 
 def keep(path: Path, key: str, value: Any) -> None:
-    """Write a value that JSON can hold and the key of all it depends on, where that can be written."""
+    """Write a JSON value with the key that it depends on, if the folder can be written."""
     with suppress(ArgumentError, OSError):
         write_bytes(path, json.dumps({"key": key, "value": value}).encode())
 
 
 def sha256(path: str | Path) -> str:
-    """Return the checksum of a file's contents as they are now."""
+    """Return the SHA-256 of a file's current contents."""
     try:
         with Path(path).open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -63,12 +63,12 @@ def digest(text: str) -> str:
 
 
 def combined_checksum(parts: Iterable[tuple[str, str]]) -> str:
-    """Return one checksum of several names with their checksums, in any order."""
+    """Combine named checksums into one, whatever their order."""
     return hashlib.sha256(json.dumps(sorted(parts)).encode()).hexdigest()
 
 
 def checksum_of_folders(*folders: Path) -> str:
-    """Return one checksum of the names and contents of all files below folders, without compiled Python."""
+    """Return a checksum of the names and contents of all files below folders, except compiled Python."""
     return combined_checksum(
         (f"{index} {path.relative_to(folder).as_posix()}", sha256(path))
         for index, folder in enumerate(folders)
@@ -89,16 +89,16 @@ class Checksums:
 
     @classmethod
     def load(cls) -> "Checksums":
-        """Return what earlier processes have computed, from the cache folder."""
+        """Read the checksums of earlier processes from the cache folder."""
         checksums = cls()
         known = recall(cache_folder() / CHECKSUMS_FILE, CHECKSUMS_FILE)
         checksums._known = known if isinstance(known, dict) else {}
         return checksums
 
     def save(self) -> None:
-        """Keep them for later processes; where the cache cannot be written, they will compute them again."""
+        """Save them for later processes; without a writable cache these compute them again."""
         if self._is_new:
-            self._known = dict(list(self._known.items())[-MOST_CHECKSUMS:])
+            self._known = dict(list(self._known.items())[-MAX_CHECKSUMS:])
             keep(cache_folder() / CHECKSUMS_FILE, CHECKSUMS_FILE, self._known)
             self._is_new = False
 
@@ -118,6 +118,6 @@ class Checksums:
         return digest
 
     def forget(self, path: Path) -> None:
-        """Compute the checksum of a file again the next time."""
+        """Forget the checksum of a file, so that the next call computes it again."""
         if self._known.pop(str(path.absolute()), None) is not None:
             self._is_new = True

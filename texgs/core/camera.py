@@ -50,7 +50,7 @@ class Camera:
         return (1 + right.square() + down.square()[:, None]).sqrt()
 
     def project(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """Return pixels [..., 2] and camera z [...] of world points [..., 3]; behind it pixels are void."""
+        """Return pixels [..., 2] and camera z [...] of world points [..., 3]; undefined behind the camera."""
         viewmat, K = self.viewmat.to(points), self.K.to(points)
         x, y, z = (points @ viewmat[:3, :3].T + viewmat[:3, 3]).unbind(-1)
         return torch.stack([K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2]], dim=-1), z
@@ -75,12 +75,12 @@ class Camera:
         return self if viewmat is self.viewmat and K is self.K else replace(self, viewmat=viewmat, K=K)
 
     def crop(self, left: int, top: int, right: int, bottom: int) -> Self:
-        """Return the camera of the pixels left <= x < right, top <= y < bottom of this one's image."""
+        """Return the camera of the crop left <= x < right, top <= y < bottom."""
         K = self.K - self.K.new_tensor([[0, 0, left], [0, 0, top], [0, 0, 0]])
         return type(self)(self.viewmat, K, right - left, bottom - top)
 
     def resized(self, longer: int) -> Self:
-        """Return the camera of the same view at another resolution, the longer side having so many pixels."""
+        """Return the camera of the same view with another length of the longer side, in pixels."""
         scale = longer / max(self.width, self.height)
         width, height = (max(1, round(side * scale)) for side in (self.width, self.height))
         K = self.K.clone()
@@ -126,7 +126,7 @@ def intrinsics(fov_y: float, width: int, height: int) -> Tensor:
 
 
 def orbit_direction(azimuth: float, polar: float) -> Tensor:
-    """Return the unit vector [3], float64, from the origin to (azimuth, polar) in degrees.
+    """Return the unit vector [3], float64, that points to (azimuth, polar) in degrees.
 
     Cameras and lights share it: (cos az cos pol, sin pol, -sin az cos pol), so azimuth 0 is +x, -90 is +z
     and polar 90 is straight up.
@@ -147,7 +147,7 @@ def orbit(
     """Return the camera on a sphere around a target [3] that looks at the target; float32.
 
     Angles are in degrees: for azimuth and polar see `orbit_direction`, the field of view is vertical. The
-    poles are as good as any other place.
+    poles are allowed.
     """
     require_numbers(azimuth=azimuth, polar=polar, radius=radius)
     if not isfinite(azimuth):

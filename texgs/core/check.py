@@ -31,7 +31,7 @@ def shape(name: str, tensor: Tensor, spec: str, **known: int) -> dict[str, int]:
 
 
 def bind(actual: tuple[int, ...], spec: str, known: dict[str, int]) -> dict[str, int] | None:
-    """Return the sizes of the names in `spec` for a shape, or None where the shape does not fit."""
+    """Return the sizes of the names in `spec` for a shape, or None if it does not fit."""
     tokens = spec.split()
     if len(tokens) != len(actual):
         return None
@@ -46,7 +46,7 @@ def bind(actual: tuple[int, ...], spec: str, known: dict[str, int]) -> dict[str,
 
 
 def _hint(actual: tuple[int, ...], spec: str, known: dict[str, int]) -> str:
-    """Return what a user most likely did: a transpose, or a missing or superfluous axis."""
+    """Return the likely mistake: a transpose, or a missing or superfluous axis."""
     remedies = (
         (len(actual) == 2, actual[::-1], "did you transpose?"),
         (len(actual) > 0, (*actual, 1), "add the last axis with unsqueeze(-1)"),
@@ -92,7 +92,7 @@ def finite(**tensors: Tensor | None) -> None:
 
 
 def constant(**tensors: Tensor | None) -> None:
-    """Refuse tensors (None is skipped) that expect a gradient where none is computed."""
+    """Refuse tensors (None is skipped) that require a gradient that is not computed."""
     for name, tensor in tensors.items():
         if tensor is not None and tensor.requires_grad and torch.is_grad_enabled():
             raise ArgumentError(
@@ -101,7 +101,7 @@ def constant(**tensors: Tensor | None) -> None:
 
 
 def torch_device(name: str) -> torch.device:
-    """Return a device of torch by its name; refuse others, and a GPU where torch sees none."""
+    """Return a torch device by name; refuse unknown ones, and a GPU that torch cannot see."""
     if name not in ("cpu", "cuda"):
         raise DeviceError(f"device: expected cpu or cuda, got {name}")
     if name == "cuda" and not torch.cuda.is_available():

@@ -1,4 +1,4 @@
-"""Cuts of a scene: planes and a box that take away what is beyond them, in world units."""
+"""Cuts of a scene: planes and a box that remove everything beyond them, in world units."""
 
 from dataclasses import dataclass, field
 from itertools import product
@@ -9,37 +9,42 @@ from texgs.core.keys import REQUIRED, key
 
 AXES = "xyz"
 FACES = ("shaded", "unlit")
-MOST_PLANES = 6
-UNIT = 1e-9  # difference of a length to 1 that is left alone: a plane that is read again is the same
-FAR = 1e6  # world units; single precision holds such coordinates
+MAX_PLANES = 6
+LENGTH_TOLERANCE = 1e-9  # deviation from length 1 that is not normalised, so that planes survive a round trip
+MAX_COORDINATE = 1e6  # world units; float32 holds such coordinates
 
 
 @dataclass(frozen=True)
 class Plane:
-    """Keeps the points x with normal . x <= offset; the normal is made a unit vector."""
+    """Keeps the points x with normal . x <= offset; the normal is normalised."""
 
-    normal: list[float] = key(REQUIRED, "[3], points to what is taken away", least=-FAR, most=FAR)
-    offset: float = key(0.0, "from the origin along the normal", "world units", least=-FAR, most=FAR)
+    normal: list[float] = key(
+        REQUIRED, "[3], points to what is taken away", least=-MAX_COORDINATE, most=MAX_COORDINATE
+    )
+    offset: float = key(
+        0.0, "from the origin along the normal", "world units", least=-MAX_COORDINATE, most=MAX_COORDINATE
+    )
 
     def __post_init__(self) -> None:
         length = hypot(*self.normal)
-        if len(self.normal) != 3 or length < 1 / FAR:
+        if len(self.normal) != 3 or length < 1 / MAX_COORDINATE:
             raise ArgumentError(f"normal: expected three numbers that are not all 0, got {self.normal}")
-        if abs(length - 1) > UNIT:
+        if abs(length - 1) > LENGTH_TOLERANCE:
             object.__setattr__(self, "normal", [each / length for each in self.normal])
             object.__setattr__(self, "offset", self.offset / length)
-        if not abs(self.offset) <= FAR:
+        if not abs(self.offset) <= MAX_COORDINATE:
             raise ArgumentError(
-                f"offset: expected at most {FAR:g} world units along the unit normal, got {self.offset:g}"
+                f"offset: expected at most {MAX_COORDINATE:g} world units along the unit normal, "
+                f"got {self.offset:g}"
             )
 
 
 @dataclass(frozen=True)
 class Box:
-    """Keeps the points between two corners; its sides are along the axes of the world."""
+    """Keeps the points between two corners; its sides follow the world axes."""
 
-    low: list[float] = key(REQUIRED, "corner [3]", "world units", least=-FAR, most=FAR)
-    high: list[float] = key(REQUIRED, "corner [3]", "world units", least=-FAR, most=FAR)
+    low: list[float] = key(REQUIRED, "corner [3]", "world units", least=-MAX_COORDINATE, most=MAX_COORDINATE)
+    high: list[float] = key(REQUIRED, "corner [3]", "world units", least=-MAX_COORDINATE, most=MAX_COORDINATE)
 
     def __post_init__(self) -> None:
         is_box = len(self.low) == len(self.high) == 3
@@ -50,30 +55,30 @@ class Box:
 
     @property
     def planes(self) -> list[Plane]:
-        """Return those of the six sides."""
+        """Return the planes of the six sides."""
         sides = product(range(3), ((1.0, self.high), (-1.0, self.low)))
         return [Plane(along(axis, sign), sign * corner[axis]) for axis, (sign, corner) in sides]
 
 
 @dataclass(frozen=True)
 class Cuts:
-    """What is shown of a scene: what all planes and the box keep."""
+    """The visible part of a scene: the intersection of all planes and the box."""
 
     planes: list[Plane] = field(default_factory=list)
     box: Box | None = None
     faces: str = key("shaded", "by the normal of the plane, or unlit", choices=FACES)
 
     def __post_init__(self) -> None:
-        if len(self.planes) > MOST_PLANES:
-            raise ArgumentError(f"planes: expected at most {MOST_PLANES}, got {len(self.planes)}")
+        if len(self.planes) > MAX_PLANES:
+            raise ArgumentError(f"planes: expected at most {MAX_PLANES}, got {len(self.planes)}")
 
     def __bool__(self) -> bool:
-        """Return whether anything may be taken away."""
+        """Return whether there is any cut."""
         return bool(self.planes or self.box)
 
     @property
     def half_spaces(self) -> list[Plane]:
-        """Return all planes, those of the box behind the others."""
+        """Return all planes, ending with those of the box."""
         return [*self.planes, *(self.box.planes if self.box else ())]
 
 
@@ -81,5 +86,5 @@ NO_CUTS = Cuts()
 
 
 def along(axis: int, sign: float = 1.0) -> list[float]:
-    """Return the unit vector of an axis, 0 to 2, or with sign -1 the one against it."""
+    """Return the unit vector along an axis, 0 to 2, or against it with sign -1."""
     return [sign * (axis == each) for each in range(3)]

@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-LONGEST = 600  # letters of a message; a damaged file can be quoted at any length
-END = 250  # letters that are kept at the end, where it says what to do
+MAX_LETTERS = 600  # letters of a message; a damaged file can be quoted at any length
+END_LETTERS = 250  # letters kept at the end, where the advice is
 
 
 class TexgsError(Exception):
@@ -37,7 +37,7 @@ class NativeError(TexgsError, RuntimeError):
 
 
 class ConfigError(TexgsError, ValueError):
-    """A key of the configuration is unknown, or its value is not one that is possible."""
+    """A key of the configuration is unknown, or its value is impossible."""
 
 
 class MissingDataError(ConfigError):
@@ -49,8 +49,8 @@ class FitError(TexgsError, ArithmeticError):
 
 
 @contextmanager
-def located(where: object, between: str = ": ") -> Iterator[None]:
-    """Put where it happened, such as a path, before the message of an error of texgs."""
+def errors_at(where: object, between: str = ": ") -> Iterator[None]:
+    """Prefix the messages of texgs errors with their origin, such as a path."""
     try:
         yield
     except TexgsError as error:
@@ -62,14 +62,14 @@ def printable(text: str) -> str:
 
     Names in files can hold sequences that move the cursor, or letters that turn the direction of the text.
     """
-    if len(text) > LONGEST:
-        text = f"{text[: LONGEST - END]} ... {text[-END:]}"
+    if len(text) > MAX_LETTERS:
+        text = f"{text[: MAX_LETTERS - END_LETTERS]} ... {text[-END_LETTERS:]}"
     letters = re.sub(r"\s", " ", text)
     return "".join(x if x.isprintable() else x.encode("unicode_escape").decode() for x in letters)
 
 
 def first_line(error: Exception) -> str:
-    """Return enough of an error to recognise it, on one line."""
+    """Return the first line of an error, enough to recognise it."""
     lines = str(error).strip().splitlines()
     text = lines[0] if lines else type(error).__name__
     return text if len(text) <= 120 else f"{text[:120]}..."

@@ -1,4 +1,4 @@
-"""Figures of Matplotlib, made without a screen and always of the same bytes, and grids of pictures."""
+"""Reproducible Matplotlib figures without a screen, and grids of pictures."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
     from torch import Tensor
 
 DPI = 200
-LEFT, CELL, GAP = 0.3, 1.86, 0.08  # inches: the names of the rows, a cell, and what is free behind it
-COLUMNS = 5  # of a page of 10 inches; cells of a row with more are narrower
-TOP, HEAD, FOOT = 0.4, 0.25, 0.28  # inches: the title of the page, and the lines above and below a cell
+LEFT, CELL, GAP = 0.3, 1.86, 0.08  # inches: row names, a cell, and the gap after it
+COLUMNS = 5  # of a 10-inch page; rows with more cells have narrower ones
+TOP, HEAD, FOOT = 0.4, 0.25, 0.28  # inches: page title, and the lines above and below a cell
 LINE = 0.15  # inches of each further line of a title
-LARGE, MEDIUM, SMALL = 11, 9, 8  # points
-LETTER = 0.6  # mean width of a letter, of its size
+LARGE, MEDIUM, SMALL = 11, 9, 8  # font sizes, points
+LETTER = 0.6  # mean width of a letter, in font sizes
 CENTERED: dict[str, Any] = {"ha": "center", "va": "center"}
 THRESHOLD = 0.02  # difference from the background, as a share of the brightest value
 MARGIN = 4  # pixels
 
 
 def new_figure(width: float, height: float, dpi: float, layout: str | None = "constrained") -> Figure:
-    """Return an empty figure of a size in inches; without a layout its axes stay where they are put."""
+    """Return an empty figure, size in inches; without a layout, axes keep their places."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # slow to import
     from matplotlib.figure import Figure
 
@@ -54,13 +54,13 @@ def as_picture(figure: Figure) -> Image.Image:
 
 
 def words(text: str) -> str:
-    """Return a text that Matplotlib shows letter by letter: between dollar signs it expects mathematics."""
+    """Escape a text so that Matplotlib shows dollar signs instead of reading mathematics."""
     return text.replace("$", r"\$")
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Which colours stand for which values."""
+    """A colour map over a range of values."""
 
     low: float
     high: float
@@ -77,7 +77,7 @@ class Scale:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """One picture, words in its place, or nothing."""
+    """One picture, words instead of it, or nothing."""
 
     title: str = ""
     pixels: Tensor | np.ndarray | None = None  # [H, W, 3] in [0, 1] or uint8
@@ -144,7 +144,7 @@ def draw(path: str | Path, rows: Sequence[Row], title: str = "", columns: int = 
 
 
 def lay_out(rows: Sequence[Row], title: str = "", columns: int = COLUMNS) -> Figure:
-    """Return a figure of rows, whose pictures are of one size, as wide as so many columns at most."""
+    """Lay out rows of equally large pictures in a figure with at most a given number of columns."""
     height, width = next(x.pixels.shape[:2] for row in rows for x in row.cells if x.pixels is not None)
     columns = min(columns, max(len(row.cells) for row in rows))
     across = columns * (CELL + GAP)
@@ -162,7 +162,7 @@ def lay_out(rows: Sequence[Row], title: str = "", columns: int = COLUMNS) -> Fig
 
 
 def draw_row(figure: Figure, row: Row, top: float, wide: float, tall: float) -> None:
-    """Draw cells of a size at a distance from the upper border, in inches."""
+    """Draw a row of cells; sizes and the distance from the upper border are in inches."""
     page_width, page = figure.get_size_inches()
 
     def axes_at(left: float, top: float, width: float, height: float) -> Axes:
@@ -184,13 +184,13 @@ def draw_row(figure: Figure, row: Row, top: float, wide: float, tall: float) -> 
 
 
 def fitting(texts: Iterable[str], inches: float) -> float:
-    """Return the size of letters, points, at which the longest line of some texts has room."""
+    """Return the font size, points, at which the longest line of some texts fits."""
     longest = max((len(line) for text in texts for line in text.splitlines()), default=0)
     return min(MEDIUM, 72 * inches / (LETTER * max(longest, 1)))
 
 
 def fill(axes: Axes, cell: Cell, size: float) -> None:
-    """Draw the picture with its title above and its words below, or what there is in its place."""
+    """Draw a cell: its picture or words, with the title above and the caption below."""
     axes.set_title(words(cell.title), fontsize=size, pad=4)
     if cell.pixels is None:
         axes.set_frame_on(bool(cell.words))
@@ -202,7 +202,7 @@ def fill(axes: Axes, cell: Cell, size: float) -> None:
 
 
 def fill_bar(axes: Axes, scale: Scale) -> None:
-    """Draw all colours of a scale, between the values of its ends."""
+    """Draw the colour bar of a scale with the values at its ends."""
     import torch
 
     axes.imshow(scale(torch.linspace(scale.low, scale.high, 256))[None].numpy(), aspect="auto")
@@ -211,7 +211,7 @@ def fill_bar(axes: Axes, scale: Scale) -> None:
 
 
 def content(pictures: Sequence[np.ndarray]) -> tuple[slice, slice]:
-    """Return rows and columns of the smallest square, or what fits of it, with all but the background."""
+    """Return rows and columns of the smallest square, clipped to the image, around the content."""
     seen = np.zeros(pictures[0].shape[:2], dtype=bool)
     for picture in pictures:
         seen |= np.abs(picture.astype(float) - picture[0, 0]).max(axis=2) > THRESHOLD * picture.max()

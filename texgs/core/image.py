@@ -18,7 +18,7 @@ from texgs.core.memory import require_memory
 
 # Pillow opens more: some formats by other programs, which a file should not be able to start.
 FORMATS = ("PNG", "JPEG", "WEBP", "GIF", "TIFF", "BMP", "PPM", "JPEG2000", "AVIF", "TGA")
-FAST = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE)
+FAST_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE)
 BYTES = 32  # bytes of memory for a pixel: as it is stored, in RGBA, and as floats
 
 
@@ -74,7 +74,7 @@ def write_png(path: str | Path, color: Tensor, alpha: Tensor | None = None) -> P
     pixels = np.asarray(to_pillow(color, alpha))
     if pixels.ndim == 3:
         pixels = cv2.cvtColor(pixels, cv2.COLOR_RGBA2BGRA if pixels.shape[2] == 4 else cv2.COLOR_RGB2BGR)
-    _, encoded = cv2.imencode(".png", pixels, FAST)
+    _, encoded = cv2.imencode(".png", pixels, FAST_PNG)
     return write_bytes(path, encoded.tobytes())
 
 

@@ -10,18 +10,18 @@ from operator import ge, gt, le, lt
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, cast
 
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.names import close, is_number
 
 T = TypeVar("T")
-LARGEST = 2**63 - 1
+MAX_INTEGER = 2**63 - 1
 REQUIRED = "???"  # the default of a key that has none, in Hydra's words
 BOOLEANS = {
     **dict.fromkeys(("true", "yes", "on", "y", "1"), True),
     **dict.fromkeys(("false", "no", "off", "n", "0"), False),
 }
-EXPECTED = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
-LONGEST = 60  # letters of a value in a sentence
+TYPE_WORDS = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
+MAX_LETTERS = 60  # letters of a value in a sentence
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Bounds:
 
     def complaint(self, value: float) -> str | None:
         """Return what was expected of a number that is not allowed; None for one that is."""
-        if isinstance(value, int) and abs(value) > LARGEST:
+        if isinstance(value, int) and abs(value) > MAX_INTEGER:
             return "an integer of 64 bits"
         if not is_number(value):
             return "a finite number"
@@ -118,7 +118,7 @@ def typed(kind: type[T], values: Mapping[str, Any], key: str = "") -> T:
     known = fields_of(cast(Any, kind))
     made = {}
     for name, value in _table(values, key).items():
-        at = f"{key}.{name:.{LONGEST}}" if key else f"{name:.{LONGEST}}"
+        at = f"{key}.{name:.{MAX_LETTERS}}" if key else f"{name:.{MAX_LETTERS}}"
         if name not in known:
             raise UnknownKey(at, f"no such key{close(name, known)}", value)
         hint, field = known[name]
@@ -135,7 +135,7 @@ def typed(kind: type[T], values: Mapping[str, Any], key: str = "") -> T:
 def typed_argument(kind: type[T], values: Mapping[str, Any], key: str = "") -> T:
     """Return what `typed` does. What is wrong is an ArgumentError that begins with the key."""
     try:
-        with located(key) if key else nullcontext():
+        with errors_at(key) if key else nullcontext():
             return typed(kind, values, key)
     except ValueMismatch as error:
         raise ArgumentError(str(error)) from error
@@ -150,8 +150,8 @@ def mismatch(key: str, expected: str, value: Any) -> ValueMismatch:
         got = "a list"
     else:
         got = kinds.get(type(value), str(value))
-    if len(got) > LONGEST:
-        got = f"{got[:LONGEST]}... ({len(got)} characters)"
+    if len(got) > MAX_LETTERS:
+        got = f"{got[:MAX_LETTERS]}... ({len(got)} characters)"
     return ValueMismatch(key, f"expected {expected}, got {got}", value)
 
 
@@ -227,13 +227,13 @@ def _single(hint: type, value: Any, key: str) -> Any:
             raise mismatch(key, "a finite number", value) from error
         except ValueError:
             pass  # told below
-    raise mismatch(key, EXPECTED[hint], value)
+    raise mismatch(key, TYPE_WORDS[hint], value)
 
 
 def _chosen(choices: Sequence[str], value: Any, key: str) -> str:
     """Return a value that is one of the choices."""
     if value not in choices:
-        got = f"{value!s:.{LONGEST}}{close(value, choices)}"
+        got = f"{value!s:.{MAX_LETTERS}}{close(value, choices)}"
         raise ValueMismatch(key, f"expected one of {', '.join(choices)}, got {got}", value)
     return str(value)
 

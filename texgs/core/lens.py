@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from math import isqrt, radians, sqrt, tan
 from typing import Literal, NamedTuple, Self
 
-from texgs.core.cuts import FAR
+from texgs.core.cuts import MAX_COORDINATE
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import REQUIRED, key
 from texgs.core.names import require_numbers
 
 ORIGIN = (0.0, 0.0, 0.0)
-FILLED = 0.9  # share of the smaller side of an image that shows what is framed
+FILL_SHARE = 0.9  # share of the smaller side of an image that shows what is framed
 
 
 class Lens(NamedTuple):
@@ -32,8 +32,10 @@ class Lens(NamedTuple):
 class Frame:
     """What cameras look at: the ball of what is visible."""
 
-    target: list[float] = key(REQUIRED, "its centre [3]", "world units", least=-FAR, most=FAR)
-    radius: float = key(REQUIRED, "its radius", "world units", above=0, most=FAR)
+    target: list[float] = key(
+        REQUIRED, "its centre [3]", "world units", least=-MAX_COORDINATE, most=MAX_COORDINATE
+    )
+    radius: float = key(REQUIRED, "its radius", "world units", above=0, most=MAX_COORDINATE)
 
     def __post_init__(self) -> None:
         if len(self.target) != 3:
@@ -56,7 +58,7 @@ class Frame:
         require_numbers(fov_y=fov_y, width=width, height=height)
         if not 0 < fov_y < 180:
             raise ArgumentError(f"fov_y: expected degrees between 0 and 180, got {fov_y}")
-        tangent = FILLED * tan(radians(0.5 * fov_y)) * min(1.0, max(width, 1) / max(height, 1))
+        tangent = FILL_SHARE * tan(radians(0.5 * fov_y)) * min(1.0, max(width, 1) / max(height, 1))
         distance = self.radius * sqrt(1 + tangent**-2) if radius is None else radius
         return Lens(distance, fov_y, width, height, self.target if target is None else target)
 
@@ -70,7 +72,11 @@ class LensKeys:
     fov_y: float = key(30.0, "vertical field of view", "degrees", above=0, below=180, option="fov")
     radius: float | None = key(None, "distance from the target; default by the frame", "world units", above=0)
     target: tuple[float, float, float] | None = key(
-        None, "what the camera looks at; default the middle of the frame", "world units", least=-FAR, most=FAR
+        None,
+        "what the camera looks at; default the middle of the frame",
+        "world units",
+        least=-MAX_COORDINATE,
+        most=MAX_COORDINATE,
     )
     frame: Literal["scene", "paper"] = key(
         "scene", "what is centred on 90 % of the picture; paper: cameras 4.0311 from the origin"

@@ -16,13 +16,17 @@ from texgs.core.io import require_place, write_atomic
 from texgs.core.memory import require_memory
 
 KINDS = (".png", ".gif", ".mp4")
-MOST_FPS, MOST_GIF_FPS = 240.0, 50.0  # browsers slow down shorter frames of a GIF
-LEAST_GIF_FPS = 0.01  # a GIF counts hundredths of a second in 16 bits
-FINE = 18  # constant rate factor of H.264 that looks like the frames
+MAX_FPS, MAX_GIF_FPS = 240.0, 50.0  # browsers slow down shorter frames of a GIF
+MIN_GIF_FPS = 0.01  # a GIF counts hundredths of a second in 16 bits
+QUALITY_CRF = 18  # constant rate factor of H.264 that looks like the frames
 
 
 def write_frames(
-    path: str | Path, frames: Iterable[np.ndarray], fps: float = 25.0, crf: int = FINE, comment: str = ""
+    path: str | Path,
+    frames: Iterable[np.ndarray],
+    fps: float = 25.0,
+    crf: int = QUALITY_CRF,
+    comment: str = "",
 ) -> Path:
     """Write frames as they come and return the path; the file appears when it is complete.
 
@@ -34,11 +38,11 @@ def write_frames(
     path = Path(path)
     if path.suffix not in ("", *KINDS):
         raise ArgumentError(f"{path}: expected {', '.join(KINDS)} or a folder, got {path.suffix}")
-    if not 0 < fps <= MOST_FPS:
-        raise ArgumentError(f"fps: expected more than 0 and at most {MOST_FPS:g}, got {fps}")
-    if path.suffix == ".gif" and not LEAST_GIF_FPS <= fps <= MOST_GIF_FPS:
+    if not 0 < fps <= MAX_FPS:
+        raise ArgumentError(f"fps: expected more than 0 and at most {MAX_FPS:g}, got {fps}")
+    if path.suffix == ".gif" and not MIN_GIF_FPS <= fps <= MAX_GIF_FPS:
         raise ArgumentError(
-            f"fps: expected {LEAST_GIF_FPS:g} to {MOST_GIF_FPS:g} in a GIF, got {fps}; write an MP4 film"
+            f"fps: expected {MIN_GIF_FPS:g} to {MAX_GIF_FPS:g} in a GIF, got {fps}; write an MP4 film"
         )
     if path.suffix == "" and (there := min(path.glob(f"{'[0-9]' * 4}.png"), default=None)):
         raise ArgumentError(

@@ -23,11 +23,11 @@ SCENE, METRICS, PAGE = "scene.yaml", "metrics.json", "scene.html"  # as jobs wri
 STYLE = "style"  # how the names of pictures begin that looks follow
 POINTS = "points3d.ply"  # where fits start, in a folder of views
 SLICES = (".tif", ".tiff")  # suffixes of the files in a folder of slices
-LARGEST = 10**300  # there are whole numbers that no float can hold
-LONGEST = 100  # letters of a name
-LONGEST_PATH = 1000  # letters of a path in a file
-LONGEST_FILE = 250  # bytes of a file's name; file systems take 255, and we put a few before it
-RESERVED = "/.="  # not in names of segments: they address MODEL/SEGMENT.KEY=VALUE
+MAX_NUMBER = 10**300  # there are whole numbers that no float can hold
+MAX_NAME_LETTERS = 100  # letters of a name
+MAX_PATH_LETTERS = 1000  # letters of a path in a file
+MAX_FILE_BYTES = 250  # bytes of a file's name; file systems take 255, and we put a few before it
+RESERVED_LETTERS = "/.="  # not in names of segments: they address MODEL/SEGMENT.KEY=VALUE
 SPACES = "Zs"  # Unicode's category of all spaces; folders of macOS have some that do not break
 SEPARATORS = frozenset("/\\")  # of folders, on one system or another
 
@@ -35,17 +35,18 @@ SEPARATORS = frozenset("/\\")  # of folders, on one system or another
 def label(where: str, name: object) -> str:
     """Return a name of something in a scene or a data set: short, and of letters that a terminal can show."""
     text = str(name)  # YAML reads some names as numbers
-    if not text.strip() or len(text) > LONGEST or not text.isprintable():
+    if not text.strip() or len(text) > MAX_NAME_LETTERS or not text.isprintable():
         raise ArgumentError(
-            f"{where}: expected a name of 1 to {LONGEST} printable letters, got {text[: LONGEST + 1]!r}"
+            f"{where}: expected a name of 1 to {MAX_NAME_LETTERS} printable letters, "
+            f"got {text[: MAX_NAME_LETTERS + 1]!r}"
         )
     return text
 
 
 def require_name(name: str | None, where: str) -> None:
     """Require a name that a segment can have."""
-    if not name or any(mark in label(where, name) for mark in RESERVED):
-        raise ArgumentError(f"{where}: expected a name without {' '.join(RESERVED)}, got {name}")
+    if not name or any(mark in label(where, name) for mark in RESERVED_LETTERS):
+        raise ArgumentError(f"{where}: expected a name without {' '.join(RESERVED_LETTERS)}, got {name}")
 
 
 def file_name(where: str, name: str) -> str:
@@ -55,10 +56,10 @@ def file_name(where: str, name: str) -> str:
     name that is empty or too long are refused.
     """
     is_plain = name.isprintable() and not SEPARATORS & set(name) and not name.startswith(".")
-    if not is_plain or not name or len(name.encode()) > LONGEST_FILE:
+    if not is_plain or not name or len(name.encode()) > MAX_FILE_BYTES:
         raise ArgumentError(
             f"{where}: expected a name that a file can have, without / and \\, control characters and a dot "
-            f"at its start, of at most {LONGEST_FILE} bytes; got {name[: LONGEST + 1]!r}"
+            f"at its start, of at most {MAX_FILE_BYTES} bytes; got {name[: MAX_NAME_LETTERS + 1]!r}"
         )
     return name
 
@@ -90,7 +91,7 @@ def new_part_file(where: str, folder: Path, *names: str) -> Path:
 
 def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> Path:
     """Return the file that another file in a folder names, there or elsewhere; it is only read."""
-    is_path = isinstance(path, str) and 0 < len(path) <= LONGEST_PATH
+    is_path = isinstance(path, str) and 0 < len(path) <= MAX_PATH_LETTERS
     if not is_path or not all(each.isprintable() or category(each) == SPACES for each in str(path)):
         raise ArgumentError(f"{where}: expected the path of {kind}, got {path!r:.100}")
     return folder / str(path)
@@ -117,7 +118,7 @@ def is_number(value: object) -> bool:
     """Return whether a value is a finite number; true and false are none."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
-    return abs(value) <= LARGEST and isfinite(value)
+    return abs(value) <= MAX_NUMBER and isfinite(value)
 
 
 def require_numbers(**values: object) -> None:

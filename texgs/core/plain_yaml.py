@@ -7,7 +7,7 @@ import yaml
 
 from texgs.core.errors import ArgumentError
 
-DEEPEST = 20  # tables and lists in one another
+MAX_DEPTH = 20  # tables and lists in one another
 # YAML 1.1 takes 5e-1 and 1e3 for text, because they have no point or no sign.
 NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$")
 
@@ -26,8 +26,8 @@ class PlainLoader(yaml.SafeLoader):  # type: ignore[misc]
             line = self.peek_event().start_mark.line + 1
             raise ArgumentError(f"expected values, got the tag {tag} in line {line}; leave it out")
         self.depth += 1
-        if self.depth > DEEPEST:
-            raise ArgumentError(f"expected at most {DEEPEST} tables and lists in one another, got more")
+        if self.depth > MAX_DEPTH:
+            raise ArgumentError(f"expected at most {MAX_DEPTH} tables and lists in one another, got more")
         node = super().compose_node(parent, index)
         self.depth -= 1
         return node

@@ -33,7 +33,7 @@ def _within(variable: ContextVar[T], value: T) -> Iterator[None]:
         variable.reset(before)
 
 
-def watched(watch: Watch) -> AbstractContextManager[None]:
+def watching(watch: Watch) -> AbstractContextManager[None]:
     """Call a function for each item that a loop of this thread has done within the block.
 
     It gets the title of the loop, the number of items done and their total, where that is known. What it
@@ -191,7 +191,7 @@ def interrupts_between_items() -> Iterator[None]:
 
     signal.signal(signal.SIGINT, note)
     try:
-        with watched(end):
+        with watching(end):
             yield
             end()
     finally:

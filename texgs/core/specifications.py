@@ -41,7 +41,7 @@ def specifications(package: str, attribute: str) -> dict[str, Any]:
     return dict(sorted(defined.items()))
 
 
-def named(name: str) -> Any:
+def import_name(name: str) -> Any:
     """Return what a module defines, by a name such as "texgs.fields.voxels:read_voxels"."""
     module, _, attribute = name.partition(":")
     return getattr(import_specification(module), attribute)

@@ -32,8 +32,8 @@ DTYPES = {
     torch.uint8: "U8",
     torch.bool: "BOOL",
 }
-ALIGNED = 8  # bytes
-LONGEST_WORD = 1000  # letters of a text in a pickle; torch's search for a cause takes the square of it
+ALIGNMENT = 8  # bytes
+MAX_TEXT_LETTERS = 1000  # letters of a text in a pickle; torch's search for a cause takes the square of it
 OLD_PICKLES = 5  # one after the other at the start of a file of torch before 1.6
 
 
@@ -60,7 +60,7 @@ def write_tensors(
         start, end = end, end + x.numel() * x.element_size()
         header[name] = {"dtype": DTYPES[x.dtype], "shape": list(x.shape), "data_offsets": [start, end]}
     text = json.dumps(header).encode()
-    text += b" " * (-len(text) % ALIGNED)
+    text += b" " * (-len(text) % ALIGNMENT)
 
     def write(file: BinaryIO) -> None:
         file.write(len(text).to_bytes(8, "little") + text)
@@ -119,7 +119,7 @@ def load_torch(path: Path) -> Any:
     is_zip = is_zipfile(path)
     for pickled in _pickles(path, is_zip):
         for _, argument, _ in pickletools.genops(pickled):
-            if isinstance(argument, str | bytes) and len(argument) > LONGEST_WORD:
+            if isinstance(argument, str | bytes) and len(argument) > MAX_TEXT_LETTERS:
                 raise ValueError(f"a text of {len(argument)} letters")  # that no name of a tensor has
     try:
         with warnings.catch_warnings():

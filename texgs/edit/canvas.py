@@ -1,4 +1,4 @@
-"""What the losses of a style see of a view: the part that shows the model, with something behind it."""
+"""The image that the losses of a style compare: the visible part of a view, over a backdrop."""
 
 from collections.abc import Iterable, Sequence
 
@@ -14,9 +14,9 @@ from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.raster import Texture
 
-VIEWS = 6  # views that tell how translucent a scene is
-SEEN_ALPHA = 0.02  # pixels with less alpha are not looked at
-MARGIN, MULTIPLE = 4, 8  # pixels around what is seen, and what sides of the part are a multiple of
+VIEWS = 6  # views to measure the translucency of a scene
+SEEN_ALPHA = 0.02  # alpha; fainter pixels are ignored
+MARGIN, MULTIPLE = 4, 8  # pixels: margin around the visible part, divisor of its sides
 
 
 def require_editable(model: Surfels, surfels: Tensor | None) -> None:
@@ -44,7 +44,7 @@ def paint(
         Premultiplied colours [3, h, w] over black, alpha [h, w], and the share of chosen surfels in it.
     """
     p = {**model.parameters, "texels": texels}
-    part = around(model, camera) if recipe.cropped else camera
+    part = visible_camera(model, camera) if recipe.cropped else camera
     if recipe.is_lit:
         texture = model.shading.colors(p, part, light)
     else:
@@ -58,8 +58,8 @@ def paint(
     return planes[:3], alpha, alpha if chosen is None else planes[3].detach()
 
 
-def around(model: Surfels, camera: Camera) -> Camera:
-    """Return the camera of the part of a view that surfels can be seen in; one pixel of it at least."""
+def visible_camera(model: Surfels, camera: Camera) -> Camera:
+    """Crop a camera to the part of the view that can show surfels, at least one pixel."""
     box = screen_box(model.parameters, model.shading.options, camera)
     left, top = min(max(box.left, 0), camera.width - 1), min(max(box.top, 0), camera.height - 1)
     right, bottom = min(box.right, camera.width), min(box.bottom, camera.height)
@@ -67,13 +67,13 @@ def around(model: Surfels, camera: Camera) -> Camera:
 
 
 def visible_part(alpha: Tensor) -> tuple[slice, slice]:
-    """Return rows and columns of the smallest part of alpha [h, w] with all that is seen, and a margin."""
+    """Return rows and columns of the visible part of alpha [h, w], with a margin."""
     seen = alpha > SEEN_ALPHA
     return visible_range(seen.any(dim=1)), visible_range(seen.any(dim=0))
 
 
 def visible_range(seen: Tensor) -> slice:
-    """Return where a row [n] has anything, widened to a multiple of pixels as far as there are any."""
+    """Return the range of true values in a row [n], widened to a multiple of pixels where possible."""
     used = seen.nonzero()[:, 0]
     if not len(used):
         return slice(0, min(MULTIPLE, len(seen)))
@@ -83,15 +83,15 @@ def visible_range(seen: Tensor) -> slice:
     return slice(start, stop)
 
 
-def some(cameras: Sequence[Camera]) -> Sequence[Camera]:
-    """Return a few of many cameras, which tell how much surfels show."""
+def few_cameras(cameras: Sequence[Camera]) -> Sequence[Camera]:
+    """Return a few evenly spread cameras, enough to measure opacity."""
     return cameras[:: -(-len(cameras) // VIEWS)]
 
 
 @torch.no_grad()
 def mean_alpha(model: Surfels, cameras: Sequence[Camera], opacity: float = 1.0) -> float:
     """Return the mean alpha of a few views of a model with a factor on its opacities, see `weighted_mean`."""
-    parts = (around(model, camera.to(model.device)) for camera in some(cameras))
+    parts = (visible_camera(model, camera.to(model.device)) for camera in few_cameras(cameras))
     nothing = model.parameters["means"][:, :1]
     return weighted_mean(model.rasterized(part, opacity, features=nothing).alpha for part in parts)
 
@@ -99,7 +99,7 @@ def mean_alpha(model: Surfels, cameras: Sequence[Camera], opacity: float = 1.0) 
 def weighted_mean(alphas: Iterable[Tensor]) -> float:
     """Return the mean alpha of pixels [h, w] of views, each weighted by its alpha; 1 where nothing shows.
 
-    Weighted so, pixels at the rim of an opaque object hardly count, and the background does not at all.
+    This weight makes the rim of an opaque object hardly count, and the background not at all.
     """
     total = square = 0.0
     for alpha in alphas:

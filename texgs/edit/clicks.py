@@ -1,4 +1,4 @@
-"""Clicks on a view as points in space, or an outline, and where other views see these points."""
+"""Clicks on a view, or an outline, as points in space, and their visibility in other views."""
 
 from dataclasses import dataclass
 
@@ -13,17 +13,17 @@ from texgs.fields.splats import REACH, geometry
 from texgs.fields.surfels.model import Surfels
 
 FAINT = 0.05  # alpha below which a click is on the background
-TOLERANCE = 0.02  # of the model's extent, by which a point may be behind what hides it: surfaces are thick
+TOLERANCE = 0.02  # in model extents: how far behind a surface a point still counts as on it
 
 
 @dataclass(frozen=True, eq=False)
 class Clicks:
-    """What a user clicked on in a rendered view, or drew around; all tensors on the model's device."""
+    """Clicks or an outline in a rendered view; all tensors are on the model's device."""
 
     camera: Camera  # of the view
     points: Tensor  # [P, 2] right and down in pixels; the centre of the first pixel is (0.5, 0.5)
     positive: Tensor  # [P] bool, whether a point is on the object or beside it
-    held: Tensor | None = None  # [H, W] bool, pixels inside of an outline that was drawn around the object
+    held: Tensor | None = None  # [H, W] bool, pixels inside an outline around the object
 
     def __post_init__(self) -> None:
         count = check.shape("points", self.points, "P 2")["P"]
@@ -33,14 +33,14 @@ class Clicks:
 
 
 def inside_of(outline: Tensor, camera: Camera) -> Tensor:
-    """Return the pixels [H, W] bool of a view whose centres an outline [V, 2] holds, by the even-odd rule."""
+    """Return the pixels [H, W] bool whose centres lie in an outline [V, 2], by the even-odd rule."""
     width, height, ends = camera.width, camera.height, outline.double()
     for x, y in ends.tolist():
         if not (0 <= x <= width and 0 <= y <= height):
             raise ArgumentError(f"outline: expected corners in {width} x {height} pixels, got ({x:g}, {y:g})")
     (x0, y0), (x1, y1) = (each.T[..., None] for each in (ends, ends.roll(-1, 0)))
     middle = torch.arange(height, device=ends.device) + 0.5
-    edge, row = ((y0 <= middle) != (y1 <= middle)).nonzero(as_tuple=True)  # that cross, left of the column
+    edge, row = ((y0 <= middle) != (y1 <= middle)).nonzero(as_tuple=True)  # edges that cross the row
     column = (x0 + (middle - y0) * (x1 - x0) / (y1 - y0) - 0.5)[edge, row].ceil().clamp(0, width).long()
     crossed = ends.new_zeros(height, width + 1).index_put_((row, column), ends.new_ones(()), accumulate=True)
     inside = crossed.cumsum(dim=1)[:, :width] % 2 == 1
@@ -51,9 +51,9 @@ def inside_of(outline: Tensor, camera: Camera) -> Tensor:
 
 @torch.no_grad()
 def places_of(model: Surfels, clicks: Clicks) -> Tensor:
-    """Return where in the world [P, 3] clicks are: on the layer of surfels that makes up most of the pixel.
+    """Return the world positions [P, 3] of clicks, on the layer of surfels that dominates the pixel.
 
-    Behind a layer that lets through more than it shows, a click is on what shows through.
+    A click passes through a layer that transmits more than it shows.
     """
     thickness = TOLERANCE * extent(model)
     places = [_place(model, clicks.camera, x, y, thickness) for x, y in clicks.points.tolist()]
@@ -61,7 +61,7 @@ def places_of(model: Surfels, clicks: Clicks) -> Tensor:
 
 
 def _place(model: Surfels, camera: Camera, x: float, y: float, thickness: float) -> Tensor:
-    """Return where the ray through a pixel meets the layer that makes up most of it, [3]."""
+    """Return the intersection [3] of a pixel's ray with the layer that dominates the pixel."""
     if not (0 <= x < camera.width and 0 <= y < camera.height):
         raise ArgumentError(
             f"point ({x:g}, {y:g}): expected a place in the view of {camera.width} x {camera.height} pixels"
@@ -74,15 +74,17 @@ def _place(model: Surfels, camera: Camera, x: float, y: float, thickness: float)
             "click on what is to be segmented"
         )
     shown = weights.nonzero()[:, 0]
-    hits, depths = met(model, camera, x, y, shown)
+    hits, depths = intersections(model, camera, x, y, shown)
     behind = depths[None] - depths[:, None]  # [K, K]
-    layers = torch.where((behind >= 0) & (behind <= thickness), weights[shown], 0.0)  # from each one on
+    layers = torch.where(
+        (behind >= 0) & (behind <= thickness), weights[shown], 0.0
+    )  # starting at each surfel
     layer = layers[layers.sum(dim=1).argmax()]
     return hits[layer.argmax()]
 
 
 def weights_at(model: Surfels, camera: Camera, column: int, row: int) -> Tensor:
-    """Return how much of a pixel each surfel makes up, [N]."""
+    """Return the blending weight [N] of each surfel in a pixel."""
     pixel = camera.crop(column, row, column + 1, row + 1)
     nothing = torch.zeros_like(model.parameters["opacities"])[:, None]
     seen = model.rasterized(pixel, features=nothing, outputs=("statistics",)).statistics
@@ -90,10 +92,12 @@ def weights_at(model: Surfels, camera: Camera, column: int, row: int) -> Tensor:
     return seen.weight_sum
 
 
-def met(model: Surfels, camera: Camera, x: float, y: float, surfels: Tensor) -> tuple[Tensor, Tensor]:
-    """Return where the ray through a place of the image meets surfels, [K, 3], and the camera z there [K].
+def intersections(
+    model: Surfels, camera: Camera, x: float, y: float, surfels: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Return the intersections [K, 3] of a pixel's ray with surfels, and their camera z [K].
 
-    Edge on, a surfel is drawn by the filter, beside where the ray meets its plane: then it is its middle.
+    The low-pass filter draws surfels seen edge on, away from their planes; these give their means.
     """
     means, quats, scales, _ = (tensor[surfels] for tensor in geometry(model.parameters))
     normals = quats_to_matrices(quats)[:, :, 2]
@@ -106,7 +110,7 @@ def met(model: Surfels, camera: Camera, x: float, y: float, surfels: Tensor) -> 
 
 
 def is_visible(pixels: Tensor, depths: Tensor, median: Tensor, tolerance: float) -> Tensor:
-    """Return which places in a view more than half of the light reaches, [P] bool.
+    """Return which points [P] bool of a view more than half of the light reaches.
 
     They have pixels [P, 2] and camera z [P], which may be behind the rasterizer's median depth [H, W] by a
     tolerance in world units.

@@ -1,4 +1,4 @@
-"""Edit views of a field again and again while it learns from them: IN2N, Instruct-GS2GS and DGE alike."""
+"""Alternate between editing the views of a field and learning from them (IN2N, Instruct-GS2GS, DGE)."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class Learner(Protocol):
 
     @property
     def original(self) -> Field:
-        """Return the field as it was at first."""
+        """Return the field before the edit."""
 
     @property
     def field(self) -> Field:
-        """Return the field as it is now."""
+        """Return the current field."""
 
     def step(self, images: Images, views: Sequence[int], generator: torch.Generator) -> float:
         """Learn from some of these views, all that memory and method allow; return the loss."""
@@ -42,7 +42,7 @@ class Learner(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PhotometricLoss:
-    """How far images are from those that an edit wants: L1, D-SSIM and LPIPS, each with its weight."""
+    """The distance of images from their edited targets: a weighted sum of L1, D-SSIM and LPIPS."""
 
     l1: float
     dssim: float
@@ -76,12 +76,12 @@ class UpdateStep(NamedTuple):
     """One iteration."""
 
     edited: Sequence[int]  # views to edit before it, together
-    level: float  # of noise, as a share
+    level: float  # noise, as a share of the schedule
     learned: Sequence[int]  # views that it may learn from
 
 
 def update_steps(schedule: UpdateSchedule, count: int, generator: torch.Generator) -> Iterator[UpdateStep]:
-    """Yield all iterations on so many views; views and levels of noise are drawn at random."""
+    """Yield all iterations on `count` views; views and noise levels are drawn at random."""
     size, following = min(schedule.views or count, count), 0
     least = ceil(size / schedule.group)
     if schedule.period < least:
@@ -115,10 +115,10 @@ def update_field(
     seed: int = 0,
     title: str = "edit",
 ) -> Updated:
-    """Edit a field by editing its training views, which it learns from as they are then.
+    """Edit a field by editing its training views while it learns from them.
 
-    The images given stay as they are. Where renders are kept, edits stay close to views of the field as it
-    was, as in DGE; else to the training views. The seed is of all random numbers.
+    The given images stay unchanged. With `keeps_renders`, edits stay close to renders of the original field,
+    as in DGE, otherwise to the training views. The seed determines all random numbers.
     """
     generator = torch.Generator().manual_seed(seed)
     updated = Updated(
@@ -138,7 +138,7 @@ def update_field(
 
 @dataclass(eq=False)
 class Updated:
-    """A field and the views that it learns from, as they are edited."""
+    """A field and its training views during an edit."""
 
     learner: Learner
     before: Images
@@ -154,9 +154,9 @@ class Updated:
 
     @torch.no_grad()
     def edit(self, ids: Sequence[int], level: float) -> None:
-        """Edit some views together, as the field shows them now."""
+        """Edit current renders of some views together."""
         start, shown = time.monotonic(), self.learner.field
-        ids = sorted(ids, key=lambda view: azimuth(self.images.cameras[view]))  # those that follow are alike
+        ids = sorted(ids, key=lambda view: azimuth(self.images.cameras[view]))  # neighbours are alike
         cameras = [self.images.cameras[view].to(shown.device) for view in ids]
         conditions = torch.stack([self._condition(view) for view in ids]).to(shown.device)
         views = field_views(shown, cameras, conditions, level)
@@ -167,7 +167,7 @@ class Updated:
         self.count, self.seconds = self.count + len(ids), self.seconds + time.monotonic() - start
 
     def _condition(self, view: int) -> Tensor:
-        """Return what edits of a view stay close to [H, W, 3]: how it was before the first of them."""
+        """Return the image [H, W, 3] that edits of a view stay close to: the view before the first edit."""
         if not self.keeps_renders:
             return self.before.target(view).color
         original = self.learner.original
@@ -175,7 +175,7 @@ class Updated:
 
     @torch.no_grad()
     def some(self, count: int) -> list[tuple[Tensor, Tensor]]:
-        """Return so many views that were edited, as they were and as they are, at most."""
+        """Return up to `count` edited views, each before and after."""
         ids = sorted(self.edited)
         chosen = ids[:: max(1, len(ids) // count)][:count]
         return [(self._condition(view), self.images.target(view).color) for view in chosen]

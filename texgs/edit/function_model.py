@@ -1,4 +1,4 @@
-"""A model of a transfer function that a scene tries on its volume, in place of the function."""
+"""Replace a transfer function on trial in a scene by a model fitted to it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -22,7 +22,7 @@ from texgs.volume.nrrd_file import open_grid
 from texgs.volume.transfer import TransferFunction, overlapping
 
 SIZE = 400  # pixels of either side of the views
-FIRST, FINER = "model", "finer model"  # in titles of steps
+FIRST_MODEL, FINER_MODEL = "model", "finer model"  # in titles of steps
 
 
 def fit_function(
@@ -34,7 +34,7 @@ def fit_function(
     *,
     soon: bool = True,
 ) -> Iterator[str]:
-    """Put a first model in the place of a function that the scene tries, then a finer one in its place.
+    """Replace a function on trial by a quick model, then that by a finer one.
 
     Views show all of what the function shows, as the other models' views show theirs. Each model is a step of
     the session; yield its name, FIRST or FINER.
@@ -52,7 +52,7 @@ def fit_function(
             nothing is to be seen, or what is replaced was changed meanwhile.
     """
     scene, given = session.scene, None
-    volume, tf = volume_of(scene), tried(scene, name)
+    volume, tf = volume_of(scene), tried_function(scene, name)
     for other, entry in scene.models.items():
         if (kind := kind_of(entry.file).name) != "surfels":
             raise ArgumentError(f"models.{other}: expected surfels, which a new model can join, got {kind}")
@@ -60,7 +60,7 @@ def fit_function(
     models = models_of(volume, tf, frame, name, device, size)
     for model in models if soon else [*models][-1:]:
         let_stop(name)
-        what = FINER if given else FIRST
+        what = FINER_MODEL if given else FIRST_MODEL
         with session.one_step(f"{name} {what}"):
             require_unchanged(session.scene, name, tf, given)
             given = write_model(file(), model)
@@ -77,22 +77,22 @@ def models_of(
     size: int = SIZE,
     **options: Any,
 ) -> Iterator[Surfels]:
-    """Yield models of what a function shows of a volume in views of a frame; for options see `fit_now`."""
+    """Yield models of a volume under a function, in views of a frame; for options see `fit_now`."""
     caster = Caster(open_grid(volume.file), volume.appearance, device)
     lens = frame.lens(width=size, height=size)
     return fit_now(caster, volume.appearance, tf, lens, name, **options)
 
 
 def require_unchanged(scene: Scene, name: str, tf: TransferFunction, given: Path | None) -> None:
-    """Require that a scene still has the function, or the model in a file, whose place a model is to take."""
+    """Require that the function, or the model in a file, to be replaced is still in the scene."""
     entry = scene.models.get(name)
     if scene.functions.get(name) != tf if given is None else entry is None or entry.file != given:
         was = "first model" if given else "function"
         raise ArgumentError(f"{name}: its {was} was changed meanwhile; make the model again")
 
 
-def tried(scene: Scene, name: str) -> TransferFunction:
-    """Return the function of a name that a scene tries, and whose model can take its place."""
+def tried_function(scene: Scene, name: str) -> TransferFunction:
+    """Return a function on trial by name, and require that a model can replace it."""
     if name not in scene.functions:
         known = ", ".join(scene.functions) or "none"
         raise ArgumentError(f"functions: expected one that the scene tries ({known}), got {name}")
@@ -105,7 +105,7 @@ def tried(scene: Scene, name: str) -> TransferFunction:
 
 
 def with_model(scene: Scene, name: str, file: Path, tf: TransferFunction) -> Scene:
-    """Return the scene with a model of a function, which is then a basic one of its volume.
+    """Return the scene with a model of a function, which becomes a basic TF of its volume.
 
     A model of the name that is there gets the file, and keeps what is edited by numbers.
     """
@@ -118,7 +118,7 @@ def with_model(scene: Scene, name: str, file: Path, tf: TransferFunction) -> Sce
 
 
 def overlap_of(scene: Scene, name: str) -> str:
-    """Return what overlaps the function of a model means, in a sentence; nothing where none does."""
+    """Return a sentence about basic TFs that overlap the function of a model, or ""."""
     tfs = scene.volume.tfs if scene.volume else {}
     others = [other for other in tfs if other != name and overlapping({name: tfs[name], other: tfs[other]})]
     if not others:

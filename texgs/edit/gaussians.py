@@ -1,4 +1,4 @@
-"""How 3D Gaussians follow a style (StyleSplat, Jain et al. 2024) or edited views (Instruct-GS2GS, DGE)."""
+"""Let 3D Gaussians follow a style (StyleSplat, Jain et al. 2024) or edited views (Instruct-GS2GS, DGE)."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from texgs.fitting.settings import CommonRates, Rates
 from texgs.models.vgg import Vgg
 from texgs.volume.images import Images
 
-HIGHER = 1 / 20  # rate of the higher harmonics in styles, against that of the zeroth
-PRUNE_EVERY = 100  # iterations
-LEAST_OPACITY, LARGEST_SCALE, LARGEST_RADIUS = 0.005, 0.1, 5.0  # scale in extents; radius in pixels
+HIGHER_RATE = 1 / 20  # rate of the higher harmonics, relative to the zeroth, for styles
+PRUNE_INTERVAL = 100  # iterations
+MIN_OPACITY, MAX_SCALE, MAX_RADIUS = 0.005, 0.1, 5.0  # scale in extents; radius in pixels
 SIGMAS = 3.0  # standard deviations of a Gaussian in its radius on screen
 
 
@@ -36,7 +36,7 @@ def stylize_gaussians(
     vgg: Vgg | None = None,
     title: str = "style",
 ) -> tuple[Gaussians, Losses]:
-    """Give Gaussians the style of a picture by training views; only their spherical harmonics change."""
+    """Stylize Gaussians on training views; only their spherical harmonics change."""
     size = cameras[0].width, cameras[0].height
     run = GaussianPainting(model, cameras, Objective.of_views(recipe, style.to(model.device), size, vgg))
     losses = learn_style(run, len(cameras), recipe, title)
@@ -45,7 +45,7 @@ def stylize_gaussians(
 
 
 class GaussianPainting:
-    """Gaussians whose harmonics are on their way to a style."""
+    """Gaussians whose harmonics learn a style."""
 
     def __init__(self, model: Gaussians, cameras: Sequence[Camera], objective: Objective) -> None:
         self.model, self.cameras, self.objective = model, cameras, objective
@@ -55,12 +55,12 @@ class GaussianPainting:
             for name, x in split(model.parameters["sh"]).items()
         }
         rate = objective.recipe.rate
-        rates = {"sh": rate, "sh_rest": HIGHER * rate}
+        rates = {"sh": rate, "sh_rest": HIGHER_RATE * rate}
         groups = [{"params": [x], "lr": rates[name]} for name, x in self.harmonics.items()]
         self.adam = torch.optim.Adam(groups, eps=1e-15, fused=True)
 
     def render(self, view: int) -> list[Painting]:
-        """Show a view over white."""
+        """Render a view over white."""
         learned = replace(self.model, parameters=join({**self.geometry, **self.harmonics}))
         shown = learned.render(self.cameras[view].to(self.model.device))
         image = shown.color.detach().permute(2, 0, 1).clamp(0, 1).requires_grad_()
@@ -77,10 +77,10 @@ class GaussianPainting:
 
 
 class GaussianLearner:
-    """Gaussians that learn from whole views by Adam, in so many iterations; the model given stays as it is.
+    """Gaussians that learn from whole views by Adam; the given model stays unchanged.
 
-    Frozen, only harmonics learn. Else `prune` removes Gaussians now and then that are faint, or large in the
-    scene or on screen.
+    If frozen, only harmonics learn. Otherwise `prune` regularly removes Gaussians that are faint, or large in
+    the scene or on screen.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class GaussianLearner:
 
     @property
     def field(self) -> Gaussians:
-        """Return the Gaussians as they are now."""
+        """Return the current Gaussians."""
         parameters = {name: x.detach() for name, x in self.optimizer.parameters.items()}
         return replace(self.original, parameters=join(parameters))
 
@@ -121,16 +121,16 @@ class GaussianLearner:
         if self.prunes:
             p = self.optimizer.parameters
             self.radii = self.radii.maximum(radii(p["means"].detach(), p["scales"].detach(), target.camera))
-            if self.iteration % PRUNE_EVERY == 0:
+            if self.iteration % PRUNE_INTERVAL == 0:
                 self._prune()
         return loss
 
     def _prune(self) -> None:
         p = {name: x.detach() for name, x in self.optimizer.parameters.items()}
         keep = (
-            (p["opacities"].sigmoid() >= LEAST_OPACITY)
-            & (p["scales"].exp().amax(dim=1) <= LARGEST_SCALE * self.extent)
-            & (self.radii <= LARGEST_RADIUS)
+            (p["opacities"].sigmoid() >= MIN_OPACITY)
+            & (p["scales"].exp().amax(dim=1) <= MAX_SCALE * self.extent)
+            & (self.radii <= MAX_RADIUS)
         )
         if bool(keep.any()):
             self.optimizer.edit_rows(len(keep), keep, {name: x[:0] for name, x in p.items()})
@@ -138,7 +138,7 @@ class GaussianLearner:
 
 
 def radii(means: Tensor, scales: Tensor, camera: Camera) -> Tensor:
-    """Return radii [N] in pixels of Gaussians by their means and raw scales [N, 3]; 0 behind the camera."""
+    """Return the radii [N] of Gaussians on screen in pixels, from means and raw scales [N, 3]; 0 behind."""
     _, z = camera.project(means)
     sides = SIGMAS * scales.exp().amax(dim=1) * camera.K[1, 1]
     return torch.where(z > 0, sides / z.clamp_min(1e-6), 0.0)

@@ -1,4 +1,4 @@
-"""Keys that all edits of a scene have, whatever their method."""
+"""Keys common to all edits of a scene."""
 
 from dataclasses import dataclass
 

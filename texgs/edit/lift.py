@@ -19,29 +19,27 @@ from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
 
-WHOLE_SHARE = 0.9  # share of a model, from which a segment may be more than what was meant
-CERTAIN_SHARE = 0.8  # share of votes from which surfels stand in for clicks that a view does not see
-AGREEMENT = 0.5  # least overlap of a mask with what other views say, or the mask model lost the object
+WHOLE_SHARE = 0.9  # share of a model above which a segment is suspiciously large
+CERTAIN_SHARE = 0.8  # share of votes above which surfels replace clicks hidden from a view
+AGREEMENT = 0.5  # smallest overlap of a mask with earlier views; below it the mask model lost the object
 TOUCH_SIGMAS = 2.0  # standard deviations of two surfels together, within which they touch
-PIECE_SHARE = (
-    0.1  # of the largest piece of what an outline selects, from which one is looked for in other views
-)
-NEIGHBOURS = 16  # surfels that one is compared with to connect them
+PIECE_SHARE = 0.1  # smallest piece to look for in other views, relative to the outline's largest
+NEIGHBOURS = 16  # nearest surfels to test for a connection
 Find = Callable[[Clicks], Tensor]  # the mask [H, W] of a view
 
 
 @dataclass(frozen=True, eq=False)
 class Lifted:
-    """A segment, and how much it rests on."""
+    """A segment, and the evidence for it."""
 
     mask: Tensor  # [N] bool
     reference: Tensor  # [H, W] bool, the mask of the view that was clicked on
-    used: int  # views whose masks have votes
-    left_out: int  # views that see nothing of the object, or whose masks disagree with the others
+    used: int  # views whose masks voted
+    left_out: int  # views without the object, or with masks that disagree
 
     @property
     def basis(self) -> str:
-        """Return how many views it rests on, in words; and whether it holds almost the whole model."""
+        """Describe the number of views behind the segment, and warn if it is almost the whole model."""
         views = f"masks of {self.used} of {self.used + self.left_out} views"
         share = float(self.mask.float().mean())
         if share < WHOLE_SHARE:
@@ -64,10 +62,10 @@ def lift(
 ) -> Lifted:
     """Segment a model by clicks on one view of it (the paper's 2D-lift-3D segmentation).
 
-    The views are visited from the one clicked on outwards. Clicks become places in space; a view gets those
-    that it sees (more than half of the light reaches them), and if it sees no positive one, a place of what
-    the views before it agree on, so that the far side of an object is found as well. A mask that contradicts
-    the views before it has no vote. An outline holds a cone in space, which cuts all masks.
+    The views are visited from the clicked one outwards. Clicks become points in space. Each view uses the
+    points it sees (more than half of the light reaches them); if it sees no positive one, it uses a point on
+    which earlier views agree, which finds the far side of an object. A mask that contradicts earlier views
+    has no vote. An outline becomes a cone in space, which crops all masks.
 
     Args:
         model: of any stage; masks are found in its own colours and textures.
@@ -82,7 +80,7 @@ def lift(
     """
     camera, find = clicks.camera, partial(view_mask, model, masks=masks, light=light)
     reference = find(clicks)
-    held = torch.ones_like(model.parameters["opacities"])  # by the cone of the outline
+    held = torch.ones_like(model.parameters["opacities"])  # share inside the outline's cone
     if clicks.held is not None:
         (cone := CentreVotes(model)).add(camera, clicks.held)
         held, clicks = cone.inside, with_middles(clicks, reference)
@@ -112,9 +110,9 @@ def lift(
 
 @torch.no_grad()
 def view_mask(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light) -> Tensor:
-    """Return the mask [H, W] bool of a view; clicks outside of what it shows are dropped.
+    """Return the mask [H, W] bool of a view; clicks outside the visible part are dropped.
 
-    The mask model sees the image cut out around what it shows, which then is larger.
+    The mask model sees a crop around the visible part, so that the object is larger.
     """
     camera = clicks.camera
     box = screen_box(model.parameters, model.shading.options, camera).within(camera.width, camera.height)
@@ -135,7 +133,7 @@ def view_mask(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light) ->
 def _mask(
     find: Find, so_far: ContributionVotes, held: Tensor, places: Tensor, positive: Tensor, camera: Camera
 ) -> Tensor | None:
-    """Return the mask of a view; None where it sees nothing of the object or contradicts the views before."""
+    """Return the mask of a view, or None if it misses the object or contradicts earlier views."""
     values = torch.stack([so_far.seen.float(), so_far.shares, held], dim=1)
     shown = so_far.shown(camera, values, ("median",))
     (has_votes, is_object, is_held), alpha = shown.color.unbind(2), shown.alpha
@@ -156,7 +154,7 @@ def _mask(
 
 
 def with_middles(clicks: Clicks, mask: Tensor) -> Clicks:
-    """Return clicks with the middles of the larger pieces of their mask [H, W], for other views."""
+    """Add the middles of the larger pieces of the mask [H, W] to clicks, for other views."""
     from scipy.ndimage import label
 
     numbers, count = label(mask.cpu().numpy())
@@ -168,7 +166,7 @@ def with_middles(clicks: Clicks, mask: Tensor) -> Clicks:
 
 
 def middle_of(mask: Tensor) -> tuple[float, float] | None:
-    """Return the place in a mask [H, W] farthest from its outline, in pixels; None in an empty one."""
+    """Return the pixel of a mask [H, W] farthest from its outline, or None if the mask is empty."""
     from scipy.ndimage import distance_transform_edt
 
     if not bool(mask.any()):
@@ -179,11 +177,11 @@ def middle_of(mask: Tensor) -> tuple[float, float] | None:
 
 
 def components_at(model: Surfels, mask: Tensor, places: Tensor) -> Tensor:
-    """Return the connected components of a segment [N] bool, not empty, that hold places [P, 3].
+    """Return the connected components of a non-empty segment [N] bool that contain points [P, 3].
 
-    Of several objects that look alike, only the one clicked on is kept so. Two surfels touch if their means
-    are within 2 standard deviations (the larger ones) of both together. A place is in the component of the
-    nearest surfel of the segment.
+    Of several similar objects this keeps only the one clicked on. Two surfels touch if their means are within
+    2 standard deviations (the larger ones) of both together. A point belongs to the component of the nearest
+    surfel of the segment.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

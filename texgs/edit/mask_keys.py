@@ -1,4 +1,4 @@
-"""Keys of segments, whoever makes them: what finds the object in views, and how its masks become surfels."""
+"""Keys of segments: the mask model, and how its masks select surfels."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ MASKS = ("mobile_sam", "sam_vit_h", "grabcut")  # the second is the paper's
 
 @dataclass(frozen=True)
 class MaskKeys:
-    """How masks are found in views around the object, and what they are turned into."""
+    """How masks are found in views around the object, and how they select surfels."""
 
     masks: str = key(
         "mobile_sam",
@@ -27,5 +27,5 @@ class MaskKeys:
 
 
 def mask_weights(masks: str) -> dict[str, str]:
-    """Return the weights of what finds the object, for `Method.weights`."""
+    """Return the weights of a mask model, for `Method.weights`."""
     return {} if masks == "grabcut" else {masks: "masks=grabcut"}

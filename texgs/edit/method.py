@@ -32,33 +32,33 @@ class MethodKeys:
     node = ""  # `edit.NAME`, for messages; `Method` sets it
 
     def check(self) -> None:
-        """Raise an ArgumentError for what is wrong with them."""
+        """Raise an ArgumentError for invalid settings."""
 
     def check_fit(self, fit: Any) -> None:
-        """Raise an ArgumentError where they do not go with those of the fit, the node `fit`."""
+        """Raise an ArgumentError if the settings contradict those of the fit, the node `fit`."""
 
     def weights(self) -> Mapping[str, str]:
-        """Return names of the weights that are needed, each with the word that does without; or ""."""
+        """Return the names of required weights, each with the setting that avoids them, or ""."""
         return {}
 
     def files(self) -> Mapping[str, Path]:
-        """Return the files that are read besides scene and views."""
+        """Return the files to read besides scene and views."""
         return {}
 
     def adds(self, models: Sequence[str]) -> Sequence[str]:
-        """Return the parts that a scene of these models has afterwards in addition."""
+        """Return the parts that the edit adds to a scene of these models."""
         return ()
 
     def picture(self) -> StylePicture | None:
-        """Return the style that the result is compared with; None where there is none, or several."""
+        """Return the style to compare the result with, or None unless there is exactly one."""
         return None
 
     def followed(self) -> str:
-        """Return what an edit follows, in tables: the name of a picture, or words."""
+        """Return the picture's name or the words that an edit follows, for tables."""
         return ""
 
     def numbers(self) -> Mapping[str, Any]:
-        """Return the numbers of the recipe that is chosen, with what is changed about it."""
+        """Return the numbers of the chosen recipe, with all changes to it."""
         return {}
 
 
@@ -73,10 +73,10 @@ class Method(Generic[Settings]):
     summary: str  # what it does, in `texgs --help`
     settings: type[Settings]  # dataclass of its keys
     run: Callable[[Any], Any]  # from a `Task[Settings]` of texgs/edit/task.py to an `EditedScene`
-    needs: frozenset[str] = frozenset()  # what fields have to be capable of, see `Capability`
-    fields: frozenset[str] = frozenset()  # kinds that it is made for; empty: all that can what it needs
-    follows: str = ""  # which of its keys, "style" or "instruction", looks of a data set have a value of
-    is_look: bool = True  # whether the scene looks different afterwards
+    needs: frozenset[str] = frozenset()  # required capabilities of fields, see `Capability`
+    fields: frozenset[str] = frozenset()  # kinds of field it supports; empty: all with these capabilities
+    follows: str = ""  # its key that a data set's looks supply: "style" or "instruction"
+    is_look: bool = True  # whether it changes the look of the scene
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():
@@ -95,7 +95,7 @@ class Method(Generic[Settings]):
             raise ConfigError(f"method {self.name}: needs: {unknown[0]} is nothing that fields can do{hint}")
 
     def _require_keys(self) -> None:
-        """Require that the keys are a dataclass of their own."""
+        """Require a separate dataclass for the keys."""
         keys, name = self.settings, getattr(self.settings, "__name__", self.settings)
         if not isinstance(keys, type) or not issubclass(keys, MethodKeys):
             raise ConfigError(f"method {self.name}: expected keys of a subclass of MethodKeys, got {name}")
@@ -104,7 +104,7 @@ class Method(Generic[Settings]):
 
     @property
     def stage(self) -> str:
-        """Return its verb, which is its stage in the workflow."""
+        """Return its verb, also the name of its stage in the workflow."""
         return f"edit_{self.name}"
 
     @property
@@ -117,9 +117,9 @@ class Method(Generic[Settings]):
         return (not self.fields or kind in self.fields) and self.needs <= kinds()[kind].can
 
     def of(self, edit: Any, followed: str | None = None) -> Settings:
-        """Return its settings among those of an edit: the schema's `Edit`, or its node in a configuration.
+        """Return its settings from an edit: the schema's `Edit`, or its node in a configuration.
 
-        `followed` is the picture or the instruction, where that is not what its settings say.
+        `followed`, a picture or an instruction, overrides the settings.
         """
         values = getattr(edit, self.name)
         settings: Any = values if isinstance(values, self.settings) else typed(self.settings, values)

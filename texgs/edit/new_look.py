@@ -1,4 +1,4 @@
-"""A new look for parts of a scene, by a picture or an instruction; nothing but the scene is needed for it."""
+"""A new look for parts of a scene from a picture or an instruction, without training views."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -11,13 +11,13 @@ from typing import Any
 import torch
 
 from texgs.core.camera import Camera, orbit
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.keys import typed_argument
 from texgs.core.progress import let_stop
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import MethodKeys, methods
 from texgs.edit.readable import raise_opacities
-from texgs.edit.task import Task, edited_by, parts_of
+from texgs.edit.task import Task, parts_of, run_method
 from texgs.fields.surfels.model import Surfels
 from texgs.scene.parts import NewLook, entry_of, look_of, part_names, with_looks
 from texgs.scene.scene import Scene
@@ -33,8 +33,8 @@ Show = Callable[[str, NewLook, Callable[[], Surfels]], None]  # a part, its look
 class LookTask(Task[Any]):
     """An edit that learns from new views around the scene, under its light: training views are not needed."""
 
-    before: Scene  # that the look is for, in which opacities are not raised
-    side: tuple[float, float] | None = None  # azimuth and polar angle of the only view; None: from all
+    before: Scene  # the scene to change, before opacities are raised
+    side: tuple[float, float] | None = None  # azimuth and polar angle of the only view; None: all sides
 
     def training_views(self, model: str) -> Sequence[View]:
         """Return the cameras on a sphere; there are no images."""
@@ -42,7 +42,7 @@ class LookTask(Task[Any]):
 
     @cached_property
     def _cameras(self) -> list[Camera]:
-        """Return the same ones for all parts."""
+        """Return the cameras, the same for all parts."""
         if self.side:
             azimuth, polar = self.side
             return [orbit(azimuth, polar, *self.lens)]
@@ -51,15 +51,15 @@ class LookTask(Task[Any]):
 
 @dataclass(frozen=True, eq=False)
 class LearnedLook:
-    """What an edit makes of some parts."""
+    """The looks that an edit gives to parts."""
 
     looks: Mapping[str, NewLook]  # by part
     how: str  # what the method worked with
-    gone: Sequence[str] = ()  # parts that were not in the scene any more
+    gone: Sequence[str] = ()  # parts no longer in the scene
 
 
 def settings_of(method: str, values: Mapping[str, Any]) -> MethodKeys:
-    """Return the settings of a method of editing from values by the names of its keys.
+    """Return the settings of a method from values by key.
 
     Raises:
         ArgumentError: for an unknown key, or a value of another type or out of range.
@@ -78,9 +78,9 @@ def look_task(
     """Return the task of giving parts a look by the settings of a method.
 
     Args:
-        scene: as it is before.
+        scene: before the edit.
         settings: of a method, checked here.
-        parts: names; none: all models, whose segments stay as they are.
+        parts: names; none: all models, with their segments unchanged.
         output: a new folder for files of the look.
         device: to learn on.
         side: azimuth and polar angle in degrees of the only view; None: views from all sides.
@@ -94,14 +94,14 @@ def look_task(
     )
 
 
-def opaque(task: LookTask) -> LookTask:
-    """Return the task with opacities in its scene at which the look can be seen, for good."""
+def readable_task(task: LookTask) -> LookTask:
+    """Raise the opacities in the task's scene permanently, so that the look can be seen."""
     task = raise_opacities(task)
     return replace(task, settings=replace(task.settings, opacity="keep"))
 
 
 def learn_look(task: LookTask, show: Show | None = None) -> LearnedLook:
-    """Return what a task, see `opaque`, makes of its parts; `show` gets parts on their way.
+    """Return what a task, see `readable_task`, makes of its parts; `show` gets parts on their way.
 
     Files of the look are written to the task's folder, which must not be there; none stays if it fails.
     """
@@ -116,7 +116,7 @@ def learn_look(task: LookTask, show: Show | None = None) -> LearnedLook:
             f"{output}: cannot be written ({error.strerror}); choose another folder"
         ) from error
     try:
-        edited = edited_by(methods()[task.edit.method], task)
+        edited = run_method(methods()[task.edit.method], task)
         let_stop(task.title)
     except BaseException:
         rmtree(output)
@@ -132,8 +132,8 @@ def give_look(session: Session, task: LookTask, title: str, show: Show | None = 
 
     Parts that are gone by then are left out, and listed. Palettes go back to those that texels are made for.
     """
-    learned = learn_look(opaque(task), show)
-    with located(f"textures are in {task.output}"), session.lock:
+    learned = learn_look(readable_task(task), show)
+    with errors_at(f"textures are in {task.output}"), session.lock:
         names = part_names(session.scene)
         there = {part: look for part, look in learned.looks.items() if part in names}
         with session.one_step(f"{', '.join(there)} {title}"):
@@ -143,6 +143,6 @@ def give_look(session: Session, task: LookTask, title: str, show: Show | None = 
 
 
 def looks_between(before: Scene, after: Scene, parts: Iterable[str]) -> dict[str, NewLook]:
-    """Return the looks that parts have afterwards, as far as they differ from what a new look begins with."""
+    """Return the looks of parts after an edit, as far as they differ from a plain new look."""
     start = with_looks(before, {part: NewLook(entry_of(before, part).texture) for part in parts})
     return {part: look_of(after, part, start) for part in parts}

@@ -1,4 +1,4 @@
-"""A new segment of a scene, from clicks on a view of one of its models; and how a mask looks before that."""
+"""A new segment of a scene from clicks on a view of a model, and a preview of its mask."""
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -26,13 +26,13 @@ from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.volume.cameras import icosphere_of
 
-MASKED, COVER = (1.0, 0.1, 0.1), 0.6  # colour over what is masked, and its opacity
-POSITIVE, NEGATIVE = (0.0, 0.7, 0.0), (0.0, 0.0, 0.9)  # of clicks
-RADIUS = 0.008  # of clicks, of the longer side
+MASK_COLOR, MASK_OPACITY = (1.0, 0.1, 0.1), 0.6  # colour over the mask, and its opacity
+POSITIVE_COLOR, NEGATIVE_COLOR = (0.0, 0.7, 0.0), (0.0, 0.0, 0.9)  # colours of clicks
+CLICK_RADIUS = 0.008  # radius, in longer sides of the picture
 
 
 class Segmented(NamedTuple):
-    """The model that a new segment was found in, and what it rests on."""
+    """The model of a new segment, and the evidence for it."""
 
     model: Surfels
     lifted: Lifted
@@ -57,13 +57,13 @@ def new_segment(
     Args:
         session: whose scene has the model; it may be edited meanwhile.
         part: MODEL/SEGMENT, a new name.
-        clicks: on a view of the model as `clicked_model` has it, and the device to compute on.
+        clicks: on a view of `clicked_model`, on the device to compute on.
         keys: how masks are found and become surfels.
         lens: of the views that vote, but for their size.
         file: returns the target, once the segment is found.
-        facts: what was clicked on, JSON, which the file says with the keys.
-        cameras: of the views that vote; default those that the keys say.
-        masks: finds the object in a view; default what the keys name.
+        facts: the clicks as JSON; the file records them with the keys.
+        cameras: of the views that vote; by default from the keys.
+        masks: mask model; by default from the keys.
         threshold: of the votes, see `lift`.
         title: of the progress bar.
     """
@@ -92,15 +92,15 @@ def new_segment(
 
 
 def clicked_model(scene: Scene, name: str, device: torch.device) -> Surfels:
-    """Return a model of a scene with the textures that it has there, alone, without other edits of the scene.
+    """Return a model of a scene alone, with its textures there but without other edits.
 
-    Clicks are on this: what an edit makes faint or hides is opaque and in front.
+    Clicks refer to this model: parts that an edit fades or hides are opaque here.
     """
     return scene.models[name].surfels()[0].to(device)
 
 
 def model_name(scene: Scene, name: str | None, where: str) -> str:
-    """Return the name of the model to segment: the one given by `where`, or that of the only model."""
+    """Return the name of the model to segment: the given one (see `where`), or the only one."""
     if not name and len(scene.models) == 1:
         return next(iter(scene.models))
     if name not in scene.models:
@@ -111,7 +111,7 @@ def model_name(scene: Scene, name: str | None, where: str) -> str:
 def clicked_mask(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light = HEADLIGHT) -> Tensor:
     """Return the mask [H, W] bool of a view from clicks on it.
 
-    A mask model that remembers images answers the second click on a view at once.
+    Mask models that remember images answer further clicks on a view at once.
     """
     places_of(model, clicks)  # they have to be on the model
     return view_mask(model, clicks, masks, light)
@@ -119,17 +119,23 @@ def clicked_mask(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light 
 
 @torch.no_grad()
 def preview(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light = HEADLIGHT) -> Tensor:
-    """Return a picture [H, W, 3] of the view that is clicked on, with its mask and the clicks."""
+    """Return a picture [H, W, 3] of the clicked view with its mask and the clicks."""
     mask = clicked_mask(model, clicks, masks, light)
     return overlay(model.render(clicks.camera, light).color.clamp(0, 1), mask, clicks)
 
 
 def overlay(image: Tensor, mask: Tensor, clicks: Clicks) -> Tensor:
     """Return an image [H, W, 3] with a mask [H, W] in red, positive clicks in green and negative in blue."""
-    shown = torch.where(mask[..., None], (1 - COVER) * image + COVER * image.new_tensor(MASKED), image)
+    shown = torch.where(
+        mask[..., None], (1 - MASK_OPACITY) * image + MASK_OPACITY * image.new_tensor(MASK_COLOR), image
+    )
     height, width = mask.shape
     rows, columns = (torch.arange(size, device=image.device) + 0.5 for size in (height, width))
     for (x, y), is_positive in zip(clicks.points.tolist(), clicks.positive.tolist(), strict=True):
-        near = (rows[:, None] - y).square() + (columns[None] - x).square() <= (RADIUS * max(mask.shape)) ** 2
-        shown = torch.where(near[..., None], image.new_tensor(POSITIVE if is_positive else NEGATIVE), shown)
+        near = (rows[:, None] - y).square() + (columns[None] - x).square() <= (
+            CLICK_RADIUS * max(mask.shape)
+        ) ** 2
+        shown = torch.where(
+            near[..., None], image.new_tensor(POSITIVE_COLOR if is_positive else NEGATIVE_COLOR), shown
+        )
     return shown

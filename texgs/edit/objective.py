@@ -1,4 +1,4 @@
-"""How far a view is from a style: NNFM and distribution of VGG features, a CLIP term, patches."""
+"""The distance of a view from a style: NNFM and distribution of VGG features, CLIP, patches."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -19,15 +19,15 @@ from texgs.models.nnfm import StyleFeatures, nnfm
 from texgs.models.vgg import STYLE_LAYERS, Vgg
 
 FeatureTerm = Callable[[Tensor], Tensor]  # image [H, W, 3] in [0, 1] to a loss []
-FINE_LAYERS = ("relu1_2", "relu2_2")  # whose distributions are compared beside that of the style's layers
+FINE_LAYERS = ("relu1_2", "relu2_2")  # layers whose distributions are compared besides the style's layers
 STRIDE = 4  # pixels between the positions of the features that NNFM compares
-ON_OBJECT = 0.5  # alpha from which a feature or a patch counts
-STYLE_FEATURES = 1100  # bytes of memory for the features of a pixel
+OBJECT_ALPHA = 0.5  # least alpha of a feature or a patch that counts
+BYTES_PER_STYLE_PIXEL = 1100  # bytes of memory for the features of a pixel
 LOSS_SCALE = 4096.0  # factor on losses going backwards: gradients of means would underflow in float16
 
 
 class ClipLoss:
-    """|C(R) - C(S)|, the distance of unit features of whole images; those of the style are computed once.
+    """|C(R) - C(S)|, the distance of unit features of whole images; the style's are computed once.
 
     It is the second term of the paper's loss for image-driven editing. The style is [H, W, 3] in [0, 1].
     """
@@ -52,7 +52,7 @@ class Objective:
     reduce: int
     vgg: Vgg | None
     style: StyleFeatures | None
-    distributions: Mapping[int, FeatureDistribution]  # by the stride of their features; none: not compared
+    distributions: Mapping[int, FeatureDistribution]  # by the stride of their features; empty: not compared
     patches: PatchStatistics | None
     clip: FeatureTerm | None
 
@@ -100,12 +100,12 @@ class Objective:
         if recipe.needs_clip and self.clip is not None:
             terms["clip"] = recipe.features * (1 - recipe.lambda_s) * self.clip(image.permute(1, 2, 0))
         if self.patches is not None:
-            where = (share > ON_OBJECT) if recipe.foreground else None
+            where = (share > OBJECT_ALPHA) if recipe.foreground else None
             terms["patches"] = recipe.patches * self.patches.distance(image, where, iteration, iteration)
         return terms
 
     def feature_terms(self, image: Tensor, share: Tensor, iteration: int) -> dict[str, Tensor]:
-        """Return those of them that compare features of VGG; see `terms`."""
+        """Return the terms that compare features of VGG; see `terms`."""
         recipe = self.recipe
         if self.style is None or self.vgg is None:
             return {}
@@ -115,7 +115,7 @@ class Objective:
         maps = self.vgg.blocks(self.small(image), wanted_layers(recipe))
         on: dict[int, Tensor | None] = dict.fromkeys(maps)
         if recipe.foreground:
-            on = {s: pooled(share, self.reduce * s, x.shape[1:]) for s, x in maps.items()}
+            on = {s: object_features(share, self.reduce * s, x.shape[1:]) for s, x in maps.items()}
         weight = recipe.features * recipe.lambda_s
         terms = {"nnfm": weight * nnfm(maps[STRIDE], self.style, on[STRIDE], recipe.queries, iteration)}
         if self.distributions:
@@ -133,12 +133,12 @@ class Objective:
         return F.mse_loss(features.float(), wanted.float())
 
     def small(self, image: Tensor) -> Tensor:
-        """Return the image [3, h, w] as features see it."""
+        """Return the image [3, h, w] at the resolution of the features."""
         return F.avg_pool2d(image[None], self.reduce)[0] if self.reduce > 1 else image
 
 
 def wanted_layers(recipe: Recipe) -> tuple[str, ...]:
-    """Return the names of the layers that the losses of a recipe look at."""
+    """Return the names of the layers that the losses of a recipe use."""
     return (*FINE_LAYERS, *STYLE_LAYERS) if recipe.distribution > 0 else STYLE_LAYERS
 
 
@@ -146,19 +146,19 @@ def wanted_layers(recipe: Recipe) -> tuple[str, ...]:
 def style_maps(
     style: StylePicture, recipe: Recipe, vgg: Vgg
 ) -> tuple[dict[int, Tensor], dict[int, Tensor | None]]:
-    """Return features [C, h, w] of a style by their stride, and which [h, w] of them count; None: all."""
+    """Return features [C, h, w] of a style by stride, and the mask [h, w] of those that count, or None."""
     height, width = style.region.shape
     what = f"features of a style of {width} x {height} pixels"
-    require_memory(STYLE_FEATURES * height * width, what, "make edit.image.pattern smaller")
+    require_memory(BYTES_PER_STYLE_PIXEL * height * width, what, "make edit.image.pattern smaller")
     maps = vgg.blocks(style.image, wanted_layers(recipe))
     regions: dict[int, Tensor | None] = {}
     for stride, features in maps.items():
         share = F.interpolate(style.region[None, None].float(), features.shape[1:], mode="area")[0, 0]
-        regions[stride] = share > ON_OBJECT if bool((share > ON_OBJECT).any()) else None
+        regions[stride] = share > OBJECT_ALPHA if bool((share > OBJECT_ALPHA).any()) else None
     return maps, regions
 
 
-def pooled(share: Tensor, side: int, size: torch.Size) -> Tensor:
-    """Return which of [h / side, w / side] features are on the object, bool, cut to the features' size."""
-    mean = F.avg_pool2d(share[None], side)[0] > ON_OBJECT
+def object_features(share: Tensor, side: int, size: torch.Size) -> Tensor:
+    """Return which features [h / side, w / side] bool are on the object, cropped to the features' size."""
+    mean = F.avg_pool2d(share[None], side)[0] > OBJECT_ALPHA
     return mean[: size[0], : size[1]]

@@ -1,4 +1,4 @@
-"""Edited views as linear equations: which bare colours of texels make them, at several opacities."""
+"""Edited views as linear equations in the bare colours of texels, at several opacities."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -19,18 +19,18 @@ from texgs.raster import Render, Texture
 from texgs.raster.losses import depth_to_normal, planar
 
 MARGIN = 11  # pixels around content: a window of SSIM
-SOFT_ALPHA = 0.05  # alpha below which colours are rather those of the neighbourhood
-NEAR, FAR = 9, 65  # pixels, windows of that neighbourhood
-FEW_ALPHA = 0.02  # mean alpha of a window below which it rather has the colour of the larger one
+SOFT_ALPHA = 0.05  # alpha below which colours blend into those of the neighbourhood
+NEAR_WINDOW, FAR_WINDOW = 9, 65  # pixels, sides of the neighbourhood's windows
+MIN_WINDOW_ALPHA = 0.02  # mean alpha below which the larger window's colour counts
 Target = Literal["colors", "images"]
 
 
 def edit_views(
     renders: Iterable[Render], cameras: Sequence[Camera], conditions: Tensor | None, level: float | None
 ) -> EditViews:
-    """Return what a guidance sees of renders over white, with depth.
+    """Return the views that a guidance edits: renders over white with depth.
 
-    Points are those of the mean depth. Fields without normals get those of the surface that these make.
+    Points lie at the mean depth. Fields without normals get normals of the surface through these points.
     Edits stay close to the conditions [V, H, W, 3], by default to the renders. The level is of noise.
     """
     images, alphas, points, normals = [], [], [], []
@@ -53,7 +53,7 @@ def edit_views(
 def render_views(
     model: Surfels, cameras: Sequence[Camera], light: Light | None, opacity: float = 1.0
 ) -> EditViews:
-    """Render a textured model for a guidance by cameras of one size; without a light, its bare colours.
+    """Render a textured model for a guidance, with cameras of one size; without a light, its bare colours.
 
     Opacities are those of the model times a factor.
     """
@@ -75,7 +75,7 @@ def render_views(
 
 
 def join_views(parts: Sequence[EditViews]) -> EditViews:
-    """Return views of several models as if they were of one scene."""
+    """Concatenate views of several models."""
     if len(parts) == 1:
         return parts[0]
     shown, conditions, alphas, points, normals = (
@@ -89,7 +89,7 @@ def join_views(parts: Sequence[EditViews]) -> EditViews:
 def light_on(model: Surfels, camera: Camera, light: Light | None) -> tuple[Tensor, Tensor]:
     """Return highlight [N, 3] and gain [N]: a fragment of bare colour c looks like highlight + gain * c.
 
-    The model is relightable; without a light, colours look as they are.
+    The model is relightable; without a light, colours are unchanged.
     """
     p, shading = model.parameters, model.shading
     black = torch.zeros_like(p["means"])
@@ -100,14 +100,14 @@ def light_on(model: Surfels, camera: Camera, light: Light | None) -> tuple[Tenso
 
 @dataclass(frozen=True, eq=False)
 class LinearObservation:
-    """One view at one opacity: how bare colours become an image, and the image wanted. Over black."""
+    """One view at one opacity, over black: the map from bare colours to an image, and its target."""
 
     model: Surfels
     opacity: float  # factor on the opacities of surfels
-    texture: Texture  # highlights and gains, both 0 for surfels that do not change
-    camera: Camera  # of the part of the view that shows anything
-    rest: Tensor  # [h, w, 1 or 3] what is in the image beside surfels that change
-    wanted: Tensor  # [h, w, 3] what they should add to the image
+    texture: Texture  # highlights and gains, both 0 for fixed surfels
+    camera: Camera  # crop to the visible part of the view
+    rest: Tensor  # [h, w, 1 or 3] contribution of fixed surfels
+    wanted: Tensor  # [h, w, 3] target for the contribution of the others
 
     @property
     def is_lit(self) -> bool:
@@ -115,9 +115,9 @@ class LinearObservation:
         return bool(self.texture.base.any())
 
     def image(self, colors: Tensor, *, plain: bool = False) -> Tensor:
-        """Return what bare colours [T, 3] add to the image [h, w, 3]; differentiable in them.
+        """Return the contribution [h, w, 3] of bare colours [T, 3] to the image; differentiable.
 
-        Plain is without highlights: then it is linear in the colours.
+        With `plain`, highlights are left out and the result is linear in the colours.
         """
         texture = replace(self.texture, texels=colors)
         if plain:
@@ -135,7 +135,7 @@ def observe(
     *,
     target: Target = "colors",
 ) -> list[list[LinearObservation]]:
-    """Return for each opacity the equations of all views.
+    """Return the equations of all views, for each opacity.
 
     An edited view says which colours surfels should have where they are seen. At another opacity the same
     colours are wanted, at the alpha of that opacity, so that nothing gets darker or paler to make up for it;
@@ -167,7 +167,7 @@ def _observation(
     goal: Tensor,
     bare: Tensor | None,
 ) -> LinearObservation:
-    """Return what colours [H, W, 3] ask for, or with the bare colours [T, 3] of the model a whole image."""
+    """Return one equation with target colours [H, W, 3], or a whole image given the bare colours [T, 3]."""
     p = model.parameters
     highlight, gain = light_on(model, camera, light)
     lit = highlight * changing[:, None], gain * changing
@@ -187,7 +187,7 @@ def _observation(
 
 
 def content(cover: Tensor) -> tuple[int, int, int, int]:
-    """Return left, top, right and bottom of what is not 0 in [H, W], with a margin; never empty."""
+    """Return left, top, right and bottom of the nonzero part of [H, W] with a margin; never empty."""
     height, width = cover.shape
     columns, rows = (cover > 0).any(dim=0).nonzero(), (cover > 0).any(dim=1).nonzero()
     if not len(columns):
@@ -197,22 +197,22 @@ def content(cover: Tensor) -> tuple[int, int, int, int]:
 
 
 def straight_colors(image: Tensor, alpha: Tensor) -> Tensor:
-    """Return colours [H, W, 3] in [0, 1] that an image over white shows, whose alpha is [H, W].
+    """Return the straight colours [H, W, 3] in [0, 1] of an image over white with alpha [H, W].
 
-    Where alpha is small, and nothing could be divided by it, they go over to the mean of what is around, and
-    so they continue beyond the silhouette.
+    Where alpha is too small to divide by, they blend into the mean of the neighbourhood, and so continue
+    beyond the silhouette.
     """
     own = (image - (1 - alpha[..., None])).clamp_min(0).minimum(alpha[..., None])  # premultiplied
     overall = own.sum(dim=(0, 1)) / alpha.sum().clamp_min(1e-6)
-    around = _mean(own, alpha, NEAR, _mean(own, alpha, FAR, overall))
+    around = _mean(own, alpha, NEAR_WINDOW, _mean(own, alpha, FAR_WINDOW, overall))
     return ((own + SOFT_ALPHA * around) / (alpha[..., None] + SOFT_ALPHA)).clamp(0, 1)
 
 
 def _mean(own: Tensor, alpha: Tensor, window: int, beyond: Tensor) -> Tensor:
-    """Return the mean colour [H, W, 3] of a window; where it is nearly empty, `beyond`."""
+    """Return the mean colour [H, W, 3] of a window, or `beyond` where the window is nearly empty."""
     planes = torch.cat([own, alpha[..., None]], dim=-1).permute(2, 0, 1)
     for _ in range(2):  # separable, and zeros beyond the border count as transparent
         sums = pad(planes, (window // 2 + 1, window // 2)).cumsum(dim=-1, dtype=torch.float64)
         planes = ((sums[..., window:] - sums[..., :-window]) / window).to(planes).mT
     *color, cover = planes
-    return (torch.stack(color, dim=-1) + FEW_ALPHA * beyond) / (cover[..., None] + FEW_ALPHA)
+    return (torch.stack(color, dim=-1) + MIN_WINDOW_ALPHA * beyond) / (cover[..., None] + MIN_WINDOW_ALPHA)

@@ -1,4 +1,4 @@
-"""StyleRF-VolVis: the free colours of a palette field follow styles; where it is stays (Tang et al. 2024)."""
+"""StyleRF-VolVis (Tang et al. 2024): stylize the free colours of a palette field; density stays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from texgs.edit.style_loop import Losses, Painting, Terms, image_variation, lear
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import free_color, light, new_networks, palette_color
-from texgs.fields.palette.rendering import RAYS, Shown, points_on, view_harmonics, visible_points
+from texgs.fields.palette.rendering import RAYS, VisiblePoints, points_on, view_harmonics, visible_points
 from texgs.fitting.colors import cluster_colors
 from texgs.fitting.rays import training_rays
 from texgs.metrics.retrieval import LUMINANCE
@@ -28,10 +28,10 @@ from texgs.raster.voxels import camera_rays
 from texgs.volume.images import Images
 
 CLUSTERS = 4  # clusters of a style's colours; the largest is its dominant one
-DRAWN, RUN = 4096, 2  # rays a step of the distillation, and neighbours among them
+DRAWN_RAYS, RUN_LENGTH = 4096, 2  # rays per step of the distillation, in runs of neighbours
 RATE, LAST_RATE = 1e-2, 7e-5  # of Adam in the distillation
 BETAS = (0.9, 0.99)
-LEAST_WEIGHT = 1e-3  # weight of points that learn
+MIN_WEIGHT = 1e-3  # smallest weight of points that learn
 
 
 def stylize_palette(
@@ -44,7 +44,7 @@ def stylize_palette(
     vgg: Vgg | None = None,
     title: str = "style",
 ) -> tuple[PaletteField, Losses, float]:
-    """Give each palette colour of a field the style of a picture; density and light stay.
+    """Stylize each palette colour of a field by a picture; density and light stay.
 
     Palette colours become the dominant ones of their styles, and free colours learn these in the steps of
     `distillation`. Then they follow the distance to the styles: of what has most of a palette colour, alone
@@ -70,9 +70,9 @@ def stylize_palette(
 
 
 class Layer(NamedTuple):
-    """What rays show of one palette colour: all that stays the same when free colours change."""
+    """The part of rays that belongs to one palette colour, as far as free colours do not change it."""
 
-    shows: Shown
+    shows: VisiblePoints
     light: Tensor  # [n, 1]
     n_rays: int
 
@@ -84,7 +84,7 @@ class Layer(NamedTuple):
 
 
 class PalettePainting:
-    """A recoloured field whose free colours are on their way to styles.
+    """A recoloured field whose free colours learn styles.
 
     They begin with the features of the palette's hash grid; networks and rays are drawn at random. By palette
     colour they follow an objective, over a grey.
@@ -110,7 +110,7 @@ class PalettePainting:
 
     @property
     def field(self) -> PaletteField:
-        """Return the field with the free colours of now."""
+        """Return the field with its current free colours."""
         free = {name: x.detach() for name, x in self.free.items()}
         return replace(self.recolored, parameters={**self.recolored.parameters, **free})
 
@@ -118,10 +118,10 @@ class PalettePainting:
         """Learn the colours of the recoloured palette at points of training rays; return the RMS error."""
         rays, adam, loss = training_rays(images), self.adam(RATE), torch.zeros(())
         for step in progress(range(steps), title=f"{title}, recoloured", unit="step"):
-            drawn, _ = rays.draw(DRAWN, RUN, self.generator)
+            drawn, _ = rays.draw(DRAWN_RAYS, RUN_LENGTH, self.generator)
             with torch.no_grad():
                 points = points_on(drawn, self.recolored.geometry, self.recolored.parameters)
-                at = visible_points(points, LEAST_WEIGHT).points.at
+                at = visible_points(points, MIN_WEIGHT).points.at
                 wanted = palette_color(at, self.recolored.parameters, self.levels).color
             loss = (free_color(at, self.free, self.levels) - wanted).square().mean()
             loss.backward()
@@ -132,13 +132,13 @@ class PalettePainting:
         return loss.sqrt().item()
 
     def render(self, view: int) -> list[Painting]:
-        """Show what a view has of each palette colour."""
+        """Render the part of a view that belongs to each palette colour."""
         camera = self.cameras[view]
         styles = zip(self.layers(camera), self.objectives, self.greys, strict=True)
         return [self.painting(camera, *each) for each in styles]
 
     def painting(self, camera: Camera, layer: Sequence[Layer], objective: Objective, grey: float) -> Painting:
-        """Show what a view has of one palette colour.
+        """Render the part of a view that belongs to one palette colour.
 
         The image is rendered without a graph, and each piece of it once more with one (deferred
         back-propagation, Zhang et al. 2022). Where a colour is cut off, it learns in the way back only.
@@ -171,7 +171,7 @@ class PalettePainting:
 
     @torch.no_grad()
     def layers(self, camera: Camera) -> list[list[Layer]]:
-        """Return what a view shows of each palette colour, in pieces of rays."""
+        """Return a layer for each palette colour of a view, in pieces of rays."""
         geometry, parameters = self.recolored.geometry, self.recolored.parameters
         colors = len(self.recolored.colors)
         pieces: list[list[Layer]] = [[] for _ in range(colors)]
@@ -180,11 +180,11 @@ class PalettePainting:
             shares = palette_color(points.at, parameters, self.levels).shares if colors > 1 else None
             for index, piece in enumerate(pieces):
                 own = points if shares is None else points.take(shares.argmax(1) == index)
-                shows = visible_points(own, LEAST_WEIGHT)
+                shows = visible_points(own, MIN_WEIGHT)
                 lit = light(shows.points.features, harmonics[shows.points.ray], parameters)
                 piece.append(Layer(shows, lit, len(rays)))
         return pieces
 
     def adam(self, rate: float) -> torch.optim.Adam:
-        """Return an optimiser of free colours at its start."""
+        """Return a new optimiser of the free colours."""
         return torch.optim.Adam([*self.free.values()], rate, BETAS, eps=1e-15, fused=True)

@@ -1,7 +1,7 @@
-"""What a new look changes of a scene beside textures: opacity, so that a person can read it, and highlights.
+"""Changes of a new look besides textures: opacity, so that a person can read it, and highlights.
 
-Where a part is translucent, a pixel shows several of its layers, whose colours average to grey. More opacity
-brings the front layer out. It also hides what is inside, of which enough has to stay visible.
+In a translucent part, a pixel shows several layers, whose colours average to grey. More opacity brings out
+the front layer, but also hides the inside, of which enough has to stay visible.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.method import MethodKeys
-from texgs.fields.part_edit import MOST_FACTOR, PartEdit
+from texgs.fields.part_edit import MAX_FACTOR, PartEdit
 
 if TYPE_CHECKING:
     import torch
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
     from texgs.scene.scene import Scene
 
 AnyTask = TypeVar("AnyTask", bound="Task[Any]")
-READABLE_ALPHA = 0.9  # mean alpha of a part from which its pattern is plain
-LARGEST_FACTOR = 16.0  # beyond this factor next to nothing changes
-KEPT_SHARE = 0.5  # share of its pixels that every part keeps
-SHOWN_SHARE = 0.1  # share of a pixel's colour from which the pixel shows a part
-VIEWS, SIZE = 6, 100  # views that are looked at, and pixels of their sides
-BISECTIONS = 5  # halvings of the interval that has a share
-CHANNELS = 32  # channels that are rasterized at once
+READABLE_ALPHA = 0.9  # mean alpha of a part above which its pattern is readable
+MAX_READABLE_FACTOR = 16.0  # largest factor on opacity; larger ones change almost nothing
+KEPT_SHARE = 0.5  # share of its pixels that every part must keep
+SHOWN_SHARE = 0.1  # share of a pixel's colour above which it shows a part
+VIEWS, SIZE = 6, 100  # number of views to measure visibility, and pixels of their sides
+BISECTIONS = 5  # halvings of the interval of a share
+CHANNELS = 32  # channels to rasterize at once
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class OpacityKeys(MethodKeys):
 
     @property
     def factor(self) -> float | None:
-        """Return the factor; None for one that follows the scene."""
+        """Return the factor, or None to choose it by the scene."""
         said = self.opacity or ("keep" if getattr(self, "recipe", "") == "paper" else "auto")
         if said in ("keep", "auto"):
             return 1.0 if said == "keep" else None
@@ -62,34 +62,34 @@ class OpacityKeys(MethodKeys):
             factor = float(said)
         except ValueError:
             factor = -1.0
-        if not 0 < factor <= MOST_FACTOR:
+        if not 0 < factor <= MAX_FACTOR:
             raise ArgumentError(
-                f"{self.node}.opacity: expected keep, auto or a factor above 0, up to {MOST_FACTOR:g}; "
+                f"{self.node}.opacity: expected keep, auto or a factor above 0, up to {MAX_FACTOR:g}; "
                 f"got {said!r:.60}"
             )
         return factor
 
 
 def raise_opacities(task: AnyTask) -> AnyTask:
-    """Return the task with the opacities in its scene that the look of its parts asks for."""
+    """Raise the opacities in the task's scene as the look of its parts requires."""
     from texgs.edit.task import parts_of
-    from texgs.scene.parts import entry_of, replaced
+    from texgs.scene.parts import entry_of, replace_entry
 
     scene, factor = task.scene, task.settings.factor
     parts = parts_of(scene, task.edit.parts)
     given = dict.fromkeys(parts, factor) if factor else readable_factors(scene, parts, task.device)
     for part, each in given.items():
         entry = entry_of(scene, part)
-        edit = replace(entry.edit, opacity=min(each * entry.edit.opacity, MOST_FACTOR))
-        scene = replaced(scene, part, replace(entry, edit=edit))
+        edit = replace(entry.edit, opacity=min(each * entry.edit.opacity, MAX_FACTOR))
+        scene = replace_entry(scene, part, replace(entry, edit=edit))
     return replace(task, scene=scene)
 
 
 def readable_factors(scene: Scene, parts: Sequence[str], device: torch.device | str) -> dict[str, float]:
-    """Return the factor on the opacity of each of some parts that makes patterns on them readable.
+    """Return a factor on the opacity of each part that makes patterns on it readable.
 
-    It brings the mean alpha of the part alone to `READABLE_ALPHA` and is at least 1. Where this would take
-    half of its pixels from a part that shows now, all factors come down together, on a logarithmic scale.
+    It raises the mean alpha of the part alone to `READABLE_ALPHA` and is at least 1. If this would hide half
+    of the pixels of a visible part, all factors fall together, on a logarithmic scale.
     """
     sight = PartVisibility.of(scene, device)
     wanted = {part: sight.readable(part) for part in parts}
@@ -105,7 +105,7 @@ def readable_factors(scene: Scene, parts: Sequence[str], device: torch.device | 
 
 @dataclass(frozen=True, eq=False)
 class PartVisibility:
-    """What a few views around a scene show of each part."""
+    """The visibility of each part in a few views around a scene."""
 
     composed: Composition
     edits: Mapping[str, PartEdit]  # by part, in the order of the composition
@@ -114,7 +114,7 @@ class PartVisibility:
 
     @classmethod
     def of(cls, scene: Scene, device: torch.device | str) -> PartVisibility:
-        """Return that of a scene of surfels, framed as its pictures are."""
+        """Measure a scene of surfels in the frame of its pictures."""
         import torch
 
         from texgs.fields.surfels.composition import Composition
@@ -135,30 +135,30 @@ class PartVisibility:
         return cls(composed, edits, marks, [camera.to(device) for camera in cameras])
 
     def readable(self, part: str) -> float:
-        """Return the factor from 1 to `LARGEST_FACTOR` that makes a part alone as opaque as is readable."""
+        """Return the factor, at most `MAX_READABLE_FACTOR`, that makes a part readable by itself."""
         from texgs.edit.canvas import weighted_mean
 
         alone = {name: replace(edit, visible=name == part) for name, edit in self.edits.items()}
 
         def is_readable(share: float) -> bool:
-            opacity = min(LARGEST_FACTOR ** (1 - share) * alone[part].opacity, MOST_FACTOR)
+            opacity = min(MAX_READABLE_FACTOR ** (1 - share) * alone[part].opacity, MAX_FACTOR)
             shares = self.shares({**alone, part: replace(alone[part], opacity=opacity)})
             return weighted_mean(each.sum(-1) for each in shares) >= READABLE_ALPHA
 
-        return float(LARGEST_FACTOR ** (1 - largest(is_readable)))
+        return float(MAX_READABLE_FACTOR ** (1 - largest(is_readable)))
 
     def pixels(self, factors: Mapping[str, float]) -> Tensor:
-        """Return how many pixels show each part [P] with factors on some opacities."""
+        """Return the number of pixels [P] that show each part, with factors on some opacities."""
         import torch
 
         edits = {
-            name: replace(edit, opacity=min(factors.get(name, 1.0) * edit.opacity, MOST_FACTOR))
+            name: replace(edit, opacity=min(factors.get(name, 1.0) * edit.opacity, MAX_FACTOR))
             for name, edit in self.edits.items()
         }
         return torch.stack([(each > SHOWN_SHARE).sum(dim=(0, 1)) for each in self.shares(edits)]).sum(0)
 
     def shares(self, edits: Mapping[str, PartEdit]) -> Iterator[Tensor]:
-        """Yield of each view what share of its pixels each part makes up [H, W, P]."""
+        """Yield the share [H, W, P] of each part in each pixel, view by view."""
         import torch
 
         from texgs.fields.surfels.composition import by_part
@@ -181,7 +181,7 @@ class PartVisibility:
 
 
 def largest(holds: Callable[[float], bool]) -> float:
-    """Return the largest share in [0, 1] at which `holds` is true; it is up to some share, and not beyond."""
+    """Return the largest share in [0, 1] for which the monotone `holds` is true."""
     if holds(1.0):
         return 1.0
     low, step = 0.0, 0.5
@@ -192,7 +192,7 @@ def largest(holds: Callable[[float], bool]) -> float:
 
 
 def two_digits(factor: float) -> float:
-    """Return a factor of at least 1 rounded down to two digits, as a person would write it."""
+    """Round a factor of at least 1 down to two digits."""
     unit = 10.0 ** (floor(log10(factor)) - 1)
     return round(floor(factor / unit + 1e-9) * unit, 1)
 
@@ -201,14 +201,14 @@ def two_digits(factor: float) -> float:
 
 
 class Highlights(NamedTuple):
-    """Highlights that a material has."""
+    """The highlights of a material."""
 
     specular: float  # k_s
     shininess: float  # beta
     tint: tuple[float, float, float] = PartEdit.tint
 
 
-# By the names of the vocabulary. Tints of metals are what these reflect straight on, linear and at most 1
+# By the names of the vocabulary. Tints of metals are their linear reflectance at normal incidence, at most 1
 # (Akenine-Moeller et al. 2018, Real-Time Rendering, table 9.2).
 MATERIALS = {
     "gold": Highlights(0.9, 20, (1.0, 0.782, 0.344)),
@@ -221,21 +221,21 @@ MATERIALS = {
 
 
 def highlights_of(instruction: str, model: Surfels, surfels: Tensor | None = None) -> dict[str, Any]:
-    """Return the values of a `PartEdit` that give a part the highlights of the material that is named.
+    """Return values for a `PartEdit` with the highlights of the material that an instruction names.
 
     The factors bring the medians of the part's own k_s and beta, as fitted, to those of the material.
 
     Args:
-        instruction: such as "make it gold"; one that says anything else, too, changes nothing: {}.
+        instruction: such as "make it gold"; if it says anything more, the result is {}.
         model: relightable.
-        surfels: [N] bool, those of the part; all by default.
+        surfels: [N] bool, surfels of the part; all by default.
     """
     from texgs.fields.surfels.shading import material
     from texgs.models.instruction import understand
 
     try:
         named = MATERIALS.get(understand(instruction)[0])
-    except ArgumentError:  # what a diffusion model may understand
+    except ArgumentError:  # for a diffusion model to understand
         named = None
     if named is None:
         return {}
@@ -244,6 +244,6 @@ def highlights_of(instruction: str, model: Surfels, surfels: Tensor | None = Non
     for name in ("specular", "shininess"):
         values = own[name] if surfels is None or len(own[name]) == 1 else own[name][surfels]
         wanted, fitted = getattr(named, name), float(values.median())
-        if fitted:  # else no factor reaches it
-            edit[name] = min(wanted / fitted, MOST_FACTOR)
+        if fitted:  # no factor changes a zero
+            edit[name] = min(wanted / fitted, MAX_FACTOR)
     return edit

@@ -1,17 +1,17 @@
-"""The numbers of an image-driven edit, the sets of them that have names, and rounds of edits of views."""
+"""The numbers of an image-driven edit, named presets of them, and schedules of edits of views."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Self
 
 Start = Literal["projected", "sphere", "mean", "random", "transfer"]
-OPAQUE = 0.8  # mean alpha from which on a scene is taken for opaque
-FULL_RESOLUTION = 500  # pixels of the longer side up to which features see every pixel
+OPAQUE_ALPHA = 0.8  # mean alpha above which a scene counts as opaque
+FULL_RESOLUTION = 500  # pixels of the longer side up to which features use full resolution
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """Numbers of an image-driven edit; the defaults are those of `default`.
+    """Numbers of an image-driven edit, by default those of the preset `default`.
 
     The loss is features * (lambda_s * (NNFM + distribution * D) + (1 - lambda_s) * CLIP) + patches * P, with
     the sliced Wasserstein distances D of features and P of patches of pixels.
@@ -20,26 +20,26 @@ class Recipe:
     iterations: int = 100  # one view each
     start: Start = "projected"  # colours at the start: the picture laid onto the surface, or by its normals
     # where it shows a sphere, its mean, random pixels, or the model's own colours moved to its colours
-    rate: float = 0.05  # of Adam at the start
-    last_rate: float = 0.1  # at the end, relative to that
+    rate: float = 0.05  # Adam's rate at the start
+    last_rate: float = 0.1  # Adam's rate at the end, relative to the start
     features: float = 1.0  # weight of NNFM and CLIP together; at 0 no weights of VGG are needed
     lambda_s: float = 1.0  # share of NNFM in them; below 1 a CLIP term is needed
     distribution: float = 0.25  # weight of the sliced Wasserstein distance of features
-    patches: float = 50.0  # weight of that of patches of pixels
+    patches: float = 50.0  # weight of the distance of patches of pixels
     pattern: float = 1.0  # size of the style's pattern: its longer side, in longer sides of a view
-    behind: Literal["style", "white"] = "style"  # what is behind the object: more of the style, or white
-    cropped: bool = True  # whether losses see only the part of a view that shows the object
+    behind: Literal["style", "white"] = "style"  # background: more of the style, or white
+    cropped: bool = True  # whether losses see a crop around the object
     foreground: bool = True  # whether only features on the object have to match
-    queries: int | None = 2048  # features of a view that have to match, drawn at random; None: all
-    positions: int | None = 8192  # features of the style that are searched, drawn at random; None: all
-    dimensions: int | None = 64  # of that search, by principal components; None: all, the search is exact
-    reduce: int | None = None  # features see averages of so many pixels each way; None: by the views' size
-    opacity: float = 1.0  # factor on opacities while stylising, so that what is in front counts more
+    queries: int | None = 2048  # features of a view to match, drawn at random; None: all
+    positions: int | None = 8192  # features of the style to search, drawn at random; None: all
+    dimensions: int | None = 64  # principal components in that search; None: all, which is exact
+    reduce: int | None = None  # pixels each way to average for features; None: automatic
+    opacity: float = 1.0  # factor on opacities while stylising, which gives the front more weight
     chroma: float = 1.0  # factor on the differences of the style's colours from grey
     adapts: bool = True  # whether opacity, chroma and weights follow how translucent the scene is
     is_textured: bool = True  # whether each texel learns, or each surfel one colour: the paper's ablation
     is_lit: bool = True  # whether the losses see the light of the views, or colours without any
-    single_precision: bool = False  # whether features are computed so, or as fast as the machine can
+    single_precision: bool = False  # whether features use float32, or the machine's fastest type
     seed: int = 0
 
     @property
@@ -53,18 +53,18 @@ class Recipe:
         return self.iterations > 0 and self.features > 0 and self.lambda_s < 1
 
     def reduction(self, width: int, height: int) -> int:
-        """Return how many pixels each way features see as one, for views of this size."""
+        """Return the number of pixels each way to average for features, for views of this size."""
         return self.reduce or max(1, round(max(width, height) / FULL_RESOLUTION))
 
     def adapted(self, alpha: float) -> Self:
-        """Return the recipe for a scene of which pixels have this alpha, see `canvas.mean_alpha`.
+        """Adapt the recipe to a scene with this mean alpha, see `canvas.mean_alpha`.
 
         Layers are averaged in a pixel of a translucent scene. Each learns as if it were opaque. A pixel shows
         the share alpha of the differences between its colours, so these are divided by it beforehand.
         Distributions of features weigh more, as they tell what is left of a pattern; those of pixels, which
         an average cannot have, do not count beside them.
         """
-        if not self.adapts or alpha >= OPAQUE:
+        if not self.adapts or alpha >= OPAQUE_ALPHA:
             return self
         return replace(
             self,
@@ -116,13 +116,13 @@ class UpdateSchedule:
 
     rounds: int
     period: int  # iterations of a round
-    views: int | None = None  # edited in a round; None: all
-    group: int = 1  # edited together
-    order: Literal["next", "random"] = "next"  # going on where the last round ended, or drawn at random
-    learned: Literal["all", "newest", "round"] = "all"  # views: any, the one just edited, or the round's
-    levels: Sequence[tuple[float, float]] = ((1.0, 1.0),)  # from and to, by round; the last holds on
+    views: int | None = None  # views to edit in a round; None: all
+    group: int = 1  # views to edit together
+    order: Literal["next", "random"] = "next"  # continue after the last round, or draw at random
+    learned: Literal["all", "newest", "round"] = "all"  # views: all, newest, this round's
+    levels: Sequence[tuple[float, float]] = ((1.0, 1.0),)  # from and to, by round; the last one repeats
 
     @property
     def iterations(self) -> int:
-        """Return how many all rounds have."""
+        """Return the number of iterations in all rounds."""
         return self.rounds * self.period

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from texgs.core.cache import Checksums, digest
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import read_json, write_json
 from texgs.core.keys import typed
 from texgs.core.names import METRICS, SCENE, natural_order
@@ -19,7 +19,7 @@ from texgs.fields.surfels.step_file import at_step, write_step
 from texgs.fitting.series import Follower
 from texgs.scene.scene import Scene, SceneModel, SceneVolume, volume_of
 from texgs.scene.scene_file import write_scene
-from texgs.scene.series_file import MOST, Series, read_series, write_series
+from texgs.scene.series_file import MAX_STEPS, Series, read_series, write_series
 from texgs.volume.framing import shown_corners, smallest_ball
 from texgs.volume.headers import NRRD
 from texgs.volume.input_files import checksum_of_input
@@ -62,7 +62,7 @@ def make_series(
     if (start := next(same, None)) is None:
         raise ArgumentError(f"steps: expected one of them to be the volume of the scene, {volume.file}")
     for name, entry in scene.models.items():
-        with located(f"models.{name}"):
+        with errors_at(f"models.{name}"):
             for order in (range(start, len(moments)), range(start, -1, -1)):
                 follow(series, name, entry, volume, order, device, seed)
     seen = [shown_corners(open_grid(series.volume(step)), volume.tfs.values()) for step in steps]
@@ -71,7 +71,7 @@ def make_series(
 
 
 def moments_of(files: Sequence[Path], settings: VolumeKeys) -> list[Moment]:
-    """Return the steps of several files or folders, or of one: of a folder of NRRD, or along its own time.
+    """Return the steps of several files or folders, of a folder of NRRD, or along one file's time axis.
 
     Without files, they are those of a generator.
     """
@@ -82,7 +82,7 @@ def moments_of(files: Sequence[Path], settings: VolumeKeys) -> list[Moment]:
         inner = [each for each in only.iterdir() if each.suffix in NRRD] if only.is_dir() else []
         if inner:
             return in_time(sorted(inner, key=natural_order))
-        with located(only):
+        with errors_at(only):
             count = open_field(replace(settings, time=0), only).n_steps
         if count > 1:
             return [Moment(f"{only.name}, step {time}", only, time) for time in range(count)]
@@ -92,14 +92,14 @@ def moments_of(files: Sequence[Path], settings: VolumeKeys) -> list[Moment]:
 def prepare_steps(
     series: Series, moments: Sequence[Moment], settings: VolumeKeys, volume: SceneVolume
 ) -> None:
-    """Prepare the volumes that are missing, as that of the scene was, and require its lattice."""
+    """Prepare missing volumes with the settings of the scene's volume, and require its lattice."""
     grid, record, checksums = open_grid(volume.file), series.file.with_name("sources.json"), Checksums.load()
     made_of = read_json(record) if record.exists() else {}
     for step, moment in enumerate(progress(moments, title="volumes", unit="step")):
         target = series.volume(step)
         own = settings if moment.time is None else replace(settings, time=moment.time)
         identity = digest(f"{own} {moment.file and checksum_of_input(moment.file, checksums)}")
-        with located(moment.name):
+        with errors_at(moment.name):
             if is_other := made_of.get(target.name) != identity:
                 require_unfollowed(series, step)
             if is_other or not target.exists():
@@ -119,7 +119,7 @@ def prepare_steps(
 
 
 def require_unfollowed(series: Series, step: int) -> None:
-    """Require that a step whose volume is made has no models, which would be of another volume."""
+    """Require that a step without a volume has no models; they would belong to another volume."""
     for name in series.models:
         if (file := series.model(name, step)).exists():
             raise ArgumentError(
@@ -129,7 +129,7 @@ def require_unfollowed(series: Series, step: int) -> None:
 
 
 def require_own_scene(folder: Path) -> None:
-    """Require that a scene in a folder is one of a series, which this one may replace."""
+    """Require that a scene in a folder belongs to a series; only then may it be replaced."""
     is_other = (folder / SCENE).exists() and not (folder / "series.json").exists()
     if is_other or (folder / METRICS).exists():
         what = "another scene" if is_other else "a result of the workflow"
@@ -137,7 +137,7 @@ def require_own_scene(folder: Path) -> None:
 
 
 def settings_of(file: Path) -> VolumeKeys:
-    """Return how the workflow has read and prepared a volume; plainly, where it was not the workflow."""
+    """Return the workflow's settings of a prepared volume, or defaults without a record."""
     facts = file.with_name(METRICS)
     if not facts.is_file():
         return VolumeKeys()
@@ -156,7 +156,7 @@ def follow(
     device: torch.device,
     seed: int,
 ) -> None:
-    """Make the files of a model's steps that are missing, in an order that begins with its own step."""
+    """Make the missing files of a model's steps, beginning at its own step."""
     key = replace(entry, texture=None, segments={}, step=None).surfels()[0]
     model, follower, before = key, None, order[0]
     for step in order:
@@ -165,7 +165,7 @@ def follow(
             if step != order[0]:
                 follower = follower or Follower(key.to(device), volume.appearance, volume.tfs[name])
                 grids = [open_grid(series.volume(each)) for each in (before, step)]
-                drawn = seed * MOST + step  # another one for each
+                drawn = seed * MAX_STEPS + step  # a different one for each step
                 title = f"{name}, step {step}"
                 model = follower.step(model.to(device), grids[0], grids[1], title, drawn)
             write_step(file, key, model.to("cpu"), {"file": series.steps[step]})

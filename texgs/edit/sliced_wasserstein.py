@@ -1,4 +1,4 @@
-"""Sliced Wasserstein distances: how alike two textures are, as whole distributions.
+"""Sliced Wasserstein distances: the similarity of two textures as whole distributions.
 
 Patches of 7 x 7 colours, or features of VGG, are projected onto random directions; along each the sorted
 values of the image are compared with the quantiles of the style (Rabin et al. 2011; Heitz et al. 2021). No
@@ -16,18 +16,18 @@ from torch.nn import functional as F
 from texgs.core import check
 from texgs.models.nnfm import draw_features
 
-SIDE = 7  # of a patch, pixels
+SIDE = 7  # side of a patch, pixels
 LEVELS = 3  # full resolution, a half, a quarter
-FILTERS = 32  # directions of one comparison
-BANKS = 12  # sets of them, one for each comparison in turn
-QUANTILES = 2048  # of the style, kept for each direction
-MOST_PATCHES, MOST_FEATURES = 4096, 2048  # of one comparison
-STYLE_MOST = 16384  # patches or features that a style is known by
+FILTERS = 32  # directions in one comparison
+BANKS = 12  # sets of directions, used in turn
+QUANTILES = 2048  # quantiles of the style for each direction
+MAX_PATCHES, MAX_FEATURES = 4096, 2048  # in one comparison
+MAX_STYLE_SAMPLES = 16384  # patches or features that represent a style
 
 
 @dataclass(frozen=True, eq=False)
 class PatchStatistics:
-    """What the patches of a style look like along random directions."""
+    """The distributions of a style's patches along random directions."""
 
     filters: Tensor  # [BANKS, FILTERS, 3 * SIDE * SIDE] of length 1
     quantiles: tuple[Tensor, ...]  # of each level [BANKS, FILTERS, QUANTILES]
@@ -45,7 +45,7 @@ class PatchStatistics:
         quantiles = []
         for image, mask in pyramid(picture, where):
             inside = mask if bool((mask > 0.5).any()) else torch.ones_like(mask)
-            values = filters @ patches(image, centres(inside, STYLE_MOST, generator)).T
+            values = filters @ patches(image, centres(inside, MAX_STYLE_SAMPLES, generator)).T
             quantiles.append(kept_quantiles(values))
         return cls(filters.unflatten(0, (BANKS, FILTERS)), tuple(quantiles))
 
@@ -62,7 +62,7 @@ class PatchStatistics:
         generator, bank = torch.Generator().manual_seed(seed), bank % BANKS
         distances = []
         for (level, mask), quantiles in zip(pyramid(image, where), self.quantiles, strict=False):
-            chosen = centres(mask, MOST_PATCHES, generator)
+            chosen = centres(mask, MAX_PATCHES, generator)
             if len(chosen):
                 values = self.filters[bank] @ patches(level, chosen).T  # [FILTERS, n]
                 distances.append(to_quantiles(values, quantiles[bank]))
@@ -71,7 +71,7 @@ class PatchStatistics:
 
 @dataclass(frozen=True, eq=False)
 class FeatureDistribution:
-    """What the features of a style look like along random directions."""
+    """The distributions of a style's features along random directions."""
 
     directions: Tensor  # [BANKS, FILTERS, C] of length 1
     quantiles: Tensor  # [BANKS, FILTERS, QUANTILES]
@@ -84,7 +84,7 @@ class FeatureDistribution:
         The seed is of the directions, and of the draw of 16,384 features where there are more.
         """
         generator = torch.Generator().manual_seed(seed)
-        rows = draw_features(features.detach(), region, STYLE_MOST, generator)
+        rows = draw_features(features.detach(), region, MAX_STYLE_SAMPLES, generator)
         directions = random_directions(rows.shape[1], generator).to(rows)
         values = directions @ rows.T
         return cls(directions.unflatten(0, (BANKS, FILTERS)), kept_quantiles(values), values.var(1).mean())
@@ -97,7 +97,7 @@ class FeatureDistribution:
         their count. The seed is of the draw of 2,048 features where there are more.
         """
         check.shape("features", features, "C h w", C=self.directions.shape[2])
-        rows = draw_features(features, where, MOST_FEATURES, torch.Generator().manual_seed(seed))
+        rows = draw_features(features, where, MAX_FEATURES, torch.Generator().manual_seed(seed))
         if not len(rows):
             return features.sum().float() * 0
         bank %= BANKS

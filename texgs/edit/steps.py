@@ -1,4 +1,4 @@
-"""What edits learn from other steps of a series in time: these show what the scene's own step hides."""
+"""Views of other steps of a series in time, which show surfels that the scene's own step hides."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,16 +8,16 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.edit.canvas import around, some
+from texgs.edit.canvas import few_cameras, visible_camera
 from texgs.fields.surfels.model import Surfels
 
-PLACE = ("means", "quats", "scales")
-MOVED = (*PLACE, "normals", "opacities")  # of surfels, in a series
-BETTER = 4.0  # times as much as before: from then on, a surfel learns from another step
+PLACE_TENSORS = ("means", "quats", "scales")
+MOVING_TENSORS = (*PLACE_TENSORS, "normals", "opacities")  # tensors that change in a series
+SWITCH_FACTOR = 4.0  # a surfel learns from another step that shows it so many times better
 
 
 class Shot(NamedTuple):
-    """Views of a step, and what learns from them."""
+    """Views of a step, and the surfels that learn from them."""
 
     model: Surfels
     cameras: Sequence[Camera]
@@ -26,31 +26,33 @@ class Shot(NamedTuple):
 
 @torch.no_grad()
 def where_shown(model: Surfels, steps: Sequence[Surfels], cameras: Sequence[Camera]) -> Surfels:
-    """Return a model of a series whose surfels are where views show them most, at one step or another.
+    """Return a model of a series with each surfel at the step where views show it best.
 
-    They stay where they are unless another step shows them much better: a picture that is laid onto them is
-    then whole on surfaces of the model, and on those that appear later.
+    Surfels move only if another step shows them much better. A picture laid onto them then stays whole on
+    surfaces of the model, and on surfaces that appear later.
     """
-    few = [around(model, camera.to(model.device)) for camera in some(cameras)]
-    shown = torch.stack([weights_of(placed(model, step), few) for step in (model, *steps)])
-    shown[0] *= BETTER
+    few = [visible_camera(model, camera.to(model.device)) for camera in few_cameras(cameras)]
+    shown = torch.stack([weights_of(model_at_step(model, step), few) for step in (model, *steps)])
+    shown[0] *= SWITCH_FACTOR
     best = shown.argmax(dim=0)
     rows = torch.arange(len(model), device=best.device)
     every = [model, *steps]
-    chosen = {name: torch.stack([step.parameters[name] for step in every])[best, rows] for name in PLACE}
+    chosen = {
+        name: torch.stack([step.parameters[name] for step in every])[best, rows] for name in PLACE_TENSORS
+    }
     return replace(model, parameters={**model.parameters, **chosen})
 
 
 def weights_of(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
-    """Return how much each surfel [N] shows in some views: the sum of its blending weights."""
+    """Return the sum [N] of each surfel's blending weights over some views."""
     nothing = model.parameters["means"][:, :1]
     renders = (model.rasterized(each, features=nothing, outputs=("statistics",)) for each in cameras)
     return torch.stack([each.statistics.weight_sum for each in renders if each.statistics]).sum(0)
 
 
-def placed(model: Surfels, step: Surfels) -> Surfels:
-    """Return a model with its surfels where they are at a step of its series."""
-    moved = {name: x for name, x in step.parameters.items() if name in MOVED}
+def model_at_step(model: Surfels, step: Surfels) -> Surfels:
+    """Return a model with its surfels at the places of a step of its series."""
+    moved = {name: x for name, x in step.parameters.items() if name in MOVING_TENSORS}
     return replace(model, parameters={**model.parameters, **moved})
 
 
@@ -60,18 +62,18 @@ def shots_of(
 ) -> list[Shot]:
     """Return views of a model for its changing surfels [N], and some of other steps, half as many as these.
 
-    Each of the latter shows its surfels much better than all before it; the most telling come first.
+    Each of the latter shows its surfels much better than all before it; the most useful come first.
     """
     shots = [Shot(model, cameras, changing)]
     if not steps:
         return shots
-    few = some(cameras)
-    others = [Shot(placed(model, step), [camera], changing) for step in steps for camera in few]
+    few = few_cameras(cameras)
+    others = [Shot(model_at_step(model, step), [camera], changing) for step in steps for camera in few]
     shown = [weights_of(each.model, each.cameras) for each in others]
-    known = BETTER * torch.stack([weights_of(model, [camera]) for camera in few]).amax(0)
+    known = SWITCH_FACTOR * torch.stack([weights_of(model, [camera]) for camera in few]).amax(0)
     for _ in range(len(cameras) // 2):
         gains = [(weights - known).clamp_min(0) * changing for weights in shown]
         best = max(range(len(others)), key=lambda index: float(gains[index].sum()))
         shots.append(others[best]._replace(surfels=gains[best] > 0))
-        known = known.maximum(BETTER * shown[best])
+        known = known.maximum(SWITCH_FACTOR * shown[best])
     return [shot for shot in shots if bool(shot.surfels.any())]

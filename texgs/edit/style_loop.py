@@ -1,4 +1,4 @@
-"""The loop of all image-driven edits: views of a field, one after the other, bring its colours to a style."""
+"""The loop of all image-driven edits: a field learns the colours of a style, one view per iteration."""
 
 import time
 from collections import defaultdict
@@ -21,35 +21,35 @@ Losses = dict[str, list[float]]  # weighted terms by name, a value for each iter
 
 
 class Painting(NamedTuple):
-    """What a view shows, and how it learns."""
+    """A rendered view, and the way back to the parameters."""
 
     image: Tensor  # [3, h, w] in [0, 1], a leaf that losses are differentiated by
-    share: Tensor  # [h, w] how much of each pixel is to look like the style
+    share: Tensor  # [h, w] share of each pixel that should look like the style
     objective: Objective
-    backward: Callable[[Tensor], None]  # brings the gradient of the image to what learns
-    added: Callable[[Tensor], Terms] = lambda image: {}  # to the objective's terms
+    backward: Callable[[Tensor], None]  # propagates the gradient of the image to the parameters
+    added: Callable[[Tensor], Terms] = lambda image: {}  # further terms besides the objective's
 
 
 class Paintable(Protocol):
-    """A field whose colours follow styles."""
+    """A field whose colours learn a style."""
 
     def render(self, view: int) -> Sequence[Painting]:
-        """Show a view: one image, or one for each layer that follows a style of its own."""
+        """Render a view: one image, or one for each layer with its own style."""
 
     def step(self, iteration: int) -> None:
-        """Follow the gradients of the last view."""
+        """Take a step along the gradients of the last view."""
 
 
 @dataclass(eq=False)
 class Stopwatch:
-    """Seconds by part."""
+    """Measures seconds by part of the work."""
 
     device: torch.device
     seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
-        """Add the time that the block takes, on a GPU until its work is done there."""
+        """Add the time of the block; on a GPU, wait for its work."""
         begin = time.perf_counter()
         yield
         if self.device.type == "cuda":
@@ -66,7 +66,7 @@ def learn_style(
     watch: Stopwatch | None = None,
     show: Callable[[], None] = lambda: None,
 ) -> Losses:
-    """Bring a field closer to its styles, by one of its views in each iteration.
+    """Bring a field closer to its style, one view per iteration.
 
     The watch measures the parts of iterations; `show` is called after each.
     """
@@ -96,7 +96,7 @@ def learn_style(
 
 
 def view_order(views: int, recipe: Recipe) -> list[int]:
-    """Return which view each iteration looks at: all of them in random order once before any again."""
+    """Return the view of each iteration: random permutations of all views."""
     generator = torch.Generator().manual_seed(recipe.seed)
     order: list[int] = []
     while len(order) < recipe.iterations:
@@ -105,7 +105,7 @@ def view_order(views: int, recipe: Recipe) -> list[int]:
 
 
 def finite_values(terms: Terms, iteration: int) -> dict[str, float]:
-    """Return the values of the terms of a loss."""
+    """Return the values of the terms of a loss; raise an error for values that are not finite."""
     values = {name: float(term.detach()) for name, term in terms.items()}
     if not all(map(isfinite, values.values())):
         raise FitError(

@@ -1,4 +1,4 @@
-"""The picture that a style is taken from: read at a useful size, with the part of it that counts."""
+"""The picture of a style, read at a useful size, with the region that counts."""
 
 import warnings
 from collections.abc import Callable
@@ -13,21 +13,21 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.image import open_picture, with_eight_bits
 from texgs.core.memory import require_memory
 
-SMALLEST = 32  # pixels of the shorter side: less holds no pattern
-LARGEST = 2048  # pixels of the longer side that are kept
-SCALED = 32  # bytes of memory for a pixel of a scaled style
+MIN_SIDE = 32  # pixels of the shorter side; a smaller picture holds no pattern
+MAX_SIDE = 2048  # pixels of the longer side; larger pictures are reduced
+BYTES_PER_PIXEL = 32  # bytes of memory for a pixel of a scaled style
 Find = Callable[[Tensor], Tensor]
 
 
 @dataclass(frozen=True, eq=False)
 class StylePicture:
-    """A style and the part of its picture that counts."""
+    """A style: a picture and the region of it that counts."""
 
-    image: Tensor  # [3, h, w] in [0, 1]; beyond the region its nearest colours
+    image: Tensor  # [3, h, w] in [0, 1]; outside the region, its nearest colours
     region: Tensor  # [h, w] bool
 
     def __post_init__(self) -> None:
@@ -40,11 +40,11 @@ class StylePicture:
 
     @classmethod
     def of(cls, image: Tensor, region: Tensor | None = None) -> Self:
-        """Return the style of an image [3, h, w], cut to the box around the region [h, w]; by default all."""
+        """Make a style of an image [3, h, w], cropped to the box around the region [h, w], by default all."""
         size = check.shape("image", image, "3 h w")
-        if min(size["h"], size["w"]) < SMALLEST:
+        if min(size["h"], size["w"]) < MIN_SIDE:
             raise ArgumentError(
-                f"style: expected a picture of at least {SMALLEST} x {SMALLEST} pixels, got {size['w']} x "
+                f"style: expected a picture of at least {MIN_SIDE} x {MIN_SIDE} pixels, got {size['w']} x "
                 f"{size['h']}; it holds no pattern to carry over"
             )
         if region is None:
@@ -66,20 +66,20 @@ class StylePicture:
         return self.image.permute(1, 2, 0)[self.region]
 
     def scaled(self, long_side: float) -> "StylePicture":
-        """Return the style with its longer side at so many pixels, its aspect kept; smaller by averaging."""
+        """Resize the style to a longer side in pixels, keeping the aspect; averages pixels to shrink."""
         height, width = self.region.shape
         factor = long_side / max(height, width)
-        size = [max(SMALLEST // 2, round(factor * x)) for x in (height, width)]
+        size = [max(MIN_SIDE // 2, round(factor * x)) for x in (height, width)]
         if size == [height, width]:
             return self
         what = f"a style of {size[1]} x {size[0]} pixels"
-        require_memory(SCALED * size[0] * size[1], what, "make edit.image.pattern smaller")
+        require_memory(BYTES_PER_PIXEL * size[0] * size[1], what, "make edit.image.pattern smaller")
         image = F.interpolate(self.image[None], size, mode="bicubic", antialias=True)[0].clamp(0, 1)
         region = F.interpolate(self.region[None, None].float(), size, mode="area")[0, 0] > 0.5
         return StylePicture(image, region if bool(region.any()) else torch.ones_like(region))
 
     def vivid(self, gain: float) -> Self:
-        """Return the style with its colours' differences from grey times a gain, as far as they can be."""
+        """Multiply the differences of the colours from grey by a gain, as far as [0, 1] permits."""
         grey = self.image.mean(0)
         return replace(self, image=(grey + gain * (self.image - grey)).clamp(0, 1))
 
@@ -89,7 +89,7 @@ class StylePicture:
 
 
 def read_style(path: str | Path, find: Find | None = None) -> StylePicture:
-    """Read a style picture: PNG, JPEG, WebP, GIF, TIFF, BMP and more; what is transparent does not count.
+    """Read a style picture: PNG, JPEG, WebP, GIF, TIFF, BMP and more; transparent pixels do not count.
 
     Args:
         path: of the file. A picture of more than 2,048 pixels along its longer side is reduced to that, and
@@ -114,17 +114,17 @@ def read_style(path: str | Path, find: Find | None = None) -> StylePicture:
         region = find(pixels[:3].permute(1, 2, 0))
         check.shape("region", region, "h w", h=visible.shape[0], w=visible.shape[1])
         visible = visible & region
-    with located(path):
+    with errors_at(path):
         return StylePicture.of(pixels[:3].contiguous(), None if bool(visible.all()) else visible)
 
 
 def shrink_picture(picture: Image.Image) -> Image.Image:
-    """Return a picture upright, as RGBA, with 2,048 pixels along its longer side at most.
+    """Return a picture upright, as RGBA, with at most 2,048 pixels along its longer side.
 
-    One so narrow that its shorter side would hold no pattern then keeps more.
+    A very narrow picture keeps more, so that its shorter side still holds a pattern.
     """
     orientation = picture.getexif().get(ExifTags.Base.Orientation, 1)
-    scale = min(1.0, max(LARGEST / max(picture.size), SMALLEST / min(picture.size)))
+    scale = min(1.0, max(MAX_SIDE / max(picture.size), MIN_SIDE / min(picture.size)))
     width, height = (max(1, round(scale * side)) for side in picture.size)
     picture.draft("RGB", (2 * width, 2 * height))  # JPEG files are decoded at a lower resolution
     picture = with_eight_bits(picture)
@@ -138,7 +138,7 @@ def shrink_picture(picture: Image.Image) -> Image.Image:
 
 
 def fill_outside(image: Tensor, region: Tensor) -> Tensor:
-    """Return the image [3, h, w]; pixels outside the region [h, w] have the colour of the nearest in it."""
+    """Fill pixels of an image [3, h, w] outside the region [h, w] with the nearest colour inside."""
     from scipy.ndimage import distance_transform_edt
 
     nearest = distance_transform_edt(~region.cpu().numpy(), return_distances=False, return_indices=True)
@@ -147,7 +147,7 @@ def fill_outside(image: Tensor, region: Tensor) -> Tensor:
 
 
 def mirrored_crop(image: Tensor, top: int, left: int, height: int, width: int) -> Tensor:
-    """Return [3, height, width] of the plane that an image, mirrored at its edges again and again, covers."""
+    """Crop [3, height, width] from the plane covered by an image and its repeated mirror images."""
 
     def indices(start: int, count: int, size: int) -> Tensor:
         at = (start + torch.arange(count, device=image.device)) % (2 * size)

@@ -1,6 +1,6 @@
-"""The colours that stylising starts from: close to the style already, they save most of the iterations.
+"""The start colours of a stylisation: close to the style already, they save most of the iterations.
 
-Pictures are laid onto surfaces by place and normal, in chunks whose strokes stay whole, as StyleBlit does.
+Pictures are projected onto surfaces by place and normal, in chunks that keep strokes whole, as in StyleBlit.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,12 +17,12 @@ from texgs.edit.style_picture import StylePicture
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import EXTENT, bare_colors, owners
 
-LEAST_VARIANCE = 1e-10  # added to the eigenvalues of covariances
+MIN_VARIANCE = 1e-10  # added to the eigenvalues of covariances
 CELLS = (0.25, 0.5, 1.0)  # sides of cells that may share a chunk, in longer sides of the picture
-ALIKE = 0.8  # cosine between the normal of a surfel and the mean normal of its chunk
-DRIFT = 0.125  # longer sides of the picture between where a chunk and where the surfel alone would read it
-RIM = 0.98  # part of a sphere's radius that is read: the last pixels have some of the background
-MOST_CELLS = 1 << 16  # cells along an axis
+MIN_COSINE = 0.8  # cosine between the normal of a surfel and the mean normal of its chunk
+MAX_DRIFT = 0.125  # largest distance between a surfel's own place and that in its chunk, in longer sides
+RIM = 0.98  # readable part of a sphere's radius; the last pixels contain background
+MAX_CELLS = 1 << 16  # cells along an axis
 TEXELS = 1 << 18  # texels at a time
 # What the picture shows to the right and down, where a surface faces x, y or z: (z, -y), (x, z), (x, -y).
 RIGHT, DOWN = ((0.0, 0, 1), (1, 0, 0), (1, 0, 0)), ((0.0, -1, 0), (0, 0, 1), (0, -1, 0))
@@ -38,7 +38,7 @@ def start_colors(
     """
     p = model.parameters
     if kind in ("projected", "sphere"):
-        return laid_out(p, style.image, pixel, sphere=kind == "sphere")
+        return projected_colors(p, style.image, pixel, sphere=kind == "sphere")
     if kind == "mean":
         return style.mean.expand_as(p["texels"]).contiguous()
     if kind == "random":
@@ -62,7 +62,7 @@ def pixel_side(model: Surfels, cameras: Sequence[Camera]) -> float:
 
 
 def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the affine map x -> A x + b that gives colours [N, 3] mean and covariance of a style's [M, 3].
+    """Return the affine map x -> A x + b that gives colours [N, 3] the mean and covariance of others [M, 3].
 
     With S the covariances and m the means, A = S_style^(1/2) S_colors^(-1/2) and b = m_style - A m_colors
     (Zhang et al. 2022, supplement; symmetric square roots), float64. Not differentiable.
@@ -72,14 +72,16 @@ def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
     for name, x in (("colors", colors), ("style", style)):
         check.shape(name, x, "N 3")
     (whiten, mean, _), (whiten_style, mean_style, _) = (
-        zca_mean(x.detach().double(), unbiased=False, eps=LEAST_VARIANCE) for x in (colors, style)
+        zca_mean(x.detach().double(), unbiased=False, eps=MIN_VARIANCE) for x in (colors, style)
     )
     matrix = torch.linalg.solve(whiten_style, whiten)
     return matrix, mean_style[0] - matrix @ mean[0]
 
 
 @torch.no_grad()
-def laid_out(parameters: Mapping[str, Tensor], picture: Tensor, pixel: float, sphere: bool = False) -> Tensor:
+def projected_colors(
+    parameters: Mapping[str, Tensor], picture: Tensor, pixel: float, sphere: bool = False
+) -> Tensor:
     """Return the colour of every texel [T, 3] from a picture [3, h, w] that is mirrored beyond its edges.
 
     A surfel reads the picture where its place falls on it, seen along the axis that it faces most. Neighbours
@@ -143,7 +145,7 @@ def on_planes(places: Tensor, normals: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def on_sphere(places: Tensor, normals: Tensor, radius: float) -> tuple[Tensor, Tensor, Tensor]:
-    """Return the same for the picture of a sphere with a radius in pixels: all planes face +z."""
+    """Do as `on_planes` for the picture of a sphere with a radius in pixels: all planes face +z."""
     outward = (normals * (places - places.mean(0))).sum(1, keepdim=True).sign()
     plane = normals.new_tensor((RIGHT[2], DOWN[2]))
     normals = normals * outward
@@ -162,14 +164,14 @@ def in_chunks(
     rows = torch.cat([places, normals, alone, planes.flatten(1)], 1)  # [N, 14]
     shared = alone
     for share in CELLS:
-        x, y, z = ((places / (share * side)).floor().long() % MOST_CELLS).unbind(1)
-        _, chunk = (((x * MOST_CELLS + y) * MOST_CELLS + z) * 6 + facing).unique(return_inverse=True)
+        x, y, z = ((places / (share * side)).floor().long() % MAX_CELLS).unbind(1)
+        _, chunk = (((x * MAX_CELLS + y) * MAX_CELLS + z) * 6 + facing).unique(return_inverse=True)
         count = chunk.bincount()[:, None]
         means = rows.new_zeros(len(count), rows.shape[1]).index_add_(0, chunk, rows) / count
         place, normal, at, plane = (each[chunk] for each in means.split((3, 3, 2, 6), 1))
         plane = F.normalize(plane.unflatten(1, (2, 3)), dim=2)
         at = at + (plane @ (places - place)[:, :, None])[:, :, 0]
-        suits = (normals * F.normalize(normal, dim=1)).sum(1, keepdim=True) > ALIKE
-        suits &= (at - alone).norm(dim=1, keepdim=True) < DRIFT * side
+        suits = (normals * F.normalize(normal, dim=1)).sum(1, keepdim=True) > MIN_COSINE
+        suits &= (at - alone).norm(dim=1, keepdim=True) < MAX_DRIFT * side
         shared, planes = torch.where(suits, at, shared), torch.where(suits[..., None], plane, planes)
     return shared, planes

@@ -13,18 +13,18 @@ from texgs.core.light import Light
 from texgs.edit.canvas import mean_alpha, paint, require_editable
 from texgs.edit.objective import FeatureTerm, Objective
 from texgs.edit.recipe import DEFAULT, Recipe
-from texgs.edit.steps import placed, where_shown
+from texgs.edit.steps import model_at_step, where_shown
 from texgs.edit.style_loop import Painting, Stopwatch, learn_style
 from texgs.edit.style_picture import StylePicture, mirrored_crop
 from texgs.edit.style_start import pixel_side, start_colors
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texels import owners, recolored, spread, untextured
+from texgs.fields.surfels.texels import owners, spread_colors, with_colors, with_single_texels
 from texgs.models.vgg import Vgg
 
 
 @dataclass(frozen=True, eq=False)
 class Stylized:
-    """A model in a style, and how it came to be."""
+    """A stylized model, and how it was made."""
 
     model: Surfels
     recipe: Recipe  # adapted to the scene
@@ -50,7 +50,7 @@ def stylize(
 
     Only texels and the surfels' colours (offsets from the palette) change: palette + offset + texel is the
     stylised colour without light, in [0, 1], so that the palette, lights and opacities can be edited as
-    before and highlights stay what they were. What no view shows keeps the colour of the start.
+    before and highlights stay what they were. Texels that no view shows keep their start colours.
 
     Args:
         model: of stage texture.
@@ -60,10 +60,10 @@ def stylize(
         recipe: how.
         vgg: for NNFM; needed unless the recipe's `features` or `lambda_s` is 0.
         clip: a differentiable loss [] of an image [H, W, 3] in [0, 1], for a `lambda_s` below 1.
-        surfels: [N] bool, the ones to change; by default all. Texels and colours of others stay, bit for bit.
+        surfels: [N] bool, surfels to change; by default all. Others keep texels and colours bit for bit.
         steps: the model at other steps of a series, with the same texels: views show all in turn.
         title: of the progress bar.
-        show: is called after each iteration with a function that makes the model as it is then.
+        show: is called after each iteration with a function that returns the current model.
     """
     require_editable(model, surfels)
     if not cameras or len(lights) != len(cameras):
@@ -79,7 +79,7 @@ def stylize(
 
 
 class SurfelPainting:
-    """Textured surfels on their way to a style; see `stylize`."""
+    """Textured surfels that learn a style; see `stylize`."""
 
     def __init__(
         self,
@@ -97,12 +97,12 @@ class SurfelPainting:
         if recipe.adapts:
             recipe = recipe.adapted(mean_alpha(model, cameras, recipe.opacity))
         if not recipe.is_textured:
-            model = untextured(model, surfels)
+            model = with_single_texels(model, surfels)
         p = model.parameters
         self.cameras, self.lights, self.recipe, self.surfels = cameras, lights, recipe, surfels
         width, height = cameras[0].width, cameras[0].height
         scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height))
-        self.style = scaled.vivid(recipe.chroma)  # at the size at which it is behind the object
+        self.style = scaled.vivid(recipe.chroma)  # at its size behind the object
         self.objective = Objective.of(recipe, self.style, recipe.reduction(width, height), vgg, clip)
         colors = -p["palette"].expand_as(p["colors"])
         places, surfel = owners(p)
@@ -111,14 +111,14 @@ class SurfelPainting:
         pixel = pixel_side(model, cameras)
         laid = where_shown(model, steps, cameras) if steps else model
         texels = start_colors(recipe.start, laid, self.style, pixel, recipe.seed, moving)
-        self.fixed: Tensor | None = None  # [F] indices of texels that stay
+        self.fixed: Tensor | None = None  # [F] indices of fixed texels
         if surfels is not None:
             colors = torch.where(surfels[:, None], colors, p["colors"])
             self.fixed = (~surfels[owner]).nonzero()[:, 0]
             texels[self.fixed] = p["texels"][self.fixed]
         # The colours of surfels are taken out where they change: texels [T, 3] have all of the colour.
         self.model = Surfels({**p, "colors": colors.contiguous()}, model.shading, model.metadata)
-        self.steps, self.turn = [self.model, *(placed(self.model, step) for step in steps)], 0
+        self.steps, self.turn = [self.model, *(model_at_step(self.model, step) for step in steps)], 0
         self.texels = texels.requires_grad_()
         self.generator = torch.Generator().manual_seed(recipe.seed)
 
@@ -128,7 +128,7 @@ class SurfelPainting:
         return torch.optim.Adam([self.texels], eps=1e-15, fused=True)
 
     def render(self, view: int) -> list[Painting]:
-        """Show a view over the style or white; of a series, the next step."""
+        """Render a view over the style or white; in a series, at the next step."""
         model = self.steps[self.turn % len(self.steps)]
         self.turn += 1
         camera, light = self.cameras[view].to(self.model.device), self.lights[view]
@@ -137,7 +137,7 @@ class SurfelPainting:
         return [Painting(image, share, self.objective, color.backward)]
 
     def behind(self, alpha: Tensor) -> Tensor:
-        """Return what is behind the object [3, h, w]: white, or somewhere in the mirrored style."""
+        """Return the background [3, h, w]: white, or a random crop of the mirrored style."""
         if self.recipe.behind == "white":
             return alpha.new_ones(3, *alpha.shape)
         top, left = torch.randint(1 << 20, (2,), generator=self.generator).tolist()
@@ -145,7 +145,7 @@ class SurfelPainting:
 
     @torch.no_grad()
     def step(self, iteration: int) -> None:
-        """Take a step of Adam, after which colours are in [0, 1] again."""
+        """Take a step of Adam, then clamp colours to [0, 1]."""
         recipe = self.recipe
         self.adam.param_groups[0]["lr"] = recipe.rate * recipe.last_rate ** (iteration / recipe.iterations)
         self.adam.step()
@@ -155,7 +155,7 @@ class SurfelPainting:
             self.texels[self.fixed] = self.model.parameters["texels"][self.fixed]
 
     def result(self) -> Surfels:
-        """Return the model with the texels as they are now."""
+        """Return the model with its current texels."""
         texels = self.texels.detach()
-        colors = texels if self.recipe.is_textured else spread(texels, self.model, self.whole)
-        return recolored(self.whole, colors, self.surfels)
+        colors = texels if self.recipe.is_textured else spread_colors(texels, self.model, self.whole)
+        return with_colors(self.whole, colors, self.surfels)

@@ -1,4 +1,4 @@
-"""What a method of editing gets and gives, and how it edits parts of a scene: whole models, or segments."""
+"""Input and output of a method of editing, and how it edits parts of a scene: models or segments."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,16 +17,16 @@ from texgs.fields.field import Field
 from texgs.fields.kinds import kinds
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import labels_of, write_texture
-from texgs.scene.parts import NewLook, entry_of, part_names, replaced, split, with_looks
+from texgs.scene.parts import NewLook, entry_of, part_names, replace_entry, split, with_looks
 from texgs.scene.scene import Scene
 from texgs.volume.view_set import View, read_views
 
 Settings = TypeVar("Settings")
-SERIES_STEPS = 6  # of a series at most, that a look is learned from beside that of the scene
+SERIES_STEPS = 6  # time steps, at most, that a look learns from besides the scene's own
 
 
 def parts_of(scene: Scene, names: Sequence[str]) -> list[str]:
-    """Return the parts of these names, MODEL or MODEL/SEGMENT, that an edit is of; all models by default."""
+    """Return the parts to edit by name, MODEL or MODEL/SEGMENT; by default all models."""
     known = part_names(scene)
     for name in names:
         if name not in known:
@@ -37,7 +37,7 @@ def parts_of(scene: Scene, names: Sequence[str]) -> list[str]:
 
 
 def parts_with_surfels(scene: Scene) -> list[str]:
-    """Return the names of all parts but models whose surfels are all in segments, and of such segments."""
+    """Return the names of all parts that have surfels outside of other parts."""
     names = []
     for name, entry in scene.models.items():
         own = [name, *(f"{name}/{segment}" for segment in entry.segments)]
@@ -50,9 +50,9 @@ def parts_with_surfels(scene: Scene) -> list[str]:
 
 
 def surfels_of(scene: Scene, part: str) -> tuple[Surfels, Tensor | None]:
-    """Return the model of a part with the textures that it has, and which surfels [N] bool are the part's.
+    """Return the model of a part with its textures, and the mask [N] of the part's surfels.
 
-    Of a model with segments these are what no segment holds; None stands for all of them.
+    For a model, these are the surfels outside all segments; None stands for all surfels.
     """
     name, segment = split(scene, part)
     entry = scene.models[name]
@@ -74,26 +74,26 @@ class Task(Generic[Settings]):
     """One edit of one scene."""
 
     settings: Settings  # of the method
-    edit: EditKeys  # what all methods have
+    edit: EditKeys  # keys common to all methods
     scene: Scene
     views: Mapping[str, Path]  # transforms_train.json of the training views, by model
     output: Path  # folder for textures, segments and pictures
     device: torch.device
     reduce: int  # factor by which the views were made smaller for the fit
-    lens: Lens  # of the views, but for the size of images
+    lens: Lens  # of the views, except for the image size
     title: str  # of progress bars
-    followed: Mapping[str, str] = field(default_factory=dict)  # by model, where not as settings say
-    show: Callable[[str, Callable[[], Surfels]], None] = lambda part, model: None  # parts on their way
-    draws: bool = True  # whether pictures of an instruction's views are wanted, which take seconds
+    followed: Mapping[str, str] = field(default_factory=dict)  # by model; overrides the settings
+    show: Callable[[str, Callable[[], Surfels]], None] = lambda part, model: None  # shows progress
+    draws: bool = True  # whether to draw pictures of an instruction's views, which takes seconds
 
     def settings_for(self, part: str) -> Settings:
-        """Return the settings with the picture or the instruction that the model of a part follows."""
+        """Return the settings with the picture or instruction for the model of a part."""
         followed = self.followed.get(split(self.scene, part)[0])
         changes: dict[str, Any] = {} if followed is None else {method_of(self.edit).follows: followed}
         return replace(self.settings, **changes)  # type: ignore[type-var]
 
     def opacity_of(self, part: str) -> float:
-        """Return the factor on the opacity of a part that the scene has; 1 for a part that it fades away."""
+        """Return the scene's factor on the opacity of a part; 1 for a part that it fades away."""
         return entry_of(self.scene, part).edit.opacity or 1.0
 
     def title_of(self, part: str) -> str:
@@ -101,7 +101,7 @@ class Task(Generic[Settings]):
         return f"{self.title} {self.edit.name}, {part}"
 
     def training_views(self, model: str) -> Sequence[View]:
-        """Return the training views of a model, one of the data set's."""
+        """Return the training views of a model."""
         if model not in self.views:
             raise ArgumentError(
                 f"scene: expected models named after basic TFs of the data set ({', '.join(self.views)}), "
@@ -110,7 +110,7 @@ class Task(Generic[Settings]):
         return read_views(self.views[model].parent).train
 
     def other_steps(self, part: str) -> list[Surfels]:
-        """Return the model of a part at some more steps of its series, so that a look is learned for all."""
+        """Return the model of a part at further steps of its series, so that the look suits all steps."""
         name, _ = split(self.scene, part)
         if self.scene.series is None or name not in self.scene.series.models:
             return []
@@ -125,9 +125,9 @@ class Task(Generic[Settings]):
     ) -> Scene:
         """Edit the parts one after the other, each alone, and return the scene with their new looks.
 
-        Palettes that were edited before are gone: these were of other texels. The edit of one part is from
-        its name, its model with the textures that it has, the surfels that may change (None: all) and
-        training views, to the edited model; `values` of the part's `PartEdit` may follow from this model.
+        Edited palettes are reset, because they belonged to other texels. `one` maps a part's name, its model
+        with textures, the surfels that may change (None: all) and training views to the edited model;
+        `values` of the part's `PartEdit` may depend on this model.
         """
         scene = self.scene
         for part, name in part_files("edit.parts", parts_of(scene, self.edit.parts)).items():
@@ -148,24 +148,24 @@ class Task(Generic[Settings]):
         for name, file_name in part_files("edit.parts", parts_of(scene, self.edit.parts)).items():
             entry, file = scene.models[split(scene, name)[0]], self.output / file_name
             edited = one(name, entry.open()[0].to(self.device), self.training_views(name))
-            scene = replaced(scene, name, replace(entry, file=kinds()[edited.kind].write(file, edited)))
+            scene = replace_entry(scene, name, replace(entry, file=kinds()[edited.kind].write(file, edited)))
         return scene
 
 
 @dataclass(frozen=True, eq=False)
 class EditedScene:
-    """A scene with a new look or a new part."""
+    """A scene with a new look or a new part, and facts about the edit."""
 
     scene: Scene
-    how: str  # what the method worked with, in tables
-    pictures: Mapping[str, str] = field(default_factory=dict)  # what files of the output show, by their names
+    how: str  # means of the method, for tables
+    pictures: Mapping[str, str] = field(default_factory=dict)  # captions by file name
     lambda_s: float | None = None  # share of NNFM against CLIP
-    notes: Mapping[str, Any] = field(default_factory=dict)  # what else there is to tell: no table reads it
+    notes: Mapping[str, Any] = field(default_factory=dict)  # further facts; no table reads them
     losses: Mapping[str, Mapping[str, Sequence[float]]] = field(default_factory=dict)  # by part and term
 
 
-def edited_by(method: Method[Any], task: Task[Any]) -> EditedScene:
-    """Return what a method makes of a task, and require that it is a scene."""
+def run_method(method: Method[Any], task: Task[Any]) -> EditedScene:
+    """Run a method on a task, and require a scene as the result."""
     edited = method.run(task)
     if not isinstance(edited, EditedScene):
         raise ConfigError(f"method {method.name}: expected an EditedScene, got {type(edited).__name__}")

@@ -1,4 +1,4 @@
-"""How texels follow edited views: by preconditioned stochastic steps, or by Adam as in the paper."""
+"""Solve for texels from edited views: by preconditioned stochastic steps, or by Adam as in the paper."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,25 +14,25 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors, owners
 from texgs.raster.losses import l1_dssim
 
-FAINT_GAIN = 1e-4  # gain times alpha below which a pixel says nothing
-HARDLY_SEEN = 0.01  # share of the mean weight: texels below it are hardly seen
+FAINT_GAIN = 1e-4  # gain times alpha below which a pixel carries no information
+UNSEEN_SHARE = 0.01  # share of the mean weight below which a texel counts as unseen
 FIRST_STEP = 1.5  # share of a Newton step in a typical observation: 2 is the limit of stability
-LAST_STEP = 0.1  # what single observations disagree about averages out as steps fall
-RIDGE = 0.02  # added to curvatures, relative to their median: texels that are hardly seen stay
-DSSIM = 0.2  # share of D-SSIM in what Adam follows
+LAST_STEP = 0.1  # length of the last step: smaller steps average out disagreement between views
+RIDGE = 0.02  # added to curvatures, relative to their median; it holds texels that are hardly seen
+DSSIM = 0.2  # share of D-SSIM in the loss for Adam
 
 
 @dataclass(frozen=True, eq=False)
 class BackProjection:
-    """What edited views say about each texel before anything is solved, a projective texture."""
+    """Projective texture: the mean of what edited views want of each texel."""
 
-    colors: Tensor  # [T, 3] mean of the bare colours wanted where it is seen, in [0, 1]
-    weights: Tensor  # [T] sum of its weights in pixels, 0 where it is never seen
+    colors: Tensor  # [T, 3] mean target of bare colours, in [0, 1]
+    weights: Tensor  # [T] sum of weights over pixels, 0 if never seen
     curvature: Tensor  # [T] row sum of the Hessian in a typical observation
 
 
 def back_project(observations: Sequence[LinearObservation], model: Surfels) -> BackProjection:
-    """Average what observations want over the pixels that show a texel.
+    """Average the targets of observations over the pixels that show a texel.
 
     The curvature is the row sum A'A 1 of one observation, A being the weights of texels in pixels; divided by
     it, no eigenvalue of A'A exceeds 1. Over observations it is the mean weighted by itself, sum c^2 / sum c:
@@ -64,12 +64,12 @@ def back_project(observations: Sequence[LinearObservation], model: Surfels) -> B
 
 
 def seen_texels(weights: Tensor) -> Tensor:
-    """Return which texels [T] views really show: not those glimpsed through what is in front of them."""
-    return weights > HARDLY_SEEN * weights.mean()
+    """Return which texels [T] views show clearly, rather than through others in front of them."""
+    return weights > UNSEEN_SHARE * weights.mean()
 
 
 def fill_unseen(colors: Tensor, weights: Tensor, model: Surfels) -> Tensor:
-    """Return colours [T, 3] of texels, those that views hardly show drawn to what is seen nearest to them.
+    """Return texel colours [T, 3]. Texels that views hardly show take the nearest visible colours.
 
     That is the mean of the texels of the same surfel, weighted by how much they are seen, [T]; where the
     whole surfel hardly is, that of the nearest one (by its mean) that is seen. So a side that nobody edited
@@ -83,17 +83,17 @@ def fill_unseen(colors: Tensor, weights: Tensor, model: Surfels) -> Tensor:
         return bare_colors(model)
     totals = colors.new_zeros(len(model), 3).index_add_(0, surfel, colors[place] * weight[:, None])
     mean = totals / of_surfel.clamp_min(torch.finfo(weight.dtype).tiny)[:, None]
-    few = HARDLY_SEEN * of_surfel.mean()
+    few = UNSEEN_SHARE * of_surfel.mean()
     around = mean[_nearest_known(model.parameters["means"], of_surfel > few)]
     mean = (totals + few * around) / (of_surfel + few)[:, None]
-    few = HARDLY_SEEN * weight.mean()
+    few = UNSEEN_SHARE * weight.mean()
     filled = colors.clone()
     filled[place] = (colors[place] * weight[:, None] + few * mean[surfel]) / (weight + few)[:, None]
     return filled
 
 
 def _nearest_known(means: Tensor, known: Tensor) -> Tensor:
-    """Return indices [N] of the nearest of the known surfels, one at least; of these themselves their own."""
+    """Return the index [N] of the nearest known surfel; known ones get their own. At least one is known."""
     index = torch.arange(len(means), device=means.device)
     if not bool(known.all()):
         _, neighbours = nearest(means[known], means[~known])
@@ -132,10 +132,9 @@ def solve(
 
 
 def image_loss(observation: LinearObservation, colors: Tensor) -> Tensor:
-    """Return L1 + D-SSIM [] between the image that bare colours [T, 3] make and the one that is wanted.
+    """Return L1 + D-SSIM [] between the image of bare colours [T, 3] and the target.
 
-    It is a sum over pixels, as outside of what an observation shows nothing changes: so the views that it
-    shows less of do not count more.
+    It is a sum over pixels, so that views with a small visible part do not count more.
     """
     image = observation.image(colors) + observation.rest
     return l1_dssim(image, observation.wanted + observation.rest, DSSIM) * image[..., 0].numel()

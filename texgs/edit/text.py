@@ -14,36 +14,36 @@ from texgs.core.light import HEADLIGHT, Light
 from texgs.core.memory import require_memory
 from texgs.edit.canvas import require_editable
 from texgs.edit.observations import LinearObservation, Target, join_views, observe, render_views
-from texgs.edit.steps import Shot, placed, shots_of
+from texgs.edit.steps import Shot, model_at_step, shots_of
 from texgs.edit.texel_solver import back_project, fill_unseen, learn, seen_texels, solve
 from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texels import bare_colors, owners, recolored, spread, untextured
+from texgs.fields.surfels.texels import bare_colors, owners, spread_colors, with_colors, with_single_texels
 from texgs.models.guidance import EditViews, Guidance, require_edited
 from texgs.models.instruction import require_instruction
 
-SIZE = 512  # pixels along the longer side of the views: what InstructPix2Pix was trained on
-PIXEL = 64  # bytes of memory for a pixel of a view: what the guidance sees, returns, and the colours there
-FOLLOWED, SURFEL = 24, 28  # bytes for a pixel and a surfel that texels follow in a view at one opacity
+SIZE = 512  # pixels along the longer side of the views, as in the training of InstructPix2Pix
+BYTES_PER_PIXEL = 64  # of a view: input and output of the guidance, and the colours there
+BYTES_PER_SHOT_PIXEL, BYTES_PER_SHOT_SURFEL = 24, 28  # in a view at one opacity
 # Azimuth and polar angle of cameras at the front (+z), back, left, right, top and bottom, degrees.
 AXES = ((-90, 0), (90, 0), (180, 0), (0, 0), (-90, 90), (-90, -90))
-ANY_FOV = 45.0  # degrees, of cameras that only their directions are needed of
-BORDER = 1.06  # of the field of view against what holds the scene, for surfels have an extent
-NEAREST = 0.05  # distance to the nearest point against that to the middle
+ANY_FOV = 45.0  # degrees; arbitrary, only the directions of these cameras count
+BORDER = 1.06  # field of view relative to the scene's bounds: room for the extent of surfels
+MIN_DISTANCE = 0.05  # distance to the nearest point, relative to the distance of the middle
 
 
 @dataclass(frozen=True)
 class TextRecipe:
     """Which views are edited, and how texels follow; the defaults are those of `default`."""
 
-    views: Literal["axes", "nearest", "all"] = "axes"  # new ones, or training views nearest to axes; or all
+    views: Literal["axes", "nearest", "all"] = "axes"  # new views, nearest or all training views
     opacities: tuple[float, ...] = (2.0, 1.0, 0.5)  # factors on the scene's opacity while texels are found
     sweeps: int = 3  # of the solver, where there are no iterations
-    iterations: int = 0  # of Adam, over which opacities follow each other; 0: solve
-    rate: float = 0.025  # of Adam at the start
-    final: float = 0.1  # at the end, relative to that
-    target: Target = "colors"  # what is wanted at each opacity: colours that edited views show, or the images
-    fills: bool = True  # whether texels that no view shows take colours of those nearest to them, or stay
+    iterations: int = 0  # of Adam, through the opacities in order; 0: use the solver
+    rate: float = 0.025  # Adam's rate at the start
+    final: float = 0.1  # Adam's rate at the end, relative to the start
+    target: Target = "colors"  # at each opacity: colours of edited views, or the images
+    fills: bool = True  # whether unseen texels take the nearest visible colours
     is_textured: bool = True  # whether each texel follows, or each surfel one colour: the paper's ablation
     material: bool = True  # whether an instruction that names a material also sets its highlights
 
@@ -67,12 +67,12 @@ RECIPES = {
 
 
 class EditedModel(NamedTuple):
-    """What an edit gives."""
+    """The result of a text-driven edit."""
 
     model: Surfels  # with new texels and offsets of surfels; the rest stays as it was, bit for bit
     views: EditViews  # as the guidance saw them
     images: Tensor  # [V, H, W, 3] as the guidance edited them
-    seen: float  # share of the texels that may change that edited views show; others are made up, or stay
+    seen: float  # share of the changing texels that edited views show
 
 
 def edit_by_text(
@@ -108,7 +108,7 @@ def edit_by_text(
         surfels: [N] bool, which may change; all by default. Others keep their colours bit for bit.
         steps: the model at other steps of a series, with the same texels: half as many views again show what
             the model hides.
-        size: pixels along the longer side of the six views; all training views are edited as they are.
+        size: pixels along the longer side of the six views; training views keep their size.
         seed: of all random numbers; with the same one, machine and versions, results are the same.
         title: of progress bars.
     """
@@ -123,25 +123,28 @@ def edit_by_text(
     shown = [render_views(each.model, each.cameras, shine, opacity) for each in shots]
     views = join_views(shown)
     edited = require_edited(guidance(views, instruction, generator), views, guidance.name)
-    own = model if recipe.is_textured else untextured(model, changing)
+    own = model if recipe.is_textured else with_single_texels(model, changing)
     opacities = [opacity * x for x in recipe.opacities]
     rows: list[list[LinearObservation]] = [[] for _ in opacities]
     for shot, part, images in zip(shots, shown, edited.split([*map(len, shown)]), strict=True):
-        at, learning = placed(own, shot.model), shot.surfels if recipe.target == "colors" else changing
+        at, learning = model_at_step(own, shot.model), shot.surfels if recipe.target == "colors" else changing
         observed = observe(at, part, images, shine, opacities, learning, target=recipe.target)
         rows = [[*row, *more] for row, more in zip(rows, observed, strict=True)]
     colors, weights = _follow(rows, own, recipe, generator, title)
     share = _seen_share(weights, own, changing)
-    colors = colors if recipe.is_textured else spread(colors, own, model)
+    colors = colors if recipe.is_textured else spread_colors(colors, own, model)
     changing = changing if recipe.fills else changing & _shown(weights, own)
-    return EditedModel(recolored(model, colors, changing), views, edited, share)
+    return EditedModel(with_colors(model, colors, changing), views, edited, share)
 
 
 def _require_memory(shots: Sequence[Shot], recipe: TextRecipe) -> None:
-    """Require memory for views, and for what texels follow at each opacity."""
+    """Require memory for the views and the equations at each opacity."""
     model, (camera, *_), _ = shots[0]
     count, pixels = sum(len(each.cameras) for each in shots), camera.width * camera.height
-    needed = count * (PIXEL * pixels + len(recipe.opacities) * (FOLLOWED * pixels + SURFEL * len(model)))
+    needed = count * (
+        BYTES_PER_PIXEL * pixels
+        + len(recipe.opacities) * (BYTES_PER_SHOT_PIXEL * pixels + BYTES_PER_SHOT_SURFEL * len(model))
+    )
     require_memory(needed, f"{count} views that are edited", "edit fewer views, or smaller ones")
 
 
@@ -202,7 +205,7 @@ def _widest(points: Tensor, radius: float, aspect: float) -> float:
     for azimuth, polar in AXES:
         R_cw = orbit(azimuth, polar, radius, ANY_FOV, 2, 2).viewmat[:3, :3].to(points)
         x, y, z = (points @ R_cw.T).unbind(dim=1)
-        if float(z.min()) + radius < NEAREST * radius:
+        if float(z.min()) + radius < MIN_DISTANCE * radius:
             raise ArgumentError(
                 f"like: expected a camera well outside of the scene, got one {radius:.3g} from its middle, "
                 "which is too near; pass one farther away"

@@ -1,4 +1,4 @@
-"""Which surfels belong to the objects that masks show: two ways of counting votes over views."""
+"""Select surfels by masks of views: two ways of counting votes."""
 
 from collections.abc import Collection
 from typing import Literal
@@ -13,13 +13,13 @@ from texgs.fields.surfels.model import Surfels
 from texgs.raster import Render, splat
 
 Vote = Literal["contribution", "centre"]
-VOTING_PIXELS = 0.01  # pixels in all views together that a surfel must make up to have a vote
+VOTING_PIXELS = 0.01  # least weight of a surfel in all views together, in pixels, to have a vote
 ROUNDS = 5
-NEIGHBOURS = 5  # seen surfels, whose mean share one that no view shows gets
+NEIGHBOURS = 5  # seen surfels whose mean share an unseen one takes
 
 
 class ContributionVotes:
-    """Each pixel votes for the surfels that it shows, by how much of it they make up.
+    """Each pixel votes for its surfels, weighted by their share of the pixel.
 
     A surfel's share is sum(weight * mask) / sum(weight) over all pixels of all views, weight being its
     blending weight there: the adjoint of rendering. What is hidden in a view has no vote in it, and what
@@ -56,7 +56,7 @@ class ContributionVotes:
 
     @property
     def shares(self) -> Tensor:
-        """Return the share [N] of each surfel's plain votes that are for the object; 0 without votes."""
+        """Return the share [N] of each surfel's votes for the object, before rounds; 0 without votes."""
         return torch.where(self.seen, self.sums / self.weights.clamp_min(VOTING_PIXELS), 0.0)
 
     @torch.no_grad()

@@ -1,4 +1,4 @@
-"""How voxel grids follow a style (ARF, Zhang et al. 2022) or edited views (Instruct-NeRF2NeRF)."""
+"""Let voxel grids follow a style (ARF, Zhang et al. 2022) or edited views (Instruct-NeRF2NeRF)."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from texgs.fields.voxels import Voxels
 from texgs.fitting.rays import training_rays
 from texgs.models.vgg import Vgg
 from texgs.raster.shading import Y00
-from texgs.raster.voxel_grid import GREY, VoxelGrid, drop_sh, recolored
+from texgs.raster.voxel_grid import GREY, VoxelGrid, drop_sh, recolor
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import Rays, Samples, camera_rays
-from texgs.volume.images import Box, Images
+from texgs.volume.images import Images, PixelBox
 
-RAYS, RUN = 5000, 2  # a step of ARF's first phase, and neighbours among them
-RATE, LAST_RATE, RATE_STEPS = 0.1, 0.01, 250_000  # of ARF's coefficients, log-linear
-COUNTED = 1_000_000  # pixels that statistics of colours look at
+RAYS, RUN_LENGTH = 5000, 2  # rays per step of ARF's first phase, in runs of neighbours
+RATE, LAST_RATE, RATE_STEPS = 0.1, 0.01, 250_000  # ARF's rates for coefficients, log-linear
+COUNTED_PIXELS = 1_000_000  # pixels in the statistics of colours
 TV_DENSITY, TV_SH = 1e-5, 1e-3  # weights of total variation of densities and of spherical harmonics (IN2N)
-OCCUPY_EVERY = 50  # iterations between looks at which cells show anything, where densities learn
+OCCUPANCY_INTERVAL = 50  # iterations between updates of occupied cells while densities learn
 
 
 def stylize_voxels(
@@ -43,13 +43,13 @@ def stylize_voxels(
     vgg: Vgg | None = None,
     title: str = "style",
 ) -> tuple[Voxels, Losses]:
-    """Give a grid the style of a picture; densities stay, and colours no longer depend on the direction.
+    """Stylize a grid; densities stay, and colours no longer depend on the direction.
 
     Colours are moved to those of the style, learned from the recoloured views, then from the distance of
     rendered views to the style, and moved once more. For `exact` see `move_colors`.
     """
     generator = torch.Generator().manual_seed(recipe.seed)
-    stride = max(1, round((images.planes[:, 0].numel() / COUNTED) ** 0.5))
+    stride = max(1, round((images.planes[:, 0].numel() / COUNTED_PIXELS) ** 0.5))
     planes = images.planes[:, :, ::stride, ::stride].permute(1, 0, 2, 3).flatten(1).float() / 255
     colors = object_colors(planes[:3].T, planes[3], generator, recipe.foreground)
     matrix, offset = (x.float() for x in color_map(colors, style.pixels))
@@ -65,7 +65,7 @@ def stylize_voxels(
 
 
 def object_colors(color: Tensor, alpha: Tensor, generator: torch.Generator, foreground: bool) -> Tensor:
-    """Return colours [M, 3] of the object, drawn from pixels [N, 3] over white by their alpha [N]; or all."""
+    """Draw colours [M, 3] of the object from pixels [N, 3] over white by their alpha [N]; or take all."""
     if not foreground:
         return color
     drawn = torch.rand(alpha.shape, generator=generator) < alpha
@@ -89,17 +89,17 @@ def move_colors(grid: VoxelGrid, matrix: Tensor, offset: Tensor, is_exact: bool)
     """Return the grid with mapped colours; not exact: coefficients s become A s + b, as in ARF's code."""
     if not is_exact:
         offset = Y00 * offset + GREY - GREY * matrix.sum(1)
-    return recolored(grid, matrix, offset)
+    return recolor(grid, matrix, offset)
 
 
 def sample_rays(grid: VoxelGrid, field: Voxels, rays: Tensor) -> tuple[Samples, Rays]:
-    """Return the samples of rays [N, 6] over white, and what they bring back."""
+    """Sample rays [N, 6] over white; return the samples and the blended result."""
     out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
     return Samples(grid, field.march, rays, out), out
 
 
 class VoxelPainting:
-    """A grid of degree 0 on its way to a style; rays and blocks are drawn at random."""
+    """A grid of degree 0 that learns a style; rays and blocks are drawn at random."""
 
     def __init__(
         self,
@@ -117,18 +117,18 @@ class VoxelPainting:
         self.generator, self.optimizer = generator, VoxelOptimizer(grid)
 
     def learn_rays(self, epochs: float, title: str) -> None:
-        """Follow the colours of rays through the pixels of views."""
+        """Learn the colours of rays through the pixels of views."""
         rays = training_rays(self.images)
         steps = range(round(epochs * len(rays) / RAYS))
         for step in progress(steps, title=f"{title}, recoloured views", unit="step"):
-            drawn, target = rays.draw(RAYS, RUN, self.generator)
+            drawn, target = rays.draw(RAYS, RUN_LENGTH, self.generator)
             samples, out = sample_rays(self.grid, self.original, drawn)
             error = out.color - target
             samples.add_gradient(error * (2 / error.numel()), None, self.optimizer.gradient)
             self.step(step)
 
     def render(self, view: int) -> list[Painting]:
-        """Show a view over white."""
+        """Render a view over white."""
         width, height = self.images.size
         target = self.images.target(view)
         samples, out = sample_rays(self.grid, self.original, camera_rays(target.camera).flatten(0, 1))
@@ -149,7 +149,7 @@ class VoxelPainting:
         return [Painting(image, out.alpha.reshape(height, width), self.objective, backward, added)]
 
     def rendered_colors(self, cameras: Sequence[Camera], foreground: bool, stride: int) -> Tensor:
-        """Return colours [M, 3] that views of the grid have."""
+        """Return the colours [M, 3] of rendered views."""
         colors = []
         for camera in cameras:
             rays = camera_rays(camera)[::stride, ::stride].flatten(0, 1).contiguous()
@@ -166,7 +166,7 @@ class VoxelPainting:
 
 
 class VoxelLearner:
-    """A grid that learns from patches of views by RMSProp; the field given stays as it is."""
+    """A grid that learns from patches of views by RMSProp; the given field stays unchanged."""
 
     def __init__(
         self, field: Voxels, loss: PhotometricLoss, rates: VoxelRates, patches: int, side: int
@@ -178,7 +178,7 @@ class VoxelLearner:
 
     @property
     def field(self) -> Voxels:
-        """Return the grid as it is now."""
+        """Return the current grid."""
         self.grid.refresh_occupancy()
         return replace(self.original, grid=self.grid)
 
@@ -201,12 +201,12 @@ class VoxelLearner:
         add_variation_of_some(self.grid, weight, TV_SH, generator, self.optimizer.gradient)
         self.optimizer.step(self.rates)
         self.iteration += 1
-        if self.rates.density and self.iteration % OCCUPY_EVERY == 0:
+        if self.rates.density and self.iteration % OCCUPANCY_INTERVAL == 0:
             self.grid.refresh_occupancy()
         return loss
 
 
-def corner(box: Box, side: int, size: tuple[int, int], generator: torch.Generator) -> tuple[int, int]:
+def corner(box: PixelBox, side: int, size: tuple[int, int], generator: torch.Generator) -> tuple[int, int]:
     """Draw left and top of a patch inside of an image of this width and height, its middle from a box."""
     low, high = torch.tensor(box[:2]), torch.tensor(box[2:])
     middle = low + (torch.rand(2, generator=generator) * (high - low)).long()

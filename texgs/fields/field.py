@@ -1,4 +1,4 @@
-"""What all fields have in common: things that are fitted to views, drawn, edited and saved."""
+"""The interface of all fields: models that are fitted to views, rendered, edited and saved."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
@@ -20,7 +20,7 @@ F = TypeVar("F", bound="Field")
 
 
 class Field(Protocol):
-    """One basic model, of whatever it is made."""
+    """One basic model of any kind."""
 
     kind: ClassVar[str]  # its name, one of `texgs.fields.kinds.kinds()`
 
@@ -29,17 +29,17 @@ class Field(Protocol):
 
     @property
     def device(self) -> torch.device:
-        """Where its tensors are."""
+        """The device of its tensors."""
 
     @property
     def metadata(self) -> Mapping[str, Any]:
-        """Where it is from, as JSON."""
+        """Its origin, as JSON."""
 
     def to(self, device: torch.device | str) -> Self:
         """Return the same field on another device."""
 
     def tensors(self, role: Role) -> Mapping[str, Tensor]:
-        """Return raw parameters that decide where it is, or how it looks; what learns is among them."""
+        """Return the raw parameters of a role: geometry or appearance."""
 
     def render(
         self,
@@ -62,14 +62,14 @@ class Field(Protocol):
         """
 
     def sizes(self) -> dict[str, float]:
-        """Return MiB by contents, and `total_mib`, as the paper's break-down counts; `stored_`, as in a file.
+        """Return MiB by contents and `total_mib` as in the paper, and `stored_` sizes as in files.
 
         `files_mib` is the total as the paper's tables of edits count.
         """
 
 
 class Asked(NamedTuple):
-    """What is asked of a view, see `Composed.render`."""
+    """Options of a view, see `Composed.render`."""
 
     background: Tensor | None
     outputs: Collection[str]
@@ -77,7 +77,7 @@ class Asked(NamedTuple):
 
 
 class Composed(ABC):
-    """Fields of one kind as a scene. Edits are one for each field, behind it one for each of its segments."""
+    """Fields of one kind as a scene. Edits are in order: for each field its own, then one per segment."""
 
     device: torch.device  # of its tensors
 
@@ -88,7 +88,7 @@ class Composed(ABC):
     @property
     @abstractmethod
     def palettes(self) -> list[tuple[float, ...]]:
-        """The colour of each field as fitted, which edits replace; black for those without one."""
+        """The fitted colour of each field, which edits replace; black for fields without one."""
 
     @torch.no_grad()
     def render(
@@ -141,7 +141,7 @@ def sizes_in_mib(
 
 
 class UnlitField(ABC):
-    """A field whose colours have the light of its views in them."""
+    """A field with the light of its views baked into its colours."""
 
     kind: ClassVar[str]
 
@@ -153,18 +153,18 @@ class UnlitField(ABC):
         background: Tensor | None = None,
         outputs: Collection[str] = (),
     ) -> Render:
-        """Render one view, see `Field`; light changes nothing."""
+        """Render one view, see `Field`; light has no effect."""
         return self.draw(camera, background, outputs)
 
     @abstractmethod
     def draw(self, camera: Camera, background: Tensor | None, outputs: Collection[str]) -> Render:
-        """Render the field with the colours that it has."""
+        """Render the field with its own colours."""
 
 
 class UnlitScene(Composed, Generic[F]):
     """Fields of one kind that are drawn together.
 
-    There is at least one, all are on one device, and none has segments. Light changes nothing.
+    There is at least one, all are on one device, and none has segments. Light has no effect.
     """
 
     def __init__(self, fields: Sequence[F], segments: Sequence[Sequence[Tensor]] = ()) -> None:
@@ -199,6 +199,6 @@ class UnlitScene(Composed, Generic[F]):
 
 
 def require_depth(outputs: Collection[str], kind: str) -> None:
-    """Require that no other output is asked for than the depth."""
+    """Refuse outputs other than the depth."""
     if unknown := sorted(set(outputs) - {"depth"}):
         raise ArgumentError(f"outputs: expected depth of {kind}, got {unknown[0]}")

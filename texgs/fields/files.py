@@ -1,4 +1,4 @@
-"""Files of fields of any kind, told apart by how they begin."""
+"""Files of fields of any kind, recognised by their first bytes."""
 
 import json
 from pathlib import Path
@@ -7,8 +7,8 @@ from texgs.core.ply_file import is_ply, properties
 from texgs.fields.field import Field
 from texgs.fields.kinds import Kind, kinds
 
-LONGEST_HEADER = 1 << 20  # bytes; those of fields have a kilobyte
-FIRST = "surfels"  # whose reader says what is wrong with a file that is of no kind
+MAX_HEADER_BYTES = 1 << 20  # headers of fields have about 1 KiB
+DEFAULT_KIND = "surfels"  # its reader reports the error in a file of no known kind
 
 
 def open_field(path: str | Path) -> Field:
@@ -25,11 +25,11 @@ def open_field(path: str | Path) -> Field:
 def kind_of(path: Path) -> Kind:
     """Return the kind of the field in a file, by its header."""
     names, known = formats(path), kinds()
-    return next((kind for kind in known.values() if names & {*kind.formats}), known[FIRST])
+    return next((kind for kind in known.values() if names & {*kind.formats}), known[DEFAULT_KIND])
 
 
 def formats(path: Path) -> set[str]:
-    """Return entries of a file's header, one of which names its format; none where it has no header of ours.
+    """Return the entries of a file's header, one of which names its format; none without our header.
 
     Files of fields are safetensors with one entry of metadata, begin with a line of JSON, or are PLY files,
     which are told apart by their properties: 3D Gaussians have a third scale, and surfels with shading may.
@@ -42,9 +42,9 @@ def formats(path: Path) -> set[str]:
         with path.open("rb") as file:
             start = file.read(9)
             if start[:1] == b"{":
-                header = json.loads(start + file.readline(LONGEST_HEADER))
+                header = json.loads(start + file.readline(MAX_HEADER_BYTES))
             else:
-                length = min(int.from_bytes(start[:8], "little"), LONGEST_HEADER)
+                length = min(int.from_bytes(start[:8], "little"), MAX_HEADER_BYTES)
                 header = json.loads(start[8:] + file.read(max(length - 1, 0))).get("__metadata__", {})
     except (OSError, ValueError, AttributeError, RecursionError):
         return set()

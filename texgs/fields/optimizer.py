@@ -1,4 +1,4 @@
-"""Adam over named parameters whose rows come and go."""
+"""Adam over named parameters with rows that are added and removed."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ native.declare("texgs_adam", "n", Learned, "fff")
 
 @dataclass(frozen=True)
 class Rate:
-    """A learning rate that falls log-linearly over a phase, and what draws a parameter to 0."""
+    """A learning rate that falls log-linearly over a phase, and a decay of the parameter."""
 
     start: float
     final: float  # relative to the start
-    decay: float = 0.0  # share of the parameter that each step takes away, whatever the rate
+    decay: float = 0.0  # share of the parameter that each step removes, independent of the rate
 
     def at(self, progress: float) -> float:
         """Return the rate at progress 0 to 1."""
@@ -50,7 +50,7 @@ class Optimizer:
             self._replace(name, x)
 
     def step(self, progress: float) -> None:
-        """Take one step with the rates of now, and forget the gradients."""
+        """Take one step with the current rates, and clear the gradients."""
         gradients = ((name, self.parameters[name].grad) for name in self._rates)
         moving = {name: gradient for name, gradient in gradients if gradient is not None}
         beta1, beta2 = self._betas
@@ -71,7 +71,7 @@ class Optimizer:
     def edit_rows(self, n: int, keep: Tensor, added: Mapping[str, Tensor]) -> None:
         """Keep some [n] bool of the n rows and append others by name, whose moments start at zero.
 
-        Parameters of another length are shared and stay.
+        Parameters of another length are shared and stay unchanged.
         """
 
         def edited(moments: Tensor) -> Tensor:
@@ -83,7 +83,7 @@ class Optimizer:
                 self._replace(name, torch.cat([old.detach()[keep], added[name]]), edited)
 
     def reset(self, name: str, values: Tensor) -> None:
-        """Give a parameter new values and zero moments."""
+        """Replace the values of a parameter, and reset its moments."""
         self._replace(name, values, torch.zeros_like)
 
     def _replace(self, name: str, values: Tensor, moments: Callable[[Tensor], Tensor] = torch.clone) -> None:
@@ -100,7 +100,7 @@ class Optimizer:
         return state
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
-        """Go on from `state`, wherever it was kept."""
+        """Continue from a `state`, on any device."""
         for name, old in self.parameters.items():
             self._replace(name, state[name].to(old.device))
         for name in self._rates:

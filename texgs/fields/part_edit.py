@@ -7,15 +7,15 @@ from texgs.core.errors import ArgumentError
 from texgs.core.names import is_number
 from texgs.fields.kinds import kinds
 
-MOST_FACTOR = 1000.0  # a larger factor is a typing error
-MOST_OPAQUE = 1 - 1e-6  # has a logit
-# What a field has to be capable of for a value of an edit; all others are factors of a material.
+MAX_FACTOR = 1000.0  # a larger factor is a typing error
+MAX_OPACITY = 1 - 1e-6  # opacity with a finite logit
+# Capability of a field that each value of an edit requires; all other values are factors of a material.
 NEEDS = {"visible": "opacity", "opacity": "opacity", "palette": "palette"}
 
 
 @dataclass(frozen=True)
 class PartEdit:
-    """What a scene changes about one of its models; the defaults change nothing.
+    """Edits of one part of a scene by numbers; the defaults change nothing.
 
     Raises:
         ArgumentError: naming the value that is out of range.
@@ -38,19 +38,17 @@ class PartEdit:
         object.__setattr__(self, "tint", color("tint", self.tint))
         for each in fields(self)[2:-1]:
             value = getattr(self, each.name)
-            if not is_number(value) or not 0 <= value <= MOST_FACTOR:
-                raise ArgumentError(
-                    f"{each.name}: expected a factor from 0 to {MOST_FACTOR:g}, got {value!r}"
-                )
+            if not is_number(value) or not 0 <= value <= MAX_FACTOR:
+                raise ArgumentError(f"{each.name}: expected a factor from 0 to {MAX_FACTOR:g}, got {value!r}")
 
     @property
     def material(self) -> tuple[object, ...]:
-        """Return what is changed about how light is reflected."""
+        """Return the changed values of the material."""
         return (self.ambient, self.diffuse, self.specular, self.shininess, self.tint)
 
 
 def require_possible(edit: PartEdit, kind: str) -> None:
-    """Require of a kind of field that it can show an edit, but for values that change nothing."""
+    """Require that a kind of field can show an edit; default values always pass."""
     for each in fields(edit):
         needs = NEEDS.get(each.name, "relight")
         if needs not in kinds()[kind].can and getattr(edit, each.name) != each.default:
@@ -59,9 +57,9 @@ def require_possible(edit: PartEdit, kind: str) -> None:
 
 
 def opacity_factors(edits: Sequence[PartEdit] | None, count: int, kind: str) -> list[float]:
-    """Return a factor on the opacity of each of `count` fields of a kind that can change nothing else.
+    """Return a factor on the opacity of each of `count` fields of a kind that supports no other edit.
 
-    It is 0 for what is hidden, and 1 without edits.
+    It is 0 for hidden fields, and 1 without edits.
     """
     if edits is None:
         return [1.0] * count

@@ -1,4 +1,4 @@
-"""What PLY files of 2DGS and 3DGS have in common: raw geometry and harmonics, a property for each number."""
+"""Common columns of PLY files of 2DGS and 3DGS: raw geometry and harmonics, one property per number."""
 
 import json
 from collections.abc import Mapping
@@ -14,28 +14,28 @@ from texgs.core.io import write_atomic
 from texgs.core.ply_file import TYPES
 from texgs.raster.shading import DEGREES
 
-Told = Mapping[str, object] | None  # what a file says besides, by keys
+Told = Mapping[str, object] | None  # comments of a file, by key
 
 
 def splat_columns(p: Mapping[str, Tensor], normals: Tensor, sh: Tensor) -> dict[str, Tensor]:
     """Return [N] values by property, in the order of 2DGS and 3DGS.
 
-    Of harmonics [N, K, 3], all but the first become `f_rest`, one channel after the other.
+    Harmonics [N, K, 3] after the first become `f_rest`, one channel after the other.
     """
     place = dict(zip("xyz", p["means"].T, strict=True))
     normal = dict(zip(("nx", "ny", "nz"), normals.T, strict=True))
     rest = sh[:, 1:].transpose(1, 2).flatten(1)  # [N, 3 (K - 1)]
-    colors = numbered("f_dc", sh[:, 0]) | numbered("f_rest", rest)
-    shape = numbered("scale", p["scales"]) | numbered("rot", p["quats"])
+    colors = numbered_columns("f_dc", sh[:, 0]) | numbered_columns("f_rest", rest)
+    shape = numbered_columns("scale", p["scales"]) | numbered_columns("rot", p["quats"])
     return place | normal | colors | {"opacity": p["opacities"]} | shape
 
 
-def numbered(name: str, values: Tensor) -> dict[str, Tensor]:
+def numbered_columns(name: str, values: Tensor) -> dict[str, Tensor]:
     """Name the columns of [N, k] name_0, name_1, ..."""
     return {f"{name}_{k}": column for k, column in enumerate(values.T)}
 
 
-def colored(places: Tensor, colors: Tensor) -> dict[str, Tensor]:
+def colored_points(places: Tensor, colors: Tensor) -> dict[str, Tensor]:
     """Name the columns of places [N, 3] and colours [N, 3] from 0 to 255."""
     values = (*places.cpu().float().T, *colors.cpu().byte().T)
     return dict(zip(("x", "y", "z", "red", "green", "blue"), values, strict=True))
@@ -84,7 +84,7 @@ def take(vertices: np.ndarray, *names: str) -> Tensor:
 
 def take_geometry(vertices: np.ndarray, axes: int) -> dict[str, Tensor]:
     """Return raw means, quaternions, `axes` scales and opacities."""
-    scales = take(vertices, *(f"scale_{k}" for k in range(axes)))  # first: without, there is nothing to draw
+    scales = take(vertices, *(f"scale_{k}" for k in range(axes)))  # required first
     return {
         "means": take(vertices, "x", "y", "z"),
         "quats": take(vertices, *(f"rot_{k}" for k in range(4))),
@@ -94,7 +94,7 @@ def take_geometry(vertices: np.ndarray, axes: int) -> dict[str, Tensor]:
 
 
 def take_harmonics(vertices: np.ndarray) -> Tensor:
-    """Return harmonics [N, K, 3] with as many coefficients as the file has."""
+    """Return all harmonics [N, K, 3] of the file."""
     dc = take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")[:, None]  # [N, 1, 3]
     n_rest = sum(name.startswith("f_rest_") for name in vertices.dtype.names or ())
     if n_rest % 3 or 1 + n_rest // 3 not in DEGREES:

@@ -1,4 +1,4 @@
-"""What surfels and 3D Gaussians have in common: raw parameters by name, and what they cover on screen."""
+"""Common base of surfels and 3D Gaussians: raw parameters by name, and their extent on screen."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
@@ -14,19 +14,19 @@ from texgs.fields.field import Role
 from texgs.raster import Options, Render, Texture, native, rasterize
 from texgs.raster.shading import Y00
 from texgs.raster.types import are_gaussians
-from texgs.volume.images import Box, Images, Target
+from texgs.volume.images import Images, PixelBox, Target
 
 GEOMETRY = ("means", "quats", "scales", "opacities")
-REACH = 3.34  # standard deviations at which opacity 1 has fallen to 1/255, below which nothing is drawn
+REACH = 3.34  # standard deviations at which opacity 1 falls to 1/255, the threshold of drawing
 native.declare("texgs_screen_bounds", "n i ppp f p")
 
 
 class Shading(Protocol):
-    """What turns raw parameters of surfels or 3D Gaussians into what the rasterizer takes."""
+    """Converts raw parameters of surfels or 3D Gaussians to arguments of the rasterizer."""
 
     @property
     def options(self) -> Options:
-        """For the rasterizer."""
+        """Options of the rasterizer."""
 
     def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light) -> Tensor | Texture:
         """Return colours [N, 3] in a view, or a texture; differentiable."""
@@ -34,7 +34,7 @@ class Shading(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Splats:
-    """Raw parameters by name, all float32 on one device, and how they are drawn."""
+    """Raw parameters by name, all float32 on one device, and their shading."""
 
     parameters: Mapping[str, Tensor]
     shading: Shading
@@ -45,7 +45,7 @@ class Splats:
 
     @property
     def device(self) -> torch.device:
-        """Where the tensors are."""
+        """The device of the tensors."""
         return self.parameters["means"].device
 
     def to(self, device: torch.device | str) -> Self:
@@ -53,7 +53,7 @@ class Splats:
         return replace(self, parameters={name: x.to(device) for name, x in self.parameters.items()})
 
     def tensors(self, role: Role) -> dict[str, Tensor]:
-        """Return the parameters of geometry, or all others, which are of colour, material and texture."""
+        """Return the parameters of geometry, or all others: colour, material and texture."""
         is_geometry = role == "geometry"
         return {name: x for name, x in self.parameters.items() if (name in GEOMETRY) == is_geometry}
 
@@ -110,12 +110,12 @@ def base_color(sh: Tensor) -> Tensor:
 
 
 def split(sh: Tensor) -> dict[str, Tensor]:
-    """Return `sh` [N, 1, 3] and, where there are more, `sh_rest` [N, K - 1, 3]; they learn at other rates."""
+    """Split harmonics into `sh` [N, 1, 3] and `sh_rest` [N, K - 1, 3], if any; their rates differ."""
     return {"sh": sh[:, :1]} | ({"sh_rest": sh[:, 1:]} if sh.shape[1] > 1 else {})
 
 
 def join(parameters: Mapping[str, Tensor], degree: int | None = None) -> dict[str, Tensor]:
-    """Return the parameters with one `sh` again, up to a degree."""
+    """Join `sh` and `sh_rest` again, up to a degree."""
     joined = dict(parameters)
     if "sh_rest" in parameters:
         count = parameters["sh_rest"].shape[1] if degree is None else (degree + 1) ** 2 - 1
@@ -124,24 +124,24 @@ def join(parameters: Mapping[str, Tensor], degree: int | None = None) -> dict[st
 
 
 @torch.no_grad()
-def screen_box(parameters: Mapping[str, Tensor], options: Options, camera: Camera) -> Box:
+def screen_box(parameters: Mapping[str, Tensor], options: Options, camera: Camera) -> PixelBox:
     """Return a box around the projected bounding spheres of all splats. Waits for a GPU once.
 
     It is the whole image where a sphere reaches behind the camera, or a value is not finite.
     """
     means, scales = parameters["means"].contiguous(), parameters["scales"].contiguous()
     if not len(means):
-        return Box(camera.width // 2, camera.height // 2, camera.width // 2, camera.height // 2)
+        return PixelBox(camera.width // 2, camera.height // 2, camera.width // 2, camera.height // 2)
     bounds, viewmat = means.new_empty(5), camera.viewmat.to(means.device).contiguous()
     spheres = (*scales.shape, means, scales, viewmat)
     native.call("texgs_screen_bounds", *spheres, REACH, bounds, device=means.device)
     nearest, left, right, top, bottom = bounds.tolist()
     if nearest <= 0:
-        return Box(0, 0, camera.width, camera.height)
+        return PixelBox(0, 0, camera.width, camera.height)
     (fx, _, cx), (_, fy, cy), _ = camera.K.tolist()
     variance = options.dilation if are_gaussians(scales) else 1 / max(options.low_pass, 1e-6)
     disc = REACH * variance**0.5  # of the low-pass filter, pixels
-    return Box(
+    return PixelBox(
         floor(fx * left + cx - disc),
         floor(fy * top + cy - disc),
         ceil(fx * right + cx + disc),
@@ -150,6 +150,6 @@ def screen_box(parameters: Mapping[str, Tensor], options: Options, camera: Camer
 
 
 def visible_part(images: Images, index: int, parameters: Mapping[str, Tensor], options: Options) -> Target:
-    """Return the part of a view in which it or the splats show anything, on the splats' device."""
+    """Crop a training view to the part where it or the splats are visible, on the splats' device."""
     around = screen_box(parameters, options, images.cameras[index])
     return images.target(index, parameters["means"].device, around)

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.core.errors import ShapeError, located
+from texgs.core.errors import ShapeError, errors_at
 from texgs.core.io import reading_as
 from texgs.core.tensor_file import read_tensor_file, write_tensor_file
 from texgs.fields.field import Asked, Role, UnlitField, UnlitScene, require_depth, sizes_in_mib
@@ -21,15 +21,15 @@ from texgs.raster.voxel_grid import (
     interpolate_rows,
     lattice_of,
     pack_rows,
+    unpack_masks,
     unpack_rows,
-    unpacked,
     voxel_grid,
 )
 from texgs.raster.voxels import March, render_view
 
-PIECE = 1 << 18  # voxels at a time
-SIDE = 8  # voxels that sides of a lattice are multiples of
-LARGEST = 1024  # voxels along a side of a lattice
+PIECE = 1 << 18  # voxels to process at a time
+SIDE = 8  # voxels; divisor of a lattice's sides
+MAX_SIDE = 1024  # voxels along a side of a lattice
 FORMAT = "texgs-voxels"
 VERSION = 1
 COEFFICIENTS = {1: 0, 4: 1, 9: 2}  # degrees by number of coefficients
@@ -37,7 +37,7 @@ COEFFICIENTS = {1: 0, 4: 1, 9: 2}  # degrees by number of coefficients
 
 @dataclass(frozen=True, eq=False)
 class Voxels(UnlitField):
-    """A sparse grid, lit as its views were: light does not change it."""
+    """A sparse grid with baked light."""
 
     kind: ClassVar[str] = "voxels"
 
@@ -50,7 +50,7 @@ class Voxels(UnlitField):
 
     @property
     def device(self) -> torch.device:
-        """Where its rows are."""
+        """The device of its rows."""
         return self.grid.rows.device
 
     def to(self, device: torch.device | str) -> Self:
@@ -69,7 +69,7 @@ class Voxels(UnlitField):
         outputs: Collection[str],
         depth_range: Tensor | None = None,
     ) -> Render:
-        """Render the grid, of each pixel what is in its depth range [2, H, W]."""
+        """Render the grid within the depth range [2, H, W] of each pixel."""
         require_depth(outputs, self.kind)
         red, green, blue = (1.0, 1.0, 1.0) if background is None else background.tolist()
         march = replace(self.march, background=(red, green, blue))
@@ -92,7 +92,7 @@ class Voxels(UnlitField):
 
 
 class VoxelScene(UnlitScene[Voxels]):
-    """Grids that are drawn together, see `UnlitScene`; edits make another merged grid.
+    """Several grids in one scene, see `UnlitScene`; each set of edits makes a merged grid.
 
     Opacity is a factor on densities.
     """
@@ -111,23 +111,23 @@ class VoxelScene(UnlitScene[Voxels]):
         first, grids = self.fields[0], []
         for each, factor in zip(self.fields, factors, strict=True):
             if factor == 0 and any(factors):
-                continue  # its voxels need no place
+                continue  # a hidden grid needs no voxels
             density, sh = unpack_rows(each.grid.rows)
             grids.append(each.grid.with_rows(pack_rows(density * factor, sh)))
         return replace(first, grid=grids[0] if len(grids) == 1 else merge_grids(grids))
 
 
 def merge_grids(grids: Sequence[VoxelGrid]) -> VoxelGrid:
-    """Merge grids to one in which densities add up, and colours are means weighted by them.
+    """Merge grids into one: densities add up, colours are means weighted by density.
 
-    It has the finest of their spacings, or that of LARGEST voxels along its longest side where this is wider.
+    It has the finest of their spacings, or a wider one that gives MAX_SIDE voxels along the longest side.
     Grids that have another lattice are interpolated at its voxels, which blurs them by less than one.
     """
     lower, upper = (torch.stack(ends) for ends in zip(*map(_bounds, grids), strict=True))  # [G, 3]
     lower, upper = lower.amin(0), upper.amax(0)
     spacing, longest = min(grid.spacing for grid in grids), float((upper - lower).max())
-    if round(longest / spacing, 3) > LARGEST - 1:
-        spacing = longest / (LARGEST - 1)
+    if round(longest / spacing, 3) > MAX_SIDE - 1:
+        spacing = longest / (MAX_SIDE - 1)
     # Extents are whole numbers of voxels but for rounding, where lattices are the same.
     extents = ((upper - lower) / spacing).tolist()
     size = [SIDE * ceil((round(extent, 3) + 1) / SIDE) for extent in extents]
@@ -148,7 +148,7 @@ def _bounds(grid: VoxelGrid) -> tuple[Tensor, Tensor]:
 
 
 def _reached(lattice: Tensor, places: Tensor, reach: float) -> Tensor:
-    """Return which voxels of a lattice [X, Y, Z] are less than `reach` from places [n, 3] along each axis.
+    """Return which voxels of a lattice [X, Y, Z] lie within `reach` of places [n, 3] along each axis.
 
     Some that are a little farther are among them.
     """
@@ -196,26 +196,26 @@ def write_voxels(path: str | Path, field: Voxels) -> Path:
 
 
 def read_voxels(path: str | Path) -> Voxels:
-    """Read a file of voxels as `write_voxels` writes it, bit for bit. Nothing in it is executed."""
+    """Read a file of `write_voxels` bit for bit. Nothing in it is executed."""
     description, tensors = read_tensor_file(Path(path), FORMAT, VERSION)
-    with located(path), reading_as("a grid and its lattice", "write it again"):
+    with errors_at(path), reading_as("a grid and its lattice", "write it again"):
         check.finite(density=tensors["density"], sh=tensors["sh"])
         return Voxels(grid_of(tensors, description), march_of(description), dict(description["metadata"]))
 
 
 def lattice(grid: VoxelGrid, march: March) -> dict[str, Any]:
-    """Describe where a grid lies, and how rays go through it."""
+    """Describe a grid's lattice, and the march of rays through it."""
     marched = {"step": march.step, "transmittance_min": march.transmittance_min}
     return {"lower": grid.lower, "spacing": grid.spacing, **marched}
 
 
 def march_of(description: Mapping[str, Any]) -> March:
-    """Return how rays go through a grid, from what `lattice` returned."""
+    """Return the march of rays through a grid, from a result of `lattice`."""
     return March(step=float(description["step"]), transmittance_min=float(description["transmittance_min"]))
 
 
 def grid_of(tensors: Mapping[str, Tensor], description: Mapping[str, Any]) -> VoxelGrid:
-    """Make a grid of masks, densities and coefficients, and of a lattice."""
+    """Make a grid from masks, densities, coefficients and a lattice."""
     masks, density, sh = (tensors[name] for name in ("masks", "density", "sh"))
     check.shape("masks", masks, "X Y Z")
     n = check.shape("density", density, "N")["N"]
@@ -223,8 +223,8 @@ def grid_of(tensors: Mapping[str, Tensor], description: Mapping[str, Any]) -> Vo
         raise ShapeError(f"sh: expected 1, 4 or 9 coefficients, [N, K, 3], got {count}")
     if masks.dtype != torch.int64 or density.dtype != torch.float32 or sh.dtype != torch.float32:
         raise ShapeError("masks, density, sh: expected int64 and float32, got other types")
-    bits = unpacked(masks)
-    if int(bits.sum()) + 1 != n:  # the first row is that of all other voxels
+    bits = unpack_masks(masks)
+    if int(bits.sum()) + 1 != n:  # the first row stands for all other voxels
         raise ShapeError(f"masks: expected the bits of {n - 1} voxels, got {int(bits.sum())}")
     spacing = float(description["spacing"])
     grid = voxel_grid(lattice_of(bits), description["lower"], spacing, COEFFICIENTS[count])

@@ -1,4 +1,4 @@
-"""Colours and normals that surfels have from their volume; fits learn how they differ from these."""
+"""Colours and normals of surfels from their volume; fits learn the differences."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from texgs.volume.lookup import Lookup
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
-HELD = ("colors", "normals")
-NEIGHBOURS = 3  # neighbours of a surfel whose normals are compared with its own
-# Where data are smooth, normals of the volume are better than learned ones; where they are noisy, or bend
-# from one surfel to the next, learned ones are, which average many samples. Between these two coherences the
-# strength of the hold grows from none to all.
-ROUGH, SMOOTH = 0.96, 0.98
-HOLD = 0.02  # all of it
+HELD_ATTRIBUTES = ("colors", "normals")
+NEIGHBOURS = 3  # neighbours whose normals are compared with a surfel's own
+# In smooth data, normals of the volume are better than learned ones. In noisy or strongly curved data,
+# learned normals are better, because they average many samples. Between these two coherences the strength of
+# the hold grows from none to all.
+ROUGH_COHERENCE, SMOOTH_COHERENCE = 0.96, 0.98
+FULL_HOLD = 0.02  # share of a difference that an iteration removes at full strength
 
 
 @dataclass(frozen=True, eq=False)
 class Attributes:
-    """What a volume says of surfels, and how strongly they are held to it."""
+    """Attributes of surfels from a volume, and how strongly a fit holds surfels to them."""
 
     lookup: Lookup
     appearance: Appearance
-    coherence: float  # how alike its normals are from one surfel to the next, 0 to 1
-    hold: float  # share of a difference that an iteration takes away; 0: the volume is no more than the start
+    coherence: float  # similarity of normals of neighbouring surfels, 0 to 1
+    hold: float  # share of a difference that an iteration removes; 0: the volume is only the start
 
     @classmethod
     def of(
@@ -44,18 +44,18 @@ class Attributes:
         means: Tensor,
         hold: float | None = None,
     ) -> Attributes:
-        """Return what a volume says of what a function shows, for surfels with means [N, 3].
+        """Look up attributes of a volume under a function, for surfels with means [N, 3].
 
-        Coherence says how strongly they are held where `hold` does not.
+        Without `hold`, the coherence of normals decides how strongly surfels are held.
         """
         lookup = Lookup(caster, tf)
         alike = coherence(lookup, means)
-        share = min(max((alike - ROUGH) / (SMOOTH - ROUGH), 0.0), 1.0)
-        return cls(lookup, appearance, alike, HOLD * share if hold is None else hold)
+        share = min(max((alike - ROUGH_COHERENCE) / (SMOOTH_COHERENCE - ROUGH_COHERENCE), 0.0), 1.0)
+        return cls(lookup, appearance, alike, FULL_HOLD * share if hold is None else hold)
 
     @property
     def held(self) -> Attributes | None:
-        """What a fit holds surfels to."""
+        """The attributes that a fit holds surfels to."""
         return self if self.hold > 0 else None
 
     def start(self, means: Tensor, kind: str) -> dict[str, Tensor]:
@@ -73,12 +73,12 @@ class Attributes:
         return {"colors": seen["colors"], "normals": seen["quats"]}
 
     def differences(self, parameters: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Return parameters of surfels with the differences from the volume for colours and normals."""
+        """Replace colours and normals in parameters by their differences from the volume."""
         own = self.at(parameters["means"])
         return {name: x - own[name] if name in own else x for name, x in parameters.items()}
 
     def added_to(self, differences: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Return parameters of surfels whose colours and normals are given as differences from the volume."""
+        """Add the volume's colours and normals to parameters with differences."""
         own = self.at(differences["means"])
         return {name: x + own[name] if name in own else x for name, x in differences.items()}
 

@@ -1,4 +1,4 @@
-"""What a volume shows of a function, for fits: views that are cast, and the places where their rays end."""
+"""Cast a volume under a function, for fits: views, and the points where their rays end."""
 
 import math
 from collections.abc import Sequence
@@ -19,12 +19,12 @@ from texgs.volume.images import Images, smaller
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
-FREQUENCY = 4  # frequency of the icosphere of cameras, which has 162
-HEADLIGHTS = 3  # one view of so many has a headlight, the others a light of their own
-GLANCE_SIZE = 64  # pixels of the longer side of views whose rays are followed, about
-PIXELS = 4000  # pixels of each view whose rays are followed
-FAINT_ALPHA = 0.02  # alpha below which a pixel shows nothing to speak of
-DENSEST_OPACITY = 1 - 1e-6  # opacity of a point
+FREQUENCY = 4  # frequency of the icosphere of 162 cameras
+HEADLIGHT_INTERVAL = 3  # one in three views has a headlight, the others a random light
+GLANCE_SIZE = 64  # approximate pixels of the longer side of views for ray ends
+PIXELS = 4000  # pixels of each view for ray ends
+FAINT_ALPHA = 0.02  # alpha below which a pixel counts as empty
+DENSEST_OPACITY = 1 - 1e-6  # largest opacity of a point
 LitCamera = tuple[Camera, Light]
 
 
@@ -39,7 +39,7 @@ class RayEnds(NamedTuple):
 def ends_of_rays(
     caster: Caster, appearance: Appearance, tf: TransferFunction, cameras: list[Camera], most: int, seed: int
 ) -> RayEnds:
-    """Return where rays of random pixels lose some part of their light, another one in each view.
+    """Return points where rays of random pixels lose a share of their light, different for each view.
 
     So there are as many ends on a layer as it shows, also behind others. They are on the CPU, `most` of them
     or fewer: small views are enough where they show so many.
@@ -54,12 +54,12 @@ def ends_of_rays(
 
 
 def ends_in(caster: Caster, tf: TransferFunction, cameras: list[Camera], most: int, seed: int) -> RayEnds:
-    """Return where rays of views end, `most` of them or fewer, along a Z curve."""
+    """Return up to `most` ends of rays of views, along a Z curve."""
     generator = torch.Generator().manual_seed(seed)
     count, parts = len(cameras), []
     shares = (torch.randperm(count, generator=generator) + 0.5) / count  # spread evenly, in random order
     for camera, left in zip(cameras, shares.tolist(), strict=True):
-        thick = thicken(tf, math.log(0.5) / math.log(left))  # half of its light is left where `left` was
+        thick = thicken(tf, math.log(0.5) / math.log(left))  # half of the light remains where `left` did
         parts.append(ends_of(caster, thick, camera, generator))
     points = RayEnds(*map(torch.cat, zip(*parts, strict=True)))
     chosen = torch.randperm(len(points.places), generator=generator)[:most]
@@ -68,13 +68,13 @@ def ends_in(caster: Caster, tf: TransferFunction, cameras: list[Camera], most: i
 
 
 def thicken(tf: TransferFunction, factor: float) -> TransferFunction:
-    """Return a function of a factor's extinction."""
+    """Multiply the extinction of a function by a factor."""
     through = [(value, math.log1p(-min(alpha, DENSEST_OPACITY))) for value, alpha in tf.opacity]
     return tf.with_points([(value, -math.expm1(factor * x)) for value, x in through], tf.color)
 
 
 def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: torch.Generator) -> RayEnds:
-    """Return where rays of random pixels of one view lose half of their light, as far as they do."""
+    """Return the points where rays of random pixels of one view lose half of their light, if they do."""
     seen = caster.cast(tf, camera, HEADLIGHT, ("median", "normal"))
     z, normals, rgba = seen.median.cpu(), seen.normal.cpu(), seen.rgba.cpu()  # type: ignore[union-attr]
     rows, columns = (rgba[..., 3] > FAINT_ALPHA).nonzero(as_tuple=True)
@@ -87,15 +87,15 @@ def ends_of(caster: Caster, tf: TransferFunction, camera: Camera, generator: tor
 
 
 def lit_cameras(lens: Lens, seed: int) -> list[LitCamera]:
-    """Return the cameras of training views: every third has a headlight, the others a random light."""
+    """Return cameras and lights of training views: every third a headlight, the others a random light."""
     cameras = icosphere(FREQUENCY, lens)
     random = random_lights(len(cameras), seed, 0)
-    lights = [light if index % HEADLIGHTS else HEADLIGHT for index, light in enumerate(random)]
+    lights = [light if index % HEADLIGHT_INTERVAL else HEADLIGHT for index, light in enumerate(random)]
     return list(zip(cameras, lights, strict=True))
 
 
 def cast_views(caster: Caster, tf: TransferFunction, lit: Sequence[LitCamera], title: str) -> Images:
-    """Cast what a function shows, from cameras of one size."""
+    """Cast views of a function from cameras of one size."""
     cameras, lights = map(list, zip(*lit, strict=True))
     planes = torch.empty(len(cameras), 4, cameras[0].height, cameras[0].width, dtype=torch.uint8)
     for index, camera in enumerate(progress(cameras, title=title, unit="view")):

@@ -1,4 +1,4 @@
-"""Fits that go on from a checkpoint, one safetensors file, as if they had never stopped."""
+"""Fits that resume from a checkpoint, one safetensors file, as if they had never stopped."""
 
 import shutil
 import time
@@ -16,37 +16,37 @@ from texgs.core.progress import has_curve_logger, log_point, progress
 from texgs.core.tensor_file import write_tensors
 
 NAME = "checkpoint.safetensors"
-FOLDER = "checkpoint"  # beside the result, there until it is written
-SAVED_EVERY = 30.0  # seconds between checkpoints
-CHECKED_EVERY = 100  # iterations between looks at the loss and the parameters
+FOLDER = "checkpoint"  # beside the result; removed after it is written
+SAVE_INTERVAL = 30.0  # seconds between checkpoints
+CHECK_INTERVAL = 100  # iterations between checks of the loss and the parameters
 
 
 class ResumableFit(ABC):
-    """A fit that can stop between two iterations and go on."""
+    """A fit that can stop between two iterations and resume."""
 
-    unit = "step"  # what an iteration is, for the progress bar
+    unit = "step"  # name of an iteration in the progress bar
 
     def __init__(self, iterations: int) -> None:
         self.iterations = iterations  # of the whole fit
         self.iteration = 0  # done
-        self.seconds = 0.0  # that earlier runs have taken, kept by whoever times them
-        self.losses: list[float] = []  # every CHECKED_EVERY iterations and at the end
+        self.seconds = 0.0  # of earlier runs; set by the caller that measures them
+        self.losses: list[float] = []  # every CHECK_INTERVAL iterations and at the end
 
     @abstractmethod
     def run(self) -> Iterator[int]:
-        """Iterate to the end, and yield how many iterations are done."""
+        """Iterate to the end, and yield the number of iterations done."""
 
     def psnr(self) -> float | None:
-        """Return the PSNR in dB of training images as they are now, where it is known."""
+        """Return the current PSNR in dB of training images, or None."""
         return None
 
     @property
     def is_checked(self) -> bool:
-        """Whether the loss of the iteration that is done is looked at."""
-        return self.iteration % CHECKED_EVERY == 0 or self.iteration == self.iterations
+        """Whether the loss of the latest iteration is checked."""
+        return self.iteration % CHECK_INTERVAL == 0 or self.iteration == self.iterations
 
     def note(self, loss: Tensor, tensors: Mapping[str, Tensor]) -> None:
-        """Note the loss of the iteration that is done, and require finite tensors."""
+        """Record the loss of the latest iteration, and require finite tensors."""
         require_finite(f"iteration {self.iteration}", tensors)
         self.losses.append(float(loss))
 
@@ -59,7 +59,7 @@ class ResumableFit(ABC):
         }
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
-        """Go on from what `state` returned."""
+        """Continue from a result of `state`."""
         self.iteration = int(state["iteration"])
         self.seconds = float(state["seconds"])
         self.losses = state["losses"].tolist()
@@ -70,7 +70,7 @@ def require_finite(
     tensors: Mapping[str, Tensor],
     advice: str = "start again with lower rates, the last checkpoint is kept",
 ) -> None:
-    """Stop a fit that has gone wrong; its loss alone does not tell: surfels with NaN are skipped."""
+    """Stop a fit with NaN. The loss does not show them, because such surfels are skipped."""
     try:
         check.finite(**tensors)
     except ArgumentError as error:
@@ -87,11 +87,11 @@ def run_to_end(fit: ResumableFit, folder: Path, title: str) -> float:
     saved = time.monotonic()
     start = saved - fit.seconds
     steps = fit.iterations - fit.iteration
-    run = fit.run()  # to its end even where no steps are left: something may follow the last one
+    run = fit.run()  # also without steps left: something may follow the last one
     n_told = _tell(fit, 0)
     for _ in progress(run, steps, title=title, unit=fit.unit) if steps else run:
         n_told = _tell(fit, n_told)
-        if time.monotonic() - saved > SAVED_EVERY:
+        if time.monotonic() - saved > SAVE_INTERVAL:
             fit.seconds = time.monotonic() - start
             save(folder, fit)
             saved = time.monotonic()
@@ -99,20 +99,20 @@ def run_to_end(fit: ResumableFit, folder: Path, title: str) -> float:
 
 
 def restore(fit: ResumableFit, folder: Path) -> None:
-    """Go on from the last checkpoint, if there is one; only the fit's own copy of it stays in memory."""
+    """Resume from the last checkpoint, if any; only the fit's own copy of it stays in memory."""
     if (state := latest(folder)) is not None:
         fit.restore(state)
 
 
 def noted_at(count: int, iteration: int, iterations: int) -> list[int]:
-    """Return the iterations of so many losses, the latest ones that a fit has noted until an iteration."""
-    last = iterations if iteration == iterations else iteration // CHECKED_EVERY * CHECKED_EVERY
-    number = -(-last // CHECKED_EVERY)
-    return [min((number - back) * CHECKED_EVERY, last) for back in reversed(range(count))]
+    """Return the iterations of the latest `count` losses recorded until an iteration."""
+    last = iterations if iteration == iterations else iteration // CHECK_INTERVAL * CHECK_INTERVAL
+    number = -(-last // CHECK_INTERVAL)
+    return [min((number - back) * CHECK_INTERVAL, last) for back in reversed(range(count))]
 
 
 def _tell(fit: ResumableFit, n_told: int) -> int:
-    """Tell who hears the losses from one on, with the PSNR of now at the last; return how many there are."""
+    """Log losses from an index on, the last one with the current PSNR; return the number of losses."""
     count = len(fit.losses)
     if count > n_told and has_curve_logger():
         places = noted_at(count, fit.iteration, fit.iterations)
@@ -124,14 +124,14 @@ def _tell(fit: ResumableFit, n_told: int) -> int:
 
 
 def save(folder: str | Path, fit: ResumableFit) -> Path:
-    """Write the state of a fit, and return the file; the one before stays until this one is complete."""
+    """Write the state of a fit, and return the file; the previous one stays until this one is complete."""
     state = {name: x.contiguous() for name, x in fit.state().items()}
     require_finite(f"iteration {fit.iteration}", state)
     return write_tensors(Path(folder) / NAME, state)
 
 
 def latest(folder: str | Path) -> dict[str, Tensor] | None:
-    """Read the state that `save` wrote last, on the CPU, for `restore`; None where there is none."""
+    """Read the latest state that `save` wrote, on the CPU, or None."""
     from safetensors.torch import load_file
 
     path = Path(folder) / NAME
@@ -145,5 +145,5 @@ def latest(folder: str | Path) -> dict[str, Tensor] | None:
 
 
 def discard(folder: str | Path) -> None:
-    """Remove the checkpoint of a run that has ended well; no error where there is none."""
+    """Remove the checkpoint of a finished run, if any."""
     shutil.rmtree(folder, ignore_errors=True)

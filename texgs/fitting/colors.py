@@ -1,4 +1,4 @@
-"""Colours that views show of an object: their mean, and the largest clusters of them."""
+"""Colours of an object in views: their mean, and their largest clusters."""
 
 import warnings
 
@@ -8,12 +8,12 @@ from torch import Tensor
 
 from texgs.volume.images import Images
 
-DRAWN_COLORS = 50_000  # colours that are clustered
-OPAQUE = 128  # alpha, of 255, from which a pixel tells a colour
+DRAWN_COLORS = 50_000  # colours to cluster
+OPAQUE_ALPHA = 128  # alpha (of 255) from which the colour of a pixel counts
 
 
 def mean_color(images: Images) -> Tensor:
-    """Return the mean colour [3] of what images show, weighted by alpha; black where they show nothing."""
+    """Return the mean colour [3] of images weighted by alpha, black if all are empty."""
     total = images.planes.new_zeros(4, dtype=torch.float64)
     for planes in images.planes:
         total += planes.sum(dim=(1, 2), dtype=torch.int64)
@@ -48,7 +48,7 @@ def cluster_colors(colors: Tensor, count: int, seed: int = 0) -> Tensor:
 def object_palette(images: Images, count: int, seed: int) -> Tensor:
     """Cluster the colours of all pixels that are opaque enough, or of the most opaque ones, [count, 3]."""
     alpha = images.planes[:, 3]
-    opaque = alpha >= min(int(alpha.max()), OPAQUE)
+    opaque = alpha >= min(int(alpha.max()), OPAQUE_ALPHA)
     share = alpha[opaque, None].float() / 255
     colors = images.planes.permute(0, 2, 3, 1)[opaque][:, :3].float() / 255
     return cluster_colors(((colors - 1 + share) / share).clamp(0, 1), count, seed)

@@ -1,4 +1,4 @@
-"""Adaptive density control of surfels or 3D Gaussians: by gradients cloned or split, by opacity removed."""
+"""Adaptive density control of surfels or 3D Gaussians: clone and split by gradients, prune by opacity."""
 
 import torch
 from torch import Tensor
@@ -9,21 +9,21 @@ from texgs.fitting.settings import Densify
 from texgs.raster import native
 from texgs.raster.shading import MATERIAL
 
-CHILDREN = 2  # surfels that a split makes of one
-SHRINK = 1.6  # factor by which children are smaller
+CHILDREN = 2  # surfels that replace a split one
+SHRINK_FACTOR = 1.6  # factor by which children are smaller
 RESET_OPACITY = 0.01
 native.declare("texgs_observe", "n p ff pp")
 
 
 def is_shared(name: str, values: Tensor) -> bool:
-    """Return whether a parameter is one material for all surfels, also where there is but one surfel."""
+    """Return whether a parameter is a material shared by all surfels, even if there is only one."""
     return name in MATERIAL and len(values) == 1
 
 
 class DensityControl:
-    """Statistics of n surfels or Gaussians since the last step, and the steps.
+    """Statistics of n surfels or Gaussians since the last step, and the steps of density control.
 
-    As Kerbl et al. 2023, section 5, and 2DGS have them; `extent` is the radius of the cameras, world units.
+    As in Kerbl et al. 2023, section 5, and 2DGS; `extent` is the radius of the cameras, world units.
     """
 
     def __init__(self, settings: Densify, n: int, extent: float, device: torch.device) -> None:
@@ -35,12 +35,12 @@ class DensityControl:
         self.counts = torch.zeros(n, device=device)  # views in which a surfel had a gradient
 
     def observe(self, shift_gradient: Tensor, width: int, height: int) -> None:
-        """Note the gradient [N, 2] of the loss for shifts in pixels."""
+        """Record the gradient [N, 2] of the loss by shifts in pixels."""
         given = (len(shift_gradient), shift_gradient, 0.5 * width, 0.5 * height)
         native.call("texgs_observe", *given, self.gradients, self.counts, device=shift_gradient.device)
 
     def step(self, iteration: int, optimizer: Optimizer, generator: torch.Generator) -> None:
-        """Densify, prune or reset opacities, as the schedule says for an iteration (counted from 1)."""
+        """Densify, prune or reset opacities by the schedule, at an iteration counted from 1."""
         s = self.settings
         if iteration > s.stop:
             return
@@ -78,10 +78,10 @@ class DensityControl:
         return chosen
 
     def _children(self, parents: dict[str, Tensor], generator: torch.Generator) -> dict[str, Tensor]:
-        """Make two smaller ones for each, drawn from its Gaussian."""
+        """Replace each by two smaller ones, drawn from its Gaussian."""
         rows = {name: x.repeat(CHILDREN, *[1] * (x.ndim - 1)) for name, x in parents.items()}
         noise = torch.randn(rows["scales"].shape, generator=generator).to(rows["scales"])
         along = quats_to_matrices(rows["quats"])[..., : rows["scales"].shape[1]]  # [n, 3, 2 or 3]
         rows["means"] = rows["means"] + (along @ (noise * rows["scales"].exp())[..., None]).squeeze(-1)
-        rows["scales"] = rows["scales"] - torch.log(torch.tensor(SHRINK)).item()
+        rows["scales"] = rows["scales"] - torch.log(torch.tensor(SHRINK_FACTOR)).item()
         return rows

@@ -1,4 +1,4 @@
-"""The fit of 3D Gaussians: one phase of the loop that surfels are fitted by."""
+"""The fit of 3D Gaussians: one phase of the same loop as for surfels."""
 
 import torch
 from torch import Tensor
@@ -16,7 +16,7 @@ from texgs.volume.view_set import ViewSet
 
 
 def fit_gaussians(task: FitTask[GaussianKeys]) -> Fitted:
-    """Fit Gaussians to the views, from the last checkpoint if there is one."""
+    """Fit Gaussians to the views, from the last checkpoint if any."""
     keys = task.settings
     most = keys.densify.cap
     start = seed_gaussians(task.images, task.views, keys.seeds, keys.sh_degree, task.seed, task.volume, most)
@@ -37,7 +37,7 @@ def seed_gaussians(
     volume: Grid | None = None,
     most: int | None = None,
 ) -> dict[str, Tensor]:
-    """Return raw parameters of the first Gaussians: as surfels start, as thick as they are wide.
+    """Return raw start parameters of Gaussians: like those of surfels, and as thick as wide.
 
     `sh` is apart from `sh_rest`, as they learn at different rates; all but the zeroth harmonic are zero.
     """

@@ -7,18 +7,18 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.fitting.rays import widened
+from texgs.fitting.rays import widen
 from texgs.volume.images import Images
 
-TRIED_POINTS = 200_000  # points at a time
+TRIED_POINTS = 200_000  # points to test at a time
 ROUNDS = 20
-SEARCHED_VOXELS = 64  # voxels along a side of the cube that is searched for the object
+SEARCHED_VOXELS = 64  # voxels along a side of the cube to search for the object
 
 Box = tuple[Tensor, Tensor]  # lowest and highest corner [3]
 
 
 def hull_points(images: Images, box: Box, count: int, generator: torch.Generator) -> Tensor:
-    """Draw random points of the box that every view shows, [count, 3], or fewer where the hull is tiny."""
+    """Draw random points [count, 3] of the visual hull in a box; fewer if the hull is tiny."""
     inside: list[Tensor] = []
     for _ in range(ROUNDS):
         points = random_points(box, TRIED_POINTS, generator)
@@ -33,7 +33,7 @@ def hull_points(images: Images, box: Box, count: int, generator: torch.Generator
 
 
 def _empty(where: str) -> ArgumentError:
-    """Make the error of views that agree on nothing."""
+    """Return the error for views with an empty visual hull."""
     return ArgumentError(
         f"visual hull: expected points that every view shows, found none {where}; do the views show anything "
         "there, and do their cameras agree?"
@@ -47,7 +47,7 @@ def random_points(box: Box, count: int, generator: torch.Generator) -> Tensor:
 
 
 def is_covered(alpha: Tensor, camera: Camera, points: Tensor) -> Tensor:
-    """Return whether points [n, 3] fall on pixels of an image [H, W] above 0; those outside of it do."""
+    """Return whether points [n, 3] fall on positive pixels of an image [H, W], or outside of it."""
     columns, rows, is_inside = project(camera, points)
     covered = torch.ones(len(points), dtype=torch.bool)
     covered[is_inside] = alpha[rows[is_inside], columns[is_inside]] > 0
@@ -55,7 +55,7 @@ def is_covered(alpha: Tensor, camera: Camera, points: Tensor) -> Tensor:
 
 
 def project(camera: Camera, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Return column and row [n] of the pixels that points fall on, and whether these are in the view."""
+    """Return column and row [n] of the pixels of points, and whether they are in the view."""
     places, z = camera.project(points)
     columns, rows = places.floor().long().unbind(dim=1)
     on_image = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
@@ -90,14 +90,14 @@ def lattice(size: list[int], low: Tensor, spacing: float) -> Tensor:
 
 
 def in_hull(images: Images, points: Tensor, spacing: float) -> Tensor:
-    """Return whether each of points [n, 3] is within about a spacing of something visible, in every view."""
+    """Return whether points [n, 3] lie within about a spacing of something visible, in every view."""
     left = torch.arange(len(points))
     for index, camera in enumerate(images.cameras):
         nearest = float((points[left] - camera.position).norm(dim=1).amin()) if len(left) else 1.0
         pixels = min(
             ceil(0.5 * float(camera.K[0, 0]) * spacing / max(nearest, spacing)), min(images.size) // 2
         )
-        alpha = widened(images.planes[index, 3], pixels)
+        alpha = widen(images.planes[index, 3], pixels)
         left = left[is_covered(alpha, camera, points[left])]
     inside = torch.zeros(len(points), dtype=torch.bool)
     inside[left] = True

@@ -1,10 +1,10 @@
-"""How fields of each kind are fitted: the phases, and of a kind with one phase its settings and function."""
+"""Specifications of fits for each kind of field: phases, or settings and function of a single phase."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from texgs.core.specifications import named, specifications
+from texgs.core.specifications import import_name, specifications
 from texgs.fields import kinds as fields
 from texgs.fitting.ray_settings import PaletteKeys, VoxelKeys
 from texgs.fitting.settings import GaussianKeys
@@ -13,14 +13,14 @@ from texgs.fitting.task import FitTask, Fitted
 
 @dataclass(frozen=True)
 class FitSpec:
-    """How fields of one kind are fitted. The function is named, "module:function", and imported late."""
+    """The fit of one kind of field. Its function is named "module:function" and imported late."""
 
     name: str  # of the kind
     summary: str  # what the fit does, in `texgs --help`
-    phases: tuple[str, ...]  # stages in their order; the last makes what scenes are composed of
-    settings: type[Any] | None = None  # of the keys `fit.NAME`; None for surfels, whose keys are `fit`
-    function: str = ""  # from a task to what is fitted; none for surfels: each phase is a stage
-    check: Callable[[Any], None] = lambda settings: None  # raises where settings do not fit each other
+    phases: tuple[str, ...]  # stages in order; the last makes the models of scenes
+    settings: type[Any] | None = None  # class of the keys `fit.NAME`; None for surfels, with keys in `fit`
+    function: str = ""  # from a task to a result; none for surfels, as each phase is a stage
+    check: Callable[[Any], None] = lambda settings: None  # raises if settings contradict each other
     devices: frozenset[str] = frozenset({"cpu", "cuda"})  # kinds of device that fit it
 
     @property
@@ -30,12 +30,12 @@ class FitSpec:
 
     @property
     def module(self) -> str:
-        """The module whose code fits the field."""
+        """The module of the function."""
         return self.function.partition(":")[0]
 
     def fit(self, task: FitTask[Any]) -> Fitted:
-        """Fit a field to views, from the last checkpoint if there is one."""
-        fitted: Fitted = named(self.function)(task)
+        """Fit a field to views, from the last checkpoint if any."""
+        fitted: Fitted = import_name(self.function)(task)
         return fitted
 
 
@@ -71,6 +71,6 @@ FITS = (
 
 
 def fit_specs() -> dict[str, FitSpec]:
-    """Return how each kind of field is fitted, by name."""
+    """Return the specification of the fit of each kind of field, by name."""
     found = {**specifications(fields.__name__, "FIT"), **{each.name: each for each in FITS}}
     return dict(sorted(found.items()))

@@ -13,7 +13,7 @@ from texgs.core.progress import progress
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.splats import Shading, Splats, join, visible_part
 from texgs.fields.surfels.model import Surfels
-from texgs.fitting.attributes import HELD, Attributes
+from texgs.fitting.attributes import HELD_ATTRIBUTES, Attributes
 from texgs.fitting.checkpoint import ResumableFit
 from texgs.fitting.densify import DensityControl
 from texgs.fitting.losses import view_loss
@@ -21,8 +21,8 @@ from texgs.fitting.settings import Phase, Rates
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 
-USUAL_DISTANCE = 4.0  # distance of cameras, in radii of the object
-SMALLEST_EXTENT = 1e-3  # distance, world units
+USUAL_DISTANCE = 4.0  # of cameras, in radii of the object
+MIN_EXTENT = 1e-3  # world units
 
 
 class Fit(ResumableFit):
@@ -58,17 +58,17 @@ class Fit(ResumableFit):
 
     @property
     def parameters(self) -> dict[str, Tensor]:
-        """What learns, as it is now."""
+        """The current learned parameters."""
         return self.optimizer.parameters
 
     @property
     def fitted(self) -> dict[str, Tensor]:
-        """Raw parameters of the surfels or Gaussians of now; differentiable in `parameters`."""
+        """Current raw parameters of the surfels or Gaussians; differentiable in `parameters`."""
         return self.parameters if self.held is None else self.held.added_to(self.parameters)
 
     @property
     def result(self) -> dict[str, Tensor]:
-        """The same without a graph."""
+        """The fitted raw parameters, without a graph."""
         return {name: x.detach() for name, x in self.fitted.items()}
 
     def run(self) -> Iterator[int]:
@@ -80,7 +80,7 @@ class Fit(ResumableFit):
             yield self.iteration
 
     def step(self) -> Tensor:
-        """Show one view: loss, gradients, a step of Adam, density control."""
+        """Learn from one view: loss, gradients, a step of Adam, density control."""
         self.iteration += 1
         p, phase = self.parameters, self.phase
         target = visible_part(self.images, self.view_of(self.iteration), p, self.shading.options)
@@ -104,14 +104,14 @@ class Fit(ResumableFit):
 
     @torch.no_grad()
     def psnr(self) -> float:
-        """Return the PSNR in dB of the first training view as it is now."""
+        """Return the current PSNR in dB of the first training view."""
         target = self.images.target(0, self.parameters["means"].device)
         now = Splats(join(self.fitted), self.shading).render(target.camera, target.light).color
         error = (now.clamp(0, 1) - target.color).square()
         return -10 * math.log10(max(float(error.mean()), 1e-10))
 
     def view_of(self, iteration: int) -> int:
-        """Return the view of an iteration: every epoch has a new order, without memory of those before."""
+        """Return the view of an iteration; each epoch has a new order that depends only on its number."""
         epoch, place = divmod(iteration - 1, len(self.images))
         if self.order[0] != epoch:
             order = torch.randperm(len(self.images), generator=self.generator(2 * epoch))
@@ -119,7 +119,7 @@ class Fit(ResumableFit):
         return self.order[1][place]
 
     def generator(self, stream: int) -> torch.Generator:
-        """Return random numbers that depend on the seed and a number only: a resumed run draws the same."""
+        """Return a generator for the seed and a number only, so that resumed runs draw the same."""
         return torch.Generator().manual_seed(hash((self.seed, stream)) & 0x7FFFFFFF)
 
     def state(self) -> dict[str, Tensor]:
@@ -128,7 +128,7 @@ class Fit(ResumableFit):
         return {**self.optimizer.state(), **control, **super().state()}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
-        """Go on from what `state` returned."""
+        """Continue from a result of `state`."""
         super().restore(state)
         self.optimizer.restore(state)
         device = self.parameters["means"].device
@@ -139,7 +139,7 @@ class Fit(ResumableFit):
 def fit_further(
     model: Surfels, images: Images, phase: Phase, seed: int, title: str, held: Attributes | None = None
 ) -> Surfels:
-    """Return a model of a phase that starts with another one, without checkpoints."""
+    """Fit a phase starting from a model, without checkpoints; return the new model."""
     fit = Fit(model.parameters, model.shading, images, phase, seed, held)
     for _ in progress(fit.run(), phase.iterations, title=title, unit=fit.unit):
         pass
@@ -147,27 +147,29 @@ def fit_further(
 
 
 def extent(cameras: Sequence[Camera], means: Tensor) -> float:
-    """Return the length that rates of means, and sizes of density control, refer to.
+    """Return the unit of length for rates of means and sizes of density control.
 
     1.1 times the largest distance of a camera from the cameras' mean. One camera, or some inside of the
     object, have none to speak of: they count as far away as an object is usually seen from.
     """
-    around = spread(torch.stack([camera.position for camera in cameras]))
-    radius = spread(means)
-    return 1.1 * max(around if around > radius else USUAL_DISTANCE * radius, SMALLEST_EXTENT)
+    around = mean_distance(torch.stack([camera.position for camera in cameras]))
+    radius = mean_distance(means)
+    return 1.1 * max(around if around > radius else USUAL_DISTANCE * radius, MIN_EXTENT)
 
 
-def spread(points: Tensor) -> float:
+def mean_distance(points: Tensor) -> float:
     """Return the largest distance of points [N, 3] from their mean; 0 for none."""
     return float((points - points.mean(dim=0)).norm(dim=1).max()) if len(points) else 0.0
 
 
 def rates(names: Iterable[str], r: Rates, size: float, hold: float = 0.0) -> dict[str, Rate]:
-    """Return the rate of each parameter that learns; `size` is the extent of the cameras."""
+    """Return the rate of each learned parameter; `size` is the extent of the cameras."""
     starts = {"quats": r.quats, "scales": r.scales, "opacities": r.opacities, "colors": r.colors}
     starts |= {"normals": r.quats, "sh": r.sh, "sh_rest": r.sh_rest, **dict.fromkeys(MATERIAL, r.material)}
     chosen = {
-        name: Rate(starts[name], r.final, hold if name in HELD else 0.0) for name in names if name in starts
+        name: Rate(starts[name], r.final, hold if name in HELD_ATTRIBUTES else 0.0)
+        for name in names
+        if name in starts
     }
     chosen["means"] = Rate(size * r.means, r.means_final)
     return {name: rate for name, rate in chosen.items() if rate.start > 0}

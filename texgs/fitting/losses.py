@@ -10,12 +10,12 @@ from texgs.fields.splats import GEOMETRY, Shading
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fitting.settings import Losses
 from texgs.raster import arguments, native
-from texgs.raster.autograd import SCENE, Gradients, Image, SurfelTensors, View
-from texgs.raster.losses import planar, scaled
+from texgs.raster.autograd import SCENE, Gradients, Image, RasterView, SurfelTensors
+from texgs.raster.losses import planar, scale
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Target
 
-SMOOTHED = len(MATERIAL)
+MATERIAL_CHANNELS = len(MATERIAL)
 Compared = native.struct("texgs_target", "p color alpha, f l1 dssim alpha_l1 alpha_dssim normal smoothness")
 native.declare("texgs_rendered_loss", *SCENE, Image, Image, Compared, Gradients, "p")
 
@@ -43,7 +43,7 @@ def view_loss(
     outputs = ("normal", "depth") if weights.normal > 0 and iteration > weights.normal_from else ()
     seen = (camera.viewmat.contiguous(), camera.K.contiguous(), camera.width, camera.height)
     background = features.new_tensor([1.0] * 3 + [0.0] * (surfels.channels - 3))  # white behind colours
-    view = View(*seen, frozenset(outputs), shading.options, background, raw=True)
+    view = RasterView(*seen, frozenset(outputs), shading.options, background, raw=True)
     tensors = (*surfels[:4], surfels.features)
     wanted = [torch.is_grad_enabled() and x is not None and x.requires_grad for x in tensors]
     observed = (shift_gradient, weights.alpha > 0)
@@ -51,19 +51,19 @@ def view_loss(
 
 
 def comparison(target: Target, weights: Losses) -> native.Struct:
-    """Return what the library compares a view with, and the weights of its losses."""
+    """Return the targets of a view and the weights of its losses, as a structure of the library."""
     l1 = 1 - weights.dssim
     of_alpha = (weights.alpha * l1 * weights.alpha_l1, weights.alpha * weights.dssim)
-    factors = (l1, weights.dssim, *of_alpha, weights.normal, weights.smoothness * SMOOTHED)
+    factors = (l1, weights.dssim, *of_alpha, weights.normal, weights.smoothness * MATERIAL_CHANNELS)
     return Compared(planar(target.color), target.alpha.contiguous(), *(target.share * x for x in factors))
 
 
 class _ViewLoss(torch.autograd.Function):
-    """Gradients are there with the value, before they are asked for; autograd hands them on, once."""
+    """Computes value and gradients together in the forward pass; autograd uses them once."""
 
     @staticmethod
     def forward(
-        ctx: Any, view: View, target: native.Struct, observed: tuple, wanted: list, *tensors: Tensor
+        ctx: Any, view: RasterView, target: native.Struct, observed: tuple, wanted: list, *tensors: Tensor
     ) -> Tensor:
         surfels = SurfelTensors._make((*tensors[:4], None, tensors[4], *[None] * 3))
         images = view.images(surfels)
@@ -78,12 +78,12 @@ class _ViewLoss(torch.autograd.Function):
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
-        gradients, ctx.gradients = ctx.gradients, None  # autograd may add to what it is handed
-        return *[None] * 4, *scaled(gradients, upstream)
+        gradients, ctx.gradients = ctx.gradients, None  # autograd may add to returned tensors
+        return *[None] * 4, *scale(gradients, upstream)
 
 
 def material_maps(parameters: Mapping[str, Tensor], shading: Shading) -> Tensor | None:
-    """Return the material of each surfel as features [N, 4]; None where all share one, or there is none."""
+    """Return the material of each surfel as features [N, 4], or None if shared or missing."""
     has_maps = "ambient" in parameters and len(parameters["ambient"]) > 1
     if not has_maps or not isinstance(shading, ShadingModel):
         return None

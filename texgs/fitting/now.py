@@ -10,7 +10,7 @@ from texgs.core.lens import Lens
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, in_full_light
 from texgs.fitting.attributes import Attributes
-from texgs.fitting.casting import HEADLIGHTS, cast_views, ends_of_rays, lit_cameras
+from texgs.fitting.casting import HEADLIGHT_INTERVAL, cast_views, ends_of_rays, lit_cameras
 from texgs.fitting.loop import fit_further
 from texgs.fitting.seeds import surfels_on
 from texgs.fitting.settings import Densify, Losses, Phase, Rates, TextureKeys
@@ -20,8 +20,8 @@ from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
 SURFELS, OPACITY = 40_000, 0.05
-FEWEST_POINTS = 100
-CAST_EVERY = 2  # one of so many views without a headlight is cast
+MIN_POINTS = 100
+CAST_INTERVAL = 2  # one in two views without a headlight is cast
 SAMPLE_DISTANCE = 1.0  # voxels between the samples of views
 PHASE = Phase(
     rates=Rates(quats=0.016, scales=0.05, opacities=0.1),
@@ -42,7 +42,7 @@ def fit_now(
     *,
     soon: bool = True,
 ) -> Iterator[Surfels]:
-    """Yield a first textured model of what a function shows of a volume, then a finer one.
+    """Yield a quick textured model of a volume under a function, then a finer one.
 
     Surfels start where rays end, and as the volume has them there, see `Attributes`: nothing has to be found
     first, so that density control is not needed. Texels see the views under a headlight.
@@ -61,10 +61,10 @@ def fit_now(
     """
     lit = lit_cameras(lens, seed)
     points = ends_of_rays(caster, appearance, tf, [camera for camera, _ in lit], SURFELS, seed)
-    if len(points.places) < FEWEST_POINTS:
+    if len(points.places) < MIN_POINTS:
         raise ArgumentError("function: expected to see enough of the volume, got little; raise its opacity")
-    others = [each for index, each in enumerate(lit) if index % HEADLIGHTS][::CAST_EVERY]
-    chosen = [*lit[::HEADLIGHTS], *others]
+    others = [each for index, each in enumerate(lit) if index % HEADLIGHT_INTERVAL][::CAST_INTERVAL]
+    chosen = [*lit[::HEADLIGHT_INTERVAL], *others]
     caster = caster.with_appearance(replace(appearance, step=SAMPLE_DISTANCE))
     images = cast_views(caster, tf, chosen, f"{title}, views")
     headlit = images[: len(chosen) - len(others)]

@@ -1,4 +1,4 @@
-"""The fit of a palette field to views: where anything is, density and base colour, then palette and light.
+"""The fit of a palette field to views: occupied space, density and base colour, then palette and light.
 
 After StyleRF-VolVis (Tang et al. 2024), but for places and the start of densities, which are those of a short
 fit of a voxel grid, and for rays near the object over white in place of all rays over random backgrounds.
@@ -17,7 +17,7 @@ from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import Parameters, base_color, density, light, new_networks, palette_color
 from texgs.fields.palette.rendering import (
     Geometry,
-    Shown,
+    VisiblePoints,
     blending_weights,
     points_on,
     view_harmonics,
@@ -32,22 +32,22 @@ from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, voxel_grid
 from texgs.volume.images import Images
 
-NEIGHBOURS = 2  # rays of a step that follow each other
-BETAS = (0.9, 0.99)  # of Adam
-MIXED = ("palette", "mixture", "trunk", "light")  # networks that learn in the last period
-TRUSTED_SHARE = 0.5  # share of the grid's densities that says where rays may end
-LEAST_DENSITY = 0.1  # density of the grid's voxels at least, so that rays have points there
-SEEDS = 16_384  # voxels of a step in which density learns that of the grid
+NEIGHBOURS = 2  # consecutive rays in a step
+BETAS = (0.9, 0.99)  # Adam's
+MIXTURE_NETWORKS = ("palette", "mixture", "trunk", "light")  # networks to learn in the last period
+TRUSTED_SHARE = 0.5  # share of the grid's densities that decides where rays may end
+MIN_DENSITY = 0.1  # least density of the grid's voxels, so that rays sample them
+SEED_VOXELS = 16_384  # voxels per step while the density learns from the grid
 
 
 @dataclass(frozen=True)
 class Period:
-    """Steps in which some networks learn."""
+    """A range of steps in which some networks learn."""
 
-    start: int  # among the steps of networks
+    start: int  # index of a step
     end: int
-    networks: tuple[str, ...]  # those that learn
-    last_rate: float  # of Adam at its end, relative to that at its start
+    networks: tuple[str, ...]  # to learn
+    last_rate: float  # Adam's rate at the end, relative to the start
 
 
 class PaletteFit(ResumableFit):
@@ -69,22 +69,22 @@ class PaletteFit(ResumableFit):
 
     @property
     def own(self) -> int:
-        """Steps of the networks that are done."""
+        """Number of finished steps of the networks."""
         return max(self.iteration - self.settings.voxels.steps, 0)
 
     @property
     def periods(self) -> list[Period]:
-        """The periods of the fit of networks, one after the other."""
+        """The periods of the fit of networks, in order."""
         s = self.settings
         base, palette = s.seed_steps, s.seed_steps + s.base_steps
         return [
             Period(0, base, ("density",), 1.0),
             Period(base, palette, ("density", "trunk", "base"), s.last_rate),
-            Period(palette, palette + s.palette_steps, MIXED, s.last_rate),
+            Period(palette, palette + s.palette_steps, MIXTURE_NETWORKS, s.last_rate),
         ]
 
     def run(self) -> Iterator[int]:
-        """Fit the grid and the networks, or what is left of them."""
+        """Fit the grid and the networks, from the current state."""
         for done in self.voxels.run():
             self.iteration = done
             yield done
@@ -98,12 +98,12 @@ class PaletteFit(ResumableFit):
                 yield self.iteration
 
     def field(self, metadata: Mapping[str, str]) -> PaletteField:
-        """Return what was fitted, when `run` is at its end; without the base colour."""
+        """Return the fitted field after `run`, without the base colour."""
         kept = {name: x.detach() for name, x in self.parameters.items() if not name.startswith("base.")}
         return PaletteField(self.geometry, kept, metadata)
 
     def begin(self, period: Period) -> None:
-        """Make the networks of a period, and an optimiser of those that learn in it."""
+        """Make the networks of a period, and an optimiser for the learned ones."""
         known = {name.split(".")[0] for name in self.parameters if name != "palette.colors"}
         new = new_networks({*period.networks} - known, self.levels, len(self.colors), self.generator)
         parameters = {"palette.colors": self.colors, **self.parameters, **new}
@@ -122,10 +122,10 @@ class PaletteFit(ResumableFit):
             self.note(error.detach(), {"loss": loss.detach(), **self.parameters})
 
     def loss_of(self, period: Period) -> tuple[Tensor, Tensor]:
-        """Compute what a period makes small, and what of it is reported, of random voxels or rays."""
+        """Return the loss of a period and its reported part, for random voxels or rays."""
         s, networks = self.settings, self.parameters
         if "trunk" not in period.networks:
-            drawn = torch.randint(len(self.seeds), (SEEDS,), generator=self.generator)
+            drawn = torch.randint(len(self.seeds), (SEED_VOXELS,), generator=self.generator)
             sigma, _ = density(self.seeds[drawn], networks, self.levels)
             loss = (sigma.log() - self.geometry.grid.density[1:][drawn].log()).square().mean()
             return loss, loss
@@ -142,7 +142,7 @@ class PaletteFit(ResumableFit):
         return {**grid, **networks, "random": self.generator.get_state(), **super().state()}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
-        """Go on from what `state` returned."""
+        """Continue from a result of `state`."""
         super().restore(state)
         self.voxels.restore(_under("voxels.", state))
         for period in self.periods:
@@ -154,7 +154,7 @@ class PaletteFit(ResumableFit):
 
 
 def fit_palette(task: FitTask[PaletteKeys]) -> Fitted:
-    """Fit networks to random rays, from the last checkpoint if there is one."""
+    """Fit networks to random rays, from the last checkpoint if any."""
     run = PaletteFit(task.images, task.settings, task.seed)
     seconds = run_to_end(run, task.output / FOLDER, task.title)
     field = run.field(task.metadata)
@@ -162,16 +162,16 @@ def fit_palette(task: FitTask[PaletteKeys]) -> Fitted:
 
 
 def places(fit: VoxelFit, levels: HashLevels, step: float) -> Geometry:
-    """Return the voxels that show in the training views: only cells next to them ask the networks."""
+    """Return the voxels visible in the training views; networks are evaluated only in cells next to them."""
     grid = fit.grid
     around = voxel_grid(fit.seen(), grid.lower, grid.spacing, 0)
-    values = (TRUSTED_SHARE * interpolate_rows(grid, around.points())[:, 3]).clamp_min(LEAST_DENSITY)
+    values = (TRUSTED_SHARE * interpolate_rows(grid, around.points())[:, 3]).clamp_min(MIN_DENSITY)
     rows = torch.cat([around.rows[:1], pack_rows(values, torch.zeros(len(values), 1, 3))])
     return Geometry(around.with_rows(rows), replace(fit.march, step=step), levels)
 
 
 def _under(prefix: str, state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Return values whose names have a prefix, without it."""
+    """Return the values whose names start with a prefix, and strip it."""
     return {name.removeprefix(prefix): x for name, x in state.items() if name.startswith(prefix)}
 
 
@@ -180,7 +180,7 @@ def base_loss(
 ) -> Tensor:
     """Compute the mean squared error [] of rays [N, 6] with density and base colour over white.
 
-    All points are looked at, and those with a weight above `weight_min` learn.
+    All points count, and those with a weight above `weight_min` learn.
     """
     with torch.no_grad():
         points = points_on(rays, geometry, parameters)
@@ -188,7 +188,7 @@ def base_loss(
     sigma, features = density(points.at[chosen], parameters, geometry.levels)
     depth = points.depth.index_copy(0, chosen, geometry.length * sigma)
     weights = blending_weights(depth, points.ray)[chosen]
-    shows = Shown(points.take(chosen), weights, chosen)
+    shows = VisiblePoints(points.take(chosen), weights, chosen)
     color = base_color(features, view_harmonics(rays)[shows.points.ray], parameters)
     return error_over_white(shows, color, target)
 
@@ -201,9 +201,9 @@ def palette_loss(
     start: Tensor,
     settings: PaletteKeys,
 ) -> tuple[Tensor, Tensor]:
-    """Compute the loss [] of rays [N, 6] with palette colours and light, and the mean squared error in it.
+    """Compute the loss [] of rays [N, 6] with palette colours and light, and its mean squared error.
 
-    Offsets of colours are held down, and the palette stays near its start [P, 3].
+    The loss penalises offsets of colours, and distance of the palette from its start [P, 3].
     """
     with torch.no_grad():
         shows = visible_points(points_on(rays, geometry, parameters), settings.weight_min)
@@ -215,8 +215,8 @@ def palette_loss(
     return error + settings.offset_weight * offsets + settings.palette_weight * moved, error
 
 
-def error_over_white(shows: Shown, colors: Tensor, target: Tensor) -> Tensor:
-    """Compare blended colours of points with those of their rays, [N, 3] over white: mean square []."""
+def error_over_white(shows: VisiblePoints, colors: Tensor, target: Tensor) -> Tensor:
+    """Return the mean squared error [] of blended points against the colours [N, 3] of rays over white."""
     values = torch.cat([colors, torch.ones_like(colors[:, :1])], dim=1)
     color, alpha = shows.blend(values, len(target)).split([3, 1], dim=1)
     return (color + 1 - alpha - target).square().mean()

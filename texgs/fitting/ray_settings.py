@@ -1,4 +1,4 @@
-"""Settings of fits to random rays: of voxel grids, and of palette fields, which begin with such a grid."""
+"""Settings of fits to random rays: voxel grids, and palette fields, which begin with such a grid."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,7 +10,7 @@ from texgs.core.keys import key
 
 @dataclass(frozen=True)
 class GridStage:
-    """Part of a fit at one resolution."""
+    """A stage of a fit at one resolution."""
 
     side: int = key(
         64, "voxels along the longest side of the box; twice those of the stage before", least=8, most=1024
@@ -37,7 +37,7 @@ class Decay:
 
 @dataclass(frozen=True)
 class VoxelKeys:
-    """How a grid is fitted. The defaults are meant for two cores of a CPU and a minute."""
+    """The fit of a grid. The defaults take about a minute on two CPU cores."""
 
     stages: list[GridStage] = key(
         [GridStage(64, 60), GridStage(128, 300), GridStage(256, 800)], "resolutions, one after the other"
@@ -61,7 +61,7 @@ class VoxelKeys:
 
     @property
     def steps(self) -> int:
-        """Steps of all stages."""
+        """Number of steps in all stages."""
         return sum(stage.steps for stage in self.stages)
 
     def check(self, where: str = "fit.voxels") -> None:
@@ -77,7 +77,7 @@ class VoxelKeys:
 
 @dataclass(frozen=True)
 class HashKeys:
-    """Lattices of the hash grids, over the box around the object."""
+    """Lattices of the hash grids over the object's box."""
 
     levels: int = key(12, "number of lattices", least=2, most=32)
     entries: int = key(1 << 16, "most rows of a level, a power of two", least=8, most=1 << 24)
@@ -87,7 +87,7 @@ class HashKeys:
 
 @dataclass(frozen=True)
 class PaletteKeys:
-    """How networks are fitted. The defaults are meant for two cores of a CPU and some minutes."""
+    """The fit of networks. The defaults take some minutes on two CPU cores."""
 
     voxels: VoxelKeys = key(
         VoxelKeys([GridStage(64, 60), GridStage(128, 150), GridStage(256, 100)], degree=0),
@@ -110,7 +110,7 @@ class PaletteKeys:
 
     @property
     def steps(self) -> int:
-        """Steps of the grid and the networks."""
+        """Number of steps of the grid and the networks."""
         return self.voxels.steps + self.seed_steps + self.base_steps + self.palette_steps
 
     def check(self) -> None:

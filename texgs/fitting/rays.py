@@ -1,4 +1,4 @@
-"""Training rays of views: those near something visible, in an order in which neighbours follow each other."""
+"""Training rays of views near something visible, ordered so that neighbours are close in memory."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.geometry import z_order
 from texgs.volume.images import Images
 
-AROUND = 6  # pixels around what is visible; the visual hull keeps all others empty
+MARGIN = 6  # pixels around visible ones; the visual hull keeps all others empty
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +37,13 @@ class TrainingRays:
 
 
 def training_rays(images: Images) -> TrainingRays:
-    """Return rays through the pixels of all views that show something, or are next to it."""
+    """Return rays through the visible pixels of all views, and through their neighbours."""
     width, height = images.size
     order = curve(width, height)
     directions, views, colors = [], [], []
     for index, camera in enumerate(images.cameras):
         planes = images.planes[index].flatten(1)[:, order]  # [4, H W]
-        near = widened(images.planes[index, 3], AROUND).flatten()[order]
+        near = widen(images.planes[index, 3], MARGIN).flatten()[order]
         directions.append(camera.rays().reshape(-1, 3)[order[near]])
         colors.append(planes[:3, near].T.contiguous())
         views.append(torch.full((int(near.sum()),), index, dtype=torch.int16))
@@ -53,8 +53,8 @@ def training_rays(images: Images) -> TrainingRays:
     return TrainingRays(origins, torch.cat(directions), torch.cat(views), torch.cat(colors))
 
 
-def widened(alpha: Tensor, pixels: int) -> Tensor:
-    """Return whether anything is visible within so many pixels along both axes, [H, W] of [H, W] uint8."""
+def widen(alpha: Tensor, pixels: int) -> Tensor:
+    """Dilate the visible pixels of alpha [H, W] uint8 by a number of pixels along both axes."""
     import cv2
 
     side = 2 * pixels + 1

@@ -1,4 +1,4 @@
-"""Where surfels start: at given points, where rays end, where views show something, or anywhere."""
+"""The start of surfels: at given points, at ends of rays, at visible points, or at random."""
 
 import sys
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.geometry import facing, nearest
 from texgs.core.names import POINTS
 from texgs.core.ply_file import read_vertices
@@ -28,16 +28,16 @@ from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
 
-MARGIN = 0.02  # of the box around the data, relative to its longest side
-HALF_SIZE = 1.1  # of the cube around the origin where nothing else is known, in halves of the longest side
-USUAL_SIDE = 1.0  # the longest side of data where views do not say, world units
-GREY = 0.5  # the colour of random seeds
-USUAL_COUNT = 10_000  # seeds, where nothing says how many
-NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
-LEAST_SCALE = 1e-4  # scale, world units
-# A quick fit finds what is seen of more surfels than are kept.
-CANDIDATES = 2  # seeds for each surfel that is kept
-PIXELS = 200  # pixels of the longer side of small images, about
+MARGIN = 0.02  # around the box of the data, relative to its longest side
+HALF_SIZE = 1.1  # of the default cube around the origin, in halves of the data's longest side
+USUAL_SIDE = 1.0  # default for the longest side of data, world units
+GREY = 0.5  # colour of random seeds
+USUAL_COUNT = 10_000  # default number of seeds
+NEIGHBOURS = 3  # their mean distance is a surfel's first scale
+MIN_SCALE = 1e-4  # world units
+# A quick fit of more surfels than needed finds the visible ones.
+CANDIDATES = 2  # candidate seeds for each one kept
+PIXELS = 200  # approximate longer side of small images
 PHASE = Phase(
     iterations=100,
     rates=Rates(quats=0.016),
@@ -54,7 +54,7 @@ def seed_surfels(
     volume: Grid | None = None,
     most: int | None = None,
 ) -> tuple[dict[str, Tensor], Tensor]:
-    """Return raw `means`, `quats`, `scales` and `opacities` of the first surfels by name, and colours [N, 3].
+    """Return raw start `means`, `quats`, `scales` and `opacities` of surfels by name, and colours [N, 3].
 
     "points" are all in the folder's points3d.ply; "volume", where rays of views through it end, with its
     normals, see `ends_of_rays`: each part has its share, however thin or small; "hull", points that no view
@@ -72,7 +72,7 @@ def seed_surfels(
     generator = torch.Generator().manual_seed(seed)
     if kind == "volume":
         ends = points_in(volume, views, images, count, seed)
-        tell_fewer(views, len(ends.places), count)
+        warn_of_fewer(views, len(ends.places), count)
         return surfels_on(ends, seeds.opacity, generator), ends.colors
     colors: Tensor | None = None
     if kind == "points":
@@ -84,7 +84,7 @@ def seed_surfels(
         candidates = CANDIDATES * count if kind == "visible" else count
         points = hull_points(images, box_of(views, half_size), candidates, generator)
     if kind != "points":
-        tell_fewer(views, len(points), count)
+        warn_of_fewer(views, len(points), count)
     if colors is None:
         colors = mean_colors(images, points)
     surfels = surfels_at(points, seeds.opacity, generator)
@@ -94,7 +94,7 @@ def seed_surfels(
 
 
 def points_in(volume: Grid | None, views: ViewSet, images: Images, most: int, seed: int) -> RayEnds:
-    """Return where rays of all views end in what they show of a volume."""
+    """Return the ends of rays of all views in their volume."""
     if volume is None or "tf" not in views.metadata:
         raise ArgumentError(
             f"{views.folder}: seeds.kind=volume needs a volume and views that name their transfer function; "
@@ -107,7 +107,7 @@ def points_in(volume: Grid | None, views: ViewSet, images: Images, most: int, se
 def shown_volume(
     volume: Grid, views: ViewSet, device: torch.device | str = "cpu"
 ) -> tuple[Caster, Appearance, TransferFunction]:
-    """Return what casts rays through a volume as its views show it, how it looks there, and the function."""
+    """Return a caster of a volume, with the appearance and the function of its views."""
     told, named = views.metadata, views.metadata["tf"]
     shading = {name: told["shading"][name] for name in MATERIAL if name in (told.get("shading") or {})}
     appearance = Appearance(**shading, opacity_unit=told.get("opacity_unit", Appearance.opacity_unit))
@@ -115,8 +115,8 @@ def shown_volume(
     return Caster(volume, appearance, device), appearance, TransferFunction.from_dict(points)
 
 
-def tell_fewer(views: ViewSet, found: int, count: int) -> None:
-    """Say on stderr where there are fewer seeds than asked."""
+def warn_of_fewer(views: ViewSet, found: int, count: int) -> None:
+    """Warn on stderr if there are fewer seeds than requested."""
     if found < count:
         what = "so that thin and small parts may be missing; larger views have room for more"
         print(f"{views.folder}: found {found:,} of {count:,} seeds, {what}", file=sys.stderr)
@@ -146,11 +146,11 @@ def box_of(views: ViewSet, half_size: float | None) -> Box:
 
 
 def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
-    """Read points [N, 3] and, where the file has them, colours [N, 3] in [0, 1] of a PLY file."""
+    """Read points [N, 3] and, if any, colours [N, 3] in [0, 1] of a PLY file."""
     if not path.exists():
         raise ArgumentError(f"{path}: no such file; seeds.kind=visible needs no points")
     vertices = read_vertices(path)
-    with located(path):
+    with errors_at(path):
         points = take(vertices, "x", "y", "z")
         is_colored = {"red", "green", "blue"} <= set(vertices.dtype.names or ())
         colors = take(vertices, "red", "green", "blue") if is_colored else None
@@ -168,11 +168,11 @@ def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
 
 
 def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
-    """Return raw geometry of round surfels at points [N, 3], as far apart as large, turned at random."""
+    """Return raw geometry of round surfels at points [N, 3], sized by distance, turned at random."""
     if len(points) <= NEIGHBOURS:
         raise ArgumentError(f"seeds: expected at least {NEIGHBOURS + 1} points, got {len(points)}")
     distances = nearest(points, points, NEIGHBOURS + 1)[0].numpy()
-    scale = torch.from_numpy(np.sqrt(np.mean(distances[:, 1:] ** 2, axis=1))).float().clamp_min(LEAST_SCALE)
+    scale = torch.from_numpy(np.sqrt(np.mean(distances[:, 1:] ** 2, axis=1))).float().clamp_min(MIN_SCALE)
     return {
         "means": points.float(),
         "quats": normalize(torch.randn(len(points), 4, generator=generator), dim=1),
@@ -189,7 +189,7 @@ def surfels_on(points: RayEnds, opacity: float, generator: torch.Generator) -> d
 def most_seen(
     surfels: Mapping[str, Tensor], colors: Tensor, images: Images, count: int, seed: int
 ) -> tuple[dict[str, Tensor], Tensor]:
-    """Fit surfels for a moment and keep the `count` that contribute most to all views, as they are then."""
+    """Fit surfels briefly, and return the `count` that contribute most to all views."""
     small = shrink(images, max(images.planes.shape[2:]) // PIXELS)
     start = {**surfels, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20.0, "bounded")}
     fit = Fit(start, ShadingModel(), small, PHASE, seed)

@@ -1,4 +1,4 @@
-"""A series in time: the model of a step from that of the step before, of the same surfels and texels."""
+"""Follow a series in time: the model of a step from its neighbour's, with the same surfels and texels."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,10 +11,10 @@ from torch.nn.functional import normalize
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import nearest, quats_to_matrices
 from texgs.core.lens import Lens
-from texgs.fields.surfels.model import TEXTURE, Surfels
+from texgs.fields.surfels.model import TEXTURE_TENSORS, Surfels
 from texgs.fields.surfels.step_file import UNITS
-from texgs.fields.surfels.texels import untextured
-from texgs.fitting.casting import HEADLIGHTS, RayEnds, cast_views, ends_of_rays, lit_cameras
+from texgs.fields.surfels.texels import with_single_texels
+from texgs.fitting.casting import HEADLIGHT_INTERVAL, RayEnds, cast_views, ends_of_rays, lit_cameras
 from texgs.fitting.loop import fit_further
 from texgs.fitting.now import OPACITY, PHASE, SURFELS
 from texgs.fitting.seeds import surfels_on, visible_weights
@@ -26,22 +26,21 @@ from texgs.volume.motion import Motion, motion
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
-VIEW_SIZE = (
-    128  # pixels of the views of a step: surfels have their places, views only say how far they are off
-)
+VIEW_SIZE = 128  # pixels of a step's views; they only correct the surfels' places
 SAMPLE_DISTANCE = 1.0  # voxels between the samples of views
-ROUNDS = 3  # through all views: a part of one would bend surfels towards the views that are in it
-SLOWER = 0.3  # times the rates of surfels that start anywhere
-MOVED = UNITS.keys() - {"normals"}  # these turn as fast as surfels
-RATES = Rates(**{name: SLOWER * getattr(PHASE.rates, name) for name in MOVED}, material=0.0)
-PLANTED_SHARE = 0.1  # share of all surfels: those that show least are planted where most is missing
-FEWEST_PLANTED = 4  # surfels to plant: of fewer the size is not known, see `surfels_at`
-HIDDEN_LOGIT = -12.0  # raw opacity of surfels where nothing is to be seen
-FARTHEST, STRETCH = 0.05, 2.0  # world units at which the ends of axes are carried; and how much they stretch
+ROUNDS = 3  # passes over all views; a partial one would favour the views in it
+RATE_FACTOR = 0.3  # relative to the rates of a fit from seeds
+MOVING_RATES = UNITS.keys() - {"normals"}  # normals turn as fast as surfels
+RATES = Rates(**{name: RATE_FACTOR * getattr(PHASE.rates, name) for name in MOVING_RATES}, material=0.0)
+PLANTED_SHARE = 0.1  # share of surfels, the least visible, to plant where most is missing
+MIN_PLANTED = 4  # surfels to plant; for fewer the size is unknown, see `surfels_at`
+HIDDEN_LOGIT = -12.0  # raw opacity of surfels at an invisible step
+# World units at which the ends of axes are carried; and how much they stretch.
+MAX_DISPLACEMENT, MAX_STRETCH = 0.05, 2.0
 
 
 class Follower:
-    """Follows what a function shows, from one volume of a series to the next.
+    """Follows a model through a series, from one volume to the next.
 
     Surfels move with the matter that they show, see `motion`; those that show least are planted where matter
     has appeared, and a short fit to small views moves, turns, fades and colours all. There are as many as
@@ -61,7 +60,7 @@ class Follower:
         self._texture = mean_texture(key.to("cpu"))
 
     def step(self, model: Surfels, before: Grid, after: Grid, title: str, seed: int = 0) -> Surfels:
-        """Return the model of a step, whose volume is `after`, from that of a step beside it.
+        """Return the model of a step with the volume `after`, from the model of a neighbouring step.
 
         Titles are those of progress bars. The seed is that of lights, planted surfels and the order of views:
         another one for each step. Volumes on different lattices are refused.
@@ -76,7 +75,7 @@ class Follower:
         if lens is None:
             hidden = torch.full_like(model.parameters["opacities"], HIDDEN_LOGIT)
             return replace(model, parameters={**model.parameters, "opacities": hidden})
-        plain = {name: x for name, x in p.items() if name not in TEXTURE}
+        plain = {name: x for name, x in p.items() if name not in TEXTURE_TENSORS}
         plain["colors"] = plain["colors"] + self._texture
         if lens_of(before, self._tf):
             plain = carry(plain, motion(before, after, self._tf))
@@ -90,7 +89,7 @@ class Follower:
     ) -> dict[str, Tensor]:
         """Plant surfels without texels, and fit all to views of a volume."""
         images = cast_views(caster, self._tf, lit_cameras(lens, seed), f"{title}, views")
-        headlit = images[::HEADLIGHTS]
+        headlit = images[::HEADLIGHT_INTERVAL]
         points = ends_of_rays(caster, self._appearance, self._tf, headlit.cameras, SURFELS, seed)
         weights = visible_weights(Surfels(plain, self._shading).to(caster.device), headlit).cpu()
         model = Surfels(plant(plain, points, weights, seed), self._shading).to(caster.device)
@@ -99,7 +98,7 @@ class Follower:
 
 
 def lens_of(grid: Grid, tf: TransferFunction) -> Lens | None:
-    """Return the lens of small views of all that a function shows; None where that is nothing."""
+    """Return the lens of small views of a function, or None if it shows nothing."""
     try:
         return frame_of(grid, [tf]).lens(width=VIEW_SIZE, height=VIEW_SIZE)
     except ArgumentError:
@@ -107,36 +106,36 @@ def lens_of(grid: Grid, tf: TransferFunction) -> Lens | None:
 
 
 def mean_texture(model: Surfels) -> Tensor:
-    """Return palette and mean texel [N, 3]: what the colours of a model are offsets from."""
+    """Return palette plus mean texel [N, 3], the base of a model's colour offsets."""
     if model.stage != "texture":
         return torch.zeros_like(model.parameters["colors"])
-    plain = untextured(model).parameters
+    plain = with_single_texels(model).parameters
     return plain["palette"] + plain["texels"][plain["offsets"]]
 
 
 def carry(parameters: Mapping[str, Tensor], moves: Motion) -> dict[str, Tensor]:
-    """Return surfels that move with matter: their middles, and the ends of their axes, which turns them.
+    """Move surfels with matter: their centres, and the ends of their axes, which turns them.
 
     Axes stay at right angles: the first keeps its direction, the second its plane.
     """
     p = parameters
     axes = quats_to_matrices(p["quats"])[..., :2]  # [N, 3, 2]
-    reach = p["scales"].exp().clamp_max(FARTHEST)
+    reach = p["scales"].exp().clamp_max(MAX_DISPLACEMENT)
     arms = [reach[:, k, None] * axes[..., k] for k in range(2)]
     first, second = (arm + (moves.at(p["means"] + arm) - moves.at(p["means"] - arm)) / 2 for arm in arms)
     stretch = torch.stack([first.norm(dim=1), second.norm(dim=1)], dim=1) / reach
-    quats = spanning(first, second)
+    quats = spanning_normals(first, second)
     return {
         **p,
         **turn_normals(p, quats),
         "means": p["means"] + moves.at(p["means"]),
         "quats": quats,
-        "scales": p["scales"] + stretch.clamp(1 / STRETCH, STRETCH).log(),
+        "scales": p["scales"] + stretch.clamp(1 / MAX_STRETCH, MAX_STRETCH).log(),
     }
 
 
 def turn_normals(parameters: Mapping[str, Tensor], quats: Tensor) -> dict[str, Tensor]:
-    """Return normals, where surfels have their own, turned as these turn to new quaternions [N, 4]."""
+    """Turn the normals of surfels, if any, with the surfels to new quaternions [N, 4]."""
     from kornia.geometry.conversions import rotation_matrix_to_quaternion
 
     if "normals" not in parameters:
@@ -146,8 +145,8 @@ def turn_normals(parameters: Mapping[str, Tensor], quats: Tensor) -> dict[str, T
     return {"normals": rotation_matrix_to_quaternion((turn @ normals).contiguous())}
 
 
-def spanning(first: Tensor, second: Tensor) -> Tensor:
-    """Return quaternions [N, 4] wxyz that turn x to one vector [N, 3], and y into its plane with another."""
+def spanning_normals(first: Tensor, second: Tensor) -> Tensor:
+    """Return quaternions [N, 4] wxyz that map x to one vector [N, 3] and y into its plane with another."""
     from kornia.geometry.conversions import rotation_matrix_to_quaternion
 
     x = normalize(first, dim=1)
@@ -157,13 +156,13 @@ def spanning(first: Tensor, second: Tensor) -> Tensor:
 
 
 def plant(parameters: Mapping[str, Tensor], points: RayEnds, weights: Tensor, seed: int) -> dict[str, Tensor]:
-    """Return surfels of which those that show least are new ones, at the points that are farthest from any.
+    """Replace the least visible surfels by new ones, at the points farthest from all surfels.
 
-    Weights [N] are what views show of each; all that are not seen move, too. Colours are plain ones.
+    Weights [N] measure visibility; all invisible surfels move, too. Colours are unlit.
     """
     n = len(weights)
     count = min(max(int(PLANTED_SHARE * n), int((weights <= 0).sum())), len(points.places))
-    if count < FEWEST_PLANTED:  # matter that is about to come or go
+    if count < MIN_PLANTED:  # matter that appears or disappears
         return {**parameters}
     least = weights.argsort()[:count]
     kept = torch.ones(n, dtype=torch.bool).index_fill_(0, least, False)

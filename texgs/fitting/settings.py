@@ -81,7 +81,7 @@ SEEDS = ("auto", "points", "volume", "visible", "hull", "random")
 
 @dataclass(frozen=True)
 class Seeds:
-    """Where surfels or Gaussians start."""
+    """The start of surfels or Gaussians."""
 
     kind: str = key(
         "auto",
@@ -104,7 +104,7 @@ class Seeds:
 
 @dataclass(frozen=True)
 class GaussianKeys:
-    """How 3D Gaussians are fitted: in one phase of the loop that surfels are fitted by."""
+    """The fit of 3D Gaussians, in one phase of the same loop as for surfels."""
 
     iterations: int = key(30000, "iterations, each of one view", least=0)
     sh_degree: int = key(3, "degree of the spherical harmonics", least=0, most=3)
@@ -131,7 +131,7 @@ class GaussianKeys:
 
 @dataclass(frozen=True)
 class Material:
-    """Blinn-Phong factors that the shading phase starts with."""
+    """Start values of Blinn-Phong factors in the shading phase."""
 
     ambient: float = key(0.5, "ambient factor k_a", least=0)
     diffuse: float = key(0.5, "diffuse factor k_d", least=0)
@@ -141,7 +141,7 @@ class Material:
 
 @dataclass(frozen=True)
 class TextureKeys:
-    """Texels: how many, and how they are found."""
+    """Number of texels, and how they are fitted."""
 
     texels: int | None = key(
         None, "texels in all, of one edge; default where they are seen, about one per pixel", least=1

@@ -1,4 +1,4 @@
-"""What a fit of one phase gets, and what it gives."""
+"""Input and output of a fit."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ Settings = TypeVar("Settings")
 class FitTask(Generic[Settings]):
     """One field to fit to the views of a basic TF."""
 
-    settings: Settings  # of the kind
+    settings: Settings  # of the kind of field
     views: ViewSet
     images: Images  # the training views, reduced
     output: Path  # folder, also for checkpoints
     device: torch.device
     seed: int
     title: str  # of progress bars
-    metadata: Mapping[str, str]  # of the field: where it is from
-    volume: Grid | None = None  # what the views show, where the fit starts from it
+    metadata: Mapping[str, str]  # origin of the field
+    volume: Grid | None = None  # volume in the views, if the fit starts from it
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A field, and how its fit went."""
+    """A fitted field, with facts about its fit."""
 
     field: Field
     seconds: float
     iterations: int
-    losses: Sequence[float] = ()  # at the steps where they were checked
-    notes: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # more to tell, which no table reads
+    losses: Sequence[float] = ()  # at checked steps
+    notes: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # further facts; no table reads them

@@ -1,4 +1,4 @@
-"""The texture phase: geometry and material stay, surfels get colours that vary."""
+"""The texture phase: surfels get texels; geometry and material stay."""
 
 from dataclasses import dataclass, replace
 
@@ -14,12 +14,12 @@ from texgs.fitting.colors import mean_color
 from texgs.fitting.settings import TextureKeys
 from texgs.fitting.texture_solve import refine, solve
 from texgs.raster import Texture
-from texgs.raster.arguments import MOST_TEXELS
+from texgs.raster.arguments import MAX_TEXELS
 from texgs.volume.cameras import farthest_first
 from texgs.volume.images import Images
 
-SIGHT_VIEWS = 54  # views, spread, that tell what is seen of surfels
-HALVINGS = 40  # halvings of the interval that has the edge of texels
+SIGHT_VIEWS = 54  # evenly spread views to measure the visibility of surfels
+HALVINGS = 40  # halvings of the interval of the texel edge
 
 
 def texturize(
@@ -51,7 +51,7 @@ def texturize(
 
 
 def add_texture(model: Surfels, palette: Tensor, sizes: Tensor) -> Surfels:
-    """Give a model texels 0, of sizes [N, 2] int32, and offsets from a palette [3]: it looks as before."""
+    """Add zero texels of sizes [N, 2] int32, and offsets from a palette [3]; the look does not change."""
     p = model.parameters
     texels = palette.new_zeros(int(sizes.long().prod(dim=1).sum()), 3)
     texture = {"palette": palette, "texels": texels, "sizes": sizes, "offsets": offsets_of(sizes)}
@@ -59,7 +59,7 @@ def add_texture(model: Surfels, palette: Tensor, sizes: Tensor) -> Surfels:
 
 
 def without_offset(model: Surfels) -> Surfels:
-    """Add the offsets of surfels to their texels, which lie one surfel after the other."""
+    """Move the offsets of surfels into their texels, which are in surfel order."""
     p = model.parameters
     owners = torch.repeat_interleave(p["sizes"].long().prod(dim=1))
     moved = {"texels": p["texels"] + p["colors"][owners], "colors": torch.zeros_like(p["colors"])}
@@ -67,7 +67,7 @@ def without_offset(model: Surfels) -> Surfels:
 
 
 def mean_unlit_color(model: Surfels, sight: "Sight") -> Tensor:
-    """Return the mean colour [3] of a model without light, each surfel as much as views show of it."""
+    """Return the mean unlit colour [3] of a model, weighted by visibility in views."""
     shown = sight.shown[:, None]
     return ((shown * model.parameters["colors"]).sum(dim=0) / shown.sum().clamp_min(1e-12)).clamp(0, 1)
 
@@ -77,7 +77,7 @@ def mean_unlit_color(model: Surfels, sight: "Sight") -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What spread training views see of each surfel."""
+    """Visibility of each surfel in spread training views."""
 
     largest: Tensor
     """[N] largest blending weight in any view, 0 where no view shows the surfel."""
@@ -92,7 +92,7 @@ class Sight:
 
 @torch.no_grad()
 def gather_sight(model: Surfels, images: Images, title: str) -> Sight:
-    """Gather what views show of a textured model, whatever its texels: `SIGHT_VIEWS` of them, spread.
+    """Measure the visibility of a textured model's surfels in `SIGHT_VIEWS` spread views.
 
     A surfel seen by few views has a small mean curvature and still a large one where it is seen;
     `curvature` is therefore the mean over views weighted by itself, sum c^2 / sum c, and at least half of
@@ -124,7 +124,7 @@ def gather_sight(model: Surfels, images: Images, title: str) -> Sight:
 
 
 def sizes_for_budget(scales: Tensor, texels: int) -> Tensor:
-    """Choose texels along u and v [N, 2], int32, of the same edge for all surfels, `texels` in all at most.
+    """Choose texels along u and v [N, 2], int32, of equal edge for all surfels, `texels` in all at most.
 
     U = ceil(6 s_u / edge), V likewise, for standard deviations [N, 2] in world units. The paper's edge,
     sqrt(36 sum(s_u s_v) / texels), exceeds the budget, as sizes are rounded up: this is the smallest one that
@@ -156,6 +156,6 @@ def sizes_where_seen(scales: Tensor, sight: Sight) -> Tensor:
 def _sizes(scales: Tensor, edges: Tensor) -> Tensor:
     counts = (EXTENT * scales / edges[:, None]).ceil().clamp_min(1)  # [N, 2]
     most = int(counts.double().prod(dim=1).max()) if len(counts) else 0
-    if most > MOST_TEXELS:
+    if most > MAX_TEXELS:
         raise ArgumentError(f"texels: expected at most 2^24 for one surfel, got {most}; lower texels")
     return counts.int()

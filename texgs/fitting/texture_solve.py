@@ -1,4 +1,4 @@
-"""Texels from images by least squares or Adam: with geometry and shading frozen, images are linear."""
+"""Fit texels to images by least squares or Adam; with geometry and shading frozen, images are linear."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,12 +22,10 @@ from texgs.volume.images import Images
 
 FIRST_STEP = 1.3  # share of a Newton step in a typical view: 2 is the limit of stability, and views differ
 LAST_STEP = 0.3  # noise of single views averages out as steps fall
-FARTHEST_TEXEL = (
-    1.0  # texels from the colours of their surfels: more brings noise of views that hardly see them
-)
-CHECKED_VIEWS = 12  # views, about, that tell how far to go
+MAX_TEXEL_CHANGE = 1.0  # largest texel; larger ones are noise from views that hardly see them
+CHECKED_VIEWS = 12  # approximate number of views to choose the step length
 STRUCTURE = 1e-3  # weight of D-SSIM against half the mean squared error
-DSSIM = 0.2  # share of D-SSIM in what Adam follows
+DSSIM = 0.2  # share of D-SSIM in the loss for Adam
 
 
 def solve(
@@ -56,7 +54,7 @@ def solve(
         (gradient,) = torch.autograd.grad(loss, texels)
         rate = FIRST_STEP * (LAST_STEP / FIRST_STEP) ** (step / len(order))
         with torch.no_grad():
-            texels.addcmul_(gradient, scale, value=-rate).clamp_(-FARTHEST_TEXEL, FARTHEST_TEXEL)
+            texels.addcmul_(gradient, scale, value=-rate).clamp_(-MAX_TEXEL_CHANGE, MAX_TEXEL_CHANGE)
     advice = "the training views or the model of the phase before are damaged"
     require_finite("texture", {"texels": texels}, advice)
     solved = replace(model, parameters={**model.parameters, "texels": texels.detach()})
@@ -67,7 +65,7 @@ def solve(
 
 @torch.no_grad()
 def share_of(solved: Surfels, start: Surfels, images: Images, views: Sequence[int]) -> float:
-    """Return how much in [0, 1] of the way from a model to a solved one has the least squared error.
+    """Return the step length in [0, 1] from a model to its solution with the least squared error.
 
     Images are linear in texels: it is <residual, change> / <change, change> over some `CHECKED_VIEWS` views.
     """
@@ -88,7 +86,7 @@ def curvature(sizes: Tensor, of_surfels: Tensor) -> Tensor:
 
 
 def _inverse(curvatures: Tensor, ridge: float) -> Tensor:
-    """Return 1 / (curvature + ridge * median) [T, 1]; 0 where nothing is seen at all."""
+    """Return 1 / (curvature + ridge * median) [T, 1], or 0 if nothing is visible."""
     seen = curvatures[curvatures > 0]
     if not len(seen):
         return torch.zeros_like(curvatures)

@@ -21,8 +21,8 @@ from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variati
 from texgs.raster.voxels import March, Rays, Samples
 from texgs.volume.images import Images
 
-PIECE = 16_384  # rays at a time
-SIDE = 8  # voxels that the sides of the coarsest grid are multiples of
+PIECE = 16_384  # rays to process at a time
+SIDE = 8  # voxels; divisor of the coarsest grid's sides
 
 
 class VoxelFit(ResumableFit):
@@ -41,12 +41,12 @@ class VoxelFit(ResumableFit):
         self._begin(hull_grid(images, s.stages[0].side, s.half_size, s.degree, s.start_density))
 
     def _begin(self, grid: VoxelGrid) -> None:
-        """Go on with another grid and a new optimiser."""
+        """Continue with another grid and a new optimiser."""
         self.grid = grid
         self.optimizer = VoxelOptimizer(grid, self.settings.optimizer)
 
     def run(self) -> Iterator[int]:
-        """Go through all stages, or what is left of them."""
+        """Run the remaining stages."""
         start = 0
         for index, stage in enumerate(self.settings.stages):
             if index and self.iteration == start:
@@ -58,12 +58,12 @@ class VoxelFit(ResumableFit):
         self.grid.refresh_occupancy()
 
     def refine(self) -> None:
-        """Remove what no ray sees, and halve the spacing."""
+        """Remove invisible voxels, and halve the spacing."""
         self.grid.refresh_occupancy()
         self._begin(refine_grid(self.grid, self.seen()))
 
     def seen(self) -> Tensor:
-        """Return the voxels [X, Y, Z] that show in the training views."""
+        """Return the voxels [X, Y, Z] visible in the training views."""
         s = self.settings
         seen = seen_voxels(self.grid, self.rays, self.march, s.prune_weight, s.prune_share)
         if not seen.any():
@@ -81,7 +81,7 @@ class VoxelFit(ResumableFit):
         return {**grid, **kept, "random": self.generator.get_state(), **super().state()}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
-        """Go on from what `state` returned."""
+        """Continue from a result of `state`."""
         super().restore(state)
         tensors = {f.name: state[f"grid.{f.name}"].clone() for f in fields(VoxelGrid)}
         lower, spacing = tensors.pop("lower").tolist(), tensors.pop("spacing").item()
@@ -108,23 +108,23 @@ class VoxelFit(ResumableFit):
         self.optimizer.step(self.rates())
         self.iteration += 1
         if self.is_checked:
-            # Densities that are not finite show nothing, so that the loss alone does not tell.
+            # Densities that are not finite are invisible, so the loss does not show them.
             loss = error.square().mean()
             self.note(loss, {"loss": loss, "density": self.grid.density})
 
     def psnr(self) -> float:
-        """Return the PSNR in dB of the training rays that were looked at last."""
+        """Return the PSNR in dB of the latest training rays."""
         return -10 * log10(max(self.losses[-1], 1e-10))
 
     def rates(self) -> VoxelRates:
-        """Return the learning rates of the step to come."""
+        """Return the learning rates of the next step."""
         s = self.settings
         sh = s.sh.at(self.iteration, s.steps)
         return VoxelRates(s.density.at(self.iteration, s.steps), sh, sh)
 
 
 def fit_voxels(task: FitTask[VoxelKeys]) -> Fitted:
-    """Fit a grid to random rays, coarse to fine, from the last checkpoint if there is one."""
+    """Fit a grid to random rays, coarse to fine, from the last checkpoint if any."""
     run = VoxelFit(task.images, task.settings, task.seed)
     seconds = run_to_end(run, task.output / FOLDER, task.title)
     field = Voxels(run.grid, run.march, task.metadata)
@@ -159,7 +159,7 @@ def seen_voxels(grid: VoxelGrid, rays: TrainingRays, march: March, weight: float
 def refine_grid(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
     """Make a grid with half the spacing, of the voxels around those to keep, [X, Y, Z] bool.
 
-    Its rows are interpolated; every other one is a row as it was.
+    Its rows are interpolated; every other one is an old row.
     """
     mask = kept
     for axis in range(3):
@@ -172,7 +172,7 @@ def refine_grid(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
 
 
 def dilate(mask: Tensor) -> Tensor:
-    """Add all 26 neighbours of what is in a mask [X, Y, Z]."""
+    """Dilate a mask [X, Y, Z] by all 26 neighbours."""
     for axis, side in enumerate(mask.shape):
         before, mask = mask, mask.clone()
         mask.narrow(axis, 0, side - 1).logical_or_(before.narrow(axis, 1, side - 1))

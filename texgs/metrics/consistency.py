@@ -1,4 +1,4 @@
-"""Multi-view consistency: views warped into each other by their depth, compared where both see the same."""
+"""Multi-view consistency: warp views into each other by depth, and compare where both see the same."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 
-SHORT, LONG = 1, 7  # views from one to the other of a pair, as is usual for stylised scenes
-OPAQUE = 0.5  # least alpha of a pixel that has a depth
-TOLERANCE = 0.01  # share of the depth by which two views of the same point may differ
+SHORT_RANGE, LONG_RANGE = 1, 7  # distance of pairs in views, as usual for stylised scenes
+OPAQUE_ALPHA = 0.5  # least alpha of a pixel that has a depth
+TOLERANCE = 0.01  # largest difference in depth of the same point, relative to the depth
 
-# How far an image [H, W, 3], which differs in some pixels [H, W] at most, is from a view, such as by LPIPS.
+# Distance of an image [H, W, 3] from a view, such as LPIPS; they differ at most in a mask [H, W].
 Perceptual = Callable[[Tensor, Tensor], float]
 
 
@@ -31,14 +31,14 @@ class SeenFrame:
 
 
 class Difference(NamedTuple):
-    """How much a pair of views differs where both see the same."""
+    """Differences of a pair of views in their common part."""
 
     square: float  # mean squared difference of colours
-    distance: float | None  # perceptual; None where it is not measured
+    distance: float | None  # perceptual, if measured
 
 
 def mean_differences(pairs: Sequence[Difference]) -> tuple[float, float | None]:
-    """Return the root of the mean squared difference of one pair or more, and the mean distance."""
+    """Return the RMS difference of one or more pairs, and the mean distance."""
     squares, distances = zip(*pairs, strict=True)
     return sqrt(fmean(squares)), None if distances[0] is None else fmean(distances)
 
@@ -46,7 +46,7 @@ def mean_differences(pairs: Sequence[Difference]) -> tuple[float, float | None]:
 def difference(
     first: SeenFrame, second: SeenFrame, distance: Perceptual | None = None, tolerance: float = TOLERANCE
 ) -> Difference | None:
-    """Compare a view with another one, warped into it; None where they see nothing that is the same.
+    """Compare a view with another one warped into it; None without a common part.
 
     What depends on the place of the viewer counts as inconsistent, highlights and headlights too: render
     without light to measure textures alone.
@@ -85,10 +85,10 @@ def warp(source: SeenFrame, target: SeenFrame, tolerance: float = TOLERANCE) -> 
     x, y = (pixels - 0.5).unbind(-1)
     warped = remap(source.image.permute(2, 0, 1)[None], x[None], y[None], align_corners=True)
     inside = ((pixels >= 0.5) & (pixels <= pixels.new_tensor([width - 0.5, height - 0.5]))).all(-1)
-    same = (target.alpha >= OPAQUE) & inside & (z > 0)
+    same = (target.alpha >= OPAQUE_ALPHA) & inside & (z > 0)
     column, row = (at.nan_to_num(0, 0, 0).floor().long() for at in (x, y))
     for down in (row, row + 1):
         for right in (column, column + 1):
             at = (down.clamp(0, height - 1), right.clamp(0, width - 1))
-            same &= (source.alpha[at] >= OPAQUE) & ((source.depth[at] - z).abs() <= tolerance * z)
+            same &= (source.alpha[at] >= OPAQUE_ALPHA) & ((source.depth[at] - z).abs() <= tolerance * z)
     return warped[0].permute(1, 2, 0), same

@@ -1,4 +1,4 @@
-"""What a metric of edits is, and the metrics that there are: the modules of texgs/metrics/edits.
+"""Specifications of metrics of edits, from the modules of texgs/metrics/edits.
 
 A metric is one file there. It measures the scene, or watches its views: then VGG-16 runs once a view for all
 metrics. The stage edit_metrics runs all of them; the tables of edits and of sweeps take their columns from
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from texgs.raster import Render
     from texgs.scene.scene import Scene
 
-LAST_FRAMES = 32  # frames that are kept: all that a usual number of views needs
+LAST_FRAMES = 32  # frames to keep, enough for a usual number of views
 
 
 @dataclass(frozen=True)
@@ -34,11 +34,11 @@ class Measure:
     """One number of a metric and its column in tables."""
 
     name: str  # its key in metrics.json
-    title: str  # heading of its column, with the unit where it has one
-    digits: int | None = None  # how many stand after the point; None for what is no number
+    title: str  # heading of its column, with the unit, if any
+    digits: int | None = None  # digits after the point; None for words
     better: Literal["", "up", "down"] = ""  # which way is better
     published: str = ""  # column of the paper's tables of edits
-    words: Mapping[Any, str] | None = None  # what tables say in place of its values
+    words: Mapping[Any, str] | None = None  # words in tables for its values
 
     def __post_init__(self) -> None:
         if self.better not in ("", "up", "down"):
@@ -49,16 +49,16 @@ class Measure:
 
 @dataclass(frozen=True)
 class Metric:
-    """One metric of edited scenes. Its module imports nothing heavy before `run` is called."""
+    """One metric of edited scenes. Its module must import nothing heavy before `run`."""
 
     name: str
     measures: tuple[Measure, ...]
     run: Callable[[MeasuredScene], Mapping[str, Any] | Watcher]  # values of measures and notes
-    notes: Mapping[str, str] | None = None  # words beside numbers, and the sentences that hold them
-    order: int = 100  # where its columns stand; the lowest come first
-    is_in_paper: bool = True  # whether tables that are as in the paper have its columns, too
-    tables: tuple[str, ...] = ()  # values that are numbers by name, which no table shows
-    # From what each look of a scene follows, and its values, to measures that it has among these looks.
+    notes: Mapping[str, str] | None = None  # sentences for notes beside numbers, by key
+    order: int = 100  # position of its columns, in rising order
+    is_in_paper: bool = True  # whether the paper's tables include its columns
+    tables: tuple[str, ...] = ()  # names of values that are tables of numbers, not shown
+    # Maps the pictures and values of all looks of a scene to further measures of each look.
     among: Callable[[Sequence[tuple[str, Mapping[str, Any]]]], Sequence[Mapping[str, Any]]] | None = None
 
     def __post_init__(self) -> None:
@@ -75,48 +75,48 @@ class Metric:
 
 @dataclass(frozen=True, eq=False)
 class SeenView:
-    """A view of the edited scene, and what VGG-16 makes of it."""
+    """A view of the edited scene with its features of VGG-16."""
 
-    place: int  # along the path
+    place: int  # index along the path
     image: Tensor  # [H, W, 3] in [0, 1]
     alpha: Tensor  # [H, W]
-    layers: Mapping[str, Tensor]  # [1, C, h, w], those of LPIPS and of styles by name; none without weights
+    layers: Mapping[str, Tensor]  # [1, C, h, w] layers of LPIPS and styles by name; none without weights
 
 
 @runtime_checkable
 class Watcher(Protocol):
-    """What measures views that are shown to it in turn, so that VGG-16 runs once a view for all metrics."""
+    """Measures one view after another, so that VGG-16 runs once a view for all metrics."""
 
     def see(self, view: SeenView) -> None:
         """Measure a view."""
 
     def values(self) -> Mapping[str, Any]:
-        """Return the values of measures and notes, after the last view."""
+        """Return the values of measures and notes after the last view."""
 
 
 @dataclass(frozen=True, eq=False)
 class Style:
-    """A picture that a scene follows, or one of its models."""
+    """A picture that a scene or one of its models follows."""
 
-    model: str | None  # by itself; None: all that is shown
+    model: str | None  # to measure alone; None: the whole scene
     image: Tensor  # [3, h, w] in [0, 1], its longer side that of the views
     region: Tensor  # [h, w] bool
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredScene:
-    """An edited scene, and what its metrics may look at."""
+    """An edited scene with the inputs of its metrics."""
 
     title: str  # of progress bars
     scenes: tuple[Scene, Scene]  # before and after the edit
     compositions: tuple[Composed, Composed]  # the same, opened
-    geometry_file: Path  # scene whose depth says where surfaces are
+    geometry_file: Path  # scene whose depth defines the surfaces
     cameras: Sequence[Camera]  # along the test path
-    compared: int  # how many of them measure
+    compared: int  # number of cameras to measure with
     captions: tuple[str, str]  # before and after
     clip: str  # backbone of CLIP
-    weights: Mapping[str, str | None]  # digests by name; None for those that nothing can work with here
-    styles: Sequence[Style]  # none where parts of models follow them
+    weights: Mapping[str, str | None]  # digests by name; None for unusable weights
+    styles: Sequence[Style]  # empty if parts of models follow pictures
 
     @property
     def after(self) -> Scene:
@@ -130,18 +130,18 @@ class MeasuredScene:
 
     @property
     def places(self) -> list[int]:
-        """Return which cameras measure: in the middles of equal parts of the path; all, if it has no more."""
+        """Return the indices of measured cameras: the middles of equal parts of the path, or all."""
         length, count = len(self.cameras), min(self.compared, len(self.cameras))
         return [(2 * index + 1) * length // (2 * count) for index in range(count)]
 
     @property
     def some(self) -> list[Camera]:
-        """Return the cameras that measure."""
+        """Return the measured cameras."""
         return [self.cameras[place] for place in self.places]
 
     @cached_property
     def frame(self) -> Callable[[int], Render]:
-        """Return what renders the edited scene at a place of the path, and keeps the last frames."""
+        """Return a cached renderer of the edited scene along the path."""
         scene = self.after
         return lru_cache(LAST_FRAMES)(
             lambda place: self.shown.render(self.cameras[place], scene.light, scene.edits)
@@ -149,7 +149,7 @@ class MeasuredScene:
 
     @cached_property
     def vgg(self) -> Vgg | None:
-        """Return VGG-16 in single precision for all metrics; None without its weights."""
+        """Return VGG-16 in single precision for all metrics, or None without weights."""
         import torch
 
         from texgs.models.lpips import LAYERS
@@ -160,7 +160,7 @@ class MeasuredScene:
         return Vgg.load(None, self.shown.device, layers, torch.float32) if is_here else None
 
     def views(self) -> Iterator[SeenView]:
-        """Yield what measures, one view at a time: the features of a view are larger than its pixels."""
+        """Yield the measured views one at a time, because features are larger than pixels."""
         from texgs.core.progress import progress
 
         for place in progress(self.places, title=self.title, unit="view"):
@@ -172,7 +172,7 @@ class MeasuredScene:
 
 
 def metrics() -> dict[str, Metric]:
-    """Return all metrics of edits by name, in the order of their columns; no two have a value of one name."""
+    """Return all metrics of edits by name, in column order; names of values are unique."""
     defined, owners = specifications("texgs.metrics.edits", "METRIC"), dict[str, str]()
     for metric in defined.values():
         for name in metric.names:
@@ -185,7 +185,7 @@ def metrics() -> dict[str, Metric]:
 
 
 def values_of(scene: MeasuredScene, chosen: Iterable[Metric] | None = None) -> dict[str, Any]:
-    """Measure all that can be measured of an edited scene, or what some metrics can.
+    """Measure an edited scene by all metrics that apply, or by some.
 
     Raises:
         ArgumentError: if a metric gives a value that it does not declare.
@@ -206,7 +206,7 @@ def values_of(scene: MeasuredScene, chosen: Iterable[Metric] | None = None) -> d
 
 
 def require_declared(metric: Metric, values: Any) -> None:
-    """Require that a metric gives what it declares: numbers where its columns have digits, or None."""
+    """Require the values that a metric declares: numbers for columns with digits, or None."""
     where = f"metric {metric.name}"
     if not isinstance(values, Mapping):
         raise ArgumentError(f"{where}: expected values by their names, got {type(values).__name__}")

@@ -1,4 +1,4 @@
-"""PSNR, SSIM and the share shown, as the tables define them, of images and of a model on views."""
+"""PSNR, SSIM and the share shown, as defined for the tables, of images and of a model on views."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -18,11 +18,11 @@ from texgs.raster.reference.losses import similarities
 from texgs.volume.images import over_white, smaller
 from texgs.volume.view_set import View
 
-BEST = 100.0  # dB, of equal images
-VISIBLE = 0.01  # alpha; pixels of an object have more in one of two images
-WINDOW = 3  # pixels of the side of a square whose mean alpha is compared
+MAX_PSNR = 100.0  # dB, of equal images
+VISIBLE_ALPHA = 0.01  # alpha of a pixel on the object, in one of two images
+WINDOW = 3  # pixels; side of a square whose mean alpha is compared
 KEPT_ALPHA = 0.5  # share of that mean
-WHOLE_FROM = 0.995  # fits that lose nothing have 0.997 or more, one without some leaves of a bonsai 0.991
+WHOLE_SHARE = 0.995  # complete fits have 0.997 or more; a bonsai without some leaves has 0.991
 Item = TypeVar("Item")
 Read = TypeVar("Read")
 
@@ -31,7 +31,7 @@ def psnr(image: Tensor, target: Tensor) -> float:
     """Return the PSNR in dB of an image [H, W, C], clamped to [0, 1], over all pixels; 100 if equal."""
     from kornia.metrics import psnr as of_unit_range
 
-    return min(of_unit_range(image.clamp(0, 1), target, 1.0).item(), BEST)  # NaN stays NaN
+    return min(of_unit_range(image.clamp(0, 1), target, 1.0).item(), MAX_PSNR)  # NaN stays NaN
 
 
 def ssim(image: Tensor, target: Tensor) -> float:
@@ -40,9 +40,9 @@ def ssim(image: Tensor, target: Tensor) -> float:
 
 
 def compare(image: Render, target: Render) -> dict[str, float]:
-    """Return PSNR in dB and SSIM of two images: full frame, and on the object, where one shows something.
+    """Return PSNR in dB and SSIM of two images: full frame, and on the object, the visible part of either.
 
-    Of what the target shows, `shown` is the share that the image shows, see `shown_share`.
+    `shown` is the share of the target that the image shows, see `shown_share`.
     """
     shown = image.color.clamp(0, 1)
     scores = {"psnr": psnr(shown, target.color), "ssim": ssim(shown, target.color)}
@@ -54,12 +54,12 @@ def compare(image: Render, target: Render) -> dict[str, float]:
 
 
 def object_of(image: Render, target: Render) -> Tensor:
-    """Return the pixels [H, W] in which one of two images shows something."""
-    return (image.alpha > VISIBLE) | (target.alpha > VISIBLE)
+    """Return the pixels [H, W] that are visible in one of two images."""
+    return (image.alpha > VISIBLE_ALPHA) | (target.alpha > VISIBLE_ALPHA)
 
 
 def shown_share(alpha: Tensor, truth: Tensor) -> float | None:
-    """Return the share of a view's alpha [H, W] where a model has half of it at least, as means over 3 x 3.
+    """Return the share of a view's alpha [H, W] where a model has at least half, both as 3 x 3 means.
 
     None where the view shows nothing; faint noise has little weight. What is finer than pixels differs from
     one to the next, and faint matter by a tenth of its alpha, in fits that have all parts: neither counts.
@@ -73,8 +73,8 @@ def shown_share(alpha: Tensor, truth: Tensor) -> float | None:
 
 
 def what_is_lost(share: float | None) -> str:
-    """Return what to say of a fit that misses parts, and what to do; nothing where it does not."""
-    if share is None or share >= WHOLE_FROM:
+    """Return a warning with advice for a fit that misses parts, or ""."""
+    if share is None or share >= WHOLE_SHARE:
         return ""
     return (
         f"the model shows {100 * share:.1f} % of what test views show, so that parts are missing; fit it in "
@@ -114,9 +114,9 @@ def mean(measured: dict[str, list[float]]) -> dict[str, float]:
 
 
 def read_ahead(read: Callable[[Item], Read], items: Iterable[Item]) -> Iterator[tuple[Item, Read]]:
-    """Yield each item with what `read` makes of it, in order; another thread reads the next one meanwhile.
+    """Yield each item with `read(item)`, in order; another thread reads ahead by one.
 
-    An error of `read` is raised where its item would come.
+    An error of `read` is raised at the turn of its item.
     """
     with ThreadPoolExecutor(1) as pool:
         before: tuple[Item, Future[Read]] | None = None

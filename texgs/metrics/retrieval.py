@@ -1,6 +1,6 @@
-"""How far views are from pictures as a whole, by features that no loss uses: what they would be taken for.
+"""Distances of views from whole pictures, by features that no loss uses: which picture they resemble.
 
-Only the object counts. Views are compared with colours, and by the pattern alone.
+Only the object counts. Views are compared by colours, and by pattern alone.
 """
 
 from collections.abc import Iterable
@@ -19,22 +19,22 @@ from texgs.scene.scene import Scene
 from texgs.volume.cameras import spiral
 
 LAYERS = ("relu4_3", "relu5_3")
-VIEWS = 8  # of a scene
+VIEWS = 8  # views of a scene
 SIZE = 256  # pixels of the longer side of views and pictures
-SCALES = (1.0, 0.5)  # of pictures against views: a pattern may be laid on at any size
-COVERED = 0.7  # share of what a feature sees that is on the object, for it to count
-FEW = 8  # features: where fewer count, those that are a little on the object count too
-BINS = 6  # of a channel, in the histogram
-HISTOGRAM = 0.5  # weight of the histograms against a layer
-AROUND = 1 / 16  # standard deviation of what is around a pixel, in image sides: its contrast becomes 1
-LEAST = 0.02  # contrast that is not made larger
+SCALES = (1.0, 0.5)  # of pictures relative to views, as a pattern may have any size
+MIN_COVERAGE = 0.7  # least share of a feature's window on the object
+MIN_FEATURES = 8  # with fewer features, those partly on the object count too
+BINS = 6  # per channel of the histogram
+HISTOGRAM = 0.5  # weight of the histograms relative to a layer
+CONTRAST_SIGMA = 1 / 16  # of the window that normalises contrast, in image sides
+MIN_CONTRAST = 0.02  # smallest contrast to normalise
 LUMINANCE = (0.299, 0.587, 0.114)
-KNOWN = files(__package__) / "likeness.safetensors"  # by `python -m tools.style_likeness`
+LIKENESS_FILE = files(__package__) / "likeness.safetensors"  # by `python -m tools.style_likeness`
 
 
 @dataclass(frozen=True, eq=False)
 class Likeness:
-    """What views or pictures [...] are compared by."""
+    """Features of views or pictures [...] for comparison."""
 
     colors: Tensor  # [..., C] means and deviations of features
     pattern: Tensor  # [..., C] the same without colours and with one contrast
@@ -42,7 +42,7 @@ class Likeness:
 
     @classmethod
     def stacked(cls, several: "Iterable[Likeness]") -> Self:
-        """Return many as one, along a new first dimension."""
+        """Stack several along a new first dimension."""
         listed = list(several)
         return cls(*(torch.stack([vars(each)[name] for each in listed]) for name in vars(listed[0])))
 
@@ -77,17 +77,17 @@ def likeness(image: Tensor, where: Tensor, vgg: Vgg) -> Likeness:
     whole = torch.where(where, image, own.mean(1)[:, None, None])
     red, green, blue = (BINS * own).long().clamp(0, BINS - 1)
     counts = torch.bincount((BINS * red + green) * BINS + blue, minlength=BINS**3)
-    colors, pattern = (described(each, where, vgg) for each in (whole, contrast(whole, where)))
+    colors, pattern = (layer_statistics(each, where, vgg) for each in (whole, contrast(whole, where)))
     return Likeness(colors, pattern, counts / counts.sum())
 
 
-def described(image: Tensor, where: Tensor, vgg: Vgg) -> Tensor:
+def layer_statistics(image: Tensor, where: Tensor, vgg: Vgg) -> Tensor:
     """Return mean and deviation [C] of the features of each layer on the object."""
     parts = []
     for layer in vgg.layers(image[None], LAYERS):
         height, width = layer.shape[2:]
         share = F.adaptive_avg_pool2d(where[None].float(), (height, width))[0]
-        counts = share > (COVERED if int((share > COVERED).sum()) >= FEW else 0)
+        counts = share > (MIN_COVERAGE if int((share > MIN_COVERAGE).sum()) >= MIN_FEATURES else 0)
         rows = layer[0][:, counts].float()
         parts.append(torch.cat([rows.mean(1), rows.std(1, correction=0)]))
     return torch.cat(parts)
@@ -96,7 +96,7 @@ def described(image: Tensor, where: Tensor, vgg: Vgg) -> Tensor:
 def contrast(image: Tensor, where: Tensor) -> Tensor:
     """Return an image [3, h, w] in grey, around each pixel of the object with one mean and contrast."""
     height, width = where.shape
-    sigma = AROUND * max(height, width)
+    sigma = CONTRAST_SIGMA * max(height, width)
     down, along = (smoothing(size, sigma).to(image) for size in (height, width))
     mask = where.to(image)
     grey = torch.einsum("chw,c->hw", image, image.new_tensor(LUMINANCE)) * mask
@@ -104,7 +104,7 @@ def contrast(image: Tensor, where: Tensor) -> Tensor:
     share = share.clamp_min(1e-3)
     mean = mean / share
     deviation = (square / share - mean.square()).clamp_min(0).sqrt()
-    return (0.5 + 0.2 * mask * (grey - mean) / (deviation + LEAST)).clamp(0, 1).expand(3, -1, -1)
+    return (0.5 + 0.2 * mask * (grey - mean) / (deviation + MIN_CONTRAST)).clamp(0, 1).expand(3, -1, -1)
 
 
 def smoothing(size: int, sigma: float) -> Tensor:
@@ -120,9 +120,9 @@ def smoothing(size: int, sigma: float) -> Tensor:
     return kernel[at - at[:, None] + reach + size]
 
 
-def known(device: torch.device | str = "cpu") -> Likeness:
+def style_likeness(device: torch.device | str = "cpu") -> Likeness:
     """Return the descriptions [P, S] of all pictures of texgs."""
-    tensors = load(KNOWN.read_bytes())
+    tensors = load(LIKENESS_FILE.read_bytes())
     return Likeness(**{name: x.float().to(device) for name, x in tensors.items()})
 
 

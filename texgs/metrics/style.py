@@ -10,7 +10,7 @@ from torch.nn import functional as F
 
 from texgs.models.nnfm import StyleFeatures, nnfm
 
-ON_OBJECT = 0.5  # mean alpha from which a feature counts
+OBJECT_ALPHA = 0.5  # least mean alpha of a feature that counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +22,11 @@ class StyleTarget:
 
     @classmethod
     def of(cls, rows: Tensor) -> Self:
-        """Prepare the features [n, C] of a picture."""
+        """Make a target from the features [n, C] of a picture."""
         return cls(StyleFeatures.of(rows.T[:, None]), gram(rows.T))
 
     def distances(self, rows: Tensor, most: int | None = None, seed: int = 0) -> tuple[float, float]:
-        """Return how far the features [n, C] of a view are from the picture.
+        """Return the distances of the features [n, C] of a view from the picture.
 
         They are the mean cosine distance to the nearest of the picture by exact search, of `most` features
         at random; and the distance of the Gram matrices of all, relative to the norm of the picture's.
@@ -38,7 +38,7 @@ class StyleTarget:
 def on_object(layers: Sequence[Tensor], share: Tensor) -> Tensor:
     """Return layers [c, h, w] as rows [n, C] of the n positions where more than half of a share [H, W] is."""
     height, width = layers[0].shape[1:]
-    where = F.adaptive_avg_pool2d(share[None], (height, width))[0] > ON_OBJECT
+    where = F.adaptive_avg_pool2d(share[None], (height, width))[0] > OBJECT_ALPHA
     return torch.cat([layer.permute(1, 2, 0)[where] for layer in layers], dim=1).float()
 
 

@@ -1,4 +1,4 @@
-"""How far a mesh is from a surface that is known: Chamfer distance, F-score and angle between normals."""
+"""Errors of a mesh against a known surface: Chamfer distance, F-score and angle between normals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.volume.isosurface import Mesh
 
-STEEPEST = 3.0  # slope of a surface that is taken for one
-STEPS = 1 << 20  # of depth per world unit in which points of one pixel are compared
+MAX_SLOPE = 3.0  # largest slope of a surface to a pixel
+DEPTH_STEPS = 1 << 20  # depth steps per world unit, to compare points of one pixel
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,18 +23,18 @@ class Points:
     normals: Tensor  # [N, 3] unit length, outwards
 
     def __getitem__(self, kept: Tensor) -> "Points":
-        """Return some of them, by a mask [N] or indices."""
+        """Select points by a mask [N] or indices."""
         return Points(self.places[kept], self.normals[kept])
 
 
 @dataclass(frozen=True)
 class SurfaceErrors:
-    """A mesh against a surface."""
+    """Errors of a mesh against a surface."""
 
     accuracy: float  # mean distance of the mesh from the surface, world units
     completeness: float  # mean distance of the surface from the mesh
-    precision: float  # share of the mesh that is closer than the tolerance
-    recall: float  # the same of the surface
+    precision: float  # share of the mesh within the tolerance
+    recall: float  # share of the surface within the tolerance
     normal_angle: float  # mean angle to the normal of the nearest place, both ways, degrees
 
     @property
@@ -49,7 +49,7 @@ class SurfaceErrors:
 
 
 def sample(mesh: Mesh, count: int, seed: int = 0) -> Points:
-    """Return random places on a mesh, as many on equal areas."""
+    """Sample a mesh uniformly by area."""
     a, b, c = mesh.corners.transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
@@ -64,7 +64,7 @@ def sample(mesh: Mesh, count: int, seed: int = 0) -> Points:
 
 
 def nearest(points: Tensor, camera: Camera) -> tuple[Tensor, Tensor, Tensor]:
-    """Return which of many points [N, 3] each pixel of a view shows [H * W], -1 where there is none.
+    """Return the index [H * W] of the nearest of many points [N, 3] in each pixel, or -1.
 
     With it come the pixel of each point [N], -1 outside of the image, and their camera z [N].
     """
@@ -73,31 +73,31 @@ def nearest(points: Tensor, camera: Camera) -> tuple[Tensor, Tensor, Tensor]:
     on_image = (z > 0) & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
     pixel = torch.where(on_image, v * camera.width + u, -1)
     index = torch.arange(len(points))
-    key = ((z * STEPS).long() << 32) + index
+    key = ((z * DEPTH_STEPS).long() << 32) + index
     first = torch.full((camera.width * camera.height,), torch.iinfo(torch.int64).max)
     first.scatter_reduce_(0, pixel[on_image], key[on_image], "amin")
     return torch.where(first < torch.iinfo(torch.int64).max, first & (2**32 - 1), -1), pixel, z
 
 
-def seen(points: Points, cameras: Sequence[Camera], tolerance: float) -> Tensor:
-    """Return which points [N] bool a camera sees: nothing is nearer in their pixel, but for the tolerance."""
+def are_visible(points: Points, cameras: Sequence[Camera], tolerance: float) -> Tensor:
+    """Return which points [N] bool a camera sees: the nearest in their pixels, up to the tolerance."""
     is_seen = torch.zeros(len(points.places), dtype=torch.bool)
     for camera in cameras:
         first, pixel, z = nearest(points.places, camera)
         rays = camera.position.to(points.places) - points.places
         cosine = (rays * points.normals).sum(1) / rays.norm(dim=1)
-        slope = (1 / cosine.square() - 1).clamp_min(0).sqrt().clamp_max(STEEPEST)
+        slope = (1 / cosine.square() - 1).clamp_min(0).sqrt().clamp_max(MAX_SLOPE)
         in_front = z[first[pixel.clamp_min(0)].clamp_min(0)]
-        # A surface that is seen from the side is at several depths in one pixel.
+        # A slanted surface has several depths in one pixel.
         margin = tolerance + 1.5 * slope * z / float(camera.K[0, 0])
         is_seen |= (pixel >= 0) & (cosine > 0) & (z <= in_front + margin)
     return is_seen
 
 
 def compare(mesh: Points, surface: Points, tolerance: float) -> SurfaceErrors:
-    """Return the errors of a mesh, by points on it and on what can be seen of the surface that it should be.
+    """Return the errors of a mesh, from points on it and on the visible part of the true surface.
 
-    Points closer than the tolerance, world units, count as right.
+    Points within the tolerance, world units, count as correct.
     """
     for name, points in (("mesh", mesh), ("surface", surface)):
         if not len(points.places):
@@ -114,7 +114,7 @@ def compare(mesh: Points, surface: Points, tolerance: float) -> SurfaceErrors:
 
 
 def distances(points: Points, others: Points) -> tuple[Tensor, Tensor]:
-    """Return the distances to the nearest of others, world units, and the angles between normals, degrees."""
+    """Return distances to the nearest of other points, world units, and angles of normals, degrees."""
     from scipy.spatial import cKDTree
 
     distance, index = cKDTree(others.places.numpy()).query(points.places.numpy(), workers=-1)

@@ -1,4 +1,4 @@
-"""The pretrained weights that texgs knows: names of their files, sizes, sources and checksums."""
+"""The catalogue of pretrained weights: files, sizes, sources and checksums."""
 
 import re
 from collections.abc import Mapping
@@ -21,18 +21,18 @@ class File:
 class Single:
     """A model whose weights are one file."""
 
-    file: File  # for a download
+    file: File  # to download
     source: str  # its address
-    same: tuple[File, ...] = ()  # files of the same weights, looked for before it
+    same: tuple[File, ...] = ()  # equivalent files, searched first
 
     @property
     def files(self) -> tuple[File, ...]:
-        """Return all files to look for, in order."""
+        """Return all files to search for, in order."""
         return (*self.same, self.file)
 
     @property
     def megabytes(self) -> float:
-        """Return the size of the file that is downloaded."""
+        """Return the size of the download."""
         return self.file.megabytes
 
 
@@ -43,13 +43,13 @@ class Snapshot:
     repository: str
     revision: str
     megabytes: float
-    needs: tuple[tuple[str, ...], ...]  # files of the folder, each with the names it may have
-    patterns: tuple[str, ...]  # of the files that are downloaded
+    needs: tuple[tuple[str, ...], ...]  # required files, each with alternative names
+    patterns: tuple[str, ...]  # of the files to download
     packages: tuple[str, ...] = ("transformers",)  # its readers, of the extra `models`
 
     @property
     def source(self) -> str:
-        """Return the page where a person gets it."""
+        """Return the page of the model."""
         return f"https://huggingface.co/{self.repository}"
 
 
@@ -57,11 +57,11 @@ class Snapshot:
 class Pipeline(Snapshot):
     """A pipeline of diffusers that edits images."""
 
-    megabytes: float = 0  # 0: not known
-    needs: tuple[tuple[str, ...], ...] = ()  # its index says them, see `pipeline_files`
+    megabytes: float = 0  # 0: unknown
+    needs: tuple[tuple[str, ...], ...] = ()  # from its index, see `pipeline_files`
     patterns: tuple[str, ...] = ("*.json", "*.txt", "*.jinja", "*/*.safetensors")
     packages: tuple[str, ...] = ("transformers", "diffusers")
-    numbers: Mapping[str, Any] = field(default_factory=dict)  # of its model card: scales and others
+    numbers: Mapping[str, Any] = field(default_factory=dict)  # from its model card, such as scales
 
 
 # Backbones of CLIP to choose from, for scores and for losses; the first one is the default.
@@ -148,12 +148,12 @@ CATALOGUE: dict[str, Single | Snapshot] = {
 }
 PIPELINES = {name: entry for name, entry in CATALOGUE.items() if isinstance(entry, Pipeline)}
 HUB = "OWNER/NAME@REVISION (40 digits)"
-PINNED = re.compile(r"([\w.-]+/[\w.-]+)@([0-9a-f]{40})")
+PINNED_PATTERN = re.compile(r"([\w.-]+/[\w.-]+)@([0-9a-f]{40})")
 
 
 def entry_of(name: str) -> Single | Snapshot:
     """Return a model by its name, or a pipeline of the Hugging Face hub by OWNER/NAME@REVISION."""
-    if pinned := PINNED.fullmatch(name):
+    if pinned := PINNED_PATTERN.fullmatch(name):
         return Pipeline(pinned[1], pinned[2])
     if name not in CATALOGUE:
         raise ArgumentError(f"weights: expected one of {', '.join(CATALOGUE)} or {HUB}, got {name!r}")

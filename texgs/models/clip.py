@@ -12,9 +12,9 @@ from torch.nn import functional as F
 from texgs.core import check
 from texgs.core.errors import ArgumentError
 from texgs.models.networks import read_folder
-from texgs.models.weights import locate, titled
+from texgs.models.weights import locate, title_of
 
-MEAN = (0.48145466, 0.4578275, 0.40821073)  # mean of images as CLIP knows them, per channel
+MEAN = (0.48145466, 0.4578275, 0.40821073)  # per channel, of CLIP's training images
 DEVIATION = (0.26862954, 0.26130258, 0.27577711)
 
 
@@ -22,7 +22,7 @@ DEVIATION = (0.26862954, 0.26130258, 0.27577711)
 class Clip:
     """A frozen CLIP model; features are unit vectors in a space that images and texts share."""
 
-    name: str  # of the backbone, for the headers of tables
+    name: str  # of the backbone, for table headers
     network: Any
     tokenizer: Any
 
@@ -31,16 +31,16 @@ class Clip:
         """Read a model in float32, by a name of the catalogue or from a folder with its tokenizer."""
         folder = Path(weights) if Path(weights).is_dir() else locate(str(weights))
         network, tokenizer = read_folder(folder, "clip", ("CLIPModel", "AutoTokenizer"))
-        name = folder.name if Path(weights).is_dir() else titled(str(weights))
+        name = folder.name if Path(weights).is_dir() else title_of(str(weights))
         return cls(name, network.to(device), tokenizer)
 
     @property
     def size(self) -> int:
-        """Return the side of the square image that the encoder takes, pixels."""
+        """Return the side of the encoder's square input, pixels."""
         return int(self.network.config.vision_config.image_size)
 
     def prepared(self, images: Tensor) -> Tensor:
-        """Return images [B, H, W, 3] in [0, 1] as the encoder takes them [B, 3, S, S]; differentiable.
+        """Convert images [B, H, W, 3] in [0, 1] to the encoder's input [B, 3, S, S]; differentiable.
 
         The whole image is squeezed to a square by bicubic interpolation without antialiasing, nothing is cut
         off: as the metrics of InstructPix2Pix and Instruct-NeRF2NeRF do, unlike CLIP's own preprocessing.
@@ -58,13 +58,13 @@ class Clip:
         return self.encoded(self.prepared(images))
 
     def encoded(self, pixels: Tensor) -> Tensor:
-        """Return features [B, D] of what the encoder takes, [B, 3, S, S] normalised; differentiable."""
+        """Return features [B, D] of normalised input [B, 3, S, S]; differentiable."""
         device = next(self.network.parameters()).device
         return _unit(self.network.get_image_features(pixel_values=pixels.to(device)))
 
     @torch.no_grad()
     def texts(self, texts: Sequence[str]) -> Tensor:
-        """Return features [T, D] of texts, cut off where they are longer than the model can read."""
+        """Return features [T, D] of texts, truncated to the model's length."""
         if not texts or not all(text.strip() for text in texts):
             raise ArgumentError("texts: expected words in each, got an empty one; describe the picture")
         device = next(self.network.parameters()).device
@@ -120,7 +120,7 @@ def similarity(images: Tensor, text: Tensor) -> Tensor:
 
 
 def direction(originals: Tensor, edited: Tensor, source: Tensor, target: Tensor) -> Tensor:
-    """Return the cosines [V] between what changed in images and in captions; differentiable.
+    """Return the cosines [V] between the changes of images and of captions; differentiable.
 
     cos(f(edited) - f(original), g(target) - g(source)) with unit features f [V, D] of views and g [D] of
     captions. An edit that changes nothing scores 0.

@@ -23,10 +23,14 @@ from texgs.models.guidance import EditViews
 from texgs.models.instruct_pix2pix import NO_LIGHT
 from texgs.models.instruction import require_instruction
 
-NAMES = {"steps": "num_inference_steps", "image_scale": "image_guidance_scale", "negative": "negative_prompt"}
-MULTIPLE = 16  # pixels: what sides of images are multiples of, for autoencoders and patches of transformers
-QUOTED_BYTES = 200  # bytes of a reply that is none, in a message
-TIMEOUT = 600.0  # seconds in which nothing comes from a server
+ARGUMENT_NAMES = {
+    "steps": "num_inference_steps",
+    "image_scale": "image_guidance_scale",
+    "negative": "negative_prompt",
+}
+MULTIPLE = 16  # pixels: divisor of image sides, for autoencoders and patches of transformers
+QUOTED_BYTES = 200  # bytes of an unreadable reply to quote in the error
+TIMEOUT = 600.0  # seconds without a reply from a server
 
 
 class EachAlone:
@@ -51,7 +55,7 @@ class EachAlone:
 
 
 class ImagePipeline(EachAlone):
-    """A pipeline of diffusers, called with what it takes; what is not given is as it has it.
+    """A diffusers pipeline, called with the arguments it accepts; the others keep its defaults.
 
     The longer side of a view is scaled to `size` pixels, or stays; what comes back is scaled to the view.
     Light and shadow are not wanted, where it takes such words. A level of noise is its strength, if any.
@@ -59,9 +63,9 @@ class ImagePipeline(EachAlone):
 
     def __init__(self, pipeline: Any, name: str, size: int | None = None, **options: Any) -> None:
         self.takes = takes = inspect.signature(pipeline.__call__).parameters
-        # guidance_scale without a default is of models yet to come: the other one is what counts.
+        # Some pipelines reserve guidance_scale, default None, for future models; then the other scale counts.
         is_plain = (scale := takes.get("guidance_scale")) and scale.default is not None
-        names = {**NAMES, "text_scale": "guidance_scale" if is_plain else "true_cfg_scale"}
+        names = {**ARGUMENT_NAMES, "text_scale": "guidance_scale" if is_plain else "true_cfg_scale"}
         for key in options:
             if names[key] not in takes:
                 raise ArgumentError(f"{key}: expected none, as {name} takes no {names[key]}; leave {key} out")
@@ -82,7 +86,7 @@ class ImagePipeline(EachAlone):
             from diffusers import AutoPipelineForImage2Image, DiffusionPipeline
 
             pipeline = DiffusionPipeline.from_pretrained(folder, **how)
-            if "image" not in inspect.signature(pipeline.__call__).parameters:  # of words alone
+            if "image" not in inspect.signature(pipeline.__call__).parameters:  # text to image only
                 pipeline = AutoPipelineForImage2Image.from_pipe(pipeline)
         pipeline.set_progress_bar_config(disable=True)
         return cls(pipeline.to(device), name, **options)
@@ -103,7 +107,7 @@ class ImagePipeline(EachAlone):
 
 
 def image_of(request: Request) -> Any:
-    """Return the image in a server's reply; what it says instead is the error."""
+    """Return the image in a server's reply; otherwise raise an error that quotes the reply."""
     try:
         with urlopen(request, timeout=TIMEOUT) as reply:
             body = reply.read()
@@ -117,7 +121,7 @@ def image_of(request: Request) -> Any:
 
 
 class Endpoint(EachAlone):
-    """A server at an address, which gets one request for each view, as docs/extend.md describes it."""
+    """A server at an address that gets one request per view, see docs/extend.md."""
 
     def edit(self, image: Tensor, asked: dict[str, Any]) -> Tensor:
         """Return an image [H, W, 3], edited. The request is sent once."""

@@ -1,4 +1,4 @@
-"""Attention across views: what a view shows is taken from a key view, along epipolar lines (DGE)."""
+"""Attention across views: views take features from key views along epipolar lines (DGE)."""
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
@@ -12,8 +12,8 @@ from torch.nn.functional import normalize, scaled_dot_product_attention
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 
-GROUP = 5  # views that follow each other, one of them a key
-LAST = 100  # timestep below which views get their own details
+GROUP = 5  # consecutive views, one of them a key
+LAST_TIMESTEP = 100  # timestep below which views get their own details
 BAND = 1.0  # tokens: largest distance of a match from its epipolar line
 BRANCH = 1  # the branch whose features are compared: with the image, without the instruction
 
@@ -40,10 +40,10 @@ def token_camera(camera: Camera, image: Sequence[int], rows: int, columns: int) 
 
 
 def epipolar_mask(view: Camera, key: Camera) -> Tensor:
-    """Return which tokens of the key may match each token of the view [S, S'], bool, see `token_camera`.
+    """Return which tokens of the key each token of the view may match [S, S'], bool, see `token_camera`.
 
-    Those no farther than `BAND` from the epipolar line of the token's centre. Where none is, all may; so may
-    all where both cameras are at one place, and there are no lines.
+    These lie within `BAND` of the epipolar line of the token's centre. All may match if none does, or if both
+    cameras are at one place and there are no lines.
     """
     lines = _centers(view) @ fundamental(view, key)  # [S, 3]
     length = lines[:, :2].norm(dim=1, keepdim=True)
@@ -63,7 +63,7 @@ def _centers(camera: Camera) -> Tensor:
 
 
 class Consistency:
-    """Puts attention across views into a UNet of diffusers; plain attention until views are run together.
+    """Adds attention across views to a UNet of diffusers, for views that run together.
 
     In each denoising step a key view is drawn from each group of `GROUP` views that follow each other. Keys
     attend to the tokens of all keys; every other view takes over the attention outputs of the tokens of the
@@ -87,7 +87,7 @@ class Consistency:
         self.stored: dict[int, tuple[Tensor, Tensor]] = {}
 
     def aim(self, cameras: Sequence[Camera], image: Sequence[int]) -> None:
-        """Say what cameras the views have, and the height and width in pixels that the model works on."""
+        """Set the cameras of the views, and the model's height and width in pixels."""
         self.cameras, self.image = list(cameras), (image[0], image[1])
         self.masks = {}
 
@@ -99,10 +99,10 @@ class Consistency:
         `branches` runs the UNet on some views: [3, K, ...]. The generator draws the keys.
         """
         try:
-            if time < LAST:
+            if time < LAST_TIMESTEP:
                 self.role = "alone"
                 return torch.cat([branches([index]) for index in range(count)], dim=1)
-            self.key_ids, self.masks = drawn_keys(count, generator), {}  # those of all pairs take gigabytes
+            self.key_ids, self.masks = drawn_keys(count, generator), {}  # all pairs would take gigabytes
             self.role, self.stored = "key", {}
             by_view = dict(zip(self.key_ids, branches(self.key_ids).unbind(dim=1), strict=True))
             self.role = "view"
@@ -115,7 +115,7 @@ class Consistency:
             self.role, self.stored = "alone", {}
 
     def mask(self, view: int, key: int, tokens: int) -> Tensor:
-        """Return which of so many tokens of a key may match those of a view."""
+        """Return which of `count` tokens of a key may match those of a view."""
         if (view, key, tokens) not in self.masks:
             shrink = round((self.image[0] * self.image[1] / tokens) ** 0.5)
             rows, columns = self.image[0] // shrink, self.image[1] // shrink
@@ -131,7 +131,7 @@ class Consistency:
         if len(order) == 1:
             return [(order[0], 1.0)]
         near, far = distances[order].tolist()
-        share = 1 / (1 + exp(-far / max(near + far, 1e-12)))  # of the nearer, as in DGE: 0.62 to 0.73
+        share = 1 / (1 + exp(-far / max(near + far, 1e-12)))  # of the nearer key, as in DGE: 0.62 to 0.73
         return [(order[0], share), (order[1], 1 - share)]
 
 
@@ -142,7 +142,7 @@ def drawn_keys(count: int, generator: torch.Generator) -> list[int]:
 
 
 class _SelfAttention:
-    """Processor of one self-attention module, of what its block has normalised."""
+    """Processor of one self-attention module."""
 
     def __init__(self, consistency: Consistency) -> None:
         self.consistency = consistency
@@ -176,7 +176,7 @@ def match(view: Tensor, key: Tensor, allowed: Tensor) -> Tensor:
 
 
 def attend(attn: Any, queries: Tensor, keys: Tensor) -> Tensor:
-    """Return what an attention module of diffusers makes of queries [B, S, C] and keys [B, S', C]."""
+    """Apply an attention module of diffusers to queries [B, S, C] and keys [B, S', C]."""
     q, k, v = (
         layer(x).unflatten(2, (attn.heads, -1)).transpose(1, 2)
         for layer, x in ((attn.to_q, queries), (attn.to_k, keys), (attn.to_v, keys))

@@ -1,4 +1,4 @@
-"""What every editor of views takes and gives, and how one is made to disagree with itself."""
+"""The interface of all editors of views, and a wrapper that makes one inconsistent."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,10 +16,10 @@ from texgs.core.errors import ArgumentError
 class EditViews:
     """Views of one scene to be edited together; all of one size, on one device, over white."""
 
-    images: Tensor  # [V, H, W, 3] the scene as it looks now, in [0, 1]
-    conditions: Tensor  # [V, H, W, 3] the scene before any edit of this run: an edit should stay close to it
+    images: Tensor  # [V, H, W, 3] current renders of the scene, in [0, 1]
+    conditions: Tensor  # [V, H, W, 3] the scene before this run; edits should stay close to it
     alphas: Tensor  # [V, H, W] in [0, 1]
-    points: Tensor  # [V, H, W, 3] place in the world of what a pixel shows; of no meaning where alpha is 0
+    points: Tensor  # [V, H, W, 3] world position at a pixel; undefined where alpha is 0
     normals: Tensor  # [V, H, W, 3] world axes, facing the camera; 0 where alpha is 0
     cameras: Sequence[Camera]  # one for each view
     level: float | None = None
@@ -44,12 +44,12 @@ class Guidance(Protocol):
     """Edits views as an instruction says."""
 
     name: str  # for reports and metadata
-    lit: bool  # whether it wants to see the scene with light, or the bare colours that light falls on
+    lit: bool  # whether it expects renders with light, or bare colours
 
     def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
         """Return the edited images [V, H, W, 3] over white.
 
-        The generator is of all random numbers, on the CPU; the same one gives the same images.
+        The generator, on the CPU, determines all random numbers.
         """
 
 
@@ -62,7 +62,7 @@ def require_edited(edited: Tensor, views: EditViews, name: str) -> Tensor:
 
 
 class Disagreeing:
-    """Another guidance, whose patterns lie elsewhere and whose colours are off in each view of each call.
+    """A guidance with random shifts of patterns and colours in each view of each call.
 
     It does what an editor of single images does to views of one scene. With it, methods that edit all views
     again and again can be compared with those that edit a few once, without a diffusion model. The amount is

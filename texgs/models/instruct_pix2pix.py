@@ -1,4 +1,4 @@
-"""InstructPix2Pix (Brooks et al. 2023): views edited by a diffusion model, with a short loop of our own."""
+"""InstructPix2Pix (Brooks et al. 2023): edit views by a diffusion model, in a short loop of our own."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -15,9 +15,9 @@ from texgs.models.guidance import EditViews
 from texgs.models.instruction import require_instruction
 
 PARTS = ("unet", "vae", "text_encoder", "tokenizer", "scheduler")  # folders of the file format
-LONGEST = 512  # pixels: the size the model was trained at
-MULTIPLE = 64  # pixels: 8 of the latents times 8 of the innermost level of the UNet
-NO_LIGHT = (  # what views of a lit scene should not be given by an edit: the light is the scene's
+MAX_SIDE = 512  # pixels: the training size of the model
+MULTIPLE = 64  # pixels: 8 of a latent times 8 of the UNet's innermost level
+NO_LIGHT = (  # negative prompt: the scene has its own light
     "strong light, bright light, dazzling light, shade, darkness, silhouette, obscurity, shadow"
 )
 
@@ -111,7 +111,7 @@ class InstructPix2Pix:
         return unfit(edited, views.images.shape[1:3]).permute(0, 2, 3, 1).to(views.images)
 
     def embed(self, instruction: str) -> Tensor:
-        """Return the embeddings [3, L, E] of the branches: the instruction, and twice what is not wanted."""
+        """Return the embeddings [3, L, E] of the branches: the instruction, and twice the negative prompt."""
         tokens = self.tokenizer(
             [instruction, self.negative],
             padding="max_length",
@@ -125,7 +125,7 @@ class InstructPix2Pix:
     def encode(self, images: Tensor, generator: torch.Generator | None) -> Tensor:
         """Return latents [V, 4, h, w] of images [V, 3, 8h, 8w] in [0, 1].
 
-        With a generator they are sampled and scaled, as they are denoised; else the mode, as conditions are.
+        With a generator they are sampled and scaled, for denoising; otherwise the mode, for conditions.
         """
         latents = self.vae.encode((2 * images - 1).to(self.vae.device, self.vae.dtype)).latent_dist
         if generator is None:
@@ -134,12 +134,12 @@ class InstructPix2Pix:
         return (latents.mean + latents.std * noise) * self.vae.config.scaling_factor
 
     def decode(self, latents: Tensor) -> Tensor:
-        """Return images [V, 3, 8h, 8w] in [0, 1] of latents [V, 4, h, w]."""
+        """Decode latents [V, 4, h, w] to images [V, 3, 8h, 8w] in [0, 1]."""
         scaled = (latents / self.vae.config.scaling_factor).to(self.vae.dtype)
         return (self.vae.decode(scaled).sample.float() / 2 + 0.5).clamp(0, 1)
 
     def times(self, level: float | None) -> list[int]:
-        """Return the timesteps that denoising visits, from a share of the noise schedule down to 0."""
+        """Return the timesteps of denoising, from a share of the noise schedule down to 0."""
         longest = len(self.alphas) - 1
         first = self.level if level is None else min(max(round(level * longest), self.steps), longest)
         return torch.linspace(first, 0, self.steps + 1).round().long().tolist()
@@ -149,7 +149,7 @@ class InstructPix2Pix:
     ) -> Tensor:
         """Noise latents [V, 4, h, w] to the first timestep and denoise them step by step (DDIM)."""
         if clean.dtype == torch.float16:
-            clean = clean.float()  # the networks alone are in half precision
+            clean = clean.float()  # only the networks use half precision
         first = float(self.alphas[times[0]])
         noise = torch.randn(clean.shape, generator=generator).to(clean)
         latents = first**0.5 * clean + (1 - first) ** 0.5 * noise
@@ -205,15 +205,15 @@ def _read(folder: Path, device: torch.device) -> tuple[dict[str, Any], Any]:
     return modules, DDIMScheduler.from_pretrained(folder / "scheduler", **local)
 
 
-def fitted(height: int, width: int) -> tuple[int, int]:
-    """Return height and width of an image scaled so that the longer side is `LONGEST`."""
-    scale = LONGEST / max(height, width)
+def fitting_size(height: int, width: int) -> tuple[int, int]:
+    """Return height and width of an image scaled so that the longer side is `MAX_SIDE`."""
+    scale = MAX_SIDE / max(height, width)
     return max(1, round(height * scale)), max(1, round(width * scale))
 
 
 def fit(images: Tensor) -> Tensor:
-    """Return images [V, 3, H, W] scaled to `LONGEST` and padded at right and bottom with their edges."""
-    height, width = fitted(*images.shape[2:])
+    """Return images [V, 3, H, W] scaled to `MAX_SIDE` and padded at right and bottom with their edges."""
+    height, width = fitting_size(*images.shape[2:])
     scaled = images
     if (height, width) != tuple(images.shape[2:]):
         scaled = interpolate(images, (height, width), mode="bicubic", antialias=True).clamp(0, 1)
@@ -221,8 +221,8 @@ def fit(images: Tensor) -> Tensor:
 
 
 def unfit(images: Tensor, size: tuple[int, int] | torch.Size) -> Tensor:
-    """Return what `fit` made of images of height and width `size`, back at that size."""
-    height, width = fitted(*size)
+    """Invert `fit`: return images at height and width `size`."""
+    height, width = fitting_size(*size)
     cut = images[..., :height, :width]
     if (height, width) == tuple(size):
         return cut

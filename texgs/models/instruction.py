@@ -1,4 +1,4 @@
-"""What a user asks for in words, and the words that procedural filters understand."""
+"""Instructions of users, and the vocabulary of the procedural filters."""
 
 import re
 
@@ -34,7 +34,7 @@ FILLERS = """
 
 
 def require_instruction(instruction: str) -> str:
-    """Return the instruction without blanks around it; one must be left."""
+    """Strip an instruction, and require that it is not empty."""
     if not isinstance(instruction, str) or not instruction.strip():
         raise ArgumentError(
             f"instruction: expected what to do in words, such as 'make it gold', got {instruction!r}"
@@ -43,7 +43,7 @@ def require_instruction(instruction: str) -> str:
 
 
 def vocabulary() -> list[str]:
-    """Return what can be asked for, one entry each."""
+    """Return the entries of the vocabulary."""
     return [*WORDS, "any named colour, such as 'make it dark red' or '#8040ff'"]
 
 
@@ -65,7 +65,7 @@ def understand(instruction: str) -> tuple[str, Color | None]:
 
 
 def named_color(name: str) -> Color | None:
-    """Return red, green and blue of a colour by its CSS name or as #rrggbb; None if there is none."""
+    """Return red, green and blue of a CSS colour name or #rrggbb, or None."""
     from PIL import ImageColor
 
     if name not in ImageColor.colormap and not name.startswith("#"):

@@ -32,9 +32,9 @@ class Lpips:
         device: torch.device | str = "cpu",
         dtype: torch.dtype | None = torch.float32,
     ) -> Self:
-        """Read both files of weights, by default where they are found; a VGG with `LAYERS` may be given.
+        """Read both files of weights, by default from their known places; a VGG with `LAYERS` may be given.
 
-        Without a dtype features are computed in the fastest, see `Vgg.load`.
+        By default features use the fastest dtype, see `Vgg.load`.
         """
         heads = locate("lpips_vgg") if heads is None else heads
         names = [f"lin{index}.model.1.weight" for index in range(len(LAYERS))]
@@ -46,7 +46,7 @@ class Lpips:
         return cls(backbone, weights)
 
     def features(self, images: Tensor) -> list[Tensor]:
-        """Return what images [H, W, 3] or [N, H, W, 3] in [0, 1] are compared by; differentiable.
+        """Return the features that LPIPS compares of images [H, W, 3] or [N, H, W, 3]; differentiable.
 
         They have 16 pixels at least each way. Features are [N, C, H/s, W/s] of length 1, s = 1, 2, 4 ...
         """
@@ -56,7 +56,7 @@ class Lpips:
         return [unit(layer) for layer in self.vgg.layers(images.permute(0, 3, 1, 2), LAYERS)]
 
     def between(self, ours: Sequence[Tensor], others: Sequence[Tensor]) -> Tensor:
-        """Return how different images look [] by their features, 0 for equal ones; differentiable in both."""
+        """Return the LPIPS distance [] of images, given their features; differentiable in both."""
         total = ours[0].new_zeros(())
         for a, b, head in zip(ours, others, self.heads, strict=True):
             difference = (a - b).square()  # [N, C, h, w]
@@ -64,7 +64,7 @@ class Lpips:
         return total
 
     def distance(self, image: Tensor, other: Tensor) -> Tensor:
-        """Return how different two images of `features` look [], or N of them on average."""
+        """Return the LPIPS distance [] of two images, or the mean of N pairs."""
         if image.ndim == 3:
             image, other = image[None], other[None]
         size = check.shape("image", image, "N H W 3")

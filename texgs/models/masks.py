@@ -1,4 +1,4 @@
-"""Models that find an object in an image from clicks: what all take, give and remember, and GrabCut."""
+"""Models that find an object in an image from clicks: interface, cache of features, and GrabCut."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -14,23 +14,17 @@ from torch.nn import functional as F
 from texgs.core import check
 from texgs.core.errors import ArgumentError
 
-REMEMBERED_IMAGES = (
-    64  # images whose features are kept: the training views of a lift, and the view clicked on
-)
-SIZE = 320  # pixels of the longer side that is segmented; larger images are reduced, and masks enlarged
-SEED = 0.01  # radius of what a click marks for certain, of the longer side
-ALIKE_CHANNELS = 16  # largest difference per channel of 255 of what is probably the same object as a click
-PLAIN_CHANNELS = (
-    20  # largest difference per channel within an empty background; less parts objects that nearly touch
-)
+REMEMBERED_IMAGES = 64  # features to keep, of the training views and the clicked view
+SIZE = 320  # pixels of the longer side to segment; larger images are reduced, masks enlarged
+SEED_RADIUS = 0.01  # radius that a click marks for certain, in longer sides
+ALIKE_CHANNELS = 16  # of 255: largest difference per channel within a click's object
+PLAIN_CHANNELS = 20  # of 255, within an empty background; smaller values split it
 ROUNDS = 5
-FEW_SHARE = (
-    0.1  # of what an outline holds: less is found where what is outside looks the same, and says nothing
-)
+FEW_SHARE = 0.1  # smallest mask relative to the outline; smaller ones are unreliable
 
 
 class MaskModel(Protocol):
-    """Finds what the positive points lie on and the negative ones do not."""
+    """Finds the object under the positive points and not under the negative ones."""
 
     name: str  # for tables and files
 
@@ -43,7 +37,7 @@ class MaskModel(Protocol):
 
 
 def check_clicks(image: Tensor, points: Tensor, positive: Tensor, held: Tensor | None) -> None:
-    """Require what every mask model takes."""
+    """Check the arguments of a mask model."""
     size = check.shape("image", image, "H W 3")
     count = check.shape("points", points, "P 2")["P"]
     check.shape("positive", positive, "P", P=count)
@@ -60,14 +54,14 @@ def check_clicks(image: Tensor, points: Tensor, positive: Tensor, held: Tensor |
 
 
 class Remembered:
-    """Results of a slow function of images, kept for the last ones it was asked for."""
+    """A cache for a slow function of images."""
 
     def __init__(self, function: Callable[[Tensor], Tensor], most: int = REMEMBERED_IMAGES) -> None:
         self.function, self.most = function, most
         self.results: OrderedDict[bytes, Tensor] = OrderedDict()
 
     def __call__(self, image: Tensor) -> Tensor:
-        """Return the result for an image, computed where these pixels have not been seen."""
+        """Return the result for an image; compute it for new pixels."""
         pixels = image.detach().cpu().contiguous().numpy()
         key = blake2b(f"{pixels.dtype} {pixels.shape}".encode() + pixels.tobytes(), digest_size=16).digest()
         if key not in self.results:
@@ -112,10 +106,10 @@ def cut(pixels: np.ndarray, places: np.ndarray, positive: np.ndarray, held: np.n
     plain, on_it = plain_border(pixels), places[positive]
     if held is not None:
         held &= ~plain
-        rest = held & (connected(held, places[positive]) | ~connected(held, places[~positive]))
-        held = rest if rest.any() else held  # without the parts that only negative clicks are on
+        rest = held & (connected_mask(held, places[positive]) | ~connected_mask(held, places[~positive]))
+        held = rest if rest.any() else held  # without parts under negative clicks only
         on_it = np.argwhere(held)[:, ::-1]
-    clicked = connected(~plain, on_it)
+    clicked = connected_mask(~plain, on_it)
     # Other objects would teach the mixture of the background their colours, which may be those of this one.
     emptied = np.where(clicked[..., None], pixels, np.median(pixels[plain], axis=0) if plain.any() else 0)
     emptied = emptied.astype(np.uint8)
@@ -126,18 +120,18 @@ def cut(pixels: np.ndarray, places: np.ndarray, positive: np.ndarray, held: np.n
         models = np.zeros((2, 1, 65))
         cv2.grabCut(emptied, labels, (0, 0, 0, 0), models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
         is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
-    found = connected(is_object, on_it)
+    found = connected_mask(is_object, on_it)
     return found if held is None or found.sum() > FEW_SHARE * held.sum() else held
 
 
 def first_guess(
     pixels: np.ndarray, clicked: np.ndarray, places: np.ndarray, positive: np.ndarray, is_drawn: bool
 ) -> np.ndarray:
-    """Return the labels [H, W] that GrabCut starts from: certain at clicks and outside, else probable."""
+    """Return the start labels [H, W] of GrabCut: certain at clicks and outside, otherwise probable."""
     smooth = cv2.GaussianBlur(pixels, (3, 3), 0)
     probable = cv2.GC_PR_BGD if positive.any() else cv2.GC_PR_FGD
     labels = np.where(clicked, probable, cv2.GC_BGD).astype(np.uint8)
-    is_inside = is_drawn or not (clicked[[0, -1]].any() or clicked[:, [0, -1]].any())  # of a plain border
+    is_inside = is_drawn or not (clicked[[0, -1]].any() or clicked[:, [0, -1]].any())  # needs a plain border
     if is_inside and positive.any():  # all of it is the object, but for what looks like negative clicks
         colors = smooth[places[:, 1], places[:, 0]].astype(int)  # [P, 3]
         nearest = np.abs(smooth[..., None, :].astype(int) - colors).sum(axis=-1).argmin(axis=-1)  # [H, W]
@@ -145,9 +139,9 @@ def first_guess(
     order = np.argsort(~positive, kind="stable")  # negative clicks last: they take from positive ones
     clicks = list(zip(places[order], positive[order], strict=True))
     for place, is_positive in clicks:
-        alike = flooded(smooth, place, ALIKE_CHANNELS) & clicked
+        alike = flood(smooth, place, ALIKE_CHANNELS) & clicked
         labels[alike] = cv2.GC_PR_FGD if is_positive else cv2.GC_PR_BGD
-    radius = max(round(SEED * max(labels.shape)), 1)
+    radius = max(round(SEED_RADIUS * max(labels.shape)), 1)
     for place, is_positive in clicks:
         certain = cv2.GC_FGD if is_positive else cv2.GC_BGD
         cv2.circle(labels, tuple(map(int, place)), radius, int(certain), -1)
@@ -158,17 +152,17 @@ def plain_border(pixels: np.ndarray) -> np.ndarray:
     """Return pixels [H, W] bool of one colour that are connected to a corner."""
     height, width = pixels.shape[:2]
     corners = ((0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1))
-    return np.any([flooded(pixels, corner, PLAIN_CHANNELS) for corner in corners], axis=0)
+    return np.any([flood(pixels, corner, PLAIN_CHANNELS) for corner in corners], axis=0)
 
 
-def connected(mask: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the connected parts of a mask that places lie on."""
+def connected_mask(mask: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the connected parts of a mask under given places."""
     _, parts = cv2.connectedComponents(mask.astype(np.uint8))
     return np.isin(parts, np.setdiff1d(parts[places[:, 1], places[:, 0]], 0))
 
 
-def flooded(pixels: np.ndarray, place: tuple[int, int] | np.ndarray, most: int) -> np.ndarray:
-    """Return pixels [H, W] bool connected to a place whose channels differ from it by at most so much."""
+def flood(pixels: np.ndarray, place: tuple[int, int] | np.ndarray, most: int) -> np.ndarray:
+    """Flood-fill pixels [H, W] bool from a place; channels may differ from it by `most`."""
     height, width = pixels.shape[:2]
     filled = np.zeros((height + 2, width + 2), dtype=np.uint8)
     flags = 4 | cv2.FLOODFILL_MASK_ONLY | cv2.FLOODFILL_FIXED_RANGE | (1 << 8)

@@ -1,4 +1,4 @@
-"""Pretrained networks from files, which are never executed, and the number format to compute them in."""
+"""Pretrained networks from files that are never executed, and the fastest number format for them."""
 
 from collections.abc import Iterable
 from functools import cache
@@ -13,11 +13,11 @@ from texgs.core.io import read_json, reading, reading_as
 from texgs.core.tensor_file import load_torch
 
 CPUINFO = Path("/proc/cpuinfo")
-BFLOAT16_FLAGS = {"avx512_bf16", "amx_bf16", "bf16"}  # what Linux calls instructions for it, x86 and Arm
+BFLOAT16_FLAGS = {"avx512_bf16", "amx_bf16", "bf16"}  # Linux's names of such instructions, x86 and Arm
 
 
 def fast_dtype(device: torch.device | str) -> torch.dtype:
-    """Return float16 on a GPU, bfloat16 on a CPU with instructions for it, else float32."""
+    """Return float16 on a GPU, bfloat16 on a CPU with instructions for it, otherwise float32."""
     if torch.device(device).type == "cuda":
         return torch.float16
     return torch.bfloat16 if has_bfloat16() else torch.float32
@@ -25,7 +25,7 @@ def fast_dtype(device: torch.device | str) -> torch.dtype:
 
 @cache
 def has_bfloat16() -> bool:
-    """Return whether the processor multiplies bfloat16 itself; where nothing tells, no."""
+    """Return whether the processor has bfloat16 instructions; false if unknown."""
     if not CPUINFO.exists():
         return False
     lines = CPUINFO.read_text(encoding="utf-8", errors="replace").splitlines()
@@ -34,7 +34,7 @@ def has_bfloat16() -> bool:
 
 
 def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[str, Tensor]:
-    """Return the tensors of a file by name, all or those wanted: .safetensors, else of torch's own format."""
+    """Read all or some tensors of a file by name: .safetensors, or torch's own format."""
     from safetensors import safe_open
 
     with reading(path, "a file of weights", "copy or download it again") as path:
@@ -47,14 +47,14 @@ def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[s
 
 
 def _whole(path: Path, name: str, tensor: object) -> Tensor:
-    """Return a tensor of which every number is in the file: few can be told to be read again and again."""
+    """Return a tensor stored in full; strides could make a small storage expand without bound."""
     if not isinstance(tensor, Tensor) or tensor.nbytes > tensor.untyped_storage().nbytes():
         raise ArgumentError(f"{path}: {name}: expected a tensor, got something else; download it again")
     return tensor
 
 
 def _chosen(path: Path, stored: Iterable[str], names: Iterable[str] | None) -> list[str]:
-    """Return the names wanted of those in a file."""
+    """Return the wanted names among those in a file."""
     there = list(stored)
     wanted = there if names is None else list(names)
     if missing := [name for name in wanted if name not in set(there)]:
@@ -65,7 +65,7 @@ def _chosen(path: Path, stored: Iterable[str], names: Iterable[str] | None) -> l
 
 
 def read_folder(folder: str | Path, kind: str, names: tuple[str, ...]) -> list[Any]:
-    """Return what classes of transformers read from a folder; networks come frozen and in float32.
+    """Read a folder with classes of transformers; networks are frozen and in float32.
 
     Nothing is downloaded. The kind is the model_type of config.json, such as "clip".
     """

@@ -1,6 +1,6 @@
 """Nearest neighbour feature matching: each feature of an image is pulled to the most similar one of a style.
 
-The loss of ARF (Zhang et al. 2022, eq. 3), which the paper takes over: the mean over positions of the cosine
+The loss of ARF (Zhang et al. 2022, eq. 3), as in the paper: the mean over positions of the cosine
 distance to the nearest feature of the style.
 """
 
@@ -14,16 +14,16 @@ from torch.nn import functional as F
 from texgs.core import check
 from texgs.core.errors import ArgumentError
 
-SCORES = 1 << 21  # numbers at a time of all queries by all positions: 8 MB, which stay in caches
+SCORES = 1 << 21  # similarities to compute at a time: 8 MB, which fit into caches
 
 
 @dataclass(frozen=True, eq=False)
 class StyleFeatures:
-    """Features of a style picture, ready to be searched."""
+    """Searchable features of a style picture."""
 
     unit: Tensor  # [S, C] of length 1
-    searched: Tensor  # [S, D] float32: the same, or what is left of them in D principal directions
-    basis: Tensor | None  # [C, D] those directions; None: the search is exact
+    searched: Tensor  # [S, D] float32: the same, or their projection to D principal directions
+    basis: Tensor | None  # [C, D] the directions; None: exact search
 
     @classmethod
     def of(
@@ -36,8 +36,8 @@ class StyleFeatures:
     ) -> Self:
         """Gather the features [C, h, w] of a picture, or of its region [h, w] bool.
 
-        Of more positions so many are kept, drawn at random. The search is in so many principal directions of
-        the features; by default in all, which is exact.
+        At most `positions` are kept, drawn at random. The search uses some principal directions of the
+        features; by default all, which is exact.
         """
         size = check.shape("features", features, "C h w")
         rows = draw_features(features.detach(), region, positions, torch.Generator().manual_seed(seed))
@@ -70,7 +70,7 @@ def principal(rows: Tensor, dimensions: int) -> Tensor:
 
 
 def best(scores: Tensor) -> Tensor:
-    """Return the index [Q] of the largest of each row; on a CPU by NumPy, several times as fast as torch."""
+    """Return the argmax [Q] of each row; on a CPU by NumPy, several times as fast as torch."""
     if scores.is_cuda:
         return scores.argmax(1)
     return torch.from_numpy(scores.numpy().argmax(1))

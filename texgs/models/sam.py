@@ -1,4 +1,4 @@
-"""Masks from clicks by Segment Anything (Kirillov et al. 2023): its files, or a folder of transformers."""
+"""Masks from clicks by Segment Anything (Kirillov et al. 2023), from its files or a transformers folder."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,9 +13,9 @@ from texgs.models.masks import GrabCut, MaskModel, Remembered, check_clicks
 from texgs.models.networks import fast_dtype, read_folder, read_tensors
 from texgs.models.weights import locate
 
-MEAN = (123.675 / 255, 116.28 / 255, 103.53 / 255)  # mean of images as the encoder knows them, per channel
+MEAN = (123.675 / 255, 116.28 / 255, 103.53 / 255)  # per channel, of the encoder's training images
 DEVIATION = (58.395 / 255, 57.12 / 255, 57.375 / 255)
-PUBLISHED = {  # title, and name of the architecture in kornia, by name in the catalogue
+PUBLISHED_NETWORKS = {  # title, and architecture in kornia, by name in the catalogue
     "mobile_sam": ("MobileSAM", "mobile_sam"),  # Zhang et al. 2023
     "sam_vit_h": ("SAM ViT-H", "vit_h"),  # the paper's
 }
@@ -43,7 +43,7 @@ class Sam:
         self._features = Remembered(lambda image: encode(self.prepared(image)))
 
     def prepared(self, image: Tensor) -> Tensor:
-        """Return an image [H, W, 3] as the encoder takes it [1, 3, S, S], with zeros below or right."""
+        """Convert an image [H, W, 3] to the encoder's input [1, 3, S, S], zero-padded below or right."""
         from kornia.enhance import normalize
 
         planes = image.to(self.device).float().permute(2, 0, 1)[None]
@@ -53,7 +53,7 @@ class Sam:
         return F.pad(planes, (0, self.size - width, 0, self.size - height))
 
     def fitted(self, height: int, width: int) -> tuple[int, int]:
-        """Return the size of an image whose longer side fills the encoder's square."""
+        """Return the size of an image scaled to fill the encoder's square."""
         scale = self.size / max(height, width)
         return max(int(height * scale + 0.5), 1), max(int(width * scale + 0.5), 1)
 
@@ -82,14 +82,14 @@ def published_sam(
     device: torch.device | str = "cpu",
     dtype: torch.dtype | None = None,
 ) -> Sam:
-    """Return a SAM of `PUBLISHED` from the file of its authors, by default where it is found.
+    """Return a SAM of `PUBLISHED_NETWORKS` from its authors' file, by default from a known place.
 
     The dtype, by default the fastest, is that of the encoder, which takes nearly all of the time.
     """
     from kornia.models.sam import Sam as Network
     from kornia.models.sam import SamConfig
 
-    title, kind = PUBLISHED[name]
+    title, kind = PUBLISHED_NETWORKS[name]
     path = locate(name) if path is None else path
     dtype = fast_dtype(device) if dtype is None else dtype
     network = Network.from_config(SamConfig(kind)).eval().requires_grad_(False)
@@ -103,7 +103,7 @@ def published_sam(
 
 
 def _kornia(network: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
-    """Return encoder and decoder of a network of kornia."""
+    """Wrap encoder and decoder of a kornia network."""
 
     def encode(pixels: Tensor) -> Tensor:
         features: Tensor = network.image_encoder(pixels.to(dtype)).float()
@@ -130,7 +130,7 @@ def sam_folder(
 
 
 def _transformers(model: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
-    """Return encoder and decoder of a model of transformers."""
+    """Wrap encoder and decoder of a transformers model."""
 
     def encode(pixels: Tensor) -> Tensor:
         features: Tensor = model.get_image_embeddings(pixels.to(dtype)).float()
@@ -150,13 +150,13 @@ def _transformers(model: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
 
 
 def mask_model(name: str, device: torch.device) -> MaskModel:
-    """Return the mask model of a name, or in a folder."""
+    """Open the mask model of a name, or in a folder."""
     if name == "grabcut":
         return GrabCut()
-    if name in PUBLISHED:
+    if name in PUBLISHED_NETWORKS:
         return published_sam(name, device=device)
     if not Path(name).is_dir():
         raise ArgumentError(
-            f"masks: expected {', '.join(PUBLISHED)}, grabcut or a folder with a SAM, got {name}"
+            f"masks: expected {', '.join(PUBLISHED_NETWORKS)}, grabcut or a folder with a SAM, got {name}"
         )
     return sam_folder(name, device)

@@ -1,4 +1,4 @@
-"""VGG-16 as far as its features are wanted."""
+"""VGG-16 up to the last layer needed."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ from texgs.models.weights import locate
 from texgs.raster.convolution import RectifiedConvolution
 
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of ImageNet, per channel
-BLOCKS = (2, 2, 3, 3, 3)  # convolutions between poolings
-CHANNELS = (64, 128, 256, 512, 512)  # of the blocks
+BLOCKS = (2, 2, 3, 3, 3)  # convolutions before each pooling
+CHANNELS = (64, 128, 256, 512, 512)  # in each block
 Box = tuple[EllipsisType | slice, ...]  # rows and columns of an image
 STYLE_LAYERS = ("relu3_1", "relu3_2", "relu3_3")  # 3 x 256 channels, a quarter of the resolution
 
 
 @dataclass(frozen=True, eq=False)
 class Vgg:
-    """Convolutions up to the last layer wanted, frozen."""
+    """Frozen convolutions up to the last wanted layer."""
 
     convolutions: tuple[Callable[[Tensor], Tensor], ...]  # each with its rectifier
     names: tuple[str, ...]  # of the layers, such as relu3_1
@@ -39,7 +39,7 @@ class Vgg:
         layers: Sequence[str] = STYLE_LAYERS,
         dtype: torch.dtype | None = None,
     ) -> Self:
-        """Read the weights that the layers need, `relu1_1` to `relu5_3` in order.
+        """Read the weights for some layers, `relu1_1` to `relu5_3` in order.
 
         They have torchvision's names, `features.N.weight`. The dtype to compute in is by default the fastest:
         float16 on a GPU, and float32 on a CPU, where convolutions are by Winograd's algorithm.
@@ -55,7 +55,7 @@ class Vgg:
             inputs = 3 if before is None else channels(before)
             check.shape(f"{path}: {key}.weight", stored[f"{key}.weight"], f"{channels(name)} {inputs} 3 3")
         convolutions = [
-            rectified(*(stored[f"{key}.{kind}"].to(device, dtype) for kind in ("weight", "bias")))
+            rectified_convolution(*(stored[f"{key}.{kind}"].to(device, dtype) for kind in ("weight", "bias")))
             for key in keys
         ]
         return cls(tuple(convolutions), tuple(names), tuple(layers), dtype)
@@ -78,7 +78,7 @@ class Vgg:
         return features
 
     def prepared(self, images: Tensor) -> Tensor:
-        """Return images [N, 3, H, W] in [0, 1] as the first convolution takes them."""
+        """Normalise images [N, 3, H, W] in [0, 1] for the first convolution."""
         from kornia.enhance import normalize
 
         check.shape("images", images, "N 3 H W")
@@ -88,7 +88,7 @@ class Vgg:
     def changed(
         self, layers: Mapping[str, Tensor], image: Tensor, where: Tensor
     ) -> Iterator[tuple[str, Box, Tensor]]:
-        """Yield where the last layer of each block differs from a known one, and what it is there.
+        """Yield the part of each block's last layer that differs from a known one, and its values.
 
         It is that of an image [1, 3, H, W], which differs from the known one in some pixels [H, W] at most.
         What is given and yielded are outputs [1, C, h, w] by name. Not differentiable.
@@ -96,26 +96,26 @@ class Vgg:
         rows, columns = (where.any(dim).nonzero()[:, 0] for dim in (1, 0))
         ends = [(int(each[0]), int(each[-1]) + 1) for each in (rows, columns)]
         sizes, first = list(where.shape), 0
-        outer = grown(ends, 2 * BLOCKS[0], sizes)
+        outer = grow_ends(ends, 2 * BLOCKS[0], sizes)
         x = self.prepared(image[box(outer)])
         for count, following in zip(BLOCKS, (*BLOCKS[1:], 0), strict=True):
             for convolve in self.convolutions[first : first + count]:
                 x = convolve(x)
             first += count
             # Of what the convolutions saw, what differs and as much around it as they have made wrong.
-            inner = grown(ends, count, sizes)
+            inner = grow_ends(ends, count, sizes)
             name, seen = self.names[first - 1], x[box(inner, outer)]
             yield name, box(inner), seen
             if following:
                 ends, halves = [(a // 2, (b + 1) // 2) for a, b in inner], [size // 2 for size in sizes]
-                outer = grown(ends, 2 * following, halves)
+                outer = grow_ends(ends, 2 * following, halves)
                 full = [(2 * a, min(2 * b + 1, size)) for (a, b), size in zip(outer, sizes, strict=True)]
                 layer = layers[name][box(full)].clone()
                 layer[box(inner, full)] = seen
                 x, sizes = F.max_pool2d(layer, 2), halves
 
     def blocks(self, image: Tensor, wanted: Sequence[str] | None = None) -> dict[int, Tensor]:
-        """Return some layers of an image [3, H, W], those of a block as one [C, H/s, W/s], by s."""
+        """Return some layers of an image [3, H, W] by stride s, those of a block stacked [C, H/s, W/s]."""
         wanted = self.wanted if wanted is None else wanted
         joined: dict[int, list[Tensor]] = {}
         for name, layer in zip(wanted, self.layers(image[None], wanted), strict=True):
@@ -123,22 +123,22 @@ class Vgg:
         return {stride: torch.cat(layers, dim=1).squeeze(0) for stride, layers in joined.items()}
 
     def features(self, image: Tensor) -> Tensor:
-        """Return the wanted layers of an image [3, H, W], all of one block, as one [C, H/s, W/s]."""
+        """Return the wanted layers of an image [3, H, W], all of one block, stacked [C, H/s, W/s]."""
         (features,) = self.blocks(image).values()
         return features
 
 
-def grown(ends: Sequence[tuple[int, int]], margin: int, sizes: Sequence[int]) -> list[tuple[int, int]]:
-    """Return the first and last of rows and of columns with a margin, within an image of these sizes."""
+def grow_ends(ends: Sequence[tuple[int, int]], margin: int, sizes: Sequence[int]) -> list[tuple[int, int]]:
+    """Grow ranges of rows and columns by a margin, within an image of these sizes."""
     return [(max(0, a - margin), min(size, b + margin)) for (a, b), size in zip(ends, sizes, strict=True)]
 
 
 def box(ends: Sequence[tuple[int, int]], outer: Sequence[tuple[int, int]] = ((0, 0), (0, 0))) -> Box:
-    """Return the index of rows and columns, counted from the first of others."""
+    """Return slices of rows and columns relative to the first of others."""
     return (..., *(slice(a - first, b - first) for (a, b), (first, _) in zip(ends, outer, strict=True)))
 
 
-def rectified(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:
+def rectified_convolution(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:
     """Return the function max(0, weight * x + bias) of images x [N, in, H, W] with zeros around them."""
     if weight.device.type == "cpu" and weight.dtype == torch.float32:
         return RectifiedConvolution(weight, bias)
@@ -146,7 +146,7 @@ def rectified(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:
 
 
 def by_torch(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:
-    """Return the same for any device and type of numbers."""
+    """Do as `rectified_convolution`, for any device and dtype."""
     weight = weight.contiguous(memory_format=torch.channels_last)
     return lambda x: F.relu(F.conv2d(x, weight, bias, padding=1), inplace=True)
 

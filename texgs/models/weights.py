@@ -1,4 +1,4 @@
-"""Where the weights of a pretrained model are: a local folder, the hubs' caches, or else a download."""
+"""Find the weights of pretrained models: in a local folder, in the hubs' caches, or by download."""
 
 import os
 import sys
@@ -12,21 +12,21 @@ from texgs.core.errors import ArgumentError, MissingDataError, first_line
 from texgs.core.io import read_json
 from texgs.models.catalogue import File, Single, Snapshot, entry_of
 
-VERIFIED = Checksums()  # checksums of the files that this process has read
-CONNECTED = 20.0  # seconds within which a hub answers
+VERIFIED_CHECKSUMS = Checksums()  # of files that this process has read
+CONNECT_SECONDS = 20.0  # seconds to wait for a hub
 
 
 def locate(name: str) -> Path:
     """Return the path of the weights of a model: a file, or a folder in the layout of the Hugging Face hub.
 
-    Looked for in the weights folder (TEXGS_WEIGHTS), in the caches of the hubs, and then downloaded with
-    a line that says so and a progress bar, at a pinned revision or with a known checksum, into the cache.
+    The search covers the weights folder (TEXGS_WEIGHTS) and the caches of the hubs. Otherwise the weights are
+    downloaded into the cache, with a message and a progress bar, at a pinned revision or checksum.
     """
     return find(name) or _download(name, entry_of(name))
 
 
 def find(name: str) -> Path | None:
-    """Return the path of the weights on this machine; None where `locate` would have to download them."""
+    """Return the path of the weights on this machine, or None if `locate` would download them."""
     entry = entry_of(name)
     if isinstance(entry, Snapshot):
         folders = (weights_folder() / name, *_hub_folders(entry))
@@ -39,8 +39,8 @@ def find(name: str) -> Path | None:
     return None
 
 
-def unusable(name: str) -> str:
-    """Return why nothing can work with the weights of a model here, and what to do; empty where it can."""
+def missing_advice(name: str) -> str:
+    """Return why the weights of a model cannot be used here, and what to do; "" if they can."""
     if find(name) is None:
         how = f"`texgs weights {name}` downloads them or says how to get them"
         return f"the weights of {name} are not on this machine; {how}"
@@ -51,8 +51,8 @@ def unusable(name: str) -> str:
     return ""
 
 
-def titled(name: str) -> str:
-    """Return the name of weights, with the revision of a snapshot that is not the one of the catalogue."""
+def title_of(name: str) -> str:
+    """Return the name of weights, with the revision of a snapshot that is not the catalogue's."""
     entry = entry_of(name)
     if not isinstance(entry, Snapshot) or (path := find(name)) is None:
         return name
@@ -62,9 +62,9 @@ def titled(name: str) -> str:
 
 
 def checksum(name: str, checksums: Checksums) -> str | None:
-    """Return the checksum of the weights that `find` finds, by what is known of files; None if unusable."""
+    """Return the checksum of the weights that `find` returns, from known checksums, or None if unusable."""
     path = find(name)
-    if path is None or unusable(name):
+    if path is None or missing_advice(name):
         return None
     entry = entry_of(name)
     if isinstance(entry, Single):
@@ -75,7 +75,7 @@ def checksum(name: str, checksums: Checksums) -> str | None:
 
 
 def _file_folders() -> Iterator[Path]:
-    """Yield the folders that files of weights may be in."""
+    """Yield the folders to search for files of weights."""
     yield weights_folder()
     yield cache_folder() / "weights"
     home = os.environ.get("TORCH_HOME")
@@ -83,16 +83,16 @@ def _file_folders() -> Iterator[Path]:
 
 
 def _hub_folders(entry: Snapshot) -> list[Path]:
-    """Return the folders of snapshots in the cache of the Hugging Face hub, first that of the catalogue."""
+    """Return the snapshot folders in the Hugging Face cache, the catalogue's revision first."""
     home = Path(os.environ.get("HF_HOME") or Path.home() / ".cache" / "huggingface").expanduser()
     cache = Path(os.environ.get("HF_HUB_CACHE") or home / "hub").expanduser()
     snapshots = cache / f"models--{entry.repository.replace('/', '--')}" / "snapshots"
-    # No other revision stands in for that of a pipeline.
+    # A pipeline needs exactly its revision.
     return [snapshots / entry.revision, *(sorted(snapshots.glob("*")) if entry.needs else ())]
 
 
 def pipeline_files(folder: Path) -> list[tuple[str, ...]]:
-    """Return the files of a pipeline of diffusers, each with the names it may have; none without an index."""
+    """Return the files of a diffusers pipeline, each with alternative names; none without an index."""
     files: list[tuple[str, ...]] = [("model_index.json",)]
     with suppress(ArgumentError, LookupError, TypeError, AttributeError):
         index = read_json(folder / "model_index.json")
@@ -109,14 +109,14 @@ def pipeline_files(folder: Path) -> list[tuple[str, ...]]:
 
 
 def _is_complete(folder: Path, entry: Snapshot) -> bool:
-    """Return whether a folder has all files of a snapshot that are needed."""
+    """Return whether a folder has all required files of a snapshot."""
     needs = entry.needs or pipeline_files(folder)
     return bool(needs) and all(any((folder / name).is_file() for name in names) for names in needs)
 
 
 def _verify(name: str, file: File, path: Path) -> None:
-    """Require a file with the checksum of the catalogue."""
-    checksum = VERIFIED.of(path)
+    """Require that a file has the catalogue's checksum."""
+    checksum = VERIFIED_CHECKSUMS.of(path)
     if checksum != file.sha256:
         raise ArgumentError(
             f"{path}: expected the weights of {name} with checksum {file.sha256[:12]}, got {checksum[:12]}; "
@@ -138,10 +138,12 @@ def _download(name: str, entry: Single | Snapshot) -> Path:
             return Path(pooch.retrieve(entry.source, known, file.name, folder, progressbar=True))
         from huggingface_hub import HfApi, snapshot_download
 
-        HfApi().model_info(entry.repository, revision=entry.revision, timeout=CONNECTED)  # it tries only once
+        HfApi().model_info(
+            entry.repository, revision=entry.revision, timeout=CONNECT_SECONDS
+        )  # it tries only once
         patterns = list(entry.patterns)
         return Path(snapshot_download(entry.repository, revision=entry.revision, allow_patterns=patterns))
-    except Exception as error:  # the hub's client passes on those of the library that it connects with
+    except Exception as error:  # including errors of the client's HTTP library
         files = [file.name for file in entry.files] if isinstance(entry, Single) else []
         target = f"file {' or '.join(files)}" if files else f"folder {name}"
         raise MissingDataError(

@@ -1,4 +1,4 @@
-"""Render surfels or 3D Gaussians, splat images back onto them, and find what cuts leave of a view's rays."""
+"""Render surfels or 3D Gaussians, splat images back onto them, and clip the rays of a view by cuts."""
 
 from collections.abc import Collection
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from texgs.raster.autograd import IMAGES, RasterizeFunction, bin_surfels, contri
 from texgs.raster.autograd import Camera as NativeCamera
 from texgs.raster.types import DEFAULT_OPTIONS, Options, Render, Texture
 
-MOST_PLANES = 12
+MAX_PLANES = 12
 
 
 def rasterize(
@@ -95,7 +95,7 @@ def splat(
     depth_range: Tensor | None = None,
     options: Options = DEFAULT_OPTIONS,
 ) -> tuple[Tensor, Tensor]:
-    """Splat an image back onto what shows it: the adjoint of rendering features over black.
+    """Splat an image back onto the primitives that show it: the adjoint of rendering features over black.
 
     Divided by the weights, the sums are the average of the image as each surfel sees it: votes of a
     segmentation, labels lifted from pixels to surfels. Not differentiable.
@@ -132,7 +132,7 @@ native.declare("texgs_cut_range", NativeCamera, "ippp")
 
 
 class CutRange(NamedTuple):
-    """The rays of a view behind the planes of a cut."""
+    """The parts of a view's rays behind the planes of a cut."""
 
     depth_range: Tensor  # [2, H, W] camera z, 0 and infinity without a plane; no ray: the second is not above
     face: Tensor  # [H, W] int32: the plane through which a ray enters, -1 where it enters through none
@@ -149,8 +149,8 @@ def cut_range(normals: Tensor, offsets: Tensor, camera: Camera) -> CutRange:
     inputs = {"normals": (normals, "P 3"), "offsets": (offsets, "P"), **matrices}
     count = require(inputs, constant=inputs)["P"]
     pinhole(camera.viewmat, camera.K)
-    if count > MOST_PLANES:
-        raise ArgumentError(f"normals: expected {MOST_PLANES} planes at most, got {count}; leave some out")
+    if count > MAX_PLANES:
+        raise ArgumentError(f"normals: expected {MAX_PLANES} planes at most, got {count}; leave some out")
     lengths = normals.norm(dim=1)
     if not bool(((lengths > 0) & lengths.isfinite()).all()):
         raise ArgumentError(f"normals: expected finite vectors but 0, got {normals.tolist()}")

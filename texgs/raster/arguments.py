@@ -1,4 +1,4 @@
-"""Checks of what the rasterizer is called with; what passes comes out dense."""
+"""Check the arguments of the rasterizer, and return them dense."""
 
 from collections.abc import Collection, Mapping, Sequence
 from math import inf, isfinite
@@ -10,16 +10,16 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.errors import ArgumentError, DeviceError
 from texgs.raster import native
-from texgs.raster.autograd import SurfelTensors, View
+from texgs.raster.autograd import RasterView, SurfelTensors
 from texgs.raster.types import OUTPUTS, Options, Texture, check_primitive
 
 MAX_CHANNELS = 32
 TEXTURE_CHANNELS = 3
-MOST_TEXELS = 2**24  # of one surfel: the library counts them in 32-bit floats
+MAX_TEXELS = 2**24  # of one surfel; the library counts them in float32
 MAX_SIDE = 2**20 - 16  # pixels; the library counts tiles of 16 of them in 16 bits
-SKEWED = 1e-3  # largest difference of a camera's axes from those of a rotation
-ROUNDING = 1e-4  # error of a matrix that was inverted or multiplied
-BYTES_PER_SURFEL = 192  # records, footprints, sorting, a few tiles: what no scene stays below
+MAX_SKEW = 1e-3  # largest deviation of a camera's axes from a rotation
+ROUNDING = 1e-4  # rounding error to expect in inverted or multiplied matrices
+BYTES_PER_SURFEL = 192  # least memory: record, footprint, sorting keys, a few tiles
 AXES = {
     "means": "N 3",
     "quats": "N 4",
@@ -33,19 +33,19 @@ AXES = {
 }
 
 
-PASSED: dict[tuple, dict[str, int]] = {}  # sizes by all that is asked of tensors: loops ask again and again
+CHECKED_SIZES: dict[tuple, dict[str, int]] = {}  # results by all that is checked: loops repeat the same calls
 Inputs = Mapping[str, tuple[Tensor | None, str]]  # by name: a tensor, if any, and axes as in `check.shape`
 
 
 def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -> dict[str, int]:
     """Return the sizes of the axes of tensors; require their shapes, float32 and one device.
 
-    `constant` names those for which there is no gradient, `cpu` says why other devices are refused.
+    `constant` names tensors without a gradient, `cpu` is the reason for refusing other devices.
     """
     given = {name: tensor for name, (tensor, _) in tensors.items() if tensor is not None}
     about = [(x.shape, x.dtype, x.device) for x in given.values() if isinstance(x, Tensor)]
     key = (cpu, *[(name, tensors[name][1]) for name in given], *about)
-    if (sizes := PASSED.get(key)) is None:
+    if (sizes := CHECKED_SIZES.get(key)) is None:
         sizes = {}
         for name, tensor in given.items():
             sizes |= check.shape(name, tensor, tensors[name][1], **sizes)
@@ -54,9 +54,9 @@ def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -
             if cpu and tensor.device.type != "cpu":
                 raise DeviceError(f"{name}: expected a tensor on cpu, got {tensor.device}; {cpu}")
         check.same_device(**given)
-        if len(PASSED) > 4096:
-            PASSED.clear()
-        PASSED[key] = sizes
+        if len(CHECKED_SIZES) > 4096:
+            CHECKED_SIZES.clear()
+        CHECKED_SIZES[key] = sizes
     check.constant(**{name: given.get(name) for name in constant})
     return sizes
 
@@ -64,7 +64,7 @@ def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -
 def surfel_tensors(
     geometry: Sequence[Tensor], shift: Tensor | None, features: Tensor | None, texture: Texture | None
 ) -> SurfelTensors:
-    """Return all tensors of surfels or 3D Gaussians; `geometry` is means, quats, scales and opacities."""
+    """Check all tensors of surfels or 3D Gaussians; `geometry` is means, quats, scales and opacities."""
     if features is None and texture is None:
         raise ArgumentError("rasterize: expected features, a texture or both, got neither")
     colors = (None, None, None) if texture is None else (texture.base, texture.gain, texture.texels)
@@ -80,7 +80,7 @@ def surfel_tensors(
 
 
 def check_texture(texture: Texture, n: int) -> None:
-    """Require a layout for n surfels. Where textures lie is checked on the CPU only; a GPU would wait."""
+    """Require a layout for n surfels. Offsets are checked on the CPU only; a GPU would wait."""
     check.shape("texture.texels", texture.texels, "T 3")
     check.shape("texture.sizes", texture.sizes, "N 2", N=n)
     check.shape("texture.offsets", texture.offsets, "N", N=n)
@@ -105,12 +105,12 @@ def _check_range(texture: Texture, counts: Tensor, ends: Tensor) -> None:
             f"texture: expected sizes of at least 1 and textures within the {len(texture.texels)} texels, "
             f"got sizes from {smallest}, offsets from {first} and a last texel at {end - 1}"
         )
-    if (most := int(counts.max())) > MOST_TEXELS:
+    if (most := int(counts.max())) > MAX_TEXELS:
         raise ArgumentError(f"texture.sizes: expected at most 2^24 texels for one surfel, got {most}")
 
 
 def _check_overlap(offsets: Tensor, ends: Tensor) -> None:
-    if bool((offsets[1:] >= ends[:-1]).all()):  # one surfel after the other, as most atlases are
+    if bool((offsets[1:] >= ends[:-1]).all()):  # in the order of surfels, as in most atlases
         return
     order = offsets.argsort(stable=True)
     overlaps = (offsets[order][1:] < ends[order][:-1]).nonzero()
@@ -135,8 +135,8 @@ def view(
     texture: Texture | None,
     outputs: Collection[str],
     options: Options,
-) -> View:
-    """Check the rest; `camera` is viewmat, K, background and depth range, `size` is (width, height)."""
+) -> RasterView:
+    """Check camera and image; `camera` is viewmat, K, background and depth range, `size` (width, height)."""
     viewmat, K, background, depth_range = camera
     constant = {
         "viewmat": (viewmat, "4 4"),
@@ -167,14 +167,14 @@ def view(
     matrices = (viewmat.detach().contiguous(), K.detach().contiguous())
     layout = (None, None) if texture is None else (texture.sizes, texture.offsets)
     rest = (None if x is None else x.detach().contiguous() for x in (background, *layout, depth_range))
-    return View(*matrices, width, height, wanted, options, *rest)
+    return RasterView(*matrices, width, height, wanted, options, *rest)
 
 
 def pinhole(viewmat: Tensor, K: Tensor) -> None:
-    """Require the entries that the library takes for granted. On the CPU only: a GPU would have to wait.
+    """Require the matrix entries that the library assumes. On the CPU only: a GPU would have to wait.
 
-    Focal lengths are above 0, there is no skew, and last rows are those of homogeneous coordinates. NaN
-    and infinity pass, they have a check of their own.
+    Focal lengths are positive, there is no skew, and last rows are 0, ..., 0, 1. NaN and infinity pass;
+    they have a separate check.
     """
     if K.device.type != "cpu":
         return
@@ -190,5 +190,5 @@ def pinhole(viewmat: Tensor, K: Tensor) -> None:
             raise ArgumentError(f"{name}: expected 0, 0, 0, 1, got {row}; did you transpose?")
     axes = [row[:3] for row in rows]
     products = [abs(sum(map(mul, a, b)) - (a is b)) for a in axes for b in axes]
-    if any(SKEWED < product < inf for product in products):
+    if any(MAX_SKEW < product < inf for product in products):
         raise ArgumentError(f"viewmat: expected a rotation and a shift, got axes {axes}; normalise them")

@@ -1,4 +1,4 @@
-"""The native rasterizer as a differentiable function of torch, and what one call of it works on."""
+"""The native rasterizer as a differentiable function of torch, and the arguments of a call."""
 
 from ctypes import byref
 from dataclasses import dataclass, field
@@ -35,7 +35,7 @@ native.declare("texgs_release", "p", result=None, stream=False)
 
 
 class SurfelTensors(NamedTuple):
-    """Everything that gradients are computed for, in the order of `texgs_gradients`."""
+    """All differentiable tensors, in the order of `texgs_gradients`."""
 
     means: Tensor  # [N, 3]
     quats: Tensor  # [N, 4]
@@ -55,8 +55,8 @@ class SurfelTensors(NamedTuple):
 
 
 @dataclass(frozen=True)
-class View:
-    """What does not take part in differentiation: camera, options, texture layout, wanted outputs."""
+class RasterView:
+    """All constants of a call: camera, options, texture layout, wanted outputs."""
 
     viewmat: Tensor  # [4, 4]
     K: Tensor  # [3, 3]
@@ -71,7 +71,7 @@ class View:
     raw: bool = field(default=False, kw_only=True)  # scales are logarithms and opacities logits
 
     def images(self, surfels: SurfelTensors) -> dict[str, Tensor]:
-        """Return memory for the planar images of surfels that are wanted."""
+        """Allocate the planar images of the wanted outputs."""
         means, size = surfels.means, (self.height, self.width)
         images = {"color": means.new_empty(surfels.channels, *size), "alpha": means.new_empty(size)}
         for name in self.outputs & {"depth", "median", "distortion"}:
@@ -81,7 +81,7 @@ class View:
         return images
 
     def structures(self, surfels: SurfelTensors) -> tuple[native.Struct, ...]:
-        """Return the surfels, camera and options as the library takes them."""
+        """Return surfels, camera and options as structures of the library."""
         means, quats, scales, opacities, shift, *colors = surfels
         geometry = (*scales.shape, means, quats, scales, opacities, self.raw, shift)
         n_texels = 0 if surfels.texels is None else len(surfels.texels)
@@ -94,7 +94,7 @@ class View:
         return scene, Camera(self.viewmat, self.K, self.width, self.height, self.depth_range), options
 
 
-def bin_surfels(surfels: SurfelTensors, view: View, images: dict[str, Tensor]) -> native.Handle:
+def bin_surfels(surfels: SurfelTensors, view: RasterView, images: dict[str, Tensor]) -> native.Handle:
     """Project, sort and bin the surfels, and render into `images` where it has a "color"."""
     device = surfels.means.device
     frame = native.Handle("texgs_release", device)
@@ -104,7 +104,7 @@ def bin_surfels(surfels: SurfelTensors, view: View, images: dict[str, Tensor]) -
 
 
 def contribute(
-    frame: native.Handle, surfels: SurfelTensors, view: View, image: Tensor | None
+    frame: native.Handle, surfels: SurfelTensors, view: RasterView, image: Tensor | None
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Return sums [N, C] of weight * image [C, H, W]; sum of weights, largest weight, pixels [N]."""
     means = surfels.means
@@ -120,7 +120,7 @@ class RasterizeFunction(torch.autograd.Function):
     """Surfel tensors to images; the images are planar, [C, H, W] and [H, W]."""
 
     @staticmethod
-    def forward(ctx: Any, view: View, extra: dict, *tensors: Any) -> tuple[Tensor | None, ...]:
+    def forward(ctx: Any, view: RasterView, extra: dict, *tensors: Any) -> tuple[Tensor | None, ...]:
         """Render; `extra` receives the statistics."""
         surfels = SurfelTensors(*tensors)
         means = surfels.means
@@ -131,7 +131,7 @@ class RasterizeFunction(torch.autograd.Function):
             _, weight_sum, weight_max, pixels = contribute(frame, surfels, view, None)
             extra["statistics"] = Statistics(weight_sum, weight_max, pixels, radii["radii"])
         ctx.view, ctx.frame = view, frame
-        # The view has them already; saved here too, autograd refuses a backward pass after they were changed.
+        # The view holds them already; saved here too, so that autograd notices changes in place.
         constants = (view.viewmat, view.K, view.background, view.sizes, view.offsets, view.depth_range)
         ctx.save_for_backward(*tensors, *(images.get(name) for name in IMAGES), *constants)
         ctx.set_materialize_grads(False)

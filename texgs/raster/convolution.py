@@ -1,4 +1,4 @@
-"""Convolutions with 3x3 kernels that stay as they are, on the CPU, by Winograd's F(4x4, 3x3).
+"""Convolutions with constant 3x3 kernels, on the CPU, by Winograd's F(4x4, 3x3).
 
 They take a quarter of the multiplications of a direct convolution (Lavin and Gray 2016). Relative errors are
 2e-6 to 4e-6, about four times those of a direct one. Rounding, NaN and infinity reach up to 3 pixels farther
@@ -17,7 +17,7 @@ from texgs.raster import native
 from texgs.raster.arguments import require
 
 ON_GPU = "torch convolves on GPUs"
-BLOCK = 16  # channels that lie side by side
+BLOCK = 16  # channels side by side in memory
 TRANSFORM = (  # G of Lavin and Gray 2016, section 4.3
     (1 / 4, 0, 0),
     (-1 / 6, -1 / 6, -1 / 6),
@@ -54,22 +54,22 @@ class RectifiedConvolution:
 
     @cached_property
     def kernel(self) -> Tensor:
-        """The weights, transformed; for the way there."""
-        return transformed(self.weight)
+        """The transformed weights, for the forward pass."""
+        return transform_kernel(self.weight)
 
     @cached_property
     def adjoint(self) -> Tensor:
-        """For the way back: outputs and inputs change places, and each 3x3 is turned by half a turn."""
-        return transformed(self.weight.transpose(0, 1).flip(2, 3))
+        """The weights for the backward pass: outputs and inputs swapped, each 3x3 rotated by half a turn."""
+        return transform_kernel(self.weight.transpose(0, 1).flip(2, 3))
 
     @cached_property
     def padded_bias(self) -> Tensor:
-        """The bias, filled up with zeros to whole blocks."""
+        """The bias, padded with zeros to whole blocks."""
         return F.pad(self.bias, (0, -len(self.bias) % BLOCK)).contiguous()
 
 
-def transformed(weight: Tensor) -> Tensor:
-    """Return G g G^T of each kernel g of [out, in, 3, 3], as [36, out / 16, in, 16]; filled up with zeros."""
+def transform_kernel(weight: Tensor) -> Tensor:
+    """Return G g G^T of each kernel g of [out, in, 3, 3], as [36, out / 16, in, 16], zero-padded."""
     outputs, inputs = weight.shape[:2]
     g = torch.tensor(TRANSFORM, dtype=torch.float64)
     padded = F.pad(weight, (0, 0, 0, 0, 0, -inputs % BLOCK, 0, -outputs % BLOCK))

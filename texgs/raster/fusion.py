@@ -22,7 +22,7 @@ native.declare("texgs_fuse", NativeLattice, "np", NativeView, "f")
 
 @dataclass(frozen=True, eq=False)
 class DepthView:
-    """What a view knows of a surface; on the CPU."""
+    """The surface in one view; on the CPU."""
 
     camera: Camera
     depth: Tensor  # [H, W] float32, camera z in world units, 0 where there is no surface

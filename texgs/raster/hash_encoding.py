@@ -15,7 +15,7 @@ from texgs.core.errors import ArgumentError
 from texgs.raster import native
 from texgs.raster.arguments import require
 
-FEATURES = 2  # numbers of a point at each level
+FEATURES = 2  # features of a point at each level
 CPU = torch.device("cpu")
 NativeHash = native.struct("texgs_hash", "i levels, p resolution first")
 native.declare("texgs_hash_encode", NativeHash, "nppp")
@@ -26,7 +26,7 @@ native.declare("texgs_hash_backward", NativeHash, "nppp")
 class HashLevels:
     """Lattices over the unit cube whose points have rows of one table; sides grow by a constant factor.
 
-    A level with more lattice points than `entries` has so many rows, which points share by their hash.
+    A level with more lattice points than `entries` has that many rows, shared by hash.
     """
 
     levels: int = 16
@@ -52,7 +52,7 @@ class HashLevels:
 
     @cached_property
     def first(self) -> list[int]:
-        """Row at which each level begins, and the number of all rows."""
+        """First row of each level, and the number of rows."""
         firsts = [0]
         for resolution in self.resolutions:
             firsts.append(firsts[-1] + 8 * ceil(min((resolution + 1) ** 3, self.entries) / 8))
@@ -60,16 +60,16 @@ class HashLevels:
 
     @property
     def rows(self) -> int:
-        """Of the table, which is [rows, 2]."""
+        """Number of rows of the table [rows, 2]."""
         return self.first[-1]
 
     @property
     def width(self) -> int:
-        """Features of a point."""
+        """Number of features of a point."""
         return FEATURES * self.levels
 
     def structure(self) -> native.Struct:
-        """Return the levels as the library takes them."""
+        """Return the levels as a structure of the library."""
         resolutions = torch.tensor(self.resolutions, dtype=torch.int32)
         return NativeHash(self.levels, resolutions, torch.tensor(self.first))
 
@@ -93,7 +93,7 @@ class _Encode(torch.autograd.Function):
         ctx.levels, ctx.table = levels, table.shape
         planes = points.new_empty(levels.width, len(points))
         native.call("texgs_hash_encode", levels.structure(), len(points), points, table, planes, device=CPU)
-        return planes.T  # matrix products take it as it is
+        return planes.T  # matrix products accept this layout
 
     @staticmethod
     @torch.autograd.function.once_differentiable

@@ -1,4 +1,4 @@
-"""Losses of images: photometric, smooth but across edges, normals as the depth has them; and those normals.
+"""Losses of images: photometric, edge-aware smoothness, consistency of normals with depth; normals of depth.
 
 The library returns the gradients of a loss along with its value.
 """
@@ -60,7 +60,7 @@ def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float = 0.2) -> Tensor
 
 
 def planar(image: Tensor) -> Tensor:
-    """Return [H, W, C] or [H, W] as dense [C, H, W]; no copy where the memory is laid out so."""
+    """Return [H, W, C] or [H, W] as dense [C, H, W]; no copy if memory is planar already."""
     return (image[None] if image.ndim == 2 else image.permute(2, 0, 1)).contiguous()
 
 
@@ -142,7 +142,7 @@ def normal_consistency(normal: Tensor, depth: Tensor, alpha: Tensor, viewmat: Te
 
 
 def _require(depth: Tensor, viewmat: Tensor, K: Tensor, **others: tuple[Tensor, str]) -> None:
-    """Require a depth map of a camera, and what else is given of it."""
+    """Check a depth map with its camera, and images of the same size."""
     camera = {"viewmat": (viewmat, "4 4"), "K": (K, "3 3")}
     require({"depth": (depth, "H W"), **camera, **others}, constant=camera)
     pinhole(viewmat, K)
@@ -169,15 +169,15 @@ class _FusedLoss(torch.autograd.Function):
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
-        # Autograd may add to what it is handed: a second pass through a retained graph computes again.
+        # Autograd may add to returned tensors, so a second pass through a retained graph computes them again.
         gradients = ctx.gradients or _evaluate(ctx.loss, ctx.saved_tensors)[1]
         ctx.gradients = None
         constants = len(ctx.needs_input_grad) - 1 - len(gradients)
-        return None, *scaled(gradients, upstream), *[None] * constants
+        return None, *scale(gradients, upstream), *[None] * constants
 
 
-def scaled(gradients: Sequence[Tensor | None], upstream: Tensor) -> Sequence[Tensor | None]:
-    """Scale the gradients of a loss by its own []."""
+def scale(gradients: Sequence[Tensor | None], upstream: Tensor) -> Sequence[Tensor | None]:
+    """Scale the gradients of a loss by the upstream gradient []."""
     # A weight of 1 is common and scaling a pass over the image; looking at it would make a GPU wait.
     if upstream.device.type == "cpu" and upstream.item() == 1.0:
         return gradients
@@ -185,7 +185,7 @@ def scaled(gradients: Sequence[Tensor | None], upstream: Tensor) -> Sequence[Ten
 
 
 def _evaluate(loss: Loss, tensors: Sequence[Tensor]) -> tuple[Tensor, list[Tensor | None]]:
-    """Return the value [] of a loss, and the gradients that are wanted of its first tensors."""
+    """Return the value [] of a loss, and the wanted gradients of its first tensors."""
     name, numbers, wanted = loss
     value = tensors[0].new_empty(())
     gradients = native.gradients(tensors[: len(wanted)], wanted)

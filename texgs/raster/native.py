@@ -1,4 +1,4 @@
-"""The native libraries: found, opened and described to ctypes; calls with errors turned into exceptions.
+"""The native libraries: find, open and describe them to ctypes; turn errors of calls into exceptions.
 
 `libtexgs` works on CPU tensors, `libtexgs_cuda` on CUDA tensors; both export the functions of `csrc/texgs.h`,
 `texgs_losses.h`, `texgs_fit.h`, `texgs_grid.h` and `texgs_volume.h`, the first also those of `texgs_fusion.h`
@@ -27,11 +27,11 @@ from texgs.core.native_sources import SUFFIX, built_from, library_sources
 ABI_VERSION = 7
 FOLDER = Path(__file__).parent / "_native"
 CSRC = Path(__file__).parent / "csrc"
-INSTALL = "install texgs again (pip install .)"
+INSTALL_ADVICE = "install texgs again (pip install .)"
 ERRORS = {1: ArgumentError, 2: OutOfMemoryError, 3: DeviceError}
 PASSES = ("project", "sort", "bin", "forward", "backward", "reduce")  # in the order of `texgs_pass`
 TYPES = {"p": c_void_p, "i": c_int32, "n": c_int64, "f": c_float}
-DECLARED: dict[str, tuple[list[Any], Any]] = {}  # arguments and result of each function of the libraries
+DECLARATIONS: dict[str, tuple[list[Any], Any]] = {}  # arguments and result of each function of the libraries
 
 
 def fields(layout: str) -> list[tuple[str, Any]]:
@@ -45,7 +45,7 @@ def fields(layout: str) -> list[tuple[str, Any]]:
 
 
 class Struct(Structure):
-    """A structure of the library; tensors become their addresses, and stay for as long as it does."""
+    """A structure of the library; it holds tensors by address and keeps them alive."""
 
     def __init__(self, *values: Any, **named: Any) -> None:
         self.kept = values, named
@@ -53,23 +53,23 @@ class Struct(Structure):
 
 
 def struct(name: str, layout: str) -> type[Struct]:
-    """Return the type of a structure of the library, which has a name there, and `fields`."""
+    """Define the type of a structure of the library by its name there and `fields`."""
     return cast(type[Struct], type(name, (Struct,), {"_fields_": fields(layout)}))
 
 
 def as_ctypes(value: Any) -> Any:
-    """Return a value as ctypes takes it: a dense tensor's address, NULL for None."""
+    """Convert a value for ctypes: a dense tensor to its address, None to NULL."""
     return value.data_ptr() if isinstance(value, Tensor) else value
 
 
 def gradients(tensors: Iterable[Tensor | None], wanted: Iterable[bool]) -> list[Tensor | None]:
-    """Return memory for the gradients of those tensors that want one."""
+    """Allocate gradients for the tensors that need one."""
     pairs = zip(tensors, wanted, strict=True)
     return [torch.empty_like(x) if want and x is not None else None for x, want in pairs]
 
 
 class Handle:
-    """Owns what the library keeps between calls: the address of `pointer` is where it writes it.
+    """Owns an object of the library between calls; the library writes its address to `pointer`.
 
     A call that changes it holds the lock: two threads may go back through one graph.
     """
@@ -87,7 +87,7 @@ def declare(name: str, *arguments: str | type[Structure], result: Any = c_int32,
     types: list[Any] = []
     for each in arguments:
         types += [TYPES[x] for x in each.replace(" ", "")] if isinstance(each, str) else [POINTER(each)]
-    DECLARED[name] = [*types, c_void_p] if stream else types, result
+    DECLARATIONS[name] = [*types, c_void_p] if stream else types, result
 
 
 for _name, _result, _arguments in (
@@ -106,27 +106,29 @@ for _name, _result, _arguments in (
 
 
 def library_path(device_type: str = "cpu") -> Path:
-    """Return where the library for "cpu" or "cuda" tensors lies, or would."""
+    """Return the path of the library for "cpu" or "cuda" tensors, whether or not it exists."""
     name = "texgs_cuda" if device_type == "cuda" else "texgs"
     return FOLDER / f"{'' if sys.platform == 'win32' else 'lib'}{name}{SUFFIX}"
 
 
 @cache
 def library(device_type: str = "cpu") -> ctypes.CDLL:
-    """Open the library for "cpu" or "cuda" tensors; the second time, the same object."""
+    """Open the library for "cpu" or "cuda" tensors, once."""
     if device_type not in ("cpu", "cuda"):
         raise DeviceError(f"texgs.raster: expected tensors on cpu or cuda, got {device_type}; move them")
     path = library_path(device_type)
     if not path.exists():
         hint = "install a CUDA compiler and " if device_type == "cuda" else ""
-        raise NativeError(f"{path.name}: not found in {path.parent}; {hint}{INSTALL}")
+        raise NativeError(f"{path.name}: not found in {path.parent}; {hint}{INSTALL_ADVICE}")
     try:
         lib = ctypes.CDLL(str(path))
     except OSError as error:
-        raise NativeError(f"{path.name}: cannot be loaded: {error}; {INSTALL}") from error
+        raise NativeError(f"{path.name}: cannot be loaded: {error}; {INSTALL_ADVICE}") from error
     version = function(lib, "texgs_abi_version")()
     if version != ABI_VERSION:
-        raise NativeError(f"{path.name}: interface version {ABI_VERSION} expected, got {version}; {INSTALL}")
+        raise NativeError(
+            f"{path.name}: interface version {ABI_VERSION} expected, got {version}; {INSTALL_ADVICE}"
+        )
     _require_own_sources(lib)
     if device_type == "cpu":
         function(lib, "texgs_use_openmp")(_openmp_of_torch())
@@ -136,7 +138,7 @@ def library(device_type: str = "cpu") -> ctypes.CDLL:
 
 
 def _require_own_sources(lib: ctypes.CDLL) -> None:
-    """Require of a library in a source tree that it was built from the sources there as they are now."""
+    """Require that a library in a source tree was built from the current sources."""
     expected, built = library_sources(), built_from(function(lib, "texgs_sources"))
     if CSRC.is_dir() and built != expected:
         raise NativeError(
@@ -146,13 +148,13 @@ def _require_own_sources(lib: ctypes.CDLL) -> None:
 
 
 def function(lib: ctypes.CDLL, name: str) -> Any:
-    """Return a function of a library, as it is declared; one of other sources may lack it."""
+    """Return a declared function of a library; a library from other sources may lack it."""
     try:
         found = getattr(lib, name)
     except AttributeError:
-        raise NativeError(f"{Path(lib._name).name}: has no function {name}; {INSTALL}") from None
+        raise NativeError(f"{Path(lib._name).name}: has no function {name}; {INSTALL_ADVICE}") from None
     if found.argtypes is None:
-        found.argtypes, found.restype = DECLARED[name]
+        found.argtypes, found.restype = DECLARATIONS[name]
     return found
 
 
@@ -175,7 +177,7 @@ def instruction_set(device_type: str = "cpu") -> str:
 
 
 def threads() -> int:
-    """Return the number of threads that the CPU library works with: as many as torch."""
+    """Return the number of threads of the CPU library, the same as torch's."""
     return torch.get_num_threads()
 
 

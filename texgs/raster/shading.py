@@ -81,7 +81,7 @@ def blinn_phong(
 
 
 class _BlinnPhong(torch.autograd.Function):
-    """Whether facing, and clamped; ranges; colour, material, means, quats, camera position, light or None."""
+    """Autograd function of `blinn_phong`; arguments are its options, ranges and tensors."""
 
     @staticmethod
     def forward(ctx: Any, how: tuple, ranges: Ranges, color: Tensor, *others: Tensor) -> tuple[Tensor, ...]:
@@ -110,13 +110,13 @@ class _BlinnPhong(torch.autograd.Function):
 
 
 def _arguments(tensors: Sequence[Tensor], how: tuple) -> tuple:
-    """Return the arguments of the library, with a bit for each factor of the material that is shared."""
+    """Return the arguments of the library, with a bit for each shared factor of the material."""
     shared = sum(len(x) == 1 and 1 << k for k, x in enumerate(tensors[1:5]))
     return len(tensors[0]), *tensors[:5], shared, *tensors[5:], *how
 
 
 def between(low: float, high: float, raw: Tensor) -> Tensor:
-    """Return values in a range; without an operation that one of 0 to 1 does not need."""
+    """Map raw values to a range by a sigmoid; the range 0 to 1 needs no scaling."""
     values = raw.sigmoid()
     values = values if high - low == 1 else (high - low) * values
     return values if low == 0 else low + values

@@ -1,4 +1,4 @@
-"""What the rasterizer takes and gives besides plain tensors."""
+"""Inputs and outputs of the rasterizer besides plain tensors."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ class Texture:
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """What each surfel contributed to one image; without gradient."""
+    """Contributions of each surfel to one image; without gradient."""
 
     weight_sum: Tensor
     """[N] sum of its blending weights over all pixels."""
@@ -90,7 +90,7 @@ class Statistics:
 
 @dataclass(frozen=True, eq=False)
 class Render:
-    """One view of the surfels. What was not asked for in `outputs` is None."""
+    """One view of the surfels. Images that `outputs` does not name are None."""
 
     color: Tensor
     """[H, W, C] blended colour or features over the background."""
@@ -111,12 +111,12 @@ class Render:
 
 
 def are_gaussians(scales: Tensor) -> bool:
-    """Return whether scales [N, 2 or 3] are those of 3D Gaussians."""
+    """Return whether scales [N, 2 or 3] belong to 3D Gaussians."""
     return scales.shape[1] == 3
 
 
 def check_primitive(scales: Tensor, has_texture: bool, outputs: Collection[str]) -> None:
-    """Require scales [N, 2] or [N, 3], and of 3D Gaussians nothing that only surfels have."""
+    """Require scales [N, 2] or [N, 3]; refuse textures and normals for 3D Gaussians."""
     if scales.ndim != 2 or scales.shape[1] not in (2, 3):
         hint = "2 draw surfels, 3 draw 3D Gaussians"
         raise ShapeError(f"scales: expected [N, 2] or [N, 3], got {list(scales.shape)}; {hint}")

@@ -15,12 +15,12 @@ from texgs.raster import native
 from texgs.raster.arguments import require
 from texgs.raster.shading import Y00
 
-FLOATS = {0: 4, 1: 16, 2: 32}  # of a row, by degree of the spherical harmonics
+FLOATS = {0: 4, 1: 16, 2: 32}  # floats in a row, by degree of the spherical harmonics
 DEGREES = {floats: degree for degree, floats in FLOATS.items()}
 SIDES = range(8, 1025, 4)  # voxels along an axis
-PIECE = 1 << 17  # points that are interpolated at a time
-GREY = 0.5  # colour of coefficients that are 0
-EMPTY = 1  # rows before those of voxels: that of all others
+PIECE = 1 << 17  # points to interpolate at a time
+GREY = 0.5  # colour of zero coefficients
+EMPTY_ROWS = 1  # rows before the voxels' own: one for all empty voxels
 NativeGrid = native.struct(
     "texgs_grid", "3i size, 3f lower, f spacing, i degree, n n, p masks first occupied distance rows density"
 )
@@ -29,7 +29,7 @@ native.declare("texgs_grid_occupy", NativeGrid, "pp")
 
 @dataclass(frozen=True, eq=False)
 class VoxelGrid:
-    """Density and colour at the points of a lattice, where there is any (Fridovich-Keil et al. 2022).
+    """Sparse density and colour at the points of a lattice (Fridovich-Keil et al. 2022).
 
     Voxels lie in blocks of 4 x 4 x 4. A block's mask has a bit for each voxel that has a row; rows follow
     each other as their voxels do, z fastest within a block and between blocks. A row holds what `pack_rows`
@@ -41,14 +41,14 @@ class VoxelGrid:
     spacing: float  # of voxels, world units
     masks: Tensor  # [X / 4, Y / 4, Z / 4] int64
     first: Tensor  # [X / 4, Y / 4, Z / 4] int32: row of a block's first voxel
-    rows: Tensor  # [n, 4, 16 or 32]; the first is that of voxels without one
+    rows: Tensor  # [n, 4, 16 or 32]; the first stands for voxels without one
     density: Tensor  # [n] as in the rows
-    occupied: Tensor  # [X / 4, Y / 4, Z / 4] int64: cells that can show something, by their lowest voxel
+    occupied: Tensor  # [X / 4, Y / 4, Z / 4] int64: cells with visible density, by their lowest voxel
     distance: Tensor  # [X / 4, Y / 4, Z / 4] uint8: blocks to the next such cell
 
     @property
     def size(self) -> tuple[int, int, int]:
-        """Voxels along x, y and z, with a row or without."""
+        """Number of voxels along x, y and z, including empty ones."""
         x, y, z = (4 * side for side in self.masks.shape)
         return x, y, z
 
@@ -59,22 +59,22 @@ class VoxelGrid:
 
     def __len__(self) -> int:
         """Return the number of voxels with a row."""
-        return len(self.rows) - EMPTY
+        return len(self.rows) - EMPTY_ROWS
 
     def structure(self) -> native.Struct:
-        """Return the grid as the library takes it."""
+        """Return the grid as a structure of the library."""
         lattice = (self.size, self.lower, self.spacing, self.degree, len(self.rows))
         found = (self.masks, self.first, self.occupied, self.distance)
         return NativeGrid(*lattice, *found, self.rows, self.density)
 
     @torch.no_grad()
     def refresh(self) -> None:
-        """Bring density and occupancy up to date with the rows."""
+        """Update density and occupancy from the rows."""
         self.density.copy_(self.rows[:, 3])
         self.refresh_occupancy()
 
     def refresh_occupancy(self) -> None:
-        """Find the cells that can show something, where the density is up to date."""
+        """Update the occupied cells from the density."""
         native.call(
             "texgs_grid_occupy", self.structure(), self.occupied, self.distance, device=self.rows.device
         )
@@ -105,13 +105,13 @@ class VoxelGrid:
 
     def links(self) -> Tensor:
         """Return [X, Y, Z] int32: the row of each voxel, 0 where it has none."""
-        bits = unpacked(self.masks)  # [X / 4, Y / 4, Z / 4, 64]
+        bits = unpack_masks(self.masks)  # [X / 4, Y / 4, Z / 4, 64]
         rows = self.first[..., None] + bits.cumsum(-1, dtype=torch.int32) - 1
         return lattice_of((rows * bits).int())
 
     def points(self) -> Tensor:
         """Return the world positions [n - 1, 3] of the voxels that have a row, in their order."""
-        block, bit = unpacked(self.masks).flatten(0, 2).nonzero().unbind(1)
+        block, bit = unpack_masks(self.masks).flatten(0, 2).nonzero().unbind(1)
         _, columns, depth = self.masks.shape
         corner = torch.stack([block // (columns * depth), block // depth % columns, block % depth], dim=1)
         inside = torch.stack([bit // 16, bit // 4 % 4, bit % 4], dim=1)
@@ -119,7 +119,7 @@ class VoxelGrid:
 
 
 def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int = 2) -> VoxelGrid:
-    """Return a grid whose rows are 0: no density, and grey.
+    """Make a grid of zero rows: no density, and grey.
 
     Args:
         mask: [X, Y, Z] bool, voxels that have a row; sides are multiples of 4 from 8 to 1024.
@@ -142,9 +142,9 @@ def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int
     bits = _blocks(mask)  # [X / 4, Y / 4, Z / 4, 64]
     masks = (bits.long() << torch.arange(64, device=mask.device)).sum(-1)
     counts = bits.sum(-1)
-    first = (counts.flatten().cumsum(0).reshape(counts.shape) - counts + EMPTY).int()
+    first = (counts.flatten().cumsum(0).reshape(counts.shape) - counts + EMPTY_ROWS).int()
     x, y, z = map(float, lower)
-    rows = torch.zeros(int(counts.sum()) + EMPTY, FLOATS[degree], device=mask.device)
+    rows = torch.zeros(int(counts.sum()) + EMPTY_ROWS, FLOATS[degree], device=mask.device)
     empty = torch.zeros_like(masks)
     grid = VoxelGrid(
         (x, y, z), float(spacing), masks, first, rows, rows.new_zeros(len(rows)), empty, empty.to(torch.uint8)
@@ -154,7 +154,7 @@ def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int
 
 
 def pack_rows(density: Tensor, sh: Tensor) -> Tensor:
-    """Return the rows [n, 4, 16 or 32] of densities [n] and coefficients [n, 1, 4 or 9, 3].
+    """Pack densities [n] and coefficients [n, 1, 4 or 9, 3] into rows [n, 4, 16 or 32].
 
     A row is quadruples (red, green, blue, extra), one a coefficient. The first extra is the density; those of
     the second, third and fourth are the ninth coefficient.
@@ -169,7 +169,7 @@ def pack_rows(density: Tensor, sh: Tensor) -> Tensor:
 
 
 def unpack_rows(rows: Tensor) -> tuple[Tensor, Tensor]:
-    """Return densities [n] and coefficients [n, 1, 4 or 9, 3] of rows: what `pack_rows` has put together."""
+    """Unpack rows into densities [n] and coefficients [n, 1, 4 or 9, 3]; inverts `pack_rows`."""
     quads = rows.unflatten(1, (-1, 4))  # [n, K / 4, 4]
     sh = quads[:, :, :3]
     if quads.shape[1] == 8:
@@ -178,7 +178,7 @@ def unpack_rows(rows: Tensor) -> tuple[Tensor, Tensor]:
 
 
 @torch.no_grad()
-def recolored(grid: VoxelGrid, matrix: Tensor, offset: Tensor) -> VoxelGrid:
+def recolor(grid: VoxelGrid, matrix: Tensor, offset: Tensor) -> VoxelGrid:
     """Return a grid whose every colour c is matrix @ c + offset, wherever neither is clamped to 0.
 
     Colour is 0.5 + Y00 s_0 + sum_k Y_k s_k. So the coefficients s_k become A s_k, and s_0 becomes
@@ -196,14 +196,14 @@ def recolored(grid: VoxelGrid, matrix: Tensor, offset: Tensor) -> VoxelGrid:
 
 @torch.no_grad()
 def drop_sh(grid: VoxelGrid) -> VoxelGrid:
-    """Return a grid with the zeroth harmonic alone: colours that are the same from everywhere."""
+    """Return a grid with the zeroth harmonic only: the same colour from all directions."""
     return grid.with_rows(grid.rows[:, :4])
 
 
 def interpolate_rows(grid: VoxelGrid, points: Tensor, out: Tensor | None = None) -> Tensor:
     """Return the trilinear rows [m, K] at world points [m, 3], in `out` if it is given.
 
-    Outside of the lattice they are the first one.
+    Points outside of the lattice get the first row.
     """
     links = grid.links()
     out = points.new_empty(len(points), grid.rows.shape[1]) if out is None else out
@@ -235,6 +235,6 @@ def lattice_of(blocks: Tensor) -> Tensor:
     return blocks.reshape(x, y, z, 4, 4, 4).permute(0, 3, 1, 4, 2, 5).reshape(4 * x, 4 * y, 4 * z)
 
 
-def unpacked(masks: Tensor) -> Tensor:
+def unpack_masks(masks: Tensor) -> Tensor:
     """Return the bits of int64 masks [...], [..., 64] bool."""
     return (masks[..., None] >> torch.arange(64, device=masks.device) & 1).bool()

@@ -1,4 +1,4 @@
-"""What changes the rows of a voxel grid: lazy optimisers and total variation."""
+"""Updates of a voxel grid's rows: lazy optimisers and total variation."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from texgs.raster.voxel_grid import NativeGrid, VoxelGrid
 from texgs.raster.voxels import RowGradient
 
 EPSILON = 1e-8
-BETAS = {"rmsprop": (0.0, 0.95), "adam": (0.9, 0.99)}  # of means of gradients and of their squares
+BETAS = {"rmsprop": (0.0, 0.95), "adam": (0.9, 0.99)}  # decay of the means of gradients and of their squares
 NativeRule = native.struct("texgs_rule", "f rate_density rate_base rate_sh beta1 beta2 epsilon")
 native.declare("texgs_grid_total_variation", NativeGrid, "np ff pp")
 native.declare("texgs_grid_step", NativeGrid, NativeRule, "pppp")
@@ -23,12 +23,12 @@ class VoxelRates:
     """Learning rates of one step."""
 
     density: float
-    base: float  # of the zeroth spherical harmonic
-    sh: float  # of the others
+    base: float  # rate of the zeroth spherical harmonic
+    sh: float  # rate of the higher ones
 
 
 class VoxelOptimizer:
-    """RMSProp as in Plenoxels, or Adam, on the rows that have a gradient; all others stay as they are.
+    """RMSProp as in Plenoxels, or Adam, on the rows with a gradient; all others stay unchanged.
 
     Running means start at the first gradient of a row and its square, so that the first step of each float
     is its rate, and no correction is needed. The rows of the grid change in place; its density follows them,
@@ -45,11 +45,11 @@ class VoxelOptimizer:
         self.second = torch.zeros_like(grid.rows)
 
     def step(self, rates: VoxelRates) -> None:
-        """Move the rows that have a gradient, and forget it."""
+        """Update the rows with a gradient, and clear it."""
         rule = NativeRule(rates.density, rates.base, rates.sh, *self.betas, EPSILON)
         state = (self.gradient.rows, self.gradient.touched, self.first, self.second)
         native.call("texgs_grid_step", self.grid.structure(), rule, *state, device=self.grid.rows.device)
-        torch.autograd.graph.increment_version(self.grid.rows)  # autograd sees no writes of the library
+        torch.autograd.graph.increment_version(self.grid.rows)  # autograd cannot see writes by the library
 
 
 def add_total_variation(

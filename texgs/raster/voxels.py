@@ -1,4 +1,4 @@
-"""Rays through a sparse voxel grid: blended, differentiable in its rows, or as the points they sample."""
+"""Rays through a sparse voxel grid: blended samples, differentiable in the rows, or the sample points."""
 
 from ctypes import byref, c_int64
 from dataclasses import dataclass, replace
@@ -37,7 +37,7 @@ class March:
     """[2, N] in lengths of a ray's direction: samples count from the first on and before the second."""
 
     def structure(self, rays: Tensor) -> native.Struct:
-        """Return the march along rays [N, 6] as the library takes it."""
+        """Return the march along rays [N, 6] as a structure of the library."""
         require({"rays": (rays, "N 6"), "depth_range": (self.depth_range, "2 N")}, constant=("depth_range",))
         depth_range = None if self.depth_range is None else self.depth_range.contiguous()
         sampling = (self.background, self.step, self.transmittance_min)
@@ -45,7 +45,7 @@ class March:
 
 
 class Rays(NamedTuple):
-    """What rays bring back."""
+    """The blended result of rays."""
 
     color: Tensor  # [N, 3] over the background
     alpha: Tensor  # [N]
@@ -55,7 +55,7 @@ class Rays(NamedTuple):
 class RowGradient:
     """The gradient of a grid's rows, gathered over calls until an optimiser takes it.
 
-    A dense gradient is as large as the grid; this one is cleared where it was written, and nowhere else.
+    A dense gradient is as large as the grid; this one is cleared only where it was written.
     """
 
     def __init__(self, grid: VoxelGrid) -> None:
@@ -105,14 +105,14 @@ class Samples:
         self.call("texgs_grid_mark", weights)
 
     def call(self, name: str, *arguments: Tensor | None) -> None:
-        """Call a function of the library for the samples, which were kept."""
+        """Call a function of the library on the kept samples."""
         if not self.handle.pointer:
             raise ArgumentError("samples: expected those that were kept, got none; march with keep=True")
         with self.handle.lock:
             native.call(name, self.handle.pointer, *self._structures(), *arguments, device=self.rays.device)
 
     def _structures(self) -> tuple[native.Struct, native.Struct]:
-        """Return the grid and the march as the library takes them."""
+        """Return grid and march as structures of the library."""
         return self.grid.structure(), self.march.structure(self.rays)
 
 
@@ -166,7 +166,7 @@ class _Render(torch.autograd.Function):
     ) -> tuple[Tensor, Tensor, Tensor]:
         out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
         ctx.samples = Samples(grid, march, rays, out, keep)
-        ctx.save_for_backward(rows)  # autograd refuses a backward pass after they were changed
+        ctx.save_for_backward(rows)  # autograd refuses a backward pass after a change in place
         ctx.mark_non_differentiable(out.distance)
         ctx.set_materialize_grads(False)
         return out.color, out.alpha, out.distance

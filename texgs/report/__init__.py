@@ -1,1 +1,1 @@
-"""Tables and figures, made from the files of jobs and nothing else."""
+"""Tables and figures, made only from the files of jobs."""

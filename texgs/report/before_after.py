@@ -1,4 +1,4 @@
-"""Pictures of an edit: the scene before and after it, and the losses on the way."""
+"""Pictures of an edit: the scene before and after, and the losses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,20 +17,24 @@ from texgs.scene.scene import Scene
 from texgs.volume.cameras import FRONT, orbit_path
 
 POLAR = 20.0  # degrees
-SHOWN = 3  # views around the object
-SIDE = Light("directional", -30.0, 40.0)  # a light that no edit has seen
+VIEW_COUNT = 3  # around the object
+SIDE_LIGHT = Light("directional", -30.0, 40.0)  # a light that no edit has seen
 SIZE = 512  # pixels of a picture
-TURN = 36  # frames of the turntable
+TURNTABLE_FRAMES = 36  # frames of the turntable
 
 
 def write_before_and_after(
     before: Scene, after: Scene, kind: Kind, lens: Lens, output: Path, device: torch.device, title: str
 ) -> None:
     """Write edit.png, views of both, under another light where they can be relit too, and turntable.mp4."""
-    cameras = orbit_path(SHOWN, POLAR, lens.square(SIZE))
-    lights, titles = [before.light] * SHOWN, [f"view {index + 1}" for index in range(SHOWN)]
+    cameras = orbit_path(VIEW_COUNT, POLAR, lens.square(SIZE))
+    lights, titles = [before.light] * VIEW_COUNT, [f"view {index + 1}" for index in range(VIEW_COUNT)]
     if "relight" in kind.can:
-        cameras, lights, titles = [*cameras, cameras[0]], [*lights, SIDE], [*titles, "light from the side"]
+        cameras, lights, titles = (
+            [*cameras, cameras[0]],
+            [*lights, SIDE_LIGHT],
+            [*titles, "light from the side"],
+        )
     scenes = {"before": before, "after": after}
     rows = {}
     for name, scene in scenes.items():
@@ -38,14 +42,17 @@ def write_before_and_after(
         shown = frames_of(scene, seen, device)
         rows[name] = list(progress(shown, len(cameras), title=f"{title}, {name}", unit="picture"))
     write_grid(output / "edit.png", rows, titles)
-    film, turned = Film(what="orbit", frames=TURN, azimuth=FRONT, polar=POLAR), lens.square(kind.film_size)
+    film, turned = (
+        Film(what="orbit", frames=TURNTABLE_FRAMES, azimuth=FRONT, polar=POLAR),
+        lens.square(kind.film_size),
+    )
     halves = [frames_of(scene, film.shots(scene, lens=turned), device) for scene in scenes.values()]
     frames = (np.concatenate(pair, axis=1) for pair in zip(*halves, strict=True))
     film.write(output / "turntable.mp4", frames, title=f"{title}, turntable")
 
 
 def write_convergence(path: str | Path, curves: Mapping[str, Mapping[str, Sequence[float]]]) -> Path:
-    """Write a PNG with the weighted losses of an edit over its iterations, by term, by what was edited."""
+    """Write a PNG of an edit's weighted losses over its iterations, by part and term."""
     figure = new_figure(8, 3.2, 120)
     axes = figure.subplots()
     axes.set(xlabel="iterations, one view each", ylabel="loss of one view")

@@ -1,4 +1,4 @@
-"""A view of a scene beside its volume, or as fitted: both, their difference, and how close they are."""
+"""A view of a scene beside its volume or its fit: both pictures, their difference, and scores."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,12 +7,16 @@ import numpy as np
 from texgs.core.figures import CELL, DPI, Cell, Row, Scale, as_picture, lay_out
 from texgs.metrics.quality import compare
 from texgs.raster import Render
-from texgs.report.fit_figure import DIVERGING, MAGNIFIED, signed_error
+from texgs.report.fit_figure import DIVERGING, ERROR_GAIN, signed_error
 
-KEPT = {"depth": "depth", "normal": "normal", "opacity": "alpha"}  # what new looks leave alone, in a render
+KEPT_IMAGES = {
+    "depth": "depth",
+    "normal": "normal",
+    "opacity": "alpha",
+}  # images that new looks do not change, in a render
 
 
-def pictures(image: Render, truth: Render, gain: float = MAGNIFIED) -> dict[str, np.ndarray]:
+def pictures(image: Render, truth: Render, gain: float = ERROR_GAIN) -> dict[str, np.ndarray]:
     """Return scene, volume and error [H, W, 3] in [0, 1] by these names.
 
     The error is that of the worst channel, enlarged by the gain: red where the scene is too bright, blue
@@ -24,7 +28,7 @@ def pictures(image: Render, truth: Render, gain: float = MAGNIFIED) -> dict[str,
 
 
 def scale_of(gain: float) -> Scale:
-    """Return which colours stand for which errors."""
+    """Return the colour scale of errors."""
     return Scale(-1 / gain, 1 / gain, DIVERGING)
 
 
@@ -37,34 +41,34 @@ def side_by_side(
     """
     scores, shown = compare(image, truth), pictures(image, truth, gain)
     both = (shown["scene"], shown["volume"])
-    cells = [Cell(*each) for each in zip(titles, both, in_words(scores), strict=True)]
+    cells = [Cell(*each) for each in zip(titles, both, score_words(scores), strict=True)]
     cells.append(Cell(f"difference × {gain:g}", shown["error"], scale=scale_of(gain)))
     figure = lay_out([Row("", cells)])
     figure.set_dpi(max(DPI, image.color.shape[1] / CELL))
     return np.asarray(as_picture(figure).convert("RGB")), scores
 
 
-def in_words(scores: Mapping[str, float]) -> tuple[str, str]:
-    """Return the scores of `compare`: on the object, if there is one, and of the whole picture."""
+def score_words(scores: Mapping[str, float]) -> tuple[str, str]:
+    """Format the scores of `compare`: on the object, if any, and of the whole picture."""
     whole = "whole picture: {psnr:.2f} dB, SSIM {ssim:.4f}".format(**scores)
     if "object_psnr" not in scores:
         return "no object in view", whole
     return "PSNR on the object {object_psnr:.2f} dB, SSIM {object_ssim:.4f}".format(**scores), whole
 
 
-def changed(image: Render, fitted: Render) -> dict[str, float]:
-    """Return the largest difference of a colour, and in how many pixels depth, normals, opacity differ."""
+def changes_of(image: Render, fitted: Render) -> dict[str, float]:
+    """Return the largest difference of a colour, and numbers of pixels with other depth, normal, opacity."""
     told = {"colour": float((image.color - fitted.color).abs().max())}
-    for title, name in KEPT.items():
+    for title, name in KEPT_IMAGES.items():
         now, before = getattr(image, name), getattr(fitted, name)
         if now is not None and before is not None:
             told[title] = float((now != before).reshape(*image.alpha.shape, -1).any(dim=-1).sum())
     return told
 
 
-def what_changed(told: Sequence[Mapping[str, float]]) -> str:
-    """Say what edits changed of all views; see `changed`."""
-    total = {title: sum(view[title] for view in told) for title in KEPT if title in told[0]}
+def change_words(told: Sequence[Mapping[str, float]]) -> str:
+    """Describe the changes of all views by edits; see `changes_of`."""
+    total = {title: sum(view[title] for view in told) for title in KEPT_IMAGES if title in told[0]}
     kept = ", ".join(title for title, pixels in total.items() if not pixels)
     other = [f"{pixels:.0f} pixels have another {title}" for title, pixels in total.items() if pixels]
     words = [f"colours differ by {max(view['colour'] for view in told):.3f} at most", *other]

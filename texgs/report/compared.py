@@ -14,22 +14,23 @@ from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.metrics.quality import compare, mean
 from texgs.raster import Render
-from texgs.report.beside_volume import changed, in_words, pictures, side_by_side, what_changed
-from texgs.report.results import COMPARED, Comparison
-from texgs.scene.cut_view import beside, beside_fitted
+from texgs.report.beside_volume import change_words, changes_of, pictures, score_words, side_by_side
+from texgs.report.results import COMPARED_VIEWS, ViewComparison
+from texgs.scene.cut_view import scene_and_fitted, scene_and_volume
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
 
-LARGEST_GAIN = 16.0
-POLAR = 20.0  # of the views that are compared, degrees
-LEFT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
-SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in the paper's figure, degrees
+MAX_GAIN = 16.0
+POLAR = 20.0  # polar angle of compared views, degrees
+LEFT_LIGHT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
+# Polar angles of the light in the paper's figure, degrees.
+SWEEP_ANGLES = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)
 
 
 def mean_scores(pairs: Iterable[tuple[Render, Render]]) -> dict[str, float]:
-    """Return the means over pairs of pictures of what `texgs.metrics.quality.compare` measures."""
+    """Return the means of `texgs.metrics.quality.compare` over pairs of pictures."""
     measured = defaultdict[str, list[float]](list)
     for image, truth in pairs:
         for name, value in compare(image, truth).items():
@@ -39,23 +40,23 @@ def mean_scores(pairs: Iterable[tuple[Render, Render]]) -> dict[str, float]:
 
 def compare_views(
     title: str, scene: Scene, composition: Composed, twin: Twin | None, cameras: Sequence[Camera]
-) -> tuple[Comparison, dict[str, np.ndarray]]:
+) -> tuple[ViewComparison, dict[str, np.ndarray]]:
     """Return PSNR and SSIM against the volume over some views, and all pictures [H, W, 3] of the first."""
     if twin is None:
-        return Comparison(title), {"scene": frame(composition, cameras[0], scene)}
+        return ViewComparison(title), {"scene": frame(composition, cameras[0], scene)}
     shown: dict[str, np.ndarray] = {}
 
     def pairs() -> Iterator[tuple[Render, Render]]:
         for camera in cameras:
-            pair = beside(composition, camera, scene, twin)
+            pair = scene_and_volume(composition, camera, scene, twin)
             shown.update({} if shown else pictures(*pair))
             yield pair
 
-    return Comparison(title, **mean_scores(pairs())), shown
+    return ViewComparison(title, **mean_scores(pairs())), shown
 
 
 class SideBySide:
-    """Frames of a scene, its volume or what it was as fitted, and their difference; and what differs in all.
+    """Frames of a scene, its volume or its fit, and their difference; and a summary of all differences.
 
     Args:
         session: of the scene.
@@ -64,15 +65,15 @@ class SideBySide:
     """
 
     def __init__(self, session: Session, other: str, gain: float) -> None:
-        if not 1 <= gain <= LARGEST_GAIN:
-            raise ArgumentError(f"gain: expected 1 to {LARGEST_GAIN:g}, got {gain:g}")
+        if not 1 <= gain <= MAX_GAIN:
+            raise ArgumentError(f"gain: expected 1 to {MAX_GAIN:g}, got {gain:g}")
         if session.scene.shows_volume and other == "volume":
             raise ArgumentError(
                 "compare: expected a scene of models, got a cut one that shows its volume; take cuts back by "
                 "texgs edit, or compare it with what was fitted"
             )
         if other == "volume":
-            session.twin_of(session.scene)  # what is wrong with its volume is told now
+            session.twin_of(session.scene)  # reports errors of its volume now
         self._session, self._gain, self._is_fitted = session, gain, other == "fitted"
         self._scores, self._changes = defaultdict[str, list[float]](list), list[dict[str, float]]()
 
@@ -84,27 +85,30 @@ class SideBySide:
             picture, scores = side_by_side(image, truth, self._gain, titles)
             for name, value in scores.items():
                 self._scores[name].append(value)
-            self._changes.append(changed(image, truth))
+            self._changes.append(changes_of(image, truth))
             yield picture
 
     @property
     def sentences(self) -> list[str]:
-        """Return the means of PSNR and SSIM so far, and what edits have changed."""
-        return [", ".join(in_words(mean(self._scores))), *([what_changed(self._changes)] * self._is_fitted)]
+        """Return the means of PSNR and SSIM so far, and the changes by edits."""
+        return [
+            ", ".join(score_words(mean(self._scores))),
+            *([change_words(self._changes)] * self._is_fitted),
+        ]
 
     def _pair(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
-        """Return a view of a scene, and what it is compared with."""
+        """Render a view of a scene, and its counterpart."""
         if not self._is_fitted:
             return self._session.beside(camera, scene)
         can = kind_of(next(iter(scene.models.values())).file).can
         outputs = ("depth", "normal") if "normals" in can else ("depth",)
         now, before = (self._session.composition_of(each) for each in (scene, scene.as_fitted))
-        return beside_fitted(now, before, camera, scene, outputs)
+        return scene_and_fitted(now, before, camera, scene, outputs)
 
 
-def caption(entry: Comparison) -> str:
-    """Return the title of a picture, with the mean PSNR of all views where it was measured."""
-    measured = "" if entry.psnr is None else f"\nmean of {COMPARED} views: {entry.psnr:.1f} dB"
+def caption(entry: ViewComparison) -> str:
+    """Return the title of a picture, with the mean PSNR of all views, if measured."""
+    measured = "" if entry.psnr is None else f"\nmean of {COMPARED_VIEWS} views: {entry.psnr:.1f} dB"
     return entry.title + measured
 
 
@@ -126,19 +130,19 @@ def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str
         changes.append(("+ k_a x 0.7, k_d x 1.2, k_s x 2", dict.fromkeys(names, magnitude)))
     for title, change in changes:
         scene = steps[title] = with_edits(scene, change)
-    return {**steps, "+ light from the left": replace(scene, light=Light("directional", *LEFT))}
+    return {**steps, "+ light from the left": replace(scene, light=Light("directional", *LEFT_LIGHT))}
 
 
 def light_sweep(scene: Scene) -> dict[str, Scene]:
     """Return the scene under a light that moves from below the object to above it, by title."""
     return {
         f"light at (-90°, {polar:g}°)": replace(scene, light=Light("directional", -90.0, polar))
-        for polar in SWEEP
+        for polar in SWEEP_ANGLES
     }
 
 
 def with_edits(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
-    """Return the scene with edits of some models changed."""
+    """Return the scene with changed edits of some models."""
     session = Session(scene)
     for part, values in changes.items():
         for key, value in values.items():

@@ -1,4 +1,4 @@
-"""Table `differences`: where recipes and edits are not as in the paper, by their values."""
+"""Table `differences`: values of recipes and edits that differ from the paper."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,7 +17,7 @@ from texgs.report.results import EditResult, FitResult, SheetResult
 from texgs.report.table import Column, Table, report_file
 
 COLUMNS = tuple(map(Column, ("what", "the paper", "here", "in", "where the paper says it")))
-ALL = "all"  # of what no key expresses
+NO_KEY = "all"  # in rows that no key expresses
 CAPTION = (
     "Keys whose values in conf/ are not those of the paper, for the recipes and edits of this report, and "
     "what no key expresses. What a run overrides is not told here."
@@ -26,17 +26,17 @@ CAPTION = (
 
 @dataclass(frozen=True)
 class Claim:
-    """What the paper does, by the key that stands for it."""
+    """A value in the paper, with its key here."""
 
     key: str  # such as fit.texture.rate; edit.METHOD.recipe.NAME is a number of an edit's recipe
     paper: Any  # its value
     where: str  # the paper's section
-    of: str | None = None  # key that is 0 where this has no meaning
+    of: str | None = None  # key whose 0 makes this one meaningless
 
 
 @dataclass(frozen=True)
 class Other:
-    """What the paper does otherwise and no key expresses, in words."""
+    """A difference that no key expresses, in words."""
 
     what: str
     paper: str
@@ -46,7 +46,7 @@ class Other:
 
 @dataclass(frozen=True)
 class Count:
-    """How many views the paper has."""
+    """Numbers of views in the paper."""
 
     what: str
     paper: int
@@ -55,7 +55,7 @@ class Count:
 
 @dataclass(frozen=True)
 class Published:
-    """The paper's method: what a configuration can be compared with, and the rest."""
+    """The paper's method: values to compare with configurations, and other facts."""
 
     views: list[Count]
     keys: list[Claim]
@@ -64,7 +64,7 @@ class Published:
 
 @cache
 def published() -> Published:
-    """Read what the paper says from recipe.yaml."""
+    """Read the paper's method from recipe.yaml."""
     return typed(Published, parse_yaml(report_file("paper/recipe.yaml")))
 
 
@@ -73,7 +73,7 @@ def differences(
     edits: Sequence[str] = (),
     views: Mapping[str, Mapping[int, Sequence[str]]] | None = None,
 ) -> Table:
-    """Return the table of what differs from the paper; a difference that several files share is one row.
+    """Return the table of differences from the paper; a difference shared by several files is one row.
 
     Names without a file in conf/, such as variants of a sweep, are left out, and so is what has nothing to
     compare: fits of other fields than surfels, and edits by methods that are not the paper's.
@@ -86,8 +86,8 @@ def differences(
     names: dict[tuple[str, str], list[str]] = defaultdict(list)  # by key and value here
     for group, given in (("fit", recipes), ("edit", edits)):
         for name in [name for name in given if name in members(group)]:
-            for claim, here in compared(group, name):
-                if plain(here) != plain(claim.paper):
+            for claim, here in claims_and_values(group, name):
+                if plain_value(here) != plain_value(claim.paper):
                     names[claim.key, text(here)].append(name)
     rows = [
         (count.what, text(count.paper), text(here), ", ".join(some), count.where)
@@ -101,13 +101,13 @@ def differences(
         for (key, here), some in names.items()
         if key == claim.key
     ]
-    rows += [(each.what, each.paper, each.here, ALL, each.where) for each in published().others]
+    rows += [(each.what, each.paper, each.here, NO_KEY, each.where) for each in published().others]
     titles = [column.title for column in COLUMNS]
     return Table(CAPTION, COLUMNS, [dict(zip(titles, row, strict=True)) for row in rows])
 
 
 def differences_of(records: Sequence[Record[Any]]) -> Table:
-    """Return where the recipes and edits of some jobs differ from the paper; no rows where there are none."""
+    """Return the differences of some jobs' recipes and edits from the paper; perhaps no rows."""
     recipes = sorted({record.recipe for record in of(FitResult, records)})
     edits = sorted({record.result.edit for record in of(EditResult, records)})
     table = differences(recipes, edits, views_of(records))
@@ -115,7 +115,7 @@ def differences_of(records: Sequence[Record[Any]]) -> Table:
 
 
 def views_of(records: Sequence[Record[Any]]) -> dict[str, dict[int, list[str]]]:
-    """Return numbers of training and test views, each with the data sets that have so many."""
+    """Return numbers of training and test views, each with its data sets."""
     views: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
     for record in of(SheetResult, records):
         for what, count in (("training views", record.result.train), ("test views", record.result.test)):
@@ -123,8 +123,8 @@ def views_of(records: Sequence[Record[Any]]) -> dict[str, dict[int, list[str]]]:
     return {what: {n: sorted(names) for n, names in counts.items()} for what, counts in views.items()}
 
 
-def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
-    """Yield claims of the paper that a file of conf/ can be compared with, each with the value there."""
+def claims_and_values(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
+    """Yield the paper's claims that apply to a file of conf/, each with the file's value."""
     config, prefix, numbers = preset(group, name), "fit.", dict[str, Any]()
     if group == "edit" and config.edit.method != NO_METHOD:
         method = method_of(config.edit)
@@ -141,13 +141,13 @@ def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
             yield claim, value(claim.key)
 
 
-def plain(value: Any) -> Any:
-    """Return a value to compare: sequences of any kind as lists."""
+def plain_value(value: Any) -> Any:
+    """Return a comparable value: sequences of any kind as lists."""
     return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
 
 
 def text(value: Any) -> str:
-    """Return a value as files of conf/ have it."""
+    """Format a value as in files of conf/."""
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
     if isinstance(value, float):

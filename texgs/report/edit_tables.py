@@ -1,4 +1,4 @@
-"""Tables of edits: the paper's comparisons, of those with the key `compared`, and `looks`, which has all."""
+"""Tables of edits: the paper's comparisons of edits with the key `compared`, and `looks` of all edits."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -8,13 +8,13 @@ from texgs.fields.kinds import kinds
 from texgs.metrics.metric import Measure, metrics
 from texgs.models.pictures import PICTURES
 from texgs.report.metrics_files import Record, of
-from texgs.report.published import DATA, LABEL, THEIRS, cells, in_order, mean_rows, paper, paper_file
+from texgs.report.published import DATA, LABEL, PAPER_LABEL, cells, in_order, mean_rows, paper, paper_file
 from texgs.report.results import EditMeasures, EditResult
-from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table
+from texgs.report.table import SOURCES, UNPUBLISHED_CELL, Column, Table
 
 MINUTES = Measure("minutes", "minutes", 2, "down", "editing_min")
-LABELS = (*map(Column, (DATA, LABEL, "edit", "method")), Column("pixels", None, UNPUBLISHED))
-PAPER = {  # its tables and their images, by what edits follow
+LABELS = (*map(Column, (DATA, LABEL, "edit", "method")), Column("pixels", None, UNPUBLISHED_CELL))
+PAPER = {  # the paper's tables and their image sizes, by what edits follow
     "style": ("image_npse", "800x800"),
     "instruction": ("text_npse", "512x512"),
 }
@@ -26,24 +26,24 @@ CAPTION = (
     "Sizes are those of the paper's tables of edits, with 100 bytes for each surfel beside its texels. "
     f"{CONSISTENCY} Mean rows count no stand-ins. Edits of no comparison are in the table of all edits."
 )
-NOT_ALIKE = (
+UNLIKE_NOTE = (
     "The paper's rows are means over four data sets on an RTX 4090. It publishes neither its pictures nor "
     "its instructions nor its transfer functions, so they stand by themselves."
 )
-ADAPTS = "adapts"  # method in mean rows over data sets where it works with different things
-FOLLOWED = ("style", "instruction", "")  # what edits follow, in the order of the table of all edits
+ADAPTS = "adapts"  # method in mean rows over data sets with different methods
+FOLLOW_ORDER = ("style", "instruction", "")  # what edits follow, in the order of the table of all edits
 Edit = Record[EditResult]
 Rows = list[dict[str, Any]]
 
 
 def measures() -> list[Measure]:
-    """Return what is measured of edits, in the order of columns."""
+    """Return the measures of edits, in column order."""
     listed = [(metric.order, measure) for metric in metrics().values() for measure in metric.measures]
     return [measure for _, measure in sorted([*listed, (20, MINUTES)], key=lambda each: each[0])]
 
 
 def paper_measures(follows: str) -> list[Measure]:
-    """Return the columns of one of the paper's tables in its order, then those that it has nowhere."""
+    """Return the columns of one of the paper's tables in its order, then the unpublished ones."""
     by_heading = {measure.published: measure for measure in measures()}
     own = [by_heading[heading] for heading in paper_file(PAPER[follows][0]) if heading in by_heading]
     more = [each for metric in metrics().values() if metric.is_in_paper for each in metric.measures]
@@ -51,7 +51,7 @@ def paper_measures(follows: str) -> list[Measure]:
 
 
 def image_driven(records: Iterable[Record[Any]]) -> Table:
-    """Return the comparison of edits by pictures, of which the paper measures no CLIP scores."""
+    """Return the comparison of edits by pictures, for which the paper has no CLIP scores."""
     return comparison("style", compared_rows(records, "style"), paper_measures("style"))
 
 
@@ -63,7 +63,7 @@ def text_driven(records: Iterable[Record[Any]]) -> Table:
 
 
 def text_driven_frozen(records: Iterable[Record[Any]]) -> Table:
-    """Return the comparison of edits that keep geometry; none where only those do that always do."""
+    """Return the comparison of edits that keep geometry; empty if only methods that always keep it do."""
     rows = compared_rows(records, "instruction")
     kept = [row for row in rows if row["has_texture"] or row["is_kept"]]
     is_chosen = not all(row["has_texture"] for row in kept)
@@ -83,7 +83,7 @@ def looks(records: Iterable[Record[Any]]) -> Table:
         f"{len(PICTURES)} of texgs, by how near views are to each, less the mean over the scene's looks, two "
         f"at least: 1 is the nearest. {CONSISTENCY}"
     )
-    rows = sorted(rows_of(records), key=lambda row: FOLLOWED.index(row["kind"]))
+    rows = sorted(rows_of(records), key=lambda row: FOLLOW_ORDER.index(row["kind"]))
     labels = [*LABELS[:4], Column("follows"), Column("lambda_s", 2, "-")]
     columns = [Column(measure.title, measure.digits) for measure in measures()]
     own = notes(rows, [measure.title for measure in measures()])
@@ -91,23 +91,23 @@ def looks(records: Iterable[Record[Any]]) -> Table:
 
 
 def comparison(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
-    """Return rows of edits, means of those of one size, and the paper's rows of its own."""
+    """Return rows of edits, means over edits of one size, and the paper's own rows."""
     titles = [measure.title for measure in listed]
     columns = [Column(measure.title, measure.digits) for measure in listed]
     means = mean_rows(rows, (LABEL, "edit", "pixels", "device"), ["method", *titles])
     means = [{**row, "method": row["method"] or ADAPTS} for row in means]
     theirs = paper_rows(follows, listed) if rows and follows else []
-    sentences = [CAPTION, NOT_ALIKE, *notes(rows, titles)] if theirs else [CAPTION, *notes(rows, titles)]
+    sentences = [CAPTION, UNLIKE_NOTE, *notes(rows, titles)] if theirs else [CAPTION, *notes(rows, titles)]
     return Table(" ".join(sentences), [*LABELS, *columns], [*rows, *means, *theirs])
 
 
 def rows_of(records: Iterable[Record[Any]]) -> Rows:
-    """Return a row for each edit that is of no sweep, in the order of tables."""
+    """Return a row for each edit outside of sweeps, in table order."""
     return [row_of(*pair) for pair in pairs_of(in_order(each for each in records if not each.is_swept))]
 
 
 def pairs_of(records: Sequence[Record[Any]]) -> list[tuple[Edit, Record[EditMeasures] | None]]:
-    """Return each edit with what was measured of it, also among the looks of its scene."""
+    """Return each edit with its measures, including those among the looks of its scene."""
 
     def key(record: Record[Any]) -> tuple[str, str, str]:
         return record.dataset, record.label, record.result.edit
@@ -143,7 +143,7 @@ def row_of(edit: Edit, measured: Record[EditMeasures] | None) -> dict[str, Any]:
         "lambda_s": made.lambda_s,
         "device": edit.facts.get("device"),
         "pixels": f"{seen.width}x{seen.height}" if seen and seen.width else None,
-        "has_texture": field is not None and "texture" in field.can,  # geometry may stay anyway
+        "has_texture": field is not None and "texture" in field.can,  # then geometry can stay
         "is_kept": seen is not None and bool(seen.values.get("geometry_kept")),
         "values": seen.values if seen else {},
         **measured_cells(measures(), edit, measured),
@@ -153,7 +153,7 @@ def row_of(edit: Edit, measured: Record[EditMeasures] | None) -> dict[str, Any]:
 def measured_cells(
     listed: Iterable[Measure], edit: Edit, measured: Record[EditMeasures] | None
 ) -> dict[str, Any]:
-    """Return minutes and measures of an edit by the titles of columns, as tables say them, and its files."""
+    """Return minutes and measures of an edit by column title, and its files."""
     values = {"minutes": edit.result.edit_seconds / 60, **(measured.result.values if measured else {})}
     cells = {measure.title: (measure.words or {}, values.get(measure.name)) for measure in listed}
     files = [edit.path, measured.path] if measured else [edit.path]
@@ -161,7 +161,7 @@ def measured_cells(
 
 
 def words_of(followed: Mapping[str, str]) -> str:
-    """Return the picture or the words of an edit, once where all models follow the same."""
+    """Return the picture or the words of an edit, once if all models follow the same."""
     if len(set(followed.values())) == 1:
         return next(iter(followed.values()))
     return ", ".join(f"{name}: {value}" for name, value in followed.items()) or "-"
@@ -172,14 +172,14 @@ def paper_rows(follows: str, listed: Sequence[Measure]) -> list[dict[str, Any]]:
     name, pixels = PAPER[follows]
     numbers = {measure.published: measure.title for measure in listed if measure.published}
     lines = paper(name, {"method": "method"}, numbers)
-    lines = lines.astype(object).where(lines.notna(), UNPUBLISHED)
-    blank = dict.fromkeys([measure.title for measure in listed], UNPUBLISHED)
-    labels = {DATA: "mean of 4", LABEL: THEIRS, "edit": UNPUBLISHED, "pixels": pixels}
+    lines = lines.astype(object).where(lines.notna(), UNPUBLISHED_CELL)
+    blank = dict.fromkeys([measure.title for measure in listed], UNPUBLISHED_CELL)
+    labels = {DATA: "mean of 4", LABEL: PAPER_LABEL, "edit": UNPUBLISHED_CELL, "pixels": pixels}
     return [{**blank, **labels, **line} for line in lines.to_dict("records")]
 
 
 def notes(rows: Rows, titles: Collection[str]) -> list[str]:
-    """Return what metrics with all their columns there say beside numbers, such as which CLIP it was."""
+    """Return the notes of metrics with all columns in a table, such as the CLIP backbone."""
     return [
         sentence.format(value)
         for metric in metrics().values()

@@ -1,4 +1,4 @@
-"""Figures of fits beside views that they have not seen: one phase by phase with its maps, or several fits."""
+"""Figures of fits beside unseen views: one fit phase by phase with its maps, or several fits."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -20,17 +20,17 @@ from texgs.raster.shading import MATERIAL
 from texgs.volume.images import over_white, smaller
 from texgs.volume.view_set import View, ViewSet
 
-VISIBLE = 2 / 255  # alpha
-MAGNIFIED = 4  # a quarter of the range of colours has the full colour
+VISIBLE_ALPHA = 2 / 255  # alpha
+ERROR_GAIN = 4  # an error of a quarter has the full colour
 DIVERGING = "bwr"  # 0 is white
-ERROR = Scale(-1 / MAGNIFIED, 1 / MAGNIFIED, DIVERGING)  # red where too bright, blue where too dark
-MARGIN = 1.06  # side of the part that is shown, in sides of what is visible
+ERROR = Scale(-1 / ERROR_GAIN, 1 / ERROR_GAIN, DIVERGING)  # red where too bright, blue where too dark
+MARGIN = 1.06  # side of the shown crop, relative to the visible part
 KEY = Cell("", words="of the worst channel\nred: too bright\nblue: too dark")
 
 
 @torch.no_grad()
 def shown_views(views: ViewSet) -> dict[str, View]:
-    """Return two test views by the names that stand beside them; training views where there are none."""
+    """Return two test views by label, or training views without test views."""
     split, candidates = ("test", views.test) if views.test else ("training", views.train)
     return {f"{split} view {index}": candidates[index] for index in sorted({0, len(candidates) // 3})}
 
@@ -80,47 +80,47 @@ def write_comparison(
 
 
 def require_both(path: str | Path, models: Mapping[str, Field], views: Mapping[str, View]) -> None:
-    """Raise ArgumentError where there is no model or no view."""
+    """Raise ArgumentError without a model or a view."""
     if not views or not models:
         raise ArgumentError(f"{path}: expected models and views, got {len(models)} and {len(views)}")
 
 
 def lines(recipes: Sequence[str]) -> list[Sequence[str]]:
-    """Return the recipes in as few lines as there is room for beside a view, about as many in each."""
+    """Split the recipes into few lines of similar length that fit beside a view."""
     count = ceil(len(recipes) / (COLUMNS - 1))
     size = ceil(len(recipes) / count)
     return [recipes[first : first + size] for first in range(0, len(recipes), size)]
 
 
 def draw_visible(path: str | Path, rows: list[Row], visible: Tensor, title: str) -> Path:
-    """Draw of all cells the part around what is visible [H, W]."""
+    """Draw all cells, cropped around the visible part [H, W]."""
     box = frame(visible)
     return draw(path, [Row(row.name, [crop(cell, box) for cell in row.cells]) for row in rows], title)
 
 
 def compare(models: Mapping[str, Field], view: View, reduce: int) -> tuple[list[Cell], Tensor]:
-    """Return the cells of one view, and where it or one of its renderings shows something, [H, W]."""
+    """Return the cells of one view, and the mask [H, W] visible in it or one of its renderings."""
     planes = over_white(view, reduce)
-    truth, visible = planes[:3].permute(1, 2, 0), planes[3] > VISIBLE
+    truth, visible = planes[:3].permute(1, 2, 0), planes[3] > VISIBLE_ALPHA
     height, width = visible.shape
     cells = [Cell("ground truth", truth, f"PSNR over {width} × {height} pixels")]
     for phase, model in models.items():
         image = model.render(smaller(view.camera, reduce).to(model.device), view.light)
         color = image.color.cpu().clamp(0, 1)
-        visible = visible | (image.alpha.cpu() > VISIBLE)
+        visible = visible | (image.alpha.cpu() > VISIBLE_ALPHA)
         cells.append(Cell(phase, color, f"PSNR {psnr(color, truth):.2f} dB"))
-    cells.append(Cell(f"error × {MAGNIFIED} ({DIVERGING})", ERROR(signed_error(color, truth)), scale=ERROR))
+    cells.append(Cell(f"error × {ERROR_GAIN} ({DIVERGING})", ERROR(signed_error(color, truth)), scale=ERROR))
     return cells, visible
 
 
 def signed_error(image: Tensor, target: Tensor) -> Tensor:
-    """Return errors [H, W] of the channel that is farthest off; above 0 where the image is too bright."""
+    """Return signed errors [H, W] of the worst channel; positive if the image is too bright."""
     error = image - target
     return error.gather(2, error.abs().argmax(dim=2, keepdim=True))[..., 0]
 
 
 def maps(model: Field, view: View, reduce: int) -> list[Cell]:
-    """Return the cells of depth and alpha in one view; of surfels also normals and material."""
+    """Return the cells of depth and alpha in one view; for surfels also normals and material."""
     camera = smaller(view.camera, reduce).to(model.device)
     has_normals = isinstance(model, Surfels)
     image = model.render(camera, view.light, outputs=("normal", "depth") if has_normals else ("depth",))
@@ -137,7 +137,7 @@ def maps(model: Field, view: View, reduce: int) -> list[Cell]:
         lines = [f"{name:9} {value.item():6.3f}" for name, value in factors.items()]
         return [*cells, Cell("material of all surfels", words="\n".join(lines))]
     blended = model.rasterized(camera, features=features).color.cpu()
-    means = (blended / cover.clamp_min(1e-6)).unbind(dim=2)  # of the surfels that a pixel shows
+    means = (blended / cover.clamp_min(1e-6)).unbind(dim=2)  # over the surfels in a pixel
     return [*cells, *(map_cell(name, mean, alpha) for name, mean in zip(MATERIAL, means, strict=True))]
 
 
@@ -163,5 +163,5 @@ def frame(visible: Tensor) -> tuple[slice, slice]:  # [H, W]
 
 
 def crop(cell: Cell, box: tuple[slice, slice]) -> Cell:
-    """Return the part of a cell's picture in a box."""
+    """Crop a cell's picture to a box."""
     return cell if cell.pixels is None else replace(cell, pixels=cell.pixels[box])

@@ -7,12 +7,12 @@ from texgs.fitting.kinds import fit_specs
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import DATA, LABEL, beside_paper, cells, in_order, is_alike, rank
 from texgs.report.results import FitResult, MeshResult
-from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table, columns
+from texgs.report.table import SOURCES, UNPUBLISHED_CELL, Column, Table, columns
 
 Run = dict[str, Record[FitResult]]  # a fit by its phases
-ON_OBJECT = Column("PSNR on the object", 2)
-SHOWN = Column("share shown", 4)
-RELIT = Column("PSNR under unseen lights", 2, UNPUBLISHED)  # after the last phase
+OBJECT_PSNR = Column("PSNR on the object", 2)
+SHOWN_SHARE = Column("share shown", 4)
+RELIT_PSNR = Column("PSNR under unseen lights", 2, UNPUBLISHED_CELL)  # after the last phase
 VARIANTS = {  # heading of the variants of each sweep, and the heading in the paper's file
     "views": ("training views", "views"),
     "resolution": ("pixels", "image_px"),
@@ -20,7 +20,7 @@ VARIANTS = {  # heading of the variants of each sweep, and the heading in the pa
 
 
 def phase_rows(records: Iterable[Record[Any]]) -> list[dict[str, Any]]:
-    """Return the phases of fits that are of no sweep, by data set, label and order; unknown ones last."""
+    """Return the phases of fits outside of sweeps, by data set, label and order; unknown ones last."""
     phases = [phase for kind in fit_specs().values() for phase in kind.phases]
     order = {phase: place for place, phase in enumerate(phases)}
     unswept = [record for record in of(FitResult, records) if not record.is_swept]
@@ -30,14 +30,14 @@ def phase_rows(records: Iterable[Record[Any]]) -> list[dict[str, Any]]:
         result, gpu = record.result, record.result.peak_gpu_memory_mib
         numbers = {
             "PSNR": result.psnr,
-            ON_OBJECT.title: result.object_psnr,
-            SHOWN.title: result.shown,
+            OBJECT_PSNR.title: result.object_psnr,
+            SHOWN_SHARE.title: result.shown,
             "SSIM": result.ssim,
             "minutes": result.fit_seconds / 60,
             "CPU GiB": record.facts["peak_memory_mib"] / 1024,
             "GPU GiB": None if gpu is None else gpu / 1024,
             "primitives": result.primitives,
-            RELIT.title: result.relit_psnr,
+            RELIT_PSNR.title: result.relit_psnr,
         }
         rows.append(cells(record, phase=record.stage, alike=is_alike(record), **numbers))
     return rows
@@ -58,7 +58,7 @@ def fits(records: Iterable[Record[Any]]) -> Table:
         "show, by alpha, where the model is half as opaque at least: below 0.995 parts are missing. "
         "Minutes of the phase itself."
     )
-    return Table(caption, [*labels, ON_OBJECT, psnr, SHOWN, RELIT, *others], rows)
+    return Table(caption, [*labels, OBJECT_PSNR, psnr, SHOWN_SHARE, RELIT_PSNR, *others], rows)
 
 
 def runs_of(records: Iterable[Record[Any]]) -> list[Run]:
@@ -70,12 +70,12 @@ def runs_of(records: Iterable[Record[Any]]) -> list[Run]:
 
 
 def end_of(run: Run) -> Record[FitResult] | None:
-    """Return the last phase of a fit; None where one is missing, or its kind of field is not known here."""
+    """Return the last phase of a fit, or None if a phase is missing or the kind of field is unknown."""
     return next((run[kind.phases[-1]] for kind in fit_specs().values() if set(kind.phases) <= set(run)), None)
 
 
 def measures_of(run: Run) -> dict[str, Any]:
-    """Return what is measured of a fit after its last phase, with the minutes of all phases, by titles."""
+    """Return the measures of a fit after its last phase, with the minutes of all phases, by title."""
     if (end := end_of(run)) is None:
         return {}
     result = end.result
@@ -84,7 +84,7 @@ def measures_of(run: Run) -> dict[str, Any]:
         "SSIM, training": result.train_ssim,
         "PSNR": result.psnr,
         "SSIM": result.ssim,
-        RELIT.title: result.relit_psnr,
+        RELIT_PSNR.title: result.relit_psnr,
         "minutes": sum(part.result.fit_seconds for part in run.values()) / 60,
         "memory GiB": max(part.facts["peak_memory_mib"] for part in run.values()) / 1024,
         "primitives": result.primitives,
@@ -92,7 +92,7 @@ def measures_of(run: Run) -> dict[str, Any]:
 
 
 def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
-    """Return the table of one of `VARIANTS`, and of sweeps whose names begin so, such as `views_quick`."""
+    """Return the table of one of `VARIANTS`, including sweeps with that prefix, such as `views_quick`."""
     variant, heading = VARIANTS[sweep]
     own = [each for each in records if each.sweep == sweep or each.sweep.startswith(f"{sweep}_")]
     rows = []
@@ -108,7 +108,7 @@ def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
 
 
 def model_size(records: Iterable[Record[Any]]) -> Table:
-    """Return the sizes of the models of a data set together, as the paper's appendix counts them."""
+    """Return the total sizes of a data set's models, counted as in the paper's appendix."""
     rows = []
     for record in in_order(of(FitResult, records)):
         if record.result.sizes and not record.is_swept:

@@ -24,11 +24,11 @@ class RenderedCell:
     """A picture, or nothing."""
 
     pixels: np.ndarray | None = None  # [H, W, 3] in [0, 1]
-    psnr: float | None = None  # against the volume, where the picture shows the difference, dB
+    psnr: float | None = None  # against the volume, dB; for pictures of the difference
 
 
 class GalleryRenderer:
-    """Takes pictures. A scene stays open until one of another is taken.
+    """Renders pictures; a scene stays open until a picture of another one.
 
     Args:
         scenes: their files by name; the first one frames all pictures.
@@ -41,10 +41,10 @@ class GalleryRenderer:
         self._lens = read_scene(next(iter(scenes.values()))).framed().lens(fov_y)
         self._scenes, self._size, self._device = scenes, size, device
         self._open: tuple[str, Session] | None = None
-        self._twin: Twin | None = None  # of the scene that is open
+        self._twin: Twin | None = None  # of the open scene
 
     def render(self, cell: GalleryCell) -> RenderedCell:
-        """Return one picture."""
+        """Render one picture."""
         if not cell.show:
             return RenderedCell()
         session = self._session(cell.scene)
@@ -82,15 +82,15 @@ class GalleryRenderer:
         return orbit(azimuth, polar, *lens._replace(fov_y=cell.fov_y or lens.fov_y))
 
     def _cut(self, image: np.ndarray, cell: GalleryCell) -> np.ndarray:
-        """Return the part of a view that is shown, as large as a picture, each pixel that of its place."""
+        """Crop a view to the part to show, enlarged to picture size without interpolation."""
         left, top, side = cell.box or (0, 0, 1)
         across = (np.arange(self._size) + 0.5) / self._size * side * len(image)
         rows, columns = ((across + start * len(image)).astype(int) for start in (top, left))
         return image[rows[:, None], columns]
 
 
-def rendered(grid: Grid, renderer: GalleryRenderer, title: str) -> dict[str, list[RenderedCell]]:
-    """Return the pictures of each row by its title; those of one scene are taken together."""
+def render_rows(grid: Grid, renderer: GalleryRenderer, title: str) -> dict[str, list[RenderedCell]]:
+    """Render the pictures of each row by its title, grouped by scene."""
     places = [(row.title, column, cell) for row in grid.rows for column, cell in enumerate(row.pictures)]
     places.sort(key=lambda place: place[2].scene)
     taken = {

@@ -1,4 +1,4 @@
-"""What the looks of a comparison were given, for a row beside their views."""
+"""The inputs of the looks in a comparison, as a row beside their views."""
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -11,7 +11,7 @@ from texgs.core.figures import Cell, Row, as_picture
 from texgs.core.names import style_file
 from texgs.volume.transfer import TransferFunction
 
-SIDE, INCHES = 512, 3.2  # side of a picture, pixels and inches; the inches decide the size of letters
+SIDE, INCHES = 512, 3.2  # side of a picture, pixels and inches; the inches determine the font size
 LINE_LENGTH = 18  # letters
 
 
@@ -21,11 +21,11 @@ def given_row(
     instructions: Mapping[str, str],
     scenes: Collection[Path],
 ) -> Row:
-    """Return a row of a plot, of pictures, which are files beside edited scenes, and of instructions."""
+    """Return a row of a plot, of style pictures beside edited scenes, and of instructions."""
     cells = [] if plot is None else [Cell("transfer functions", plot)]
     for name, style in styles.items():
         files = [scene.with_name(file) for scene in scenes for file in map(style_file, (name, ""))]
-        for file in [file for file in files if file.is_file()][:1]:  # none of methods with several pictures
+        for file in [file for file in files if file.is_file()][:1]:  # methods with several pictures have none
             with Image.open(file) as picture:
                 square = ImageOps.pad(picture.convert("RGB"), (SIDE, SIDE), color="white")
             cells.append(Cell(f"{name}: {Path(style).stem}", np.asarray(square)))

@@ -1,4 +1,4 @@
-"""One HTML file with all that a run has to show: tables, pictures, curves, and where each came from."""
+"""One HTML report of a run: tables, pictures, curves, and the origin of each."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,17 +9,30 @@ from PIL import Image
 from texgs.core.figures import as_picture, new_figure, words
 from texgs.core.io import write_bytes
 from texgs.report.metrics_files import LeftOut, Record, of
-from texgs.report.published import THEIRS, in_order
+from texgs.report.published import PAPER_LABEL, in_order
 from texgs.report.results import SECTIONS, FitResult
 from texgs.report.sections import Figure, data_uri, figures
 from texgs.report.sweep_figure import sweep_figure
 from texgs.report.table import SOURCES, Table, report_file
 from texgs.report.tables import specs, sweeps_of, tables_of
 
-JOB = ("stage", "dataset", "tf", "recipe", "edit", "variant", "seed", "seconds", "peak_memory_mib", "device")
-SOURCE = ("config_sha", "code_sha", "git_sha", "run")
-LOSSES = "Loss of single views while fields were fitted."
-SWEPT = "Means over seeds with their standard deviation, of what differs; below them the edited scenes."
+JOB_FACTS = (
+    "stage",
+    "dataset",
+    "tf",
+    "recipe",
+    "edit",
+    "variant",
+    "seed",
+    "seconds",
+    "peak_memory_mib",
+    "device",
+)
+SOURCE_FACTS = ("config_sha", "code_sha", "git_sha", "run")
+LOSS_CAPTION = "Loss of single views while fields were fitted."
+SWEEP_CAPTION = (
+    "Means over seeds with their standard deviation, of what differs; below them the edited scenes."
+)
 
 
 def write_report(
@@ -29,7 +42,7 @@ def write_report(
     given: Mapping[str, Table] | None = None,
     more: Mapping[str, Sequence[Figure]] | None = None,
 ) -> Path:
-    """Write a report that needs no other file than pages of scenes that are too large for it.
+    """Write a report that needs no other files, except pages of scenes too large to embed.
 
     Tables by name and figures by section that need more than records are `given` and `more`.
     """
@@ -41,7 +54,7 @@ def write_report(
     pictures["fitting"] += loss_figures(records)
     for name in sweeps_of(records):
         drawn = data_uri(sweep_figure(records, name))
-        pictures["ablations"].append(Figure(f"sweep {name}", "", SWEPT, drawn, ""))
+        pictures["ablations"].append(Figure(f"sweep {name}", "", SWEEP_CAPTION, drawn, ""))
     for section, own in (more or {}).items():
         pictures[section] += own
     text = environment.from_string(template).render(
@@ -50,9 +63,9 @@ def write_report(
         jobs=[job(record.facts) for record in records],
         places={record.path: index for index, record in enumerate(records, start=1)},
         versions=versions([record.facts for record in records]),
-        headings=(*JOB, *SOURCE),
-        sources_from=len(JOB),
-        is_theirs=lambda cells: any(cell.startswith(THEIRS) for cell in cells),
+        headings=(*JOB_FACTS, *SOURCE_FACTS),
+        sources_from=len(JOB_FACTS),
+        is_theirs=lambda cells: any(cell.startswith(PAPER_LABEL) for cell in cells),
         sources=SOURCES,
     )
     return write_bytes(path, text.encode())
@@ -61,7 +74,7 @@ def write_report(
 def sections(
     records: Sequence[Record[Any]], tables: Mapping[str, Table], pictures: Mapping[str, list[Figure]]
 ) -> list[dict[str, Any]]:
-    """Return the sections that have something to show, with tables by name and figures by data set."""
+    """Return the non-empty sections, with tables by name and figures by data set."""
     places = {spec.name: spec.section for spec in specs(sweeps_of(records))}
     shown = []
     for key, title in SECTIONS.items():
@@ -75,13 +88,13 @@ def sections(
 
 
 def loss_figures(records: Sequence[Record[Any]]) -> list[Figure]:
-    """Draw curves of the phases that recorded their loss more than once, without those of sweeps."""
+    """Draw curves of all phases outside of sweeps that recorded several losses."""
     by_dataset: dict[str, list[Record[FitResult]]] = {}
     for record in in_order(of(FitResult, records)):
         if len(record.result.losses) > 1 and not record.is_swept:
             by_dataset.setdefault(record.title, []).append(record)
     drawn = {title: data_uri(curves(phases)) for title, phases in by_dataset.items()}
-    return [Figure(title, "", LOSSES, uri, "", is_narrow=True) for title, uri in drawn.items()]
+    return [Figure(title, "", LOSS_CAPTION, uri, "", is_narrow=True) for title, uri in drawn.items()]
 
 
 def curves(phases: Sequence[Record[FitResult]]) -> Image.Image:
@@ -100,12 +113,12 @@ def curves(phases: Sequence[Record[FitResult]]) -> Image.Image:
 
 
 def job(metrics: Mapping[str, Any]) -> list[str]:
-    """Return the cells of one job in the list of where things came from."""
+    """Return the cells of one job in the list of origins."""
     facts = {"edit": metrics["numbers"].get("edit"), **metrics}
-    cells = [facts.get(key) for key in (*JOB, *SOURCE)]
+    cells = [facts.get(key) for key in (*JOB_FACTS, *SOURCE_FACTS)]
     return ["" if x is None else f"{x:.1f}" if isinstance(x, float) else str(x) for x in cells]
 
 
 def versions(jobs: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what the jobs ran with, each combination once."""
+    """Return the versions that jobs ran with, each combination once."""
     return sorted({", ".join(f"{name} {v}" for name, v in metrics["versions"].items()) for metrics in jobs})

@@ -1,4 +1,4 @@
-"""Figure of a mesh: the surface that it should be, the mesh, and how far it is from that surface."""
+"""Figure of a mesh: the true surface, the mesh, and its distance from the surface."""
 
 from pathlib import Path
 
@@ -11,26 +11,26 @@ from texgs.core.geometry import facing
 from texgs.core.lens import Lens
 from texgs.metrics.surface import Points, distances, sample
 from texgs.raster import Render, rasterize
-from texgs.report.fit_figure import VISIBLE, draw_visible
+from texgs.report.fit_figure import VISIBLE_ALPHA, draw_visible
 from texgs.volume.cameras import orbit_path
 from texgs.volume.isosurface import Mesh
 
-DISCS = 300_000  # discs that a surface is drawn with
+DISCS = 300_000  # discs to draw a surface with
 VIEW_SIZE = 640  # pixels
 POLAR = 20.0  # polar angle of the cameras, degrees
-LARGEST_ERROR = 0.02  # world units, the brightest colour of an error
-CLAY, AMBIENT = 0.8, 0.2  # colour of a surface, and its share without light
+MAX_ERROR = 0.02  # world units, the brightest colour of an error
+CLAY, AMBIENT = 0.8, 0.2  # colour of a surface, and its ambient share
 
 
 def write_mesh_figure(
     path: str | Path, mesh: Mesh, reference: Mesh, surface: Points, lens: Lens, title: str
 ) -> Path:
-    """Draw a mesh beside the surface that it should be as PNG, in one step, from two sides.
+    """Draw a mesh beside the true surface from two sides, as PNG, in one step.
 
     Errors are distances from `surface`, points on what counts of the reference.
     """
     truth, ours = sample(reference, DISCS), sample(mesh, DISCS)
-    error = Scale(0, LARGEST_ERROR, "inferno")
+    error = Scale(0, MAX_ERROR, "inferno")
     errors, rows, visible = error(distances(ours, surface)[0]), [], []
     for index, camera in enumerate(orbit_path(2, POLAR, lens.square(VIEW_SIZE)), start=1):
         views = [
@@ -44,7 +44,7 @@ def write_mesh_figure(
             for (name, scale), view in zip(names.items(), views, strict=True)
         ]
         rows.append(Row(f"view {index}", cells))
-        visible += [view.alpha > VISIBLE for view in views]
+        visible += [view.alpha > VISIBLE_ALPHA for view in views]
     return draw_visible(path, rows, torch.stack(visible).any(dim=0), title)
 
 

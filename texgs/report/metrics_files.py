@@ -1,4 +1,4 @@
-"""The metrics files of jobs, read and checked, and what there is no job of."""
+"""Read and check the metrics files of jobs, and the list of missing jobs."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from texgs.core.names import METRICS
 from texgs.metrics.metric import metrics
 from texgs.report.results import EditMeasures, Result
 
-ARTIFACTS = "mlartifacts"  # folder of the files that MLflow keeps of runs
+ARTIFACTS = "mlartifacts"  # folder of MLflow's files of runs
 WORDS = ("stage", "dataset", "field", "variant", "sweep", "stand_in", "command", "result")
 FACTS: dict[str, tuple[Any, str]] = {  # what a metrics file holds beside its numbers, as far as it is read
     **dict.fromkeys((*WORDS, "tf", "recipe"), (str, "words")),
@@ -26,18 +26,18 @@ R_co = TypeVar("R_co", bound=Result, covariant=True)
 
 @dataclass(frozen=True)
 class Record(Generic[R_co]):
-    """A job: its result, and what is known of it."""
+    """A job: its result, and facts about it."""
 
     path: Path  # its metrics.json
     stage: str
     dataset: str
     tf: str | None  # None for jobs of a whole data set
     label: str  # recipe, variant and seeds other than 0, as in tables; empty for jobs before a fit
-    field: str  # kind of the fit
+    field: str  # kind of field
     variant: str
     sweep: str
     seed: int
-    stand_in: str  # what the data set stands in for; empty for those that are what they are called
+    stand_in: str  # data set that this one replaces, or ""
     result: R_co
     facts: dict[str, Any]  # the file, for its times, versions and digests
 
@@ -48,30 +48,30 @@ class Record(Generic[R_co]):
 
     @property
     def title(self) -> str:
-        """Return the data set as tables name it."""
+        """Return the name of the data set in tables."""
         return f"{self.dataset}, stand-in for {self.stand_in}" if self.stand_in else self.dataset
 
     @property
     def is_swept(self) -> bool:
-        """Return whether this is a job of a sweep, whose numbers are in tables of their own."""
+        """Return whether this is a job of a sweep, which has a separate table."""
         return self.sweep not in ("", NO_SWEEP)
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Something that a run has no jobs of."""
+    """Something missing from a run."""
 
     what: str  # such as "data set wood"
     why: str  # one sentence
     places: list[str]  # rules of the workflow whose jobs are missing
 
     def __str__(self) -> str:
-        why = self.why.removeprefix(f"{self.what}: ")  # sentences that name it themselves
+        why = self.why.removeprefix(f"{self.what}: ")  # avoids naming it twice
         return f"{self.what}: {why.rstrip('. ')}."
 
 
 class OtherVersionError(ArgumentError):
-    """A metrics file is of another version of texgs."""
+    """A metrics file comes from another version of texgs."""
 
 
 def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[LeftOut]]:
@@ -113,7 +113,7 @@ def require_apart(records: Iterable[Record[Any]]) -> None:
 
 
 def read_left_out(path: str | Path | None) -> list[LeftOut]:
-    """Return what a file says was left out; nothing without a file."""
+    """Read the list of missing parts from a file; empty without a file."""
     if path is None or not Path(path).exists():
         return []
     entries = read_json(path)
@@ -126,13 +126,13 @@ def read_left_out(path: str | Path | None) -> list[LeftOut]:
 
 
 def note(left_out: Iterable[LeftOut], places: Collection[str]) -> str:
-    """Return what of a table is left out, in words; empty where all is there."""
+    """Describe the missing parts of a table, or ""."""
     entries = [str(entry) for entry in left_out if set(entry.places) & set(places)]
     return " ".join(["Left out:", *entries]) if entries else ""
 
 
 def of(kind: type[R_co], records: Iterable[Record[Any]]) -> list[Record[R_co]]:
-    """Return those with a result of one kind."""
+    """Select the records with a result of one kind."""
     return [record for record in records if isinstance(record.result, kind)]
 
 

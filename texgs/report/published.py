@@ -1,4 +1,4 @@
-"""The paper's numbers beside ours: which may stand in one row, and rows of its own for all others."""
+"""The paper's numbers beside ours: in one row if they are comparable, otherwise in separate rows."""
 
 from __future__ import annotations
 
@@ -10,28 +10,29 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from texgs.report.metrics_files import Record
 from texgs.report.results import FitResult
-from texgs.report.table import PAPER, SOURCES, UNLIKE, UNPUBLISHED, Column, Table, data_frame
+from texgs.report.table import PAPER, SOURCES, UNLIKE_CELL, UNPUBLISHED_CELL, Column, Table, data_frame
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 R = TypeVar("R", bound=Record[Any])
-THEIRS = "the paper"  # recipe in rows of its own numbers
-RECIPE = "paper"  # file of conf/fit whose results may stand beside the paper's numbers
-VIEWS = 162  # training views, where the paper does not say another number
-ALIKE = (
+PAPER_LABEL = "the paper"  # recipe in rows of the paper
+RECIPE = "paper"  # file of conf/fit with results comparable to the paper's
+VIEWS = 162  # default number of training views in the paper
+COMPARED_FACTS = (
     "Numbers of the paper stand beside ours where recipe, size of images and number of training views are "
-    f"the paper's; elsewhere there is {UNLIKE}, not like for like. Its transfer functions are not published: "
-    "even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
+    f"the paper's; elsewhere there is {UNLIKE_CELL}, not like for like. Its transfer functions are not "
+    "published: even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
 )
 DATA, LABEL = "data set", "recipe"  # titles of columns
-SEEN = "seen"  # size and number of views, and changes of the recipe, in rows: means are over fits of the same
+# Size and number of views, and changes of the recipe, in rows: means are over fits of the same.
+VIEWS_COLUMN = "seen"
 SCENES = Column("basic scenes", 0)
 Rows = Sequence[Mapping[str, Any]]
 
 
 def paper_file(name: str) -> DataFrame:
-    """Read one of the paper's tables as words, by the headings of its file."""
+    """Read one of the paper's tables as text, by the headings of its file."""
     import pandas as pd  # slow to import
 
     with files("texgs.report").joinpath("paper", f"{name}.csv").open() as file:
@@ -46,19 +47,19 @@ def paper(name: str, keys: Mapping[str, str], numbers: Mapping[str, str]) -> Dat
 
 @cache
 def volumes() -> dict[str, dict[str, Any]]:
-    """Return the paper's table of data sets by their names, in its order; None where it has no number."""
+    """Return the paper's table of data sets by name, in its order; None for missing numbers."""
     names = ("volume_x", "volume_y", "volume_z", "image_px", "basic_scenes", "volume_mib", "dvr_ms")
     frame = paper("datasets", {"dataset": DATA}, {name: name for name in names}).set_index(DATA)
     return frame.astype(object).where(frame.notna(), None).to_dict("index")
 
 
 def images(dataset: str) -> int | None:
-    """Return the width and height of the paper's images of a data set, pixels; None of others."""
+    """Return width and height of the paper's images of a data set in pixels, or None."""
     return int(volumes()[dataset]["image_px"]) if dataset in volumes() else None
 
 
 def intended_dataset(record: Record[Any]) -> str:
-    """Return the data set of a job, or the one that it stands in for."""
+    """Return the data set of a job, or the one it replaces."""
     return record.stand_in.replace(" ", "_") or record.dataset
 
 
@@ -68,27 +69,27 @@ def in_order(records: Iterable[R]) -> list[R]:
 
 
 def rank(record: Record[Any]) -> tuple[int, int, str]:
-    """Return where a data set stands: in the paper's order, stand-ins below the real ones, others last."""
+    """Return the sort key of a data set: the paper's order, stand-ins below the real ones, others last."""
     place, _, _ = rank_in_paper(intended_dataset(record))
     return place, 2 if record.stand_in else 0, record.dataset
 
 
 def rank_in_paper(dataset: str) -> tuple[int, int, str]:
-    """Return the same for a row of the paper: below ours."""
+    """Return the sort key of a row of the paper, below ours."""
     order = list(volumes())
     return order.index(dataset) if dataset in order else len(order), 1, dataset
 
 
 def cells(record: Record[Any], **more: Any) -> dict[str, Any]:
-    """Return what rows of all tables have of a job: its names, its place and its file."""
+    """Return the common cells of a job's rows: names, sort key and file."""
     views = (getattr(record.result, key, 0) for key in ("width", "height", "train_views"))
     return {
         DATA: record.title,
         "TF": record.tf,
         LABEL: record.label,
         "rank": rank(record),
-        "published": "" if record.stand_in else record.dataset,  # whose numbers stand beside
-        SEEN: (*views, bool(record.facts.get("recipe_changed"))),
+        "published": "" if record.stand_in else record.dataset,  # data set for the paper's numbers
+        VIEWS_COLUMN: (*views, bool(record.facts.get("recipe_changed"))),
         SOURCES: [record.path],
         **more,
     }
@@ -104,7 +105,7 @@ def is_alike(record: Record[FitResult], pixels: int | None = None, views: int = 
 
 
 def mean(values: Iterable[Any]) -> float | None:
-    """Return the mean; None where a value is missing, or there is none."""
+    """Return the mean, or None without values or if one is missing."""
     listed = list(values)
     return fmean(listed) if listed and None not in listed else None
 
@@ -121,14 +122,14 @@ def beside_paper(
     titles = [column.title for column in columns.values()]
     theirs = paper(name, {"dataset": DATA, **keys}, dict(zip(columns, titles, strict=True)))
     theirs[SCENES.title] = [volumes()[dataset]["basic_scenes"] for dataset in theirs[DATA]]
-    ours = grouped(rows, (DATA, LABEL, SEEN, *keys.values()), titles, is_sum)
+    ours = grouped(rows, (DATA, LABEL, VIEWS_COLUMN, *keys.values()), titles, is_sum)
     if is_sum:
         counts = ours["published"].map(lambda name: volumes().get(name, {}).get("basic_scenes"))
         ours["alike"] &= ours[SCENES.title] == counts
     names = [*map(Column, (DATA, LABEL, *keys.values())), SCENES]
-    published = [Column(each.title + PAPER, each.digits, UNPUBLISHED) for each in columns.values()]
+    published = [Column(each.title + PAPER, each.digits, UNPUBLISHED_CELL) for each in columns.values()]
     shown = side_by_side(ours, theirs, ("published", *keys.values()), titles)
-    return Table(ALIKE, [*names, *columns.values(), *published], shown)
+    return Table(COMPARED_FACTS, [*names, *columns.values(), *published], shown)
 
 
 def grouped(rows: Rows, keys: Sequence[str], titles: Sequence[str], is_sum: bool) -> DataFrame:
@@ -148,7 +149,7 @@ def grouped(rows: Rows, keys: Sequence[str], titles: Sequence[str], is_sum: bool
 
 
 def side_by_side(ours: DataFrame, theirs: DataFrame, keys: Sequence[str], titles: Sequence[str]) -> DataFrame:
-    """Return our rows in the paper's order, with rows of its own for numbers that stand in none of ours.
+    """Return our rows in the paper's order, with extra rows for the paper's remaining numbers.
 
     Without a data set of the paper's, or a stand-in for one, there are only ours.
     """
@@ -160,12 +161,12 @@ def side_by_side(ours: DataFrame, theirs: DataFrame, keys: Sequence[str], titles
     is_alike = rows["alike"].astype(bool)
     for title in titles:
         cell = rows[title + PAPER]
-        rows[title + PAPER] = cell.mask(~is_alike & cell.notna(), UNLIKE)
+        rows[title + PAPER] = cell.mask(~is_alike & cell.notna(), UNLIKE_CELL)
     if any(place < len(volumes()) for place, _, _ in rows["rank"]):
         shown = set(rows.loc[is_alike, list(keys)].itertuples(index=False, name=None))
         is_left = [key not in shown for key in theirs[published].itertuples(index=False, name=None)]
         left = theirs[is_left]
-        left = left.assign(**{LABEL: THEIRS}, rank=[rank_in_paper(name) for name in left[DATA]])
+        left = left.assign(**{LABEL: PAPER_LABEL}, rank=[rank_in_paper(name) for name in left[DATA]])
         rows = pd.concat([rows, left.astype(object)], ignore_index=True)
     places = rows["rank"].tolist()
     return rows.iloc[sorted(range(len(rows)), key=places.__getitem__)]
@@ -190,7 +191,7 @@ def mean_rows(rows: Rows, keys: Sequence[str], titles: Iterable[str]) -> list[di
 
 
 def _mean_cell(values: Sequence[Any]) -> Any:
-    """Return the mean of numbers, or the words that are the same in all rows."""
+    """Return the mean of numbers, or words if they are equal in all rows."""
     if all(isinstance(value, int | float) for value in values):
         return fmean(values)
     return values[0] if len(set(values)) == 1 else None

@@ -1,4 +1,4 @@
-"""What jobs tell about their results: stages make these, `metrics.json` holds them, tables read them.
+"""Results of jobs: stages make them, `metrics.json` stores them, tables read them.
 
 What was not measured is None, and is left out of the file. Units are in the names. A result that no table
 reads is in the module of its stage.
@@ -38,7 +38,7 @@ class Result:
     pictured_in: ClassVar[str]  # section of the report for the job's pictures
 
     def __init_subclass__(cls, section: str = "more") -> None:
-        """Make a kind of result known, with the section of the report that its pictures belong to."""
+        """Register a kind of result with the section of the report for its pictures."""
         if section not in SECTIONS:
             known = close(section, SECTIONS) or f"; there are {', '.join(SECTIONS)}"
             raise ConfigError(f"{cls.__module__}: {cls.__name__}: section: no section {section}{known}")
@@ -47,7 +47,7 @@ class Result:
 
     @classmethod
     def of(cls, numbers: Mapping[str, Any]) -> Any:
-        """Return the result that `plain` made these numbers of; others are a ValueMismatch."""
+        """Read a result that `as_mapping` wrote; raise a ValueMismatch for others."""
         return typed(cls, numbers)
 
 
@@ -73,19 +73,19 @@ class ViewsResult(Result, section="data"):
     test: int
     width: int
     height: int
-    coverage: float | None = None  # mean share of the pixels that show something
+    coverage: float | None = None  # mean share of visible pixels
     frame_ms: float | None = None  # median, without the first frame
     frame_max_ms: float | None = None
     first_frame_ms: float | None = None
     frames_ms: list[float] = field(default_factory=list)
-    vtk_frame_ms: float | None = None  # median of VTK, where it was asked to render some
+    vtk_frame_ms: float | None = None  # median of VTK, if measured
 
 
 @dataclass(frozen=True)
 class SheetResult(Result, section="data"):
     """A contact sheet of views."""
 
-    train: int  # views there are
+    train: int  # number of views
     test: int
     width: int
     height: int
@@ -101,14 +101,14 @@ class FitResult(Result, section="fitting"):
     losses: list[float] = field(default_factory=list)  # recorded over the iterations
     psnr: float | None = None  # of test views, dB
     object_psnr: float | None = None  # the same on the object
-    shown: float | None = None  # share of what they show that the field shows, see `shown_share`
+    shown: float | None = None  # share of the views that the field shows, see `shown_share`
     ssim: float | None = None
     train_psnr: float | None = None
     train_ssim: float | None = None
     relit_psnr: float | None = None  # of test views under lights that no training view has
     relit_ssim: float | None = None
     train_views: int | None = None
-    width: int | None = None  # size of all these views as they were compared, pixels
+    width: int | None = None  # size of all compared views, pixels
     height: int | None = None
     peak_gpu_memory_mib: float | None = None
     sizes: dict[str, float] = field(default_factory=dict)  # of the last phase, see `Field.sizes`
@@ -131,7 +131,7 @@ class Shown:
     grid: str
     row: str
     column: str
-    psnr: float | None = None  # against the volume, where that is what it shows, dB
+    psnr: float | None = None  # against the volume, dB; for pictures of the difference
 
 
 @dataclass(frozen=True)
@@ -144,18 +144,18 @@ class GalleryResult(Result):
 
 @dataclass(frozen=True)
 class MeshResult(Result, section="fitting"):
-    """The surface of a fit against that of its volume; lengths in world units."""
+    """The surface of a fit against its volume's surface; lengths in world units."""
 
-    chamfer: float  # mean of the next two
+    chamfer: float  # mean of accuracy and completeness
     accuracy: float  # mean distance of the mesh from the surface
-    completeness: float  # and back
+    completeness: float  # mean distance of the surface from the mesh
     f_score: float  # F-score of points within the tolerance, in [0, 1]
     normal_angle: float  # degrees
     vertices: int
     triangles: int
     mesh_seconds: float
     tolerance: float
-    visible: float  # share of the surface that training views see: the rest does not count
+    visible: float  # share of the surface in training views; the rest does not count
 
 
 @dataclass(frozen=True)
@@ -166,12 +166,14 @@ class SceneResult(Result, section="pse"):
     primitives: int
 
 
-COMPARED = 3  # views around the object, one of which is shown
-BELOW = "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
+COMPARED_VIEWS = 3  # views around the object; one is shown
+BELOW_WORDS = (
+    "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
+)
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ViewComparison:
     """An edit by numbers, against the volume with the same edit."""
 
     title: str
@@ -179,14 +181,14 @@ class Comparison:
     ssim: float | None = None
     object_psnr: float | None = None
     object_ssim: float | None = None
-    shown: float | None = None  # share of what the volume shows, see `shown_share`
+    shown: float | None = None  # share of the volume's view, see `shown_share`
 
 
 @dataclass(frozen=True)
 class CheckResult:
-    """How close views from anywhere, with lights and edits at random, are to those of the volume."""
+    """Agreement of random views, lights and edits with the volume."""
 
-    sentence: str  # what holds for further views; each of its numbers by itself
+    sentence: str  # bounds for further views; each number holds by itself
     models: str  # their checksum
     views: int
     seed: int
@@ -194,7 +196,7 @@ class CheckResult:
     height: int
     psnr: dict[str, float]  # mean, percentile_5, worst and floor, dB
     object_psnr: dict[str, float]
-    shown: dict[str, float]  # the same of the share of what the volume shows
+    shown: dict[str, float]  # the same statistics of the share shown
 
 
 @dataclass(frozen=True)
@@ -202,8 +204,8 @@ class PseResult(Result, section="pse"):
     """Edits by numbers, and a light that moves."""
 
     views: int
-    pse: list[Comparison]
-    relight: list[Comparison]
+    pse: list[ViewComparison]
+    relight: list[ViewComparison]
     check: CheckResult | None = None
 
 
@@ -212,10 +214,10 @@ class StepsResult(Result, section="time"):
     """A scene that follows its volume through the steps of a series in time."""
 
     steps: int
-    views: int  # for each step that was compared
+    views: int  # per compared step
     step_mib: float  # size that a step adds
-    compared: list[Comparison]  # some of the steps, by their names
-    step_seconds: float | None = None  # mean, with its volume; None where an interrupted job went on
+    compared: list[ViewComparison]  # some steps, by name
+    step_seconds: float | None = None  # mean, with its volume; None for a resumed job
 
 
 @dataclass(frozen=True)
@@ -240,7 +242,7 @@ class PageResult(Result, section="scenes"):
     edit: str  # or "none"
     primitives: int
     page_mib: float
-    is_embedded: bool  # whether the report holds it
+    is_embedded: bool  # whether the report embeds it
 
 
 @dataclass(frozen=True)
@@ -249,27 +251,27 @@ class EditResult(Result, section="parts"):
 
     edit: str
     method: str
-    how: str  # what the method worked with
+    how: str  # means of the method
     edit_seconds: float
     lambda_s: float | None = None
     notes: dict[str, Any] = field(default_factory=dict)  # for people
     follows: str = ""  # "style" or "instruction"
-    followed: dict[str, str] = field(default_factory=dict)  # the picture or the words, by model
-    iterations: int = 0  # of the method, for each part
-    losses: dict[str, list[float]] = field(default_factory=dict)  # over them, by part and term
+    followed: dict[str, str] = field(default_factory=dict)  # picture or instruction, by model
+    iterations: int = 0  # per part
+    losses: dict[str, list[float]] = field(default_factory=dict)  # over iterations, by part and term
     is_compared: bool = False  # see `edit.compared`
-    opacity: dict[str, float] = field(default_factory=dict)  # factors that came with the look, by part
+    opacity: dict[str, float] = field(default_factory=dict)  # factors of the look, by part
 
     @property
     def lifted(self) -> str:
-        """Return which parts became more or less opaque, in words; "" where none did."""
+        """Describe which parts became more or less opaque, or ""."""
         words = ", ".join(f"{part} × {factor:g}" for part, factor in self.opacity.items())
         return f"opacity of {words}" if words else ""
 
 
 @dataclass(frozen=True)
 class EditMeasures(Result):
-    """What was measured of an edited scene."""
+    """Measures of an edited scene."""
 
     edit: str
     method: str
@@ -279,15 +281,15 @@ class EditMeasures(Result):
 
     @classmethod
     def of(cls, numbers: Mapping[str, Any]) -> Self:
-        """Return the measures that `plain` made these numbers of; who knows the metrics checks `values`."""
+        """Read measures that `as_mapping` wrote; `texgs.metrics` checks the `values`."""
         own = {each.name for each in fields(cls)} - {"values"}
         known = {name: value for name, value in numbers.items() if name in own}
         values = {name: value for name, value in numbers.items() if name not in own}
         return typed(cls, {**known, "values": values})
 
 
-def plain(result: Result) -> dict[str, Any]:
-    """Return a result for JSON, without what was not measured; values by name stand among the rest."""
+def as_mapping(result: Result) -> dict[str, Any]:
+    """Convert a result for JSON, without missing measures; `values` are merged into the rest."""
     numbers: dict[str, Any] = asdict(result)  # type: ignore[call-overload]
     numbers |= numbers.pop("values", {})
     return {name: value for name, value in numbers.items() if value is not None}

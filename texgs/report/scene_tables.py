@@ -9,8 +9,8 @@ from texgs.report.metrics_files import Record, of
 from texgs.report.published import (
     DATA,
     LABEL,
+    PAPER_LABEL,
     SCENES,
-    THEIRS,
     cells,
     images,
     in_order,
@@ -28,11 +28,11 @@ from texgs.report.results import (
     ViewsResult,
     VolumeResult,
 )
-from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Table, columns
+from texgs.report.table import SOURCES, UNLIKE_CELL, UNPUBLISHED_CELL, Table, columns
 
 
 def datasets(records: Iterable[Record[Any]]) -> Table:
-    """Return the table of all data sets and of how long the volume renderer takes, by the size of views."""
+    """Return the table of all data sets, with times of the volume renderer by view size."""
     caption = (
         "Times are means over basic scenes of the median view; VTK renders the first metric.vtk_frames test "
         "views. Where there is no volume, the views are as published. The paper: ParaView on an RTX 4090, "
@@ -52,7 +52,7 @@ def datasets(records: Iterable[Record[Any]]) -> Table:
 
 
 def is_of_sweep(views: Record[Any]) -> bool:
-    """Return whether views are those of a variant of a sweep, which have a folder of their own."""
+    """Return whether views belong to a variant of a sweep, which has its own folder."""
     name = views.path.parent.name
     return name.startswith("views-") and name != f"views{ONE_LIGHT}"
 
@@ -82,13 +82,13 @@ def dataset_row(
 
 
 def milliseconds_in_paper(record: Record[Any], width: int, height: int) -> Any:
-    """Return the paper's time of a frame of a volume, or the sign that it is of another size."""
+    """Return the paper's time of a frame of a volume, or the mark for another size."""
     time = volumes().get("" if record.stand_in else record.dataset, {}).get("dvr_ms")
-    return time if time is None or (width, height) == (images(record.dataset),) * 2 else UNLIKE
+    return time if time is None or (width, height) == (images(record.dataset),) * 2 else UNLIKE_CELL
 
 
 def rendering(records: Iterable[Record[Any]]) -> Table:
-    """Return the time of frames of whole scenes, and of their volumes in the same job."""
+    """Return the frame times of whole scenes, and of their volumes in the same job."""
     timings = [record for record in in_order(of(TimingResult, records)) if not record.is_swept]
     rows = [timing_row(record) for record in timings]
     titles = [*columns("rendering")][5:]
@@ -122,8 +122,13 @@ def published_time(driven: str, pixels: str) -> dict[str, Any]:
     """Return the paper's times of its own scenes, from its table of edits by images or by texts."""
     numbers = {"primitives": "primitives", "render_mean_ms": "mean ms", "render_max_ms": "max ms"}
     lines = paper(f"{driven}_npse", {"method": "method"}, numbers).set_index("method")
-    labels = {DATA: "mean of 4", LABEL: f"{THEIRS}, {driven}-driven", "pixels": pixels, "device": "RTX 4090"}
-    others = dict.fromkeys([*columns("rendering")][8:], UNPUBLISHED)
+    labels = {
+        DATA: "mean of 4",
+        LABEL: f"{PAPER_LABEL}, {driven}-driven",
+        "pixels": pixels,
+        "device": "RTX 4090",
+    }
+    others = dict.fromkeys([*columns("rendering")][8:], UNPUBLISHED_CELL)
     return {**labels, **lines.loc["TexGS-VolVis"], **others}
 
 
@@ -142,7 +147,7 @@ def edits(records: Iterable[Record[Any]]) -> Table:
 
 
 def steps(records: Iterable[Record[Any]]) -> Table:
-    """Return how close the steps of series are to their volumes, and what one costs."""
+    """Return the agreement of the steps of series with their volumes, and the cost of a step."""
     rows = []
     for record in in_order(each for each in of(StepsResult, records) if not each.is_swept):
         result = record.result

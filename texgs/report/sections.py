@@ -19,13 +19,13 @@ from texgs.report.published import in_order
 from texgs.report.results import SECTIONS, EditResult, GalleryResult, PageResult
 
 SECTIONS_OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
-NARROW_WIDTH = 1000  # pixels across, up to which pictures stand side by side where there is room
-WEBP_QUALITY, WEBP_EFFORT = 85, 2  # the whole pictures are in the folders of their jobs
+NARROW_WIDTH = 1000  # pixels; narrower pictures stand side by side
+WEBP_QUALITY, WEBP_EFFORT = 85, 2  # full quality is in the folders of jobs
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture with what it shows."""
+    """A picture with its description."""
 
     dataset: str
     label: str  # basic TF, fit and edit
@@ -33,12 +33,12 @@ class Figure:
     uri: str
     command: str  # command line that makes it
     is_narrow: bool = False
-    page: str = ""  # page that shows the same in a browser, as JSON; or
-    link: str = ""  # path of its file
+    page: str = ""  # page with the same scene, as JSON; or
+    link: str = ""  # path of the page
 
 
 def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figure]]:
-    """Return all pictures of jobs by section, by data set; of sweeps those that show all variants.
+    """Return all pictures of jobs by section and data set; for sweeps, only pictures of all variants.
 
     Links to larger pages begin at the folder of the report.
     """
@@ -53,7 +53,7 @@ def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figu
 
 
 def figure_of(record: Record[Any], file: Path, words: str, folder: Path) -> Figure | None:
-    """Return a picture of a job, with a page or a link from a folder; None of a film, which is too large."""
+    """Return a picture of a job, with a page or a link from a folder; None for films, which are too large."""
     with Image.open(file) as picture:
         if getattr(picture, "is_animated", False):
             return None
@@ -63,7 +63,7 @@ def figure_of(record: Record[Any], file: Path, words: str, folder: Path) -> Figu
 
 
 def page(record: Record[Any], folder: Path) -> tuple[str, str]:
-    """Return the page of a scene, or the way to it, where a job has made one; the other is empty."""
+    """Return the page of a scene, or a link to it, if a job has made one; the other is empty."""
     file = record.path.with_name(PAGE)
     if not isinstance(record.result, PageResult) or not file.is_file():
         return "", ""
@@ -73,7 +73,7 @@ def page(record: Record[Any], folder: Path) -> tuple[str, str]:
 
 
 def section_of(record: Record[Any], picture: Path) -> str:
-    """Return the section of a picture of a job: that of its name, or else that of the job's results."""
+    """Return the section of a picture: by its name, or by the job's result."""
     result = record.result
     if isinstance(result, EditResult):
         is_part = any("/" in name for name in result.followed)
@@ -84,18 +84,18 @@ def section_of(record: Record[Any], picture: Path) -> str:
 
 
 def label(record: Record[Any]) -> str:
-    """Return the basic TF, fit and edit of a job, as far as it is of one."""
+    """Return a label of a job: basic TF, fit and edit, if any."""
     return " ".join(filter(None, (record.tf, record.label, edit_of(record))))
 
 
 def edit_of(record: Record[Any]) -> str:
-    """Return the edit of a job that has made a scene or its page, if it is of one."""
+    """Return the edit of a job that made a scene or its page, if any."""
     edit = record.result.edit if isinstance(record.result, EditResult | PageResult) else ""
     return "" if edit == NO_METHOD else edit
 
 
 def data_uri(picture: Image.Image) -> str:
-    """Return a picture as text for the attribute of a tag, compressed to about an eighth of its PNG."""
+    """Return a picture as a data URI, compressed to about an eighth of its PNG."""
     file = io.BytesIO()
     picture.convert("RGBA").save(file, format="WEBP", quality=WEBP_QUALITY, method=WEBP_EFFORT)
     return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}"

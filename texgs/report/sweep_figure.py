@@ -1,4 +1,4 @@
-"""The figure of a sweep: what was measured over the swept value, and a picture of each edited scene."""
+"""The figure of a sweep: measures over the swept value, and a picture of each edited scene."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-ACROSS, WIDTH = 4, 2.6  # panels in a row, and inches of each
+PANELS_PER_ROW, WIDTH = 4, 2.6  # panels in a row, and inches of each
 HEIGHT, BAR = 2.2, 0.22  # inches of a panel over numbers, and of each bar
 PICTURE_SIZE = 400  # pixels
-LOGARITHMIC_FROM = 30.0  # ratio of the ends of an axis from which it is logarithmic
+LOGARITHMIC_RATIO = 30.0  # ratio of the ends that makes an axis logarithmic
 
 
 def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
@@ -39,8 +39,8 @@ def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
     tall = HEIGHT if is_axis else 0.6 + BAR * len(names) * len(series)
     rows = {label: [shown.get(variant) for variant in names] for label, shown in pictures.items()}
     grids = [lay_out(grid_rows(rows, names), columns=len(names))] if rows else []
-    width = max(WIDTH * min(ACROSS, len(titles)), *(grid.get_figwidth() for grid in grids), 0)
-    figure = new_figure(width, tall * -(-len(titles) // ACROSS) + 0.25, DPI)
+    width = max(WIDTH * min(PANELS_PER_ROW, len(titles)), *(grid.get_figwidth() for grid in grids), 0)
+    figure = new_figure(width, tall * -(-len(titles) // PANELS_PER_ROW) + 0.25, DPI)
     draw_panels(figure, titles, series, name, [] if is_axis else names)
     return stack([as_picture(each) for each in (figure, *grids)])
 
@@ -56,7 +56,7 @@ def stack(pictures: Sequence[Image.Image]) -> Image.Image:
 
 
 def titles_that_differ(runs: DataFrame) -> dict[str, int]:
-    """Return the measures that differ between runs with their digits; all that there are, where none does."""
+    """Return the measures that differ between runs, with digits; all measures if none differs."""
     titles = measured_titles(runs)
     counts = runs[list(titles)].nunique()
     for least in (1, 0):
@@ -69,8 +69,8 @@ def draw_panels(
     figure: Figure, titles: Mapping[str, int], series: Mapping[str, DataFrame], name: str, bars: Sequence[str]
 ) -> None:
     """Draw a panel for each measure, with a line or a bar for each of `bars` for each of the series."""
-    rows, thick = -(-len(titles) // ACROSS), 0.8 / len(series)
-    panels = figure.subplots(rows, min(ACROSS, len(titles)), squeeze=False).ravel()
+    rows, thick = -(-len(titles) // PANELS_PER_ROW), 0.8 / len(series)
+    panels = figure.subplots(rows, min(PANELS_PER_ROW, len(titles)), squeeze=False).ravel()
     for axes, (title, digits) in zip(panels, titles.items(), strict=False):
         axes.set_title(words(title), fontsize=9)
         axes.tick_params(labelsize=7)
@@ -97,9 +97,9 @@ def draw_panels(
 def draw_line(
     axes: Axes, at: Sequence[float], means: Sequence[float], spread: Sequence[float], label: str
 ) -> None:
-    """Draw means over the swept value, with their standard deviation where there are several seeds."""
+    """Draw means over the swept value, with standard deviations for several seeds."""
     axes.errorbar(at, means, spread, label=words(label), marker="o", markersize=3, linewidth=1, capsize=2)
-    if at and min(at) > 0 and max(at) / min(at) > LOGARITHMIC_FROM:
+    if at and min(at) > 0 and max(at) / min(at) > LOGARITHMIC_RATIO:
         axes.set_xscale("log")
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.errors import ArgumentError
 from texgs.metrics.metric import Measure
 from texgs.report.edit_tables import measured_cells, measures, pairs_of
-from texgs.report.fit_tables import RELIT, Run, measures_of, runs_of
+from texgs.report.fit_tables import RELIT_PSNR, Run, measures_of, runs_of
 from texgs.report.metrics_files import Record
 from texgs.report.published import DATA, LABEL
 from texgs.report.table import SOURCES, Column, Table, data_frame
@@ -17,12 +17,12 @@ from texgs.report.table import SOURCES, Column, Table, data_frame
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-# Columns of measures of fits, with the digits that they are written with.
-OF_FITS = {"PSNR, training": 2, "PSNR": 2, "SSIM": 4, "minutes": 2, "memory GiB": 2, "primitives": 0}
+# Columns of measures of fits, with their digits.
+FIT_DIGITS = {"PSNR, training": 2, "PSNR": 2, "SSIM": 4, "minutes": 2, "memory GiB": 2, "primitives": 0}
 MATERIAL = {"k_a": "ambient", "k_d": "diffuse", "k_s": "specular", "beta": "shininess"}
-SERIES = [DATA, "TF", LABEL, "edit"]  # what variants are of; empty where a run has none
+SERIES = [DATA, "TF", LABEL, "edit"]  # subjects of variants; empty for runs without them
 SEEDS = "Means over seeds, ± their standard deviation."
-CAPTIONS = {  # by the measures that they are about
+CAPTIONS = {  # by measure
     "PSNR": "Fits: test views after the last phase; minutes of all phases; medians of the material.",
     "NNFM": "Edits: minutes of the edit alone; distances to the style in views that it was not learned from.",
 }
@@ -59,7 +59,7 @@ def sweep_runs(records: Iterable[Record[Any]], name: str) -> DataFrame:
         raise ArgumentError(f"sweep {name}: no fit or edit of it among the metrics files; run it first")
     runs.sort(key=lambda run: natural(run["variant"]))
     runs.sort(key=lambda run: (run[DATA], bool(run["edit"]), *(run[key] for key in SERIES[1:])))
-    numbers = [*OF_FITS, RELIT.title, *MATERIAL, *(measure.title for measure in edit_measures())]
+    numbers = [*FIT_DIGITS, RELIT_PSNR.title, *MATERIAL, *(measure.title for measure in edit_measures())]
     return data_frame(runs, [*SERIES, "variant", "series", "is_done", SOURCES, *dict.fromkeys(numbers)])
 
 
@@ -74,7 +74,7 @@ def fit_run(run: Run) -> dict[str, Any]:
 
 
 def edit_runs(records: Sequence[Record[Any]]) -> list[dict[str, Any]]:
-    """Return the rows of edits, with what was measured of those with a new look."""
+    """Return the rows of edits, with measures for new looks."""
     return [
         {**_names(edit, "", edit.result.edit), "is_done": True, **measured_cells(edit_measures(), edit, seen)}
         for edit, seen in pairs_of(records)
@@ -82,7 +82,7 @@ def edit_runs(records: Sequence[Record[Any]]) -> list[dict[str, Any]]:
 
 
 def _names(record: Record[Any], tf: str, edit: str) -> dict[str, Any]:
-    """Return what a run is called."""
+    """Return the names of a run."""
     names = {DATA: record.dataset, "TF": tf, LABEL: record.recipe, "edit": edit}
     return {**names, "variant": record.variant, "series": " ".join(filter(None, names.values()))}
 
@@ -93,15 +93,15 @@ def edit_measures() -> list[Measure]:
 
 
 def measured_titles(runs: DataFrame) -> dict[str, int]:
-    """Return the digits of what is measured of fits, where there are some, and of edits, by titles."""
-    relit = {RELIT.title: 2} if runs[RELIT.title].notna().any() else {}
-    of_fits = {**OF_FITS, **relit, **dict.fromkeys(MATERIAL, 2)} if (runs["edit"] == "").any() else {}
+    """Return the digits of measures of fits, if any, and of edits, by title."""
+    relit = {RELIT_PSNR.title: 2} if runs[RELIT_PSNR.title].notna().any() else {}
+    of_fits = {**FIT_DIGITS, **relit, **dict.fromkeys(MATERIAL, 2)} if (runs["edit"] == "").any() else {}
     of_edits = {measure.title: measure.digits or 0 for measure in edit_measures()}
     return of_fits | ({"minutes": 2, **of_edits} if runs["edit"].any() else {})
 
 
 def variants(runs: DataFrame) -> DataFrame:
-    """Return a row for each variant: means over the seeds that are done, and their standard deviations.
+    """Return a row for each variant: means over finished seeds, and standard deviations.
 
     They are None where a value is missing, or there are too few.
     """
@@ -124,7 +124,7 @@ def natural(name: str) -> tuple[float, str]:
 
 
 def number(name: str) -> float | None:
-    """Return the value that a variant is named after; None where that is no number."""
+    """Return the number in a variant's name, or None."""
     try:
         return float(name) if name[:1] in "-.0123456789" else None
     except ValueError:

@@ -1,4 +1,4 @@
-"""One table: a data frame that is written as CSV, Markdown and LaTeX; each row knows its metrics files."""
+"""One table: a data frame written as CSV, Markdown and LaTeX; each row lists its metrics files."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from texgs.core.plain_yaml import parse_yaml
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-MISSING = "not measured"
-SOURCES = "metrics files"  # column of the paths that a row was read from
-UNPUBLISHED = "-"  # cell of a number that the paper does not have
-PAPER = " (paper)"  # end of the titles of these columns
-UNLIKE = "≠"  # cell of a number of the paper that is not like for like
+MISSING_CELL = "not measured"
+SOURCES = "metrics files"  # column of the source paths of a row
+UNPUBLISHED_CELL = "-"  # cell of a number missing from the paper
+PAPER = " (paper)"  # suffix of titles of the paper's columns
+UNLIKE_CELL = "≠"  # cell for a number of the paper that is not comparable
 FORMATS = ("csv", "md", "tex")
 DOCUMENT = "tables.tex"
 FORMULAS = r"""± \pm  × \times  ° ^\circ  · \cdot  ≠ \neq  ≤ \leq  ≥ \geq  → \rightarrow  ↑ \uparrow
   ↓ \downarrow  − -  ² ^2  ³ ^3  α \alpha  β \beta  λ \lambda  µ \mu  μ \mu  σ \sigma"""
-SPECIAL = {  # letters that LaTeX takes for something else, or has other names for
+LATEX_LETTERS = {  # LaTeX's spelling of special letters
     **{letter: f"${formula}$" for letter, formula in re.findall(r"(\S) (\S+)", FORMULAS)},
     **{letter: f"\\{letter}" for letter in "&%$#_{}"},
     **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "…": r"\ldots{}"},
-    **{"[": "{[}", "]": "{]}"},  # after the end of a row they would hold an argument
+    **{"[": "{[}", "]": "{]}"},  # after a row, brackets would be an argument
     **{"–": "--", "—": "---", "‘": "`", "’": "'", "“": "``", "”": "''"},
 }
 FLOAT = r"""\begin{table}[p]
@@ -49,19 +49,19 @@ FLOAT = r"""\begin{table}[p]
 
 @dataclass(frozen=True)
 class Column:
-    """One column: its heading and how its numbers are written."""
+    """One column: heading and number format."""
 
     title: str
-    digits: int | None = None  # after the point; None: as they are
-    missing: str = MISSING  # in place of a cell that has no value
+    digits: int | None = None  # after the point; None: unrounded
+    missing: str = MISSING_CELL  # text of an empty cell
 
     @property
     def is_number(self) -> bool:
-        """Return whether its cells are numbers, which stand to the right."""
+        """Return whether its cells are numbers, which are right-aligned."""
         return self.digits is not None
 
     def text(self, cell: Any) -> str:
-        """Return a cell as people read it."""
+        """Format a cell for readers."""
         if cell is None:
             return self.missing
         return str(cell) if isinstance(cell, str) or self.digits is None else f"{cell:,.{self.digits}f}"
@@ -87,7 +87,7 @@ def columns(name: str) -> dict[str, Column]:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Rows with a value for each column; what was not measured says so."""
+    """Rows with a value for each column, or a text for missing ones."""
 
     caption: str
     columns: Sequence[Column]
@@ -119,17 +119,17 @@ class Table:
 
     @cached_property
     def texts(self) -> DataFrame:
-        """Return all cells as people read them."""
+        """Format all cells for readers."""
         return data_frame({c.title: list(map(c.text, self.frame[c.title].tolist())) for c in self.columns})
 
     def csv(self) -> str:
-        """Return comma separated values, numbers in full; an empty cell has no number of its own."""
+        """Return comma-separated values with full precision; cells without a number are empty."""
         sources = [" ".join(path.as_posix() for path in paths) for paths in self.frame[SOURCES]]
         frame = self.frame.assign(**{SOURCES: sources})
-        return frame.where(frame != UNLIKE, None).to_csv(index=False, lineterminator="\n")
+        return frame.where(frame != UNLIKE_CELL, None).to_csv(index=False, lineterminator="\n")
 
     def markdown(self) -> str:
-        """Return a Markdown table, numbers to the right."""
+        """Return a Markdown table with right-aligned numbers."""
         rule = ["---:" if column.is_number else "---" for column in self.columns]
         lines = [self.titles, rule, *self.texts.to_numpy().tolist()]
         rows = [" | ".join(one_line(text).replace("|", r"\|") for text in line) for line in lines]
@@ -145,7 +145,7 @@ class Table:
 
 
 def data_frame(rows: Any, columns: Sequence[str] | None = None) -> DataFrame:
-    """Return rows as a data frame that keeps each value as it is; without rows it has the columns alone."""
+    """Return rows as a data frame with unchanged values; without rows it has only columns."""
     import pandas as pd  # slow to import
 
     return pd.DataFrame(rows, columns=columns, dtype=object)
@@ -158,7 +158,7 @@ def write_table(folder: str | Path, name: str, table: Table) -> None:
 
 
 def write_tables(folder: str | Path, tables: Mapping[str, Table]) -> None:
-    """Write the files of each table, and tables.tex, which has those with rows and their captions."""
+    """Write the files of each table, and tables.tex with all non-empty tables and their captions."""
     floats = []
     for name, table in tables.items():
         write_table(folder, name, table)
@@ -169,14 +169,14 @@ def write_tables(folder: str | Path, tables: Mapping[str, Table]) -> None:
 
 
 def escape(text: str) -> str:
-    """Return text as LaTeX prints it, in one line; what the fonts of pdflatex may not have by its code."""
-    return "".join(map(printed, one_line(text)))
+    """Escape text for LaTeX in one line; letters missing from pdflatex's fonts become codes."""
+    return "".join(map(latex_letter, one_line(text)))
 
 
-def printed(letter: str) -> str:
-    """Return a letter as LaTeX prints it."""
-    if letter in SPECIAL:
-        return SPECIAL[letter]
+def latex_letter(letter: str) -> str:
+    """Return LaTeX's spelling of a letter."""
+    if letter in LATEX_LETTERS:
+        return LATEX_LETTERS[letter]
     is_accented = "LATIN" in unicodedata.name(letter, "") and ord(letter) <= 0x17F  # the encoding T1 has it
     return letter if letter.isascii() or is_accented else rf"\texttt{{U+{ord(letter):04X}}}"
 

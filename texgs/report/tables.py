@@ -16,16 +16,16 @@ from texgs.report.table import PAPER, Table, tables_file
 
 @dataclass(frozen=True)
 class TableSpec:
-    """A table of the report: its entry in tables.yaml, and how it is made of records."""
+    """A table of the report: its entry in tables.yaml, and the function that makes it from records."""
 
     name: str  # of its files
     title: str
     section: str  # of the report, a key of `texgs.report.results.SECTIONS`
     places: Sequence[str]  # rules of the workflow whose jobs it reads
-    make: Callable[[Sequence[Record[Any]]], Table] | None  # None: whoever writes the tables hands it in
+    make: Callable[[Sequence[Record[Any]]], Table] | None  # None: supplied by the caller
     caption: str = ""
-    number: str = ""  # in the paper, with A in its appendix; none for tables that it does not have
-    paper: str = ""  # what else it has of this
+    number: str = ""  # in the paper, with A in its appendix; "" for other tables
+    paper: str = ""  # further content of the paper's table
 
     @property
     def heading(self) -> str:

@@ -1,4 +1,4 @@
-"""The ball around the primitives of models: what cameras look at where the data are not known."""
+"""The ball around the primitives of models: the target of cameras if the data are unknown."""
 
 from collections.abc import Sequence
 from math import radians, sin
@@ -14,9 +14,9 @@ from texgs.fields.splats import geometry
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 
-STRAYS = 0.01  # part of the primitives, far from all others, that bounds leave out
-REACH = 2.0  # standard deviations of a primitive that are visible
-SMALLEST = 1e-3  # radius, world units
+STRAY_SHARE = 0.01  # share of the farthest primitives, which bounds ignore
+REACH = 2.0  # visible extent of a primitive, in standard deviations
+MIN_RADIUS = 1e-3  # world units
 
 
 def bounds_of(models: Sequence[Field]) -> Frame:
@@ -30,15 +30,15 @@ def bounds_of(models: Sequence[Field]) -> Frame:
         return Frame(list(ORIGIN), paper.radius * sin(radians(paper.fov_y / 2)))
     places = torch.cat([p["means"] for p in whole]).double().cpu().numpy()
     reach = torch.cat([p["scales"].exp().amax(dim=1) for p in whole]).double().cpu().numpy()
-    center = np.quantile(places, [STRAYS, 1 - STRAYS], axis=0).mean(axis=0)
+    center = np.quantile(places, [STRAY_SHARE, 1 - STRAY_SHARE], axis=0).mean(axis=0)
     ends = np.linalg.norm(places - center, axis=1) + REACH * reach
-    return Frame(center.tolist(), max(float(np.quantile(ends, 1 - STRAYS)), SMALLEST))
+    return Frame(center.tolist(), max(float(np.quantile(ends, 1 - STRAY_SHARE)), MIN_RADIUS))
 
 
 def span_of(
     models: Sequence[Field], framed: Frame, normal: Sequence[float], strays: float = 0.0
 ) -> tuple[float, float]:
-    """Return from where to where models are visible along a normal, but for a share of strays at each end.
+    """Return the visible range of models along a normal, without a share of strays at each end.
 
     Fields without means count as the ball that is framed.
     """
@@ -56,7 +56,7 @@ def span_of(
 
 
 def models_of(composed: Composed) -> list[Field]:
-    """Return the models of an open scene, as far as they have means."""
+    """Return the models with means in an open scene."""
     if isinstance(composed, Composition):
         return [part.model for part in composed.parts]
     return [*composed.fields] if isinstance(composed, JoinedGaussians) else []

@@ -15,50 +15,50 @@ import numpy as np
 import yaml
 
 from texgs.core.cuts import AXES, NO_CUTS, Box, Cuts, Plane, along
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.names import is_number
 from texgs.core.plain_yaml import parse_yaml
 from texgs.scene.bounds import models_of, span_of
 from texgs.scene.parts import entry_of, key_path
 from texgs.scene.scene import Scene
-from texgs.scene.scene_file import SEGMENT_KEYS, cuts_of, known, plain_cuts
+from texgs.scene.scene_file import SEGMENT_KEYS, cuts_of, plain_cuts, require_keys
 from texgs.scene.session import SCENE_KEYS, Session
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.space import Space
 
-NUMBERED = re.compile(r"cut\.([1-9])=")
+CUT_NUMBER = re.compile(r"cut\.([1-9])=")
 PLANE = (
     "AXIS,POSITION with x, -x, y, -y, z or -z, R, A, S, L, P, I, X, Y or Z of its file, or NX,NY,NZ,OFFSET, "
     "in world units"
 )
-TOWARDS = "RASLPIXYZ"  # axes of the space of a volume's file
+DIRECTIONS = "RASLPIXYZ"  # axes of the space of a volume's file
 BOX = "X0,Y0,Z0,X1,Y1,Z1, in world units"
-LOOKS = ("style", "picture", "instruction")  # what people look for here, too
-VOXELS = "v"  # behind a position along an axis that counts samples, the first of which is 0
+LOOKS = ("style", "picture", "instruction")  # keys of looks, which are not changes of numbers
+VOXEL_SUFFIX = "v"  # after a position in samples, counted from 0
 
 
 def apply_all(session: Session, words: Sequence[str]) -> None:
-    """Make the changes that words ask for, see `texgs edit --help`; an error names its word.
+    """Apply changes given as words, see `texgs edit --help`; an error names its word.
 
     Numbers of planes are those of the scene as it is now: these planes are replaced first, then taken back.
     All are one step; none is made where one cannot be.
     """
     with session.one_step():
         for word in sorted(words, key=_turn):
-            with located(word):
+            with errors_at(word):
                 _apply(session, word)
 
 
 def _turn(word: str) -> int:
-    """Return when it is the turn of a word: first planes by number, of which the last is taken back first."""
-    numbered = NUMBERED.match(word)
+    """Return the sort key of a word: planes by number come first, removals from the last down."""
+    numbered = CUT_NUMBER.match(word)
     if not numbered:
         return 0
     return -int(numbered[1]) if numbered.end() == len(word) else -10
 
 
 def _apply(session: Session, word: str) -> None:
-    """Make the change that a word KEY=VALUE asks for."""
+    """Apply a change KEY=VALUE."""
     name, is_edit, text = word.partition("=")
     if not is_edit:
         raise ArgumentError("expected KEY=VALUE, such as TF01.opacity=0.5")
@@ -75,12 +75,12 @@ def _apply(session: Session, word: str) -> None:
         models = ", ".join(session.scene.models)
         raise ArgumentError(f"expected a model of the scene ({models}), got {part}")
     else:
-        known({name: text}, ("light", "background", "cut", "time"), "the scene")
+        require_keys({name: text}, ("light", "background", "cut", "time"), "the scene")
         session.set_of_scene(name, _plain(text) if text else SCENE_KEYS[name])
 
 
 def _require_through(session: Session, cuts: Cuts) -> None:
-    """Require of each new plane that it takes away some of the models, and of a box that it leaves some."""
+    """Require that each new plane removes a part of the models, and that a box leaves a part."""
     scene = session.scene
     for plane in cuts.half_spaces:
         if plane in scene.cuts.half_spaces:
@@ -96,14 +96,14 @@ def _require_through(session: Session, cuts: Cuts) -> None:
 
 
 def _change_part(session: Session, part: str, key: str, text: str) -> None:
-    """Change one value of a part; an empty text takes it back."""
+    """Change one value of a part; an empty text resets it."""
     entry_of(session.scene, part)
     if key in LOOKS:
         raise ArgumentError(
             "a look by a picture or by words is learned: by texgs view, scene.style in Python, or an edit of "
             "texgs run (docs/looks.md)"
         )
-    known({key: text}, SEGMENT_KEYS, key_path(part))
+    require_keys({key: text}, SEGMENT_KEYS, key_path(part))
     if key in ("file", "texture"):
         session.set_file(part, key, _file(text) if text or key == "file" else None)
     elif text:
@@ -113,14 +113,14 @@ def _change_part(session: Session, part: str, key: str, text: str) -> None:
 
 
 def _file(text: str) -> Path:
-    """Return the whole path of a file that is there."""
+    """Return the absolute path of an existing file."""
     if not Path(text).is_file():
         raise ArgumentError(f"expected a file that is there, got {text}")
     return Path(text).resolve()
 
 
 def _plain(text: str) -> Any:
-    """Read a value as YAML; also r,g,b without brackets, and #rrggbb, which YAML takes for a comment."""
+    """Read a value as YAML; also r,g,b without brackets, and #rrggbb, a comment in YAML."""
     if text.startswith("#"):
         return text
     try:
@@ -130,7 +130,7 @@ def _plain(text: str) -> Any:
 
 
 def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:
-    """Return the cuts of a scene with a change; an empty text takes something back.
+    """Return the cuts of a scene with a change; an empty text removes a cut.
 
     Args:
         scene: of whose volume samples are counted.
@@ -155,22 +155,22 @@ def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:
 
 
 def _plane(scene: Scene, text: str) -> Plane:
-    """Return the plane at a position of an axis, which takes away what is beyond; or of normal and offset."""
+    """Return the plane at a position along an axis, or of a normal and offset; it removes the far side."""
     words = text.split(",")
     letter, sign = words[0].lstrip("+-"), -1.0 if words[0].startswith("-") else 1.0
-    if len(words) != 2 or letter not in [*AXES, *TOWARDS]:
+    if len(words) != 2 or letter not in [*AXES, *DIRECTIONS]:
         numbers = _places(scene, words, [None] * 4, PLANE)
         return Plane(numbers[:3], numbers[3])
-    if letter in TOWARDS and not words[1].endswith(VOXELS):
+    if letter in DIRECTIONS and not words[1].endswith(VOXEL_SUFFIX):
         return _in_space(scene, letter, sign, words[1])
     normal = along(AXES.index(letter)) if letter in AXES else _towards(scene, letter)[1]
-    axis = int(np.abs(normal).argmax())  # that runs there most nearly
+    axis = int(np.abs(normal).argmax())  # the nearest axis
     (place,) = _places(scene, words[1:], [axis], PLANE)
     return Plane(along(axis, sign if normal[axis] > 0 else -sign), sign * place)
 
 
 def _in_space(scene: Scene, letter: str, sign: float, text: str) -> Plane:
-    """Return the plane at a place of the file's space, counted towards a letter."""
+    """Return the plane at a position in the file's space, along a letter's direction."""
     space, normal = _towards(scene, letter)
     form = f"{letter},POSITION in {space.unit or 'units of the file'}"
     (place,) = _places(scene, [text.removesuffix(space.unit)], [None], form)
@@ -192,7 +192,7 @@ def _places(scene: Scene, words: Sequence[str], axes: Sequence[int | None], form
     """Return numbers, one for each axis or None, see `_place`."""
     try:
         places = [_place(scene, *each) for each in zip(words, axes, strict=True)]
-    except ArgumentError:  # of samples
+    except ArgumentError:  # a position in samples
         raise
     except ValueError:
         places = [inf]
@@ -202,10 +202,10 @@ def _places(scene: Scene, words: Sequence[str], axes: Sequence[int | None], form
 
 
 def _place(scene: Scene, word: str, axis: int | None) -> float:
-    """Return a number; along an axis it may count samples of the volume, and is in world units then."""
-    if axis is None or not word.endswith(VOXELS):
+    """Return a number in world units; along an axis, the text may count samples of the volume."""
+    if axis is None or not word.endswith(VOXEL_SUFFIX):
         return float(word)
-    number = float(word.removesuffix(VOXELS))
+    number = float(word.removesuffix(VOXEL_SUFFIX))
     if scene.volume is None:
         raise ArgumentError("expected world units, got samples: this scene names no volume")
     grid = open_grid(scene.volume.file)

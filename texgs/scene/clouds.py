@@ -1,4 +1,4 @@
-"""A scene as clouds of splats for other programs: one colour a surfel, with the light in its harmonics."""
+"""A scene as clouds of splats for other programs: one colour per surfel, with light in its harmonics."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,35 +10,35 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.fields.field import Field
 from texgs.fields.gaussians import Gaussians
 from texgs.fields.part_edit import PartEdit, opacity_factors
 from texgs.fields.splats import geometry
-from texgs.fields.surfels.composition import Part
+from texgs.fields.surfels.composition import EditableModel
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.shading import FAR
-from texgs.fields.surfels.texels import untextured
+from texgs.fields.surfels.shading import FAR_DISTANCE
+from texgs.fields.surfels.texels import with_single_texels
 from texgs.raster.reference.shading import harmonics
 from texgs.scene.scene import Scene
 from texgs.volume.cameras import icosphere_of
 from texgs.volume.space import Space
 
-THIN = 1e-6  # standard deviation of a surfel along its normal, world units
-DIRECTIONS = 92  # from which the light on a surfel is looked at
+THICKNESS = 1e-6  # standard deviation of a surfel along its normal, world units
+DIRECTIONS = 92  # of view, to sample the light on a surfel
 COEFFICIENTS = {"headlight": 9, "directional": 16}  # a headlight looks the same from behind: even degrees
 
 
 @dataclass(frozen=True)
 class Cloud:
-    """Splats of one model as they are drawn, all float32."""
+    """Splats of one model as rendered, all float32."""
 
     name: str
-    is_flat: bool  # surfels: the third axis is their normal
-    antialiased: bool  # small ones stay faint, see texgs.raster.Options; surfels do
-    means: np.ndarray  # [N, 3] world units, or those of the space that it is placed in
+    is_flat: bool  # true for surfels, whose third axis is the normal
+    antialiased: bool  # whether small ones stay faint, see texgs.raster.Options; surfels do
+    means: np.ndarray  # [N, 3] world units, or units of the cloud's space
     quats: np.ndarray  # [N, 4] wxyz, unit length
     scales: np.ndarray  # [N, 3] standard deviations, world units
     opacities: np.ndarray  # [N] in [0, 1]
@@ -53,7 +53,7 @@ def clouds_of(scene: Scene) -> list[Cloud]:
     """
     clouds = []
     for name, entry in scene.models.items():
-        with located(f"models.{name}"):
+        with errors_at(f"models.{name}"):
             clouds.append(cloud_of(name, entry.open(), entry.edits, scene.light))
     visible = [cloud for cloud in clouds if len(cloud.means)]
     if not visible:
@@ -61,17 +61,17 @@ def clouds_of(scene: Scene) -> list[Cloud]:
     return visible
 
 
-def placed(cloud: Cloud, space: Space) -> Cloud:
-    """Return a cloud of the world in a space, whose axes have to be at right angles.
+def place_cloud(cloud: Cloud, space: Space) -> Cloud:
+    """Map a cloud from the world to a space with orthogonal axes.
 
-    Gaussians look the same from behind, so that a mirror of one is a turn of it.
+    Gaussians look the same from behind, so a mirror image of one is a rotation of it.
     """
     turn = space.turn
     if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-3):
         raise ArgumentError("space: expected axes at right angles, got oblique ones; export to the world")
     rotation = Rotation.from_matrix(-turn if space.is_mirrored else turn)
     quats = (rotation * Rotation.from_quat(np.roll(cloud.quats, -1, axis=1))).as_quat()
-    views, count = icosphere_of(DIRECTIONS, Lens(radius=FAR)), cloud.sh.shape[1]
+    views, count = icosphere_of(DIRECTIONS, Lens(radius=FAR_DISTANCE)), cloud.sh.shape[1]
     ways = normalize(torch.stack([camera.position for camera in views]).double(), dim=1)
     before, after = (harmonics(x)[:, :count] for x in (ways, ways @ torch.from_numpy(turn.T)))
     moved = torch.linalg.lstsq(after, before).solution.numpy()  # [K, K]
@@ -88,35 +88,35 @@ def placed(cloud: Cloud, space: Space) -> Cloud:
 def cloud_of(
     name: str, opened: tuple[Field, Sequence[Tensor]], edits: Sequence[PartEdit], light: Light
 ) -> Cloud:
-    """Return what is visible of a model as `SceneModel.open` returns it; edits are those of a `Part`."""
+    """Return the visible cloud of a model from `SceneModel.open`; edits are as in `EditableModel`."""
     model, masks = cast("Surfels | Gaussians", opened[0]), opened[1]
     means, quats, scales, opacities = geometry(model.parameters)
     is_flat = isinstance(model, Surfels)
     if isinstance(model, Surfels) and model.stage != "surfels":
-        opacities, sh = lit(model, masks, edits, light)
+        opacities, sh = light_harmonics(model, masks, edits, light)
     else:
         (factor,) = opacity_factors(edits, 1, model.kind)
         opacities, sh = (opacities * factor).clamp_max(1), model.parameters["sh"]
     if is_flat:
-        scales = torch.cat([scales, torch.full_like(scales[:, :1], THIN)], dim=1)
+        scales = torch.cat([scales, torch.full_like(scales[:, :1], THICKNESS)], dim=1)
     values = (means, normalize(quats, dim=1), scales, opacities, sh)
     arrays = (value[opacities > 0].numpy() for value in values)
     return Cloud(name, is_flat, is_flat or model.shading.options.antialiased, *arrays)
 
 
-def lit(
+def light_harmonics(
     model: Surfels, masks: Sequence[Tensor], edits: Sequence[PartEdit], light: Light
 ) -> tuple[Tensor, Tensor]:
-    """Return opacities [N] and harmonics [N, K, 3] of surfels with one colour, as edited, in a light.
+    """Return opacities [N] and harmonics [N, K, 3] of edited surfels with one colour each, under a light.
 
     The colour is that of the mean texel under the Gaussian. Harmonics are the least squares of its looks from
     directions all around.
     """
-    model = untextured(model) if model.stage == "texture" else model
+    model = with_single_texels(model) if model.stage == "texture" else model
     texels = model.parameters.get("texels", torch.zeros_like(model.parameters["colors"]))
-    part = Part(model, masks)
+    part = EditableModel(model, masks)
     edited = part.apply(edits)
-    cameras = icosphere_of(DIRECTIONS, Lens(radius=FAR))
+    cameras = icosphere_of(DIRECTIONS, Lens(radius=FAR_DISTANCE))
     views = normalize(torch.stack([-camera.position for camera in cameras]).double(), dim=1)  # [M, 3]
     count = COEFFICIENTS[light.kind]
     solver = torch.linalg.pinv(harmonics(views)[:, :count]).float()  # [K, M]

@@ -1,4 +1,4 @@
-"""A scene with all of its files in one folder, to keep or to pass on."""
+"""Copy a scene with all its files into one folder, to keep or to share."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -46,13 +46,13 @@ def write_copy(folder: str | Path, scene: Scene) -> Path:
 
 
 def require_files(files: Iterable[Path | None]) -> None:
-    """Require that files of a scene are there; None stands for what it does without."""
+    """Require that the files of a scene exist; None stands for no file."""
     if gone := [file for file in files if file is not None and not file.exists()]:
         raise ArgumentError(f"{gone[0]}: no such file, which the scene needs; bring it back, then try again")
 
 
 class Copies:
-    """Files that are copied into a folder, each once."""
+    """Copies files into a folder, each once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self._copies = folder, dict[Path, Path]()
@@ -69,11 +69,11 @@ class Copies:
         return replace(entry, file=self.copy(entry.file, *names), texture=texture)
 
     def volume(self, file: Path) -> Path:
-        """Return the copy of a volume, with what is known of its values beside it."""
+        """Copy a volume together with its summary."""
         return self.with_summary(file, self.copy(file, "volume"))
 
     def with_summary(self, file: Path, target: Path) -> Path:
-        """Return the copy of a volume, after its summary has been copied, too, if there is one."""
+        """Copy a volume after its summary, if any; return the copy."""
         if (summary := summary_file(file)).exists():
             self.put(summary, summary_file(target))
         return target
@@ -89,7 +89,7 @@ class Copies:
         return copied
 
     def copy(self, file: Path, *names: str) -> Path:
-        """Return the copy of a file, which has these names, a number where that is needed, and its ending."""
+        """Copy a file under a name made of these names, a number if needed, and its suffix."""
         source = file.resolve()
         if source not in self._copies:
             free = (each for each in self.targets(file.suffix, names) if self.is_free(each, source))
@@ -103,13 +103,13 @@ class Copies:
             yield self.folder / file_name("part", f"{words}{suffix}".replace("/", "-"))
 
     def is_free(self, target: Path, source: Path) -> bool:
-        """Return whether no other file has this name, here or among the copies."""
+        """Return whether no other file has this name, in the folder or among the copies."""
         if target in self._copies.values():
             return False
         return not target.exists() or target.samefile(source) or cmp(target, source, shallow=False)
 
     def put(self, source: Path, target: Path) -> Path:
-        """Copy a file, unless it is there already, and return the copy."""
+        """Copy a file unless the same is there already; return the copy."""
         if target.resolve() != source.resolve():
             copy_atomic(source, target)
         self._copies[source.resolve()] = target

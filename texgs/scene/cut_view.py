@@ -1,4 +1,4 @@
-"""What is seen of a scene that is cut: faces of its volume, and what the cut leaves of its models."""
+"""Views of a cut scene: faces of its volume, and the remaining parts of its models."""
 
 from collections.abc import Collection
 from functools import partial
@@ -16,13 +16,13 @@ from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin, range_of
 from texgs.volume.images import smaller
 
-SLAB = 36.0  # opacity units of the volume behind a face, which hide most of what is beyond
-UNITS, OPAQUE = 3.0, 0.05  # a face is where so many opacity units behind a cut have at least this alpha
-RIM = 0.01  # of the smaller side of the picture: how far around a face the slab goes on
-HIDDEN = 0.998  # alpha of a slab behind which models are not drawn, half a level of 255
+SLAB_UNITS = 36.0  # thickness of the slab behind a face, opacity units; it hides most of the rest
+FACE_UNITS, FACE_ALPHA = 3.0, 0.05  # a face has this alpha within so many opacity units behind a cut
+RIM = 0.01  # width of the slab's rim around a face, in shorter sides of the picture
+HIDDEN_ALPHA = 0.998  # alpha of a slab that hides models, half a level of 255 from opaque
 STEP = 0.5  # voxels between the samples of a slab
-COARSE = 4  # pixels each way in which faces are looked for at once
-Part = tuple[slice, slice]  # rows and columns of a picture
+COARSE_PIXELS = 4  # step of the search for faces, pixels
+Crop = tuple[slice, slice]  # rows and columns of a picture
 
 
 def cut_view(
@@ -75,17 +75,17 @@ def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut:
     beyond = cut.depth_range.clone()
     near, far = beyond[:, rows, columns]
     near.copy_(slab.depth_range[1])
-    far.copy_(torch.where(seen[..., 3] < HIDDEN, far, near))
+    far.copy_(torch.where(seen[..., 3] < HIDDEN_ALPHA, far, near))
     models = composed.render(
         *(camera, scene.light, scene.edits),
         background=camera.viewmat.new_tensor(scene.background),
         depth_range=beyond,
     )
-    return over(seen, models, part)
+    return blend_over(seen, models, part)
 
 
-def over(front: Tensor, behind: Render, part: Part) -> Render:
-    """Lay premultiplied RGBA [h, w, 4] over a part of a render, whose tensors it changes, and return that."""
+def blend_over(front: Tensor, behind: Render, part: Crop) -> Render:
+    """Blend premultiplied RGBA [h, w, 4] over a part of a render in place, and return the render."""
     clear = 1 - front[..., 3]
     for seen, plane in zip(front.unbind(-1), (*behind.color.unbind(-1), behind.alpha), strict=True):
         back = plane[part]
@@ -93,40 +93,43 @@ def over(front: Tensor, behind: Render, part: Part) -> Render:
     return behind
 
 
-def slab_thickness(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> tuple[Tensor, Part]:
-    """Return how thick the slab is in a part [h, w] of the picture, camera z, and which; elsewhere is none.
+def slab_thickness(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> tuple[Tensor, Crop]:
+    """Return the thickness [h, w] of the slab in camera z, and the part of the picture that it covers.
 
-    Around faces it falls to 0 softly.
+    It falls to 0 softly around faces.
     """
     size = camera.height, camera.width
-    multiple = camera.crop(0, 0, *(-(-size // COARSE) * COARSE for size in (camera.width, camera.height)))
-    small = smaller(multiple, COARSE)
+    multiple = camera.crop(
+        0, 0, *(-(-size // COARSE_PIXELS) * COARSE_PIXELS for size in (camera.width, camera.height))
+    )
+    small = smaller(multiple, COARSE_PIXELS)
     alpha = face_alpha(composed, small, scene, twin.with_step(1.0), range_of(scene.cuts, small))
-    face = softly_grown((alpha / OPAQUE).clamp(max=1), ceil(RIM * min(small.height, small.width)))
-    part = around(face)
-    thickness = (face * (SLAB * twin.opacity_unit) / small.ray_lengths())[part]
-    thickness = interpolate(thickness[None, None], scale_factor=COARSE, mode="bilinear")[0, 0]
+    face = grow_softly((alpha / FACE_ALPHA).clamp(max=1), ceil(RIM * min(small.height, small.width)))
+    part = bounding_part(face)
+    thickness = (face * (SLAB_UNITS * twin.opacity_unit) / small.ray_lengths())[part]
+    thickness = interpolate(thickness[None, None], scale_factor=COARSE_PIXELS, mode="bilinear")[0, 0]
     rows, columns = (
-        slice(COARSE * each.start, min(COARSE * each.stop, end)) for each, end in zip(part, size, strict=True)
+        slice(COARSE_PIXELS * each.start, min(COARSE_PIXELS * each.stop, end))
+        for each, end in zip(part, size, strict=True)
     )
     return thickness[: rows.stop - rows.start, : columns.stop - columns.start], (rows, columns)
 
 
-def around(weights: Tensor) -> Part:
-    """Return where weights [H, W] are not 0, one pixel at least, and one more to each side."""
+def bounding_part(weights: Tensor) -> Crop:
+    """Return the bounding box of nonzero weights [H, W], at least one pixel, with a margin of one."""
     places = [weights.any(dim).nonzero()[:, 0].tolist() or [0] for dim in (1, 0)]
     rows, columns = (slice(max(0, each[0] - 1), each[-1] + 2) for each in places)
     return rows, columns
 
 
 def face_alpha(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut: CutRange) -> Tensor:
-    """Return alpha [H, W] of what rays meet soon behind a plane; there is a face from `OPAQUE` on."""
-    soon = slab_of(cut, UNITS * twin.opacity_unit / camera.ray_lengths())
+    """Return the alpha [H, W] of the volume close behind a plane; a face needs `FACE_ALPHA`."""
+    soon = slab_of(cut, FACE_UNITS * twin.opacity_unit / camera.ray_lengths())
     return twin.cast(camera, scene, composed.palettes, soon).rgba[..., 3]
 
 
-def softly_grown(weights: Tensor, pixels: int) -> Tensor:
-    """Return weights [H, W] grown by so many pixels each way; over as many more they fall to 0."""
+def grow_softly(weights: Tensor, pixels: int) -> Tensor:
+    """Dilate weights [H, W] by some pixels each way, then fall to 0 over as many more."""
     reached = max_pool2d(weights[None], 2 * pixels + 1, 1, pixels)
     grown = reached
     for softer in range(pixels, 0, -1):
@@ -136,24 +139,24 @@ def softly_grown(weights: Tensor, pixels: int) -> Tensor:
 
 
 def slab_of(cut: CutRange, thickness: Tensor) -> CutRange:
-    """Return what of the rays lies within a thickness [H, W] behind a face, camera z; of others nothing."""
+    """Return the depth ranges of rays within a thickness [H, W] behind a face, camera z; empty elsewhere."""
     near, far = cut.depth_range
     behind = torch.where(cut.face >= 0, torch.minimum(near + thickness, far), near)
     return cut._replace(depth_range=torch.stack([near, behind]))
 
 
-def beside(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> tuple[Render, Render]:
-    """Return a view of a scene, and the same view of its volume."""
+def scene_and_volume(composed: Composed, camera: Camera, scene: Scene, twin: Twin) -> tuple[Render, Render]:
+    """Render a view of a scene, and the same view of its volume."""
     camera = camera.to(composed.device)
     background = camera.viewmat.new_tensor(scene.background)
     seen = cut_view(composed, camera, scene, twin, background=background)
     return seen, twin.render(camera, scene, composed.palettes)
 
 
-def beside_fitted(
+def scene_and_fitted(
     composed: Composed, fitted: Composed, camera: Camera, scene: Scene, outputs: Collection[str]
 ) -> tuple[Render, Render]:
-    """Return a view of a scene, and the same view of its models as fitted; cuts leave both without faces."""
+    """Render a view of a scene, and the same view of its fitted models; cuts have no faces in either."""
     camera = camera.to(composed.device)
     background = camera.viewmat.new_tensor(scene.background)
     view = partial(cut_view, camera=camera, twin=None, background=background, outputs=outputs)

@@ -19,52 +19,56 @@ from texgs.fields.gaussians import Gaussians, JoinedGaussians
 from texgs.fields.gaussians import write_ply as write_gaussians
 from texgs.fields.kinds import Kind, kinds
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.ply_columns import Told, colored, write_columns
+from texgs.fields.ply_columns import Told, colored_points, write_columns
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.compact import seen_surfels, write_compact
-from texgs.fields.surfels.composition import Composition, Part
+from texgs.fields.surfels.composition import Composition, EditableModel
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.ply import write_ply as write_surfels
 from texgs.raster import Render
 from texgs.raster.shading import Y00
 from texgs.scene.bounds import bounds_of
 from texgs.scene.clouds import clouds_of
-from texgs.scene.clouds import placed as placed_cloud
-from texgs.scene.export_keys import IN_FILE, OF_CLOUDS, Export
+from texgs.scene.clouds import place_cloud as placed_cloud
+from texgs.scene.export_keys import CLOUD_KINDS, FILE_SPACE_KINDS, Export
 from texgs.scene.gltf import write_gltf
-from texgs.scene.joined import joined, write_vtp
-from texgs.scene.mesh import fuse, placed, write_mesh
+from texgs.scene.joined import join_surfels, write_vtp
+from texgs.scene.mesh import fuse, place_mesh, write_mesh
 from texgs.scene.scene import Scene
 from texgs.scene.spz import write_spz
 from texgs.scene.usd import write_usd
 from texgs.volume.cameras import icosphere_of
 from texgs.volume.space import Space
 
-BAKED = "Surfels have one colour each, the mean of their texture, with the light of the scene as harmonics"
+BAKED_NOTE = (
+    "Surfels have one colour each, the mean of their texture, with the light of the scene as harmonics"
+)
 
 
 def write_export(path: Path, scene: Scene, keys: Export) -> list[str]:
-    """Write a scene, or one model of it, into a file for other programs; return what is to be told of it.
+    """Write a scene, or one model of it, into a file for other programs; return warnings for the user.
 
     Raises:
         ArgumentError, ShapeError: if it cannot be written so, or an option does not count.
     """
-    kind, shown = keys.kind_of(path), chosen(scene, keys.model)
+    kind, shown = keys.kind_of(path), single_model(scene, keys.model)
     require_other(path, scene)
     for entry in shown.models.values():
         require_export(files.kind_of(entry.file), kind)
     keys = replace(keys, kind=kind)
-    if keys.model is not None and kind not in OF_CLOUDS:
+    if keys.model is not None and kind not in CLOUD_KINDS:
         export_model(path, shown.models[keys.model].open()[0], keys, shown.space)
         return []
     export_scene(path, shown, keys)
-    is_lost = kind in IN_FILE and keys.space is None and shown.space is None
+    is_lost = kind in FILE_SPACE_KINDS and keys.space is None and shown.space is None
     lost = "in world units: the scene knows no space of a file; texgs compose writes it where there is one"
-    return [BAKED] * (kind in OF_CLOUDS) + ["its cuts are left out"] * bool(shown.cuts) + [lost] * is_lost
+    return (
+        [BAKED_NOTE] * (kind in CLOUD_KINDS) + ["its cuts are left out"] * bool(shown.cuts) + [lost] * is_lost
+    )
 
 
-def chosen(scene: Scene, model: str | None) -> Scene:
-    """Return a scene with one of its models alone, as it is edited; the whole scene for None."""
+def single_model(scene: Scene, model: str | None) -> Scene:
+    """Return the scene with only one of its models, edits included; None: the whole scene."""
     if model is None:
         return scene
     if model not in scene.models:
@@ -73,13 +77,13 @@ def chosen(scene: Scene, model: str | None) -> Scene:
 
 
 def views_of(keys: Export, frame: Frame) -> list[Camera]:
-    """Return views of all that is framed."""
+    """Return views of the whole frame."""
     placed = icosphere_of(keys.views, frame.lens().square(keys.size))
     return [camera.to(torch_device(keys.device)) for camera in placed]
 
 
 def target_of(keys: Export, known: Space | None) -> Space | None:
-    """Return the space that places are moved to; None for the world.
+    """Return the space of the exported positions, or None for the world.
 
     Args:
         keys: options.
@@ -90,12 +94,12 @@ def target_of(keys: Export, known: Space | None) -> Space | None:
             "space: expected a scene that knows the space of its volume's file, got none; export it to the "
             "world, or make it again by texgs compose"
         )
-    is_moved = keys.kind in IN_FILE if keys.space is None else keys.space == "file"
+    is_moved = keys.kind in FILE_SPACE_KINDS if keys.space is None else keys.space == "file"
     return known if is_moved else None
 
 
 def facts_of(keys: Export, known: Space | None) -> Told:
-    """Return what the file says of the space that the scene knows."""
+    """Return the facts that a file records about the scene's space."""
     if known is None:
         return None
     matrix = np.array(known.matrix, float).ravel().tolist()
@@ -104,7 +108,7 @@ def facts_of(keys: Export, known: Space | None) -> Told:
 
 
 def require_export(field: Kind, kind: str) -> None:
-    """Require of a kind of field that it can be exported as something."""
+    """Require that a kind of field supports an export."""
     if kind not in field.exports:
         able = " or ".join(name for name, other in kinds().items() if kind in other.exports)
         raise ArgumentError(
@@ -114,17 +118,17 @@ def require_export(field: Kind, kind: str) -> None:
 
 
 def require_other(path: Path, scene: Scene) -> None:
-    """Require a path that is none of the files which a scene reads."""
+    """Refuse a path that the scene itself reads."""
     files = [file for model in scene.models.values() for file in model.files if file]
     if path.resolve() in [file.resolve() for file in files]:
         raise ArgumentError(f"{path}: expected a new file, got one that the scene reads; choose another")
 
 
 def export_scene(path: Path, scene: Scene, keys: Export) -> Path:
-    """Export the visible models of a scene as one."""
+    """Export the visible models of a scene as a single one."""
     field = files.kind_of(next(iter(scene.models.values())).file)
     space, facts = target_of(keys, scene.space), facts_of(keys, scene.space)
-    if keys.kind in OF_CLOUDS:
+    if keys.kind in CLOUD_KINDS:
         clouds = [cloud if space is None else placed_cloud(cloud, space) for cloud in clouds_of(scene)]
         if keys.kind == "spz":
             return write_spz(path, clouds)
@@ -136,11 +140,11 @@ def export_scene(path: Path, scene: Scene, keys: Export) -> Path:
         return _write_fused(path, keys, scene.framed(composed), render, scene.space)
     if isinstance(composed, JoinedGaussians):
         return write_gaussians(path, composed.with_edits(edits), facts)
-    return _write(path, keys, joined(cast(Composition, composed).parts, edits), scene.space)
+    return _write(path, keys, join_surfels(cast(Composition, composed).parts, edits), scene.space)
 
 
 def export_model(path: Path, model: Field, keys: Export, known: Space | None = None) -> Path:
-    """Export one model with all that the file can hold of it."""
+    """Export one model with everything the file format can hold."""
     model = model.to(torch_device(keys.device))
     if keys.kind == "mesh":
         render, output = model.render, kinds()[model.kind].depth
@@ -153,14 +157,14 @@ def export_model(path: Path, model: Field, keys: Export, known: Space | None = N
 
 
 def _write(path: Path, keys: Export, model: Surfels, known: Space | None) -> Path:
-    """Write surfels as they are, without rendering them."""
+    """Write surfels directly, without rendering."""
     facts = facts_of(keys, known)
     if keys.kind == "compact":
         cameras = views_of(keys, bounds_of([model])) if keys.drop_unseen else []
         return write_compact(path, model, seen_surfels(model, cameras) if cameras else None)
     if keys.kind not in ("vtp", "points"):
         return write_surfels(path, model, str(keys.kind), facts)
-    plain = joined([Part(model)], [PartEdit()]) if model.stage != "surfels" else model
+    plain = join_surfels([EditableModel(model)], [PartEdit()]) if model.stage != "surfels" else model
     if keys.kind == "vtp":
         return write_vtp(path, plain, target_of(keys, known), facts)
     return _write_points(path, plain, keys, known)
@@ -169,10 +173,10 @@ def _write(path: Path, keys: Export, model: Surfels, known: Space | None) -> Pat
 def _write_fused(
     path: Path, keys: Export, frame: Frame, render: Callable[..., Render], known: Space | None
 ) -> Path:
-    """Write the mesh of what `render` shows of all that is framed."""
+    """Write the mesh fused from renders of the whole frame."""
     cameras, space = views_of(keys, frame), target_of(keys, known)
     mesh = fuse(partial(render, background=torch.zeros(3, device=cameras[0].K.device)), cameras, keys.voxel)
-    return write_mesh(path, mesh if space is None else placed(mesh, space), facts_of(keys, known))
+    return write_mesh(path, mesh if space is None else place_mesh(mesh, space), facts_of(keys, known))
 
 
 def _write_points(path: Path, model: Surfels, keys: Export, known: Space | None) -> Path:
@@ -190,5 +194,5 @@ def _write_points(path: Path, model: Surfels, keys: Export, known: Space | None)
     if space is not None:
         places = torch.from_numpy(space.points(places.cpu().numpy()))
     return write_columns(
-        path, colored(places, color.clamp(0, 1).mul(255).round()), told=facts_of(keys, known)
+        path, colored_points(places, color.clamp(0, 1).mul(255).round()), told=facts_of(keys, known)
     )

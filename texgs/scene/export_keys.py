@@ -1,4 +1,4 @@
-"""What can be written of a scene for other programs, and the options of it."""
+"""Kinds of exports of a scene for other programs, and their options."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.core.names import EXPORTS
 
-OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
-OF_CLOUDS = ("usd", "gltf", "spz")  # of scenes, with their light
-IN_FILE = ("points", "mesh", "vtp", "gltf")  # that are in the space of the volume's file by default
-OPTIONS = {  # that count for some kinds only
+MODEL_KINDS = ("release", "compact")  # kinds for a single model
+CLOUD_KINDS = ("usd", "gltf", "spz")  # kinds for whole scenes, with their light
+FILE_SPACE_KINDS = ("points", "mesh", "vtp", "gltf")  # kinds in the space of the volume's file by default
+OPTIONS = {  # options that only some kinds support
     "volume": ("html",),
     "steps": ("html",),
     "opacity": ("points",),
@@ -21,14 +21,14 @@ OPTIONS = {  # that count for some kinds only
     "views": ("mesh", "compact"),
     "size": ("mesh", "compact"),
     "drop_unseen": ("compact",),
-    "space": ("points", "mesh", "vtp", *OF_CLOUDS),
+    "space": ("points", "mesh", "vtp", *CLOUD_KINDS),
 }
 ENDINGS = list(dict.fromkeys(ending for endings in EXPORTS.values() for ending in endings))
 
 
 @dataclass(frozen=True)
 class Export:
-    """What to write."""
+    """Options of an export."""
 
     kind: str | None = key(
         None,
@@ -64,13 +64,13 @@ class Export:
     device: str = key("cpu", "where to compute", choices=("cpu", "cuda"))
 
     def kind_of(self, path: Path) -> str:
-        """Return what to write into a file; require an ending and options that go with it."""
+        """Return the kind of a file by its suffix; require options that match."""
         by_ending = (kind for kind in EXPORTS if path.suffix in EXPORTS[kind])
         kind = self.kind or next(by_ending, None)
         expected = ENDINGS if kind is None else EXPORTS[kind]
         if kind is None or path.suffix not in expected:
             raise ArgumentError(f"expected a file that ends in {' or '.join(expected)}, got {path}")
-        if kind in OF_MODELS and self.model is None:
+        if kind in MODEL_KINDS and self.model is None:
             raise ArgumentError(f"kind {kind}: expected one model, got a scene; export its models one by one")
         for name, kinds in OPTIONS.items():
             if kind not in kinds and getattr(self, name) != getattr(Export, name):

@@ -1,4 +1,4 @@
-"""Films of a scene: what moves in a shot, the camera, a light, a cut or time."""
+"""Films of a scene: shots in which the camera, a light, a cut or time moves."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 Movement = Literal["view", "test", "orbit", "light", "cut", "time", "orbit-time"]
 # Frames by default.
 COUNTS = {"view": 1, "test": 181, "orbit": 72, "light": 61, "cut": 61, "time": 61, "orbit-time": 72}
-MOST_FRAMES = 100_000  # an hour of film
-MARGIN = 0.1  # of the extent of what is visible: from its end to where a plane that moves starts or ends
+MAX_FRAMES = 100_000  # an hour of film
+MARGIN = 0.1  # distance from the visible data at which a moving plane starts and ends, relative to its extent
 
 
 @dataclass(frozen=True)
 class Film(Shot):
-    """A shot in which something moves."""
+    """A shot with a movement."""
 
     what: Movement = key(
         "view",
@@ -40,7 +40,7 @@ class Film(Shot):
         option="path",
     )
     frames: int | None = key(
-        None, "how many; default test 181, orbit and orbit-time 72, else 61", least=1, most=MOST_FRAMES
+        None, "how many; default test 181, orbit and orbit-time 72, else 61", least=1, most=MAX_FRAMES
     )
     seconds: float | None = key(None, "length of a film, in place of a number of frames", above=0)
     fps: float = key(25.0, "frames per second", above=0)
@@ -48,8 +48,8 @@ class Film(Shot):
     def __post_init__(self) -> None:
         if self.frames is not None and self.seconds is not None:
             raise ArgumentError("frames: expected a number of frames or of seconds, got both")
-        if self.count > MOST_FRAMES:
-            raise ArgumentError(f"seconds: expected at most {MOST_FRAMES} frames, got {self.count}")
+        if self.count > MAX_FRAMES:
+            raise ArgumentError(f"seconds: expected at most {MAX_FRAMES} frames, got {self.count}")
 
     @property
     def count(self) -> int:
@@ -90,9 +90,9 @@ class Film(Shot):
             places = turn if self.what == "orbit-time" else repeat(camera)
             return ((at, scene.at(round(share * last))) for at, share in zip(places, shares, strict=False))
         if self.what == "cut":
-            low, high = swept(scene, composition or scene.open())
-            return ((camera, moved(scene, high + share * (low - high))) for share in shares)
-        # from below the object to above it, on the camera's side
+            low, high = sweep_range(scene, composition or scene.open())
+            return ((camera, move_planes(scene, high + share * (low - high))) for share in shares)
+        # from below the object to above, on the camera's side
         lights = (Light("directional", self.azimuth, -90 + 180 * share) for share in shares)
         return ((camera, replace(scene, light=light)) for light in lights)
 
@@ -104,7 +104,7 @@ class Film(Shot):
         title: str = "",
         **options: int,
     ) -> Path:
-        """Write frames [H, W, 3 or 4], uint8, as they come, tell of the progress, and return the path.
+        """Write frames [H, W, 3 or 4], uint8, as they come, with a progress bar; return the path.
 
         Args:
             path: of the film, see `write_frames`.
@@ -129,26 +129,26 @@ class Film(Shot):
 def frames_of(
     scene: Scene, shots: Iterable[tuple[Camera, Scene]], device: torch.device | str
 ) -> Iterator[np.ndarray]:
-    """Yield frames [H, W, 3], uint8, of cameras and what they see: a scene with other light, cuts or time."""
+    """Yield frames [H, W, 3], uint8, of pairs of a camera and a scene."""
     from texgs.scene.session import Session
 
     session = Session(scene, device)
     return (session.frame(camera, scene=shown) for camera, shown in shots)
 
 
-def swept(scene: Scene, composition: Composed) -> tuple[float, float]:
-    """Return between which offsets the last plane moves: both ends show something."""
-    from texgs.scene.bounds import STRAYS, models_of, span_of
+def sweep_range(scene: Scene, composition: Composed) -> tuple[float, float]:
+    """Return the range of offsets for the moving last plane; both ends show something."""
+    from texgs.scene.bounds import STRAY_SHARE, models_of, span_of
 
     if not scene.cuts.planes:
         raise ArgumentError("path cut: expected a scene that a plane cuts, got none; texgs edit cut=x,0")
-    models = zip(models_of(composition), scene.models.values(), strict=False)  # none of them without means
+    models = zip(models_of(composition), scene.models.values(), strict=False)  # all of them have means
     shown = [model for model, entry in models if entry.edit.visible or entry.segments]
-    low, high = span_of(shown, scene.framed(composition), scene.cuts.planes[-1].normal, STRAYS)
+    low, high = span_of(shown, scene.framed(composition), scene.cuts.planes[-1].normal, STRAY_SHARE)
     return low + MARGIN * (high - low), high - MARGIN * (high - low)
 
 
-def moved(scene: Scene, offset: float) -> Scene:
-    """Return a scene whose last plane has another offset."""
+def move_planes(scene: Scene, offset: float) -> Scene:
+    """Return the scene with another offset of its last plane."""
     *others, last = scene.cuts.planes
     return replace(scene, cuts=replace(scene.cuts, planes=[*others, replace(last, offset=offset)]))

@@ -1,4 +1,4 @@
-"""Frames of a scene as people look at them: colours, normals, depth, material; and the point at a pixel."""
+"""Frames of a scene for display: colours, normals, depth, material; and the point at a pixel."""
 
 from typing import get_args
 
@@ -18,11 +18,12 @@ from texgs.scene.scene import Scene
 from texgs.scene.shot import Mode
 from texgs.scene.twin import Twin
 
-OVER_BLACK = ("alpha", *MATERIAL)
-SHININESS = 100.0  # shown as white
-BYTES = 64  # of memory for a pixel: the images of the rasterizer, over a background, clamped and rounded
-FAINT = 0.1  # alpha below which a pixel counts as background
-HOLLOW = {"normal", "depth", *get_args(Look)} - {"shaded"}  # modes that show no faces of cuts
+BLACK_MODES = ("alpha", *MATERIAL)
+SHININESS = 100.0  # displayed as white
+# Of memory for a pixel: the images of the rasterizer, over a background, clamped and rounded.
+BYTES_PER_PIXEL = 64
+FAINT_ALPHA = 0.1  # alpha below which a pixel counts as background
+HOLLOW_MODES = {"normal", "depth", *get_args(Look)} - {"shaded"}  # modes without faces of cuts
 
 
 def frame(
@@ -34,7 +35,7 @@ def frame(
     *,
     transparent: bool = False,
 ) -> np.ndarray:
-    """Return one frame [H, W, 3], uint8; [H, W, 4] with straight alpha, where its background is transparent.
+    """Render one frame [H, W, 3], uint8, or [H, W, 4] with straight alpha for a transparent background.
 
     The volume is that of the scene, with its edits and the functions that it tries, under the same light.
     Normals (world) are (n + 1) / 2, depth is black at the nearest and light grey at the farthest point in the
@@ -57,7 +58,7 @@ def frame(
     if mode not in get_args(Mode):
         raise ArgumentError(f"mode: expected one of {', '.join(get_args(Mode))}, got {mode}")
     what = f"a frame of {camera.width} x {camera.height} pixels"
-    require_memory(BYTES * camera.width * camera.height, what, "choose a smaller one")
+    require_memory(BYTES_PER_PIXEL * camera.width * camera.height, what, "choose a smaller one")
     camera = camera.to(composed.device)
     if mode == "volume":
         if twin is None:
@@ -68,15 +69,15 @@ def frame(
         outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())
         background = None if mode in MATERIAL else torch.tensor(scene.background, device=composed.device)
         render = cut_view(composed, camera, scene, twin, look=look, background=background, outputs=outputs)
-    behind = render.color.new_tensor((0.0,) * 3 if mode in OVER_BLACK else scene.background)
+    behind = render.color.new_tensor((0.0,) * 3 if mode in BLACK_MODES else scene.background)
     colors = pixels(render, mode, behind)
     if not transparent:
-        return quantized(colors)
+        return quantize(colors)
     return np.asarray(to_pillow(colors - (1 - render.alpha[..., None]) * behind, render.alpha))
 
 
-def quantized(colors: Tensor) -> np.ndarray:
-    """Return colours [H, W, 3] in [0, 1], cut off there, as uint8."""
+def quantize(colors: Tensor) -> np.ndarray:
+    """Convert colours [H, W, 3] to uint8, clamped to [0, 1]."""
     return colors.clamp(0, 1).mul_(255).round_().to(torch.uint8).cpu().numpy()
 
 
@@ -97,7 +98,7 @@ def pixels(render: Render, mode: Mode, background: Tensor) -> Tensor:
 def relative_depth(render: Render) -> Tensor:
     """Return the mean depth [H, W], 0 at the nearest and 1 at the farthest point that is not faint."""
     depth = render.depth
-    solid = min(0.5, 0.5 * float(render.alpha.max()))  # of what is translucent all over, its densest half
+    solid = min(0.5, 0.5 * float(render.alpha.max()))  # in an entirely translucent image, its denser half
     seen = depth[render.alpha > solid]  # type: ignore[index]
     if not len(seen):
         return torch.zeros_like(render.alpha)
@@ -115,12 +116,12 @@ def point_at(
     """
     column, row = pixel
     alone = camera.crop(column, row, column + 1, row + 1).to(composed.device)
-    if twin is None or mode in HOLLOW:
+    if twin is None or mode in HOLLOW_MODES:
         seen = cut_view(composed, alone, scene, None, outputs=("depth",))
     else:
         functions = scene.functions if mode == "volume" else None
         seen = twin.render(alone, scene, composed.palettes, functions=functions, outputs=("depth", "median"))
-    if seen.depth is None or float(seen.alpha) < FAINT:
+    if seen.depth is None or float(seen.alpha) < FAINT_ALPHA:
         return None
     depth = seen.depth if seen.median is None else torch.where(seen.median > 0, seen.median, seen.depth)
     return alone.unproject(depth.to(alone.viewmat))[0, 0].tolist()

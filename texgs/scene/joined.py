@@ -1,4 +1,4 @@
-"""The surfels of a scene as one model, for programs without textures and our light; and as a mesh."""
+"""The surfels of a scene as one model, for programs without textures and our lights, and as a mesh."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.io import write_bytes
-from texgs.fields.part_edit import MOST_OPAQUE, PartEdit
+from texgs.fields.part_edit import MAX_OPACITY, PartEdit
 from texgs.fields.ply_columns import Told
 from texgs.fields.splats import geometry
-from texgs.fields.surfels.composition import Part, by_part
+from texgs.fields.surfels.composition import EditableModel, by_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import mean_texels
 from texgs.raster.shading import Y00
@@ -25,12 +25,12 @@ from texgs.volume.space import Space
 
 if TYPE_CHECKING:
     import pyvista
-SIDES = 6  # of a polygon
+SIDES = 6  # of the polygon for a surfel
 REACH = 1.5  # standard deviations from its middle to its corners
 
 
-def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
-    """Return the visible surfels of a scene as one model of stage surfels, whatever light shone on them.
+def join_surfels(parts: Sequence[EditableModel], edits: Sequence[PartEdit]) -> Surfels:
+    """Join the visible surfels of a scene into one unlit model of stage surfels.
 
     Edits are one for each part, and behind it those of its segments; palette, opacity and visibility count.
     The model has one harmonic, that of the colour without light (palette + offset + mean texel).
@@ -44,8 +44,8 @@ def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
     return Surfels(together, parts[0].model.shading)
 
 
-def _surfels(part: Part, edits: Sequence[PartEdit], has_normals: bool) -> dict[str, Tensor]:
-    """Return the raw parameters of a part's visible surfels, where asked with normals of their own."""
+def _surfels(part: EditableModel, edits: Sequence[PartEdit], has_normals: bool) -> dict[str, Tensor]:
+    """Return the raw parameters of a part's visible surfels, on request with separate normals."""
     p = part.model.parameters
     colors = part.colored(edits).double()
     if "texels" in p:
@@ -54,14 +54,14 @@ def _surfels(part: Part, edits: Sequence[PartEdit], has_normals: bool) -> dict[s
     surfels = {
         **{name: p[name] for name in ("means", "quats", "scales")},
         **({"normals": p.get("normals", p["quats"])} if has_normals else {}),
-        "opacities": opacities.clamp_max(MOST_OPAQUE).logit(),
+        "opacities": opacities.clamp_max(MAX_OPACITY).logit(),
         "sh": ((colors - 0.5) / Y00).float()[:, None],
     }
     return {name: x[opacities > 0] for name, x in surfels.items()}
 
 
 def polydata_of(model: Surfels, space: Space | None = None) -> pyvista.PolyData:
-    """Return surfels, see `joined`, as hexagons of 1.5 standard deviations.
+    """Return surfels, see `join_surfels`, as hexagons of 1.5 standard deviations.
 
     They lie in a file's space, or in the world where there is none. Cells have `rgba`
     (uint8, straight alpha), `opacity` and `Normals`, those that light sees; colours are those without light,
@@ -92,7 +92,7 @@ def polydata_of(model: Surfels, space: Space | None = None) -> pyvista.PolyData:
 
 
 def write_vtp(path: str | Path, model: Surfels, space: Space | None = None, told: Told = None) -> Path:
-    """Create or replace a .vtp file of `polydata_of` in one step, with what is told as arrays of its field.
+    """Create or replace a .vtp file of `polydata_of` in one step, with facts as field arrays.
 
     ParaView opens it.
     """

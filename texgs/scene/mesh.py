@@ -13,25 +13,25 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.memory import require_memory
 from texgs.core.progress import progress
-from texgs.fields.ply_columns import Told, colored, write_columns
+from texgs.fields.ply_columns import Told, colored_points, write_columns
 from texgs.raster import Render
 from texgs.raster.fusion import BLOCK, DepthView, Lattice
 from texgs.volume.isosurface import Mesh, isosurface
 from texgs.volume.space import Space
 
-TRUNCATION = 5.0  # voxels beside a surface that know their distance from it, as in 2DGS; at most BLOCK
-LEAST_VIEWS = 1  # more views than this must have seen a voxel
-LEAST_VOXEL = 1e-6  # world units; the longest side of a volume is 1
-CLUSTERS, LEAST_TRIANGLES = 50, 50  # the largest connected parts that stay, and how small they may be
+TRUNCATION = 5.0  # voxels to either side of a surface that store a distance, as in 2DGS; at most BLOCK
+MIN_VIEWS = 1  # a voxel must be seen by more views
+MIN_VOXEL = 1e-6  # world units; the longest side of a volume is 1
+CLUSTERS, MIN_TRIANGLES = 50, 50  # number of the largest connected parts to keep, and their least size
 
 
 def points(view: DepthView) -> Tensor:
-    """Return where the surface is that the pixels of a view show [P, 3], world units."""
+    """Return the surface points [P, 3] at the pixels of a view, world units."""
     return view.camera.unproject(view.depth)[view.depth > 0]
 
 
 def lattice_of(low: Tensor, high: Tensor, voxel: float) -> Lattice:
-    """Return a lattice of voxels that holds the box from `low` to `high` [3]."""
+    """Return a lattice of voxels around the box from `low` to `high` [3]."""
     x, y, z = (int(n) for n in ((high - low) / (BLOCK * voxel)).ceil().long() + 1)
     what = f"a mesh of {BLOCK * x} x {BLOCK * y} x {BLOCK * z} voxels"
     require_memory(5 * 4 * x * y * z * BLOCK**3, what, "choose a larger voxel")
@@ -39,7 +39,7 @@ def lattice_of(low: Tensor, high: Tensor, voxel: float) -> Lattice:
 
 
 def fuse_view(lattice: Lattice, view: DepthView) -> None:
-    """Update the voxels close to what a view sees."""
+    """Update the voxels close to the surface in a view."""
     near = torch.zeros(lattice.blocks)
     near[((points(view) - lattice.lower) / (BLOCK * lattice.spacing)).long().unbind(1)] = 1
     blocks = F.max_pool3d(near[None], 3, stride=1, padding=1)[0].nonzero()
@@ -47,10 +47,10 @@ def fuse_view(lattice: Lattice, view: DepthView) -> None:
 
 
 def zero_surface(lattice: Lattice) -> Mesh:
-    """Return where the distance is 0, in cells all of whose corners were seen."""
+    """Return the zero level of the distance, in cells with all corners seen."""
     values = -lattice.distance.numpy()  # inside is positive
     mesh = isosurface(values, 0.0, (lattice.spacing,) * 3, tuple(lattice.lower.tolist()))
-    seen = (lattice.views > LEAST_VIEWS).float()
+    seen = (lattice.views > MIN_VIEWS).float()
     whole = -F.max_pool3d(-seen[None], 2, stride=1)[0]
     cells = ((torch.from_numpy(mesh.corners).mean(1) - lattice.lower) / lattice.spacing).floor().long()
     kept = whole[tuple(cells.clamp_min(0).T.flip(0))] > 0
@@ -67,9 +67,9 @@ def colors_at(lattice: Lattice, places: np.ndarray) -> np.ndarray:
 
 
 def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: float) -> Mesh:
-    """Return the surface that views of a scene see, with colours, but for small specks.
+    """Fuse views of a scene into a coloured surface, without small specks.
 
-    What lets more than half of the light through has no surface.
+    Matter that transmits more than half of the light has no surface.
 
     Args:
         show: renders a view over black, with `median` or else `depth`: where half of the light is left, as
@@ -81,8 +81,8 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
         ArgumentError: if the voxel is no length, or too large for what is there, or no view sees a surface.
         OutOfMemoryError: if there are too many voxels.
     """
-    if not LEAST_VOXEL <= voxel < inf:
-        raise ArgumentError(f"voxel: expected a length of {LEAST_VOXEL:g} or more, got {voxel}")
+    if not MIN_VOXEL <= voxel < inf:
+        raise ArgumentError(f"voxel: expected a length of {MIN_VOXEL:g} or more, got {voxel}")
     views = [depth_view(show(camera), camera) for camera in progress(cameras, title="render", unit="view")]
     boxes = [points(view).aminmax(dim=0) for view in views if bool(view.depth.any())]
     if not boxes:
@@ -105,7 +105,7 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
 
 @torch.no_grad()
 def depth_view(render: Render, camera: Camera) -> DepthView:
-    """Return the surface in a view, on the CPU; where a view is faint, its last fragment is none."""
+    """Return the surface in a view, on the CPU; faint pixels have no surface."""
     depth = render.depth if render.median is None else render.median
     if depth is None:
         raise ArgumentError("show: expected renders with median or depth; ask for one in outputs")
@@ -115,7 +115,7 @@ def depth_view(render: Render, camera: Camera) -> DepthView:
 
 
 def largest_clusters(mesh: Mesh) -> Mesh:
-    """Return a mesh without specks: its largest connected parts, as 2DGS keeps them."""
+    """Remove specks from a mesh: keep its largest connected parts, as in 2DGS."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -123,12 +123,12 @@ def largest_clusters(mesh: Mesh) -> Mesh:
     edges = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, c])), shape=(count, count))
     cluster = connected_components(edges, directed=False)[1][a]  # of each triangle
     sizes = np.bincount(cluster) if len(cluster) else np.zeros(1, int)
-    least = max(np.sort(sizes)[-CLUSTERS:][0], min(LEAST_TRIANGLES, sizes.max()))
+    least = max(np.sort(sizes)[-CLUSTERS:][0], min(MIN_TRIANGLES, sizes.max()))
     return with_triangles(mesh, sizes[cluster] >= least)
 
 
 def with_triangles(mesh: Mesh, kept: np.ndarray) -> Mesh:
-    """Return the triangles that stay [F] bool, and the vertices that they need."""
+    """Select triangles [F] bool and the vertices they use."""
     used, triangles = np.unique(mesh.triangles[kept], return_inverse=True)
     return Mesh(mesh.vertices[used], triangles.reshape(-1, 3).astype(np.int32))
 
@@ -136,11 +136,11 @@ def with_triangles(mesh: Mesh, kept: np.ndarray) -> Mesh:
 def write_mesh(path: str | Path, mesh: Mesh, told: Told = None) -> Path:
     """Create or replace a binary PLY file in one step; a mesh without colours is grey."""
     colors = np.full_like(mesh.vertices, 200, dtype=np.uint8) if mesh.colors is None else mesh.colors
-    columns = colored(torch.from_numpy(mesh.vertices), torch.from_numpy(colors))
+    columns = colored_points(torch.from_numpy(mesh.vertices), torch.from_numpy(colors))
     return write_columns(path, columns, mesh.triangles, told)
 
 
-def placed(mesh: Mesh, space: Space) -> Mesh:
-    """Return a mesh of the world in a space; its triangles are counter-clockwise there, too."""
+def place_mesh(mesh: Mesh, space: Space) -> Mesh:
+    """Map a mesh from the world to a space; triangles stay counter-clockwise."""
     triangles = mesh.triangles[:, ::-1] if space.is_mirrored else mesh.triangles
     return Mesh(space.points(mesh.vertices).astype(np.float32), triangles, mesh.colors)

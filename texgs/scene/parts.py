@@ -1,4 +1,4 @@
-"""Parts of a scene by their names: MODEL, what no segment of it holds, and MODEL/SEGMENT."""
+"""Parts of a scene by name: MODEL, its surfels outside all segments, and MODEL/SEGMENT."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,7 +13,7 @@ Entry = SceneModel | SceneSegment
 
 
 def part_names(scene: Scene) -> list[str]:
-    """Return all parts: models, and segments of these."""
+    """Return the names of all parts: models and their segments."""
     segments = [f"{model}/{name}" for model, entry in scene.models.items() for name in entry.segments]
     return [*scene.models, *segments]
 
@@ -21,7 +21,7 @@ def part_names(scene: Scene) -> list[str]:
 def split(scene: Scene, part: str) -> tuple[str, str | None]:
     """Return the model and segment of a part; the segment may be a new one.
 
-    Names of models may have the mark between the two, those of segments have none.
+    Names of models may contain the slash, names of segments may not.
     """
     if part in scene.models:
         return part, None
@@ -33,7 +33,7 @@ def split(scene: Scene, part: str) -> tuple[str, str | None]:
 
 
 def entry_of(scene: Scene, part: str) -> Entry:
-    """Return the model or segment of a name."""
+    """Return a model or segment by name."""
     model, segment = split(scene, part)
     if segment is None:
         return scene.models[model]
@@ -45,8 +45,8 @@ def entry_of(scene: Scene, part: str) -> Entry:
     return segments[segment]
 
 
-def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
-    """Return the scene with another model or segment of a name; None removes a segment."""
+def replace_entry(scene: Scene, part: str, entry: Entry | None) -> Scene:
+    """Replace a model or segment of the scene by name; None removes a segment."""
     model, segment = split(scene, part)
     if segment is not None:
         if entry is None:
@@ -59,19 +59,19 @@ def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
     return replace(scene, models={**scene.models, model: entry})
 
 
-HIGHLIGHTS = ("specular", "shininess", "tint")  # values of a `PartEdit` that are of a material
+HIGHLIGHTS = ("specular", "shininess", "tint")  # values of a `PartEdit` for highlights
 
 
 @dataclass(frozen=True)
 class NewLook:
-    """What a new look changes about a part."""
+    """Changes to a part by a new look."""
 
-    texture: Path | None  # file; None: what the part was fitted with
+    texture: Path | None  # file; None: the fitted texture
     edit: Mapping[str, Any] = field(default_factory=dict)  # values of a `PartEdit`
 
 
 def with_looks(scene: Scene, looks: Mapping[str, NewLook]) -> Scene:
-    """Return the scene with new looks of some of its parts.
+    """Give new looks to some parts of a scene.
 
     Their palettes go back to the fitted ones, which texels were made for. Where a part had another look
     already, its highlights go back, too: they may be those of the material that this look was.
@@ -80,24 +80,24 @@ def with_looks(scene: Scene, looks: Mapping[str, NewLook]) -> Scene:
         entry = entry_of(scene, part)
         taken_back = ("palette", *HIGHLIGHTS) if entry.texture else ("palette",)
         edit = replace(entry.edit, **{key: getattr(PartEdit, key) for key in taken_back} | {**look.edit})
-        scene = replaced(scene, part, replace(entry, texture=look.texture, edit=edit))
+        scene = replace_entry(scene, part, replace(entry, texture=look.texture, edit=edit))
     return scene
 
 
 def look_of(scene: Scene, part: str, before: Scene) -> NewLook:
-    """Return the look of a part, as far as it had another one before."""
+    """Return the look of a part as far as it differs from another scene's."""
     entry, old = entry_of(scene, part), vars(entry_of(before, part).edit)
     return NewLook(entry.texture, {key: x for key, x in vars(entry.edit).items() if x != old[key]})
 
 
 def key_path(part: str) -> str:
-    """Return where a part stands in a scene file."""
+    """Return the path of a part's keys in a scene file."""
     model, slash, segment = part.rpartition("/")
     return f"models.{model}.segments.{segment}" if slash else f"models.{part}"
 
 
 def require_new(scene: Scene, part: str) -> None:
-    """Require that the model of MODEL/SEGMENT has no such segment."""
+    """Require that the model has no such segment yet."""
     model, segment = split(scene, part)
     if segment in scene.models[model].segments:
         raise ArgumentError(

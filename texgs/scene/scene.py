@@ -1,4 +1,4 @@
-"""A scene: fields by name with what is edited about each, a light, a background; opening trains nothing."""
+"""A scene: fields by name with their edits, a light, a background; opening it trains nothing."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.cuts import NO_CUTS, Cuts
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.lens import Frame
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.names import is_number
@@ -19,7 +19,7 @@ from texgs.fields.kinds import kinds
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.step_file import at_step
-from texgs.fields.surfels.texels import lean
+from texgs.fields.surfels.texels import reduce_constant_textures
 from texgs.fields.surfels.variants import labels_of, with_texture, with_variants
 from texgs.scene.bounds import bounds_of, models_of
 from texgs.scene.segment_file import read_segment
@@ -29,30 +29,30 @@ from texgs.volume.space import Space
 from texgs.volume.transfer import TransferFunction
 
 WHITE = (1.0, 1.0, 1.0)
-MOST_FUNCTIONS = 32
+MAX_FUNCTIONS = 32
 
 
 @dataclass(frozen=True)
 class SceneVolume:
-    """The volume that a scene was made from, as the views of its models show it."""
+    """The volume that a scene was fitted to, with the functions and appearance of its views."""
 
     file: Path  # volume.nrrd, prepared
-    tfs: Mapping[str, TransferFunction]  # basic ones, by the names of models
+    tfs: Mapping[str, TransferFunction]  # basic TFs, by the names of models
     appearance: Appearance = field(default_factory=Appearance)
 
     @property
     def has_channels(self) -> bool:
-        """Return whether functions show more than the first channel."""
+        """Return whether functions use more than the first channel."""
         return any(tf.channel for tf in self.tfs.values())
 
 
 @dataclass(frozen=True)
 class SceneSegment:
-    """Surfels of a model that are edited on their own: the model's edit does not count for them."""
+    """Surfels of a model with their own edit, which replaces the model's."""
 
     file: Path  # mask of surfels, see `write_segment`
     edit: PartEdit = field(default_factory=PartEdit)
-    texture: Path | None = None  # variant of the whole model, of which these surfels take their texels
+    texture: Path | None = None  # variant of the whole model; supplies the texels of these surfels
 
 
 @dataclass(frozen=True)
@@ -63,26 +63,26 @@ class SceneModel:
     """
 
     file: Path  # lossless or compact
-    edit: PartEdit = field(default_factory=PartEdit)  # of what no segment holds
-    texture: Path | None = None  # variant in place of the model's own texels
+    edit: PartEdit = field(default_factory=PartEdit)  # of surfels outside all segments
+    texture: Path | None = None  # variant that replaces the model's own texels
     segments: Mapping[str, SceneSegment] = field(default_factory=dict)
-    step: Path | None = None  # of a series: where its surfels are, see `Scene.at`
+    step: Path | None = None  # file with the surfels of a step of a series, see `Scene.at`
 
     @property
     def edits(self) -> list[PartEdit]:
-        """Return that of what no segment holds, and behind it those of its segments."""
+        """Return the model's edit, followed by the edits of its segments."""
         return [self.edit, *(segment.edit for segment in self.segments.values())]
 
     @property
     def files(self) -> list[Path | None]:
-        """Return all that `open` reads."""
+        """Return all files that `open` reads."""
         paths = [self.file, self.texture, self.step]
         for segment in self.segments.values():
             paths += [segment.file, segment.texture]
         return paths
 
     def open(self) -> tuple[Field, list[Tensor]]:
-        """Return the field, of surfels with the texels of all variants, and the masks [N] of its segments."""
+        """Read the field, surfels with the texels of all variants, and the masks [N] of its segments."""
         fitted = open_field(self.file)
         if isinstance(fitted, Surfels) or self.texture is not None or self.segments or self.step:
             return self.surfels(fitted)
@@ -101,7 +101,7 @@ class SceneModel:
         model = placed if self.texture is None else with_texture(placed, self.texture)
         masks, variants = [], []
         for name, segment in self.segments.items():
-            with located(f"segments.{name}"):
+            with errors_at(f"segments.{name}"):
                 masks.append(read_segment(segment.file, fitted))
                 own = placed if segment.texture is None else with_texture(placed, segment.texture)
             variants.append(own)
@@ -112,32 +112,32 @@ class SceneModel:
 
 @dataclass(frozen=True)
 class Scene:
-    """Models by name in the order in which they were added; the rest holds for all of them."""
+    """Models by name in order of addition, and settings common to all."""
 
     models: Mapping[str, SceneModel]
     light: Light = HEADLIGHT
     background: tuple[float, float, float] = WHITE
     cuts: Cuts = NO_CUTS
-    volume: SceneVolume | None = None  # that it was made from, see `Twin`
-    frame: Frame | None = None  # what is visible of the volume, where that is known
-    functions: Mapping[str, TransferFunction] = field(default_factory=dict)  # that the mode volume shows
-    series: Series | None = None  # in time, of which the scene shows a step
-    time: int | None = None  # number of this step
-    space: Space | None = None  # of the file of its volume, where that is known
+    volume: SceneVolume | None = None  # that the models were fitted to, see `Twin`
+    frame: Frame | None = None  # ball of the visible volume, if known
+    functions: Mapping[str, TransferFunction] = field(default_factory=dict)  # for the mode `volume`
+    series: Series | None = None  # in time; the scene shows one step of it
+    time: int | None = None  # number of the shown step
+    space: Space | None = None  # of the volume's file, if known
 
     def __post_init__(self) -> None:
         if not self.models:
             raise ArgumentError("models: expected at least one, got none")
-        if len(self.functions) > MOST_FUNCTIONS:
-            raise ArgumentError(f"functions: expected at most {MOST_FUNCTIONS}, got {len(self.functions)}")
+        if len(self.functions) > MAX_FUNCTIONS:
+            raise ArgumentError(f"functions: expected at most {MAX_FUNCTIONS}, got {len(self.functions)}")
 
     @property
     def edits(self) -> list[PartEdit]:
-        """Return those of all models; behind the edit of a model those of its segments."""
+        """Return the edits of all models, each followed by the edits of its segments."""
         return [edit for model in self.models.values() for edit in model.edits]
 
     def framed(self, composed: Composed | None = None) -> Frame:
-        """Return what pictures show: the frame of the data, else the bounds of the models.
+        """Return the frame of pictures: that of the data, or the bounds of the models.
 
         Args:
             composed: the models, where they are open.
@@ -146,19 +146,19 @@ class Scene:
 
     @property
     def as_fitted(self) -> Self:
-        """Return the scene without what is edited about its models; light, background and cuts stay."""
+        """Return the scene without edits of its models; light, background and cuts stay."""
         models = {name: SceneModel(model.file, step=model.step) for name, model in self.models.items()}
         return replace(self, models=models)
 
     @property
     def timeline(self) -> Series:
-        """Return its series; require that it has one."""
+        """Return its series; raise an error without one."""
         if self.series is None:
             raise ArgumentError("time: expected a scene of a series, got one without; texgs series makes one")
         return self.series
 
     def at(self, time: Any) -> Self:
-        """Return the scene at a step of its series: models and volume are those of it, edits stay."""
+        """Return the scene at a step of its series, with the step's models and volume; edits stay."""
         series, last = self.timeline, len(self.timeline.steps) - 1
         if not is_number(time) or time not in range(last + 1):
             raise ArgumentError(f"time: expected the number of a step, 0 to {last}, got {time!r:.100}")
@@ -172,7 +172,7 @@ class Scene:
 
     @property
     def has_looks(self) -> bool:
-        """Return whether a part has other texels than it was fitted with, which its volume has not."""
+        """Return whether a part has texels that were not fitted, which its volume cannot show."""
         textures = [model.texture for model in self.models.values()]
         textures += [segment.texture for model in self.models.values() for segment in model.segments.values()]
         return any(textures)
@@ -187,7 +187,7 @@ class Scene:
 
     @property
     def shows_volume(self) -> bool:
-        """Return whether frames show its volume in place of its models, which are cut."""
+        """Return whether frames show its volume instead of its cut models."""
         return bool(self.cuts) and self.volume is not None and self.is_as_volume
 
     def open(self, device: torch.device | str = "cpu", *, is_lean: bool = False) -> Composed:
@@ -195,16 +195,16 @@ class Scene:
 
         Args:
             device: that they are on.
-            is_lean: surfels have no more texels than they need to look the same, see `lean`.
+            is_lean: constant textures have one texel, see `reduce_constant_textures`.
 
         Raises:
             ArgumentError, ShapeError: naming the model and its file.
         """
         models, segments = [], []
         for name, entry in self.models.items():
-            with located(f"models.{name}"):
+            with errors_at(f"models.{name}"):
                 model, masks = entry.open()
-            models.append((lean(model) if is_lean else model).to(device))
+            models.append((reduce_constant_textures(model) if is_lean else model).to(device))
             segments.append([mask.to(device) for mask in masks])
         made_of = sorted({model.kind for model in models})
         if len(made_of) > 1:
@@ -214,7 +214,7 @@ class Scene:
 
 
 def volume_of(scene: Scene) -> SceneVolume:
-    """Return the volume that a scene names; require that it names one."""
+    """Return the volume of a scene; raise an error without one."""
     if scene.volume is None:
         raise ArgumentError(
             "volume: expected the volume that the scene was made from, got none; make the scene again by "

@@ -1,4 +1,4 @@
-"""scene.yaml: basic models and what is edited about each; opening composes them and trains nothing."""
+"""scene.yaml: basic models and their edits; opening composes them and trains nothing."""
 
 import os
 from collections.abc import Callable, Collection, Mapping
@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from texgs.core.cuts import NO_CUTS, Cuts
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading, write_bytes
 from texgs.core.keys import typed_argument
 from texgs.core.lens import Frame
@@ -25,19 +25,19 @@ from texgs.volume.space import Space
 from texgs.volume.transfer import TransferFunction
 
 VERSION = 1
-LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
-OF_SCENE = ("light", "background", "cuts", "frame")
-MOST_LISTED = 5  # scene files of a folder, in an error
-KEYS = ("texgs-scene", *OF_SCENE, "models", "volume", "space", "functions", "series", "time")
-EDITS = tuple(each.name for each in fields(PartEdit))
-SEGMENT_KEYS = ("file", "texture", *EDITS)
+MAX_BYTES = 1 << 20  # a scene of a hundred models has a few thousand
+SCENE_KEYS = ("light", "background", "cuts", "frame")
+MAX_LISTED = 5  # scene files of a folder, in an error
+KEYS = ("texgs-scene", *SCENE_KEYS, "models", "volume", "space", "functions", "series", "time")
+EDIT_KEYS = tuple(each.name for each in fields(PartEdit))
+SEGMENT_KEYS = ("file", "texture", *EDIT_KEYS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
-LOOK = tuple(each.name for each in fields(Appearance))
-VOLUME_KEYS = ("file", *LOOK, "tfs")
+APPEARANCE_KEYS = tuple(each.name for each in fields(Appearance))
+VOLUME_KEYS = ("file", *APPEARANCE_KEYS, "tfs")
 
 
 def read_scene(path: str | Path) -> Scene:
-    """Read a scene: scene.yaml, a folder with one in it or below, or a model file, a scene of its own.
+    """Read a scene: scene.yaml, a folder with one in it or below, or a single model file.
 
     Files in scene.yaml are relative to its folder.
 
@@ -47,14 +47,14 @@ def read_scene(path: str | Path) -> Scene:
     path = scene_path(path)
     if path.suffix not in SCENES:
         return Scene({label(str(path), path.stem): SceneModel(path)})
-    with reading(path, "a scene in YAML", "correct it"), located(path):
-        if path.stat().st_size > LARGEST:
-            raise ArgumentError(f"expected a scene of at most {LARGEST} bytes; is it another file?")
+    with reading(path, "a scene in YAML", "correct it"), errors_at(path):
+        if path.stat().st_size > MAX_BYTES:
+            raise ArgumentError(f"expected a scene of at most {MAX_BYTES} bytes; is it another file?")
         return _scene(parse_yaml(path.read_text(encoding="utf-8")), path.parent)
 
 
 def scene_path(path: str | Path) -> Path:
-    """Return the file of what `read_scene` takes: of a folder, the scene file in it or below."""
+    """Return the file of an argument of `read_scene`: for a folder, the scene file in it or below."""
     path = Path(path)
     if not path.exists():
         raise ArgumentError(
@@ -69,19 +69,19 @@ def scene_path(path: str | Path) -> Path:
         return path
     files = sorted(path.rglob(SCENE))
     if len(files) != 1:
-        some = ", ".join(str(each.relative_to(path)) for each in files[:MOST_LISTED])
-        more = ", ..." if len(files) > MOST_LISTED else ""
+        some = ", ".join(str(each.relative_to(path)) for each in files[:MAX_LISTED])
+        more = ", ..." if len(files) > MAX_LISTED else ""
         got = f"{len(files)} ({some}{more}); name one of them" if files else "none; texgs compose writes one"
         raise ArgumentError(f"{path}: expected one scene.yaml in this folder or below, got {got}")
     return files[0]
 
 
 def _scene(values: Any, folder: Path) -> Scene:
-    """Return the scene that the plain values of a scene file describe, with files in a folder."""
-    known(values, KEYS, "the scene")
+    """Make a scene from the plain values of a scene file, with files relative to a folder."""
+    require_keys(values, KEYS, "the scene")
     if values.get("texgs-scene") != VERSION:
         raise ArgumentError(f"texgs-scene: expected {VERSION}, got {values.get('texgs-scene')!r}")
-    known(values.get("models"), None, "models")
+    require_keys(values.get("models"), None, "models")
     models = {
         label("models", name): _model(f"models.{name}", x, folder) for name, x in values["models"].items()
     }
@@ -99,7 +99,7 @@ def _scene(values: Any, folder: Path) -> Scene:
 
 
 def write_scene(path: str | Path, scene: Scene) -> Path:
-    """Write a scene file in one step, with what is edited; files in it are relative to its folder."""
+    """Write a scene file with all edits in one step; files in it are relative to its folder."""
     path = Path(path)
 
     def relative(file: Path) -> str:
@@ -131,7 +131,7 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
 
 
 def _plain(entry: SceneModel | SceneSegment, relative: Callable[[Path], str]) -> dict[str, Any]:
-    """Return the file, texture and what is edited, as a scene file has them."""
+    """Return file, texture and edits as plain values for a scene file."""
     unedited = asdict(PartEdit())
     changed = {
         key: list(value) if isinstance(value, tuple) else value
@@ -143,14 +143,14 @@ def _plain(entry: SceneModel | SceneSegment, relative: Callable[[Path], str]) ->
 
 
 def _model(where: str, values: Any, folder: Path) -> SceneModel:
-    """Return a model of the plain values of a scene file."""
-    known(values, MODEL_KEYS, where)
+    """Make a model from the plain values of a scene file."""
+    require_keys(values, MODEL_KEYS, where)
     entries = values.get("segments", {})
-    known(entries, None, f"{where}.segments")
+    require_keys(entries, None, f"{where}.segments")
     segments = {}
     for name, entry in entries.items():
         require_name(name, f"{where}.segments")
-        known(entry, SEGMENT_KEYS, f"{where}.segments.{name}")
+        require_keys(entry, SEGMENT_KEYS, f"{where}.segments.{name}")
         segments[str(name)] = SceneSegment(*_entry(f"{where}.segments.{name}", entry, folder, "a segment"))
     return SceneModel(*_entry(where, values, folder, "a model"), segments)
 
@@ -160,33 +160,33 @@ def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, Part
     file, texture = named_file(f"{where}.file", folder, values.get("file"), kind), values.get("texture")
     if texture is not None:
         texture = named_file(f"{where}.texture", folder, texture, "a texture variant")
-    with located(where, "."):
-        edit = PartEdit(**{key: value for key, value in values.items() if key in EDITS})
+    with errors_at(where, "."):
+        edit = PartEdit(**{key: value for key, value in values.items() if key in EDIT_KEYS})
     return file, edit, texture
 
 
 def volume_of(values: Any, folder: Path) -> SceneVolume:
-    """Return the volume of the plain values of a scene file."""
-    known(values, VOLUME_KEYS, "volume")
+    """Make a volume from the plain values of a scene file."""
+    require_keys(values, VOLUME_KEYS, "volume")
     file = named_file("volume.file", folder, values.get("file"), "a volume")
     functions = functions_of(values.get("tfs"), "volume.tfs")
-    with located("volume", "."):
-        look = Appearance(**{key: value for key, value in values.items() if key in LOOK})
+    with errors_at("volume", "."):
+        look = Appearance(**{key: value for key, value in values.items() if key in APPEARANCE_KEYS})
     return SceneVolume(file, functions, look)
 
 
 def functions_of(values: Any, where: str) -> dict[str, TransferFunction]:
-    """Return transfer functions by name that a value of a scene file stands for."""
-    known(values, None, where)
+    """Make transfer functions by name from a value of a scene file."""
+    require_keys(values, None, where)
     functions = {}
     for name, points in values.items():
-        with located(f"{where}.{label(where, name)}"):
+        with errors_at(f"{where}.{label(where, name)}"):
             functions[str(name)] = TransferFunction.from_dict(points)
     return functions
 
 
 def plain_functions(functions: Mapping[str, TransferFunction]) -> dict[str, Any]:
-    """Return transfer functions by name as a scene file has them."""
+    """Return transfer functions by name as plain values."""
     return {name: tf.to_dict() for name, tf in functions.items()}
 
 
@@ -209,13 +209,13 @@ def cuts_of(value: Any) -> Cuts:
 
 
 def plain_cuts(cuts: Cuts) -> dict[str, Any]:
-    """Return cuts as a scene file has them."""
+    """Return cuts as plain values."""
     unedited = asdict(NO_CUTS)
     return {key: value for key, value in asdict(cuts).items() if value != unedited[key]}
 
 
-def known(values: Any, keys: Collection[str] | None, where: str) -> None:
-    """Require a table, with known keys only; a slip names the key that is most like it."""
+def require_keys(values: Any, keys: Collection[str] | None, where: str) -> None:
+    """Require a table with known keys; the error for an unknown key names the most similar one."""
     if not isinstance(values, dict):
         raise ArgumentError(f"{where}: expected a table of keys and values, got {values!r}")
     for key in values if keys is not None else ():

@@ -1,4 +1,4 @@
-"""Files of segments: which surfels of a basic model belong to one, and enough to know the model by."""
+"""Files of segments: a mask of a basic model's surfels, with anchors that identify the model."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,8 +14,8 @@ from texgs.fields.surfels.model import Surfels
 
 FORMAT = "texgs-segment"
 VERSION = 1
-ANCHORS = 64  # surfels whose place a file keeps, spread over the list
-TOLERANCE = 1e-3  # of the model's extent: places survive exchange in other formats, another fit is elsewhere
+ANCHORS = 64  # surfels whose positions a file stores, spread over the list
+TOLERANCE = 1e-3  # in model extents: above the rounding of other formats, below another fit's shifts
 
 
 def write_segment(
@@ -42,10 +42,10 @@ def read_segment(path: str | Path, model: Surfels) -> Tensor:
     is_mask = mask is not None and mask.dtype == torch.bool and mask.ndim == 1
     if mask is None or anchors is None or not is_mask or bool((mask.view(torch.uint8) > 1).any()):
         raise ArgumentError(f"{path}: expected a mask and anchors, got {', '.join(tensors)}; make it again")
-    # A model without surfels has no places; segments of it are empty, and refused when they are written.
+    # A model without surfels has no anchors; its segments are empty, which writing refuses.
     extent = float((expected.amax(0) - expected.amin(0)).max()) if len(expected) else 0.0
     belongs = len(mask) == len(model) and anchors.shape == expected.shape
-    # Written so that places that are NaN are elsewhere.
+    # This form makes NaN a mismatch.
     if not belongs or not bool(((anchors - expected).abs() <= TOLERANCE * extent).all()):
         raise ArgumentError(
             f"{path}: expected a segment of this model, got one of another with {len(mask)} surfels; "

@@ -1,4 +1,4 @@
-"""series.json: the steps of a series in time, whose volumes and models lie beside it."""
+"""series.json: the steps of a series in time; volumes and models lie beside it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from texgs.core.io import read_json, reading_as, write_json
 from texgs.core.names import label, part_file
 
 FORMAT, VERSION = "texgs-series", 1
-MOST = 100_000  # steps
+MAX_STEPS = 100_000  # steps
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Series:
     """The steps of a series, from 0 on, and the models that follow it."""
 
     file: Path
-    steps: Sequence[str]  # names of the files that volumes come from
+    steps: Sequence[str]  # names of the source files of volumes
     models: Sequence[str]
 
     def model(self, name: str, step: int) -> Path:
@@ -36,10 +36,12 @@ def write_series(series: Series) -> Path:
 
 
 def read_series(path: Path) -> Series:
-    """Read a file as `write_series` writes it."""
+    """Read a file of `write_series`."""
     values = read_json(path)
     with reading_as("steps and models of a series", "make it again", where=f"{path}: "):
-        if values[FORMAT] != VERSION or not 0 < len(values["steps"]) <= MOST or not values["models"]:
-            raise ArgumentError(f"{path}: expected {FORMAT} {VERSION} with 1 to {MOST} steps, and models")
+        if values[FORMAT] != VERSION or not 0 < len(values["steps"]) <= MAX_STEPS or not values["models"]:
+            raise ArgumentError(
+                f"{path}: expected {FORMAT} {VERSION} with 1 to {MAX_STEPS} steps, and models"
+            )
         names = [[label(str(path), each) for each in [*values[key]]] for key in ("steps", "models")]
     return Series(path, *names)

@@ -1,4 +1,4 @@
-"""A scene that is being edited: each change makes a new scene, and all of them can be undone."""
+"""A scene under edit: each change makes a new scene, and all changes can be undone."""
 
 import sys
 from collections import deque
@@ -16,18 +16,26 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.cuts import Cuts
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.names import require_name
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.raster import Render
-from texgs.scene.cut_view import beside
+from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.frame import frame, point_at
-from texgs.scene.parts import NewLook, entry_of, key_path, replaced, require_new, split, with_looks
+from texgs.scene.parts import NewLook, entry_of, key_path, replace_entry, require_new, split, with_looks
 from texgs.scene.scene import WHITE, Scene, SceneSegment
-from texgs.scene.scene_file import EDITS, cuts_of, functions_of, known, light_of, read_scene, write_scene
+from texgs.scene.scene_file import (
+    EDIT_KEYS,
+    cuts_of,
+    functions_of,
+    light_of,
+    read_scene,
+    require_keys,
+    write_scene,
+)
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.shot import Mode
 from texgs.scene.twin import Twin, needs_twin
@@ -40,15 +48,15 @@ SCENE_KEYS: dict[str, Any] = {
     "cuts": {},
     "functions": {},
     "time": 0,
-}  # what is edited of a whole scene, and without edits
-MOST_STEPS = 200  # of the history: of more, the oldest cannot be undone
-MOST_KEPT = 3  # compositions and twins: pages may show others in turn, as before an edit and after it
+}  # edits of a whole scene, with their defaults
+HISTORY_STEPS = 200  # in the history; older ones cannot be undone
+KEPT_COMPOSITIONS = 3  # compositions and twins, as pages may compare scenes before and after an edit
 
 
 def locked(
     change: Callable[Concatenate["Session", P], T],
 ) -> Callable[Concatenate["Session", P], T]:
-    """Let a method hold the lock of its session from what it reads to the step that it makes."""
+    """Make a method hold the lock of its session from its first read to its step."""
 
     @wraps(change)
     def run(session: "Session", /, *given: P.args, **named: P.kwargs) -> T:
@@ -78,8 +86,8 @@ class Session:
             None
         )  # is called after each step, and when one is taken back
         self._device = device
-        self._opened = deque[tuple[object, Composed]](maxlen=MOST_KEPT)
-        self._twins = deque[tuple[object, Twin]](maxlen=MOST_KEPT)
+        self._opened = deque[tuple[object, Composed]](maxlen=KEPT_COMPOSITIONS)
+        self._twins = deque[tuple[object, Twin]](maxlen=KEPT_COMPOSITIONS)
 
     @classmethod
     def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Self:
@@ -88,17 +96,17 @@ class Session:
 
     @property
     def scene(self) -> Scene:
-        """Return the scene as it is now."""
+        """Return the current scene."""
         return self._past[-1][0]
 
     @property
     def past(self) -> list[str]:
-        """Return the titles of the steps that were made, the oldest first; see `one_step`."""
+        """Return the titles of the steps, the oldest first; see `one_step`."""
         return [title for _, title in self._past[1:]]
 
     @property
     def future(self) -> list[str]:
-        """Return the titles of the steps that were taken back, the latest first."""
+        """Return the titles of undone steps, the latest first."""
         return [title for _, title in reversed(self._future)]
 
     # ---- Changes ------------------------------------------------------------
@@ -107,15 +115,15 @@ class Session:
     def set(self, part: str, key: str, value: Any) -> None:
         """Set a value of a part's edit: `visible`, `palette`, `opacity`, or a factor of the material."""
         entry = entry_of(self.scene, part)
-        known({key: value}, EDITS, key_path(part))
+        require_keys({key: value}, EDIT_KEYS, key_path(part))
         kind = kind_of(self.scene.models[split(self.scene, part)[0]].file)
-        with located(key_path(part), "."):
+        with errors_at(key_path(part), "."):
             require_possible(PartEdit(**{key: value}), kind.name)
             edit = replace(entry.edit, **{key: value})
-        self._push(replaced(self.scene, part, replace(entry, edit=edit)))
+        self._push(replace_entry(self.scene, part, replace(entry, edit=edit)))
 
     def reset(self, part: str, key: str) -> None:
-        """Take a value of a part's edit back."""
+        """Reset a value of a part's edit."""
         self.set(part, key, getattr(PartEdit(), key, None))
 
     def change(self, part: str, key: str, value: Any) -> None:
@@ -129,9 +137,9 @@ class Session:
 
     @locked
     def set_file(self, part: str, key: str, file: Path | None) -> None:
-        """Give a part another `file` or `texture`; None: the texels that it was fitted with."""
+        """Give a part another `file` or `texture`; None: the fitted texels."""
         changed: dict[str, Any] = {key: file}
-        scene = replaced(self.scene, part, replace(entry_of(self.scene, part), **changed))
+        scene = replace_entry(self.scene, part, replace(entry_of(self.scene, part), **changed))
         self._push_read(scene, {split(self.scene, part)[0]})
 
     @locked
@@ -142,29 +150,29 @@ class Session:
 
     @locked
     def set_light(self, light: Light = HEADLIGHT) -> None:
-        """Let another light shine on the scene."""
+        """Change the light of the scene."""
         self._push(replace(self.scene, light=light))
 
     @locked
     def set_background(self, value: object = WHITE) -> None:
-        """Put another colour behind the scene."""
+        """Change the background of the scene."""
         self._push(replace(self.scene, background=color("background", value)))
 
     @locked
     def set_cuts(self, cuts: Cuts) -> None:
-        """Cut the scene; cuts of before are gone."""
+        """Replace the cuts of the scene."""
         self._push(replace(self.scene, cuts=cuts))
 
     @locked
     def set_scene(self, scene: Scene) -> None:
-        """Go on with another scene, whose models are read first."""
+        """Continue with another scene, after reading its models."""
         changed = [name for name, entry in scene.models.items() if self.scene.models.get(name) != entry]
         self._push_read(scene, changed)
 
     @locked
     def set_of_scene(self, key: str, value: Any) -> None:
-        """Set what is edited of a whole scene, as a scene file has it; see `SCENE_KEYS`."""
-        known({key: value}, SCENE_KEYS, "the scene")
+        """Set an edit of the whole scene from a plain value; see `SCENE_KEYS`."""
+        require_keys({key: value}, SCENE_KEYS, "the scene")
         match key:
             case "light":
                 self.set_light(light_of(value))
@@ -187,7 +195,7 @@ class Session:
         entry = self.scene.models[model]
         require_name(name, key_path(part))
         before = entry.segments.get(str(name), SceneSegment(file, entry.edit, entry.texture))
-        self._push_read(replaced(self.scene, part, replace(before, file=file)), {model})
+        self._push_read(replace_entry(self.scene, part, replace(before, file=file)), {model})
 
     @locked
     def make_segment(self, part: str, mask: Tensor, file: Path, facts: Mapping[str, Any]) -> None:
@@ -222,12 +230,12 @@ class Session:
 
     @locked
     def remove_segment(self, part: str) -> None:
-        """Give the surfels of a segment back to their model."""
-        self._push(replaced(self.scene, part, None))
+        """Remove a segment; its surfels return to their model."""
+        self._push(replace_entry(self.scene, part, None))
 
     @locked
     def rename_segment(self, part: str, name: str) -> None:
-        """Give a segment another name; it keeps its place among those of its model."""
+        """Rename a segment; it keeps its place in the order of its model."""
         model, segment = split(self.scene, part)
         if segment is None:
             raise ArgumentError(f"expected a segment to rename, got the model {part}")
@@ -239,11 +247,11 @@ class Session:
         entry = self.scene.models[model]
         names = {each: name if each == segment else each for each in entry.segments}
         renamed = replace(entry, segments={names[each]: value for each, value in entry.segments.items()})
-        self._push(replaced(self.scene, model, renamed))
+        self._push(replace_entry(self.scene, model, renamed))
 
     @contextmanager
     def one_step(self, title: str = "") -> Iterator[None]:
-        """Let all changes within the block be one step with a title; none where one of them fails.
+        """Make all changes within the block one step with a title, or none if one of them fails.
 
         Threads enter such blocks in turn.
         """
@@ -255,12 +263,12 @@ class Session:
                 self._past, self._future = past, future
                 raise
             if self.scene is not past[-1][0]:
-                self._past = [*past[-MOST_STEPS:], (self.scene, title)]
+                self._past = [*past[-HISTORY_STEPS:], (self.scene, title)]
         self.changed()
 
     @locked
     def undo(self) -> bool:
-        """Take the latest change back; return whether there was one."""
+        """Undo the latest change; return whether there was one."""
         if len(self._past) == 1:
             return False
         self._future.append(self._past.pop())
@@ -269,7 +277,7 @@ class Session:
 
     @locked
     def redo(self) -> bool:
-        """Make again what was undone last; return whether there was anything."""
+        """Redo the latest undone change; return whether there was one."""
         if not self._future:
             return False
         self._past.append(self._future.pop())
@@ -316,41 +324,41 @@ class Session:
         return point_at(self.composition_of(scene), camera, scene, mode, twin, pixel)
 
     def twin_of(self, scene: Scene) -> Twin:
-        """Return the twin of a scene of the history; the last ones are kept."""
+        """Return the twin of a scene of the history; the latest twins are cached."""
         state = (scene.volume, state_of(scene.volume.file if scene.volume else None))
         return last_of(self._twins, state, lambda: Twin(scene, self._device))
 
     def beside(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
-        """Return a view of a scene of the history, and the same view of its volume; see `beside`."""
-        return beside(self.composition_of(scene), camera, scene, self.twin_of(scene))
+        """Render a scene of the history and the same view of its volume; see `scene_and_volume`."""
+        return scene_and_volume(self.composition_of(scene), camera, scene, self.twin_of(scene))
 
     def save(self, path: str | Path) -> Path:
         """Write the scene file in one step; files in it are relative to its folder."""
         return write_scene(path, self.scene)
 
     def composition_of(self, scene: Scene) -> Composed:
-        """Return the models of a scene, joined, as long as their files are the same."""
+        """Return the joined models of a scene, cached while their files are the same."""
         states = [state_of(file) for file in files_of(scene)]
         return last_of(self._opened, states, lambda: scene.open(self._device))
 
     # ---- History ------------------------------------------------------------
 
     def _push_read(self, scene: Scene, models: Iterable[str]) -> None:
-        """Add a scene of which models have other files, which are read first."""
+        """Add a scene whose models have other files, after reading these."""
         for model in models:
-            with located(f"models.{model}"):
+            with errors_at(f"models.{model}"):
                 scene.models[model].open()
         self._push(scene)
 
     def _push(self, scene: Scene) -> None:
-        """Add a scene; what was undone is gone."""
-        self._past = [*self._past[-MOST_STEPS:], (scene, "")]
+        """Add a scene to the history, and clear undone steps."""
+        self._past = [*self._past[-HISTORY_STEPS:], (scene, "")]
         self._future.clear()
 
 
 def last_of(kept: deque[tuple[object, T]], state: object, make: Callable[[], T]) -> T:
-    """Return what was kept of a state; else make it, and keep it in place of the oldest."""
-    for each, value in tuple(kept):  # another thread may put another one there
+    """Return the cached result of a state, or compute it and replace the oldest one."""
+    for each, value in tuple(kept):  # another thread may change it
         if each == state:
             return value
     value = make()
@@ -359,12 +367,12 @@ def last_of(kept: deque[tuple[object, T]], state: object, make: Callable[[], T])
 
 
 def files_of(scene: Scene) -> list[Path | None]:
-    """Return all that a scene reads; None stands for the textures that parts were fitted with."""
+    """Return all files that a scene reads; None stands for a fitted texture."""
     return [file for entry in scene.models.values() for file in entry.files]
 
 
 def state_of(file: Path | None) -> tuple[object, ...]:
-    """Return what is another where a file was written again, or is gone."""
+    """Return a state that changes when a file is rewritten or removed."""
     if file is None or not file.exists():
         return (file,)
     status = file.stat()

@@ -1,4 +1,4 @@
-"""Shots of a scene: from where it is seen, and what of it a picture shows."""
+"""Shots of a scene: viewpoint and mode of a picture."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Mode = Literal[
 
 @dataclass(frozen=True)
 class Shot(LensKeys):
-    """From where a scene is seen, and what of it a picture shows."""
+    """Viewpoint and mode of a picture."""
 
     azimuth: float = key(30.0, "of the camera, not on path test; on an orbit of the first frame", "degrees")
     polar: float = key(20.0, "of the camera above the horizon, not on path test", "degrees")
@@ -37,7 +37,7 @@ class Shot(LensKeys):
     transparent: bool = key(False, "leave the background out: pictures have an alpha channel")
 
     def camera(self, framed: Frame) -> Camera:
-        """Return the camera, which shows all that is framed by default."""
+        """Return the camera; by default it shows the whole frame."""
         from texgs.core.camera import orbit
 
         return orbit(self.azimuth, self.polar, *self.lens(framed))

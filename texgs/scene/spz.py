@@ -1,4 +1,4 @@
-"""SPZ files of Niantic, version 3: splats in about 30 bytes each, rounded and packed by gzip."""
+"""SPZ files of Niantic, version 3: rounded splats of about 30 bytes each, compressed by gzip."""
 
 import gzip
 from collections.abc import Sequence
@@ -14,8 +14,8 @@ from texgs.raster.shading import DEGREES
 from texgs.scene.clouds import Cloud
 
 VERSION, ANTIALIASED = 3, 1  # of the format, and a flag
-LARGEST = 22  # of the 24 bits of a coordinate: one is the sign, and one is spare for rounding
-COLOR_SCALE = 0.15  # of the constant harmonic, so that colours somewhat out of [0, 1] fit
+COORDINATE_BITS = 22  # of 24 bits; one is the sign, one is spare for rounding
+COLOR_SCALE = 0.15  # of the constant harmonic; leaves room for colours slightly outside of [0, 1]
 
 
 def write_spz(path: str | Path, clouds: Sequence[Cloud]) -> Path:
@@ -31,9 +31,11 @@ def write_spz(path: str | Path, clouds: Sequence[Cloud]) -> Path:
     values = [(each.means, each.opacities, each.scales, each.quats) for each in clouds]
     means, opacities, scales, quats, sh = map(np.concatenate, (*zip(*values, strict=True), padded))
     farthest = float(np.abs(means).max())
-    fraction = LARGEST - max(frexp(farthest)[1], 0)
+    fraction = COORDINATE_BITS - max(frexp(farthest)[1], 0)
     if fraction < 0:
-        raise ArgumentError(f"{path}: expected splats within 2^{LARGEST} of the origin, got {farthest:g}")
+        raise ArgumentError(
+            f"{path}: expected splats within 2^{COORDINATE_BITS} of the origin, got {farthest:g}"
+        )
     flags = ANTIALIASED * all(each.antialiased for each in clouds)
     header = pack("<4sIIBBBB", b"NGSP", VERSION, len(means), DEGREES[count], fraction, flags, 0)
     coordinates = np.round(means.astype(np.float64) * 2**fraction).astype("<i4")

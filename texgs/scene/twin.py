@@ -1,4 +1,4 @@
-"""The twin of a scene: the volume that it was made from, under the scene's light and with its edits."""
+"""The twin of a scene: the volume it was fitted to, under the scene's light and with its edits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import torch
 
 from texgs.core.camera import Camera
 from texgs.core.cuts import Cuts
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
 from texgs.raster.api import CutRange, cut_range
@@ -27,7 +27,7 @@ from texgs.volume.transfer import TransferFunction
 
 
 class Twin:
-    """Casts the volume of a scene as the views were cast that its models were fitted to.
+    """Casts the volume of a scene in the same way as the views for its models.
 
     Args:
         scene: names its volume; of any edits.
@@ -40,13 +40,13 @@ class Twin:
 
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
         self._volume, self._device, self._by_cell = volume_of(scene), torch.device(device), True
-        with located("volume"):
+        with errors_at("volume"):
             self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
         for name in scene.models:
             self._tf(name)
 
     def with_step(self, step: float, *, by_cell: bool = True) -> Twin:
-        """Return a twin with another distance of samples, in voxels; `by_cell`: see `Caster.cast`."""
+        """Return a twin with another sample distance, in voxels; for `by_cell` see `Caster.cast`."""
         other = copy(self)
         other._by_cell = by_cell
         other._volume = replace(self._volume, appearance=replace(self._volume.appearance, step=step))
@@ -66,7 +66,7 @@ class Twin:
         functions: Mapping[str, TransferFunction] | None = None,
         outputs: Collection[str] = (),
     ) -> Render:
-        """Return what a scene's visible models show of the volume, on the device that casts.
+        """Render the volume with the edits of a scene's visible models, on the device that casts.
 
         A volume has no segments and no looks; see `cast` for what edits do to it.
 
@@ -92,7 +92,7 @@ class Twin:
         functions: Mapping[str, TransferFunction] | None = None,
         outputs: Collection[str] = (),
     ) -> Cast:
-        """Return the same before any background, with colours premultiplied.
+        """Cast the same without a background, with premultiplied colours.
 
         A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
         and tint of light hold for the whole volume: those of the first visible model. A tint costs a cast for
@@ -102,7 +102,7 @@ class Twin:
         for (name, model), palette in zip(scene.models.items(), palettes, strict=True):
             if model.edit.visible and model.edit.opacity > 0:
                 tf = functions.get(name) or self._tf(name)
-                shown[name] = edited(tf, model.edit, palette)
+                shown[name] = edit_function(tf, model.edit, palette)
                 edits.append(model.edit)
         shown |= {name: tf for name, tf in functions.items() if name not in scene.models}
         if not shown:
@@ -112,7 +112,7 @@ class Twin:
         look = replace(look, **{key: getattr(look, key) * getattr(edit, key) for key in MATERIAL})
         cut = range_of(scene.cuts, camera) if cut is None and scene.cuts else cut
         casts = {}
-        for share in dict.fromkeys(edit.tint):  # all channels are lit alike but for that
+        for share in dict.fromkeys(edit.tint):  # the only difference between channels
             caster = self._caster.with_appearance(replace(look, specular=share * look.specular))
             casts[share] = caster.cast(
                 *(overlays(shown), camera, scene.light, outputs),
@@ -136,7 +136,7 @@ class Twin:
 
 
 def twin_of(scene: Scene, device: torch.device | str = "cpu") -> Twin | None:
-    """Return the twin that shaded frames need of a scene: faces of cuts show it; None without cuts."""
+    """Return the twin that shaded frames need for faces of cuts, or None without cuts."""
     return Twin(scene, device) if needs_twin(scene, "shaded") else None
 
 
@@ -146,24 +146,24 @@ def needs_twin(scene: Scene, mode: str) -> bool:
 
 
 def range_of(cuts: Cuts, camera: Camera) -> CutRange:
-    """Return what cuts leave of the rays of a camera, and the faces at which rays begin."""
+    """Return the parts of a camera's rays inside of cuts, and the faces at which rays begin."""
     planes = [[*plane.normal, plane.offset] for plane in cuts.half_spaces]
     normals, offsets = camera.viewmat.new_tensor(planes).split([3, 1], dim=1)
     return cut_range(normals, offsets[:, 0], camera)
 
 
-@lru_cache(maxsize=32)  # frames of a moving camera ask for the same
-def edited(tf: TransferFunction, edit: PartEdit, palette: tuple[float, ...]) -> TransferFunction:
-    """Return a basic TF with an edit's colour and opacity, cut off at 0 and 1 at every value."""
-    opacity = clipped([(value, alpha * edit.opacity) for value, alpha in tf.opacity])
+@lru_cache(maxsize=32)  # frames of a moving camera repeat it
+def edit_function(tf: TransferFunction, edit: PartEdit, palette: tuple[float, ...]) -> TransferFunction:
+    """Apply an edit's colour and opacity to a basic TF, clamped to [0, 1] at every value."""
+    opacity = clip_points([(value, alpha * edit.opacity) for value, alpha in tf.opacity])
     if edit.palette is None:
         return tf.with_points(opacity, tf.color)
     moved = np.subtract(edit.palette, palette)
-    return tf.with_points(opacity, clipped([(value, *np.add(rgb, moved)) for value, *rgb in tf.color]))
+    return tf.with_points(opacity, clip_points([(value, *np.add(rgb, moved)) for value, *rgb in tf.color]))
 
 
-def clipped(points: Sequence[tuple[float, ...]]) -> Any:
-    """Return the points of a piecewise linear function cut off at 0 and 1, with those where that begins."""
+def clip_points(points: Sequence[tuple[float, ...]]) -> Any:
+    """Clamp a piecewise linear function to [0, 1], adding points where clamping begins."""
     made = [points[0]]
     for before, after in pairwise(points):
         places = {

@@ -15,7 +15,7 @@ from texgs.raster.shading import DEGREES
 from texgs.scene.clouds import Cloud
 
 METRES = {"mm": 1e-3, "um": 1e-6, "micrometer": 1e-6, "nm": 1e-9, "nanometer": 1e-9, "angstrom": 1e-10}
-ATTRIBUTES = ("Position", "Orientation", "Scale", "Opacity", "SphericalHarmonics")  # in schemas of their own
+ATTRIBUTES = ("Position", "Orientation", "Scale", "Opacity", "SphericalHarmonics")  # each in its own schema
 
 
 def write_usd(path: str | Path, clouds: Sequence[Cloud], told: Told = None) -> Path:
@@ -47,14 +47,14 @@ def write_usd(path: str | Path, clouds: Sequence[Cloud], told: Told = None) -> P
     Usd.ColorSpaceAPI.Apply(root).CreateColorSpaceNameAttr(Gf.ColorSpaceNames.SRGBRec709)
     for cloud in clouds:
         _define(root, cloud)
-    with TemporaryDirectory() as folder:  # pxr knows a format by the ending of its file
+    with TemporaryDirectory() as folder:  # pxr recognises a format by the suffix
         file = Path(folder, f"scene{Path(path).suffix}")
         stage.GetRootLayer().Export(str(file))
         return write_bytes(path, file.read_bytes())
 
 
 def _define(root: Any, cloud: Cloud) -> None:
-    """Define the prim of a model: values without activations, quaternions xyzw as USD has them in memory."""
+    """Define the prim of a model: activated values, and quaternions xyzw, the order of USD in memory."""
     from pxr import Tf, Vt
 
     vectors = Vt.Vec3fArray.FromNumpy
@@ -64,7 +64,7 @@ def _define(root: Any, cloud: Cloud) -> None:
     kind = "ParticleField" if cloud.is_flat else "ParticleField3DGaussianSplat"
     prim = root.GetStage().DefinePrim(root.GetPath().AppendChild(name), kind)
     prim.SetDisplayName(cloud.name)
-    if cloud.is_flat:  # the other has all its schemas
+    if cloud.is_flat:  # the other prim includes all its schemas
         for schema in ("KernelGaussianSurflet", *(f"{each}Attribute" for each in ATTRIBUTES)):
             prim.AddAppliedSchema(f"ParticleField{schema}API")
     reach = REACH * cloud.scales.max(axis=1, keepdims=True)

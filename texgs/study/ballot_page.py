@@ -1,4 +1,4 @@
-"""The page that voters get: one HTML file with all clips, which works offline and names no method.
+"""The page for voters: one HTML file with all clips that works offline and names no method.
 
 A clip is a film of several scenes that turn in step, each in its cell of one picture: it cannot fall apart.
 """
@@ -23,16 +23,16 @@ from texgs.study.questions import Question, rank_name
 from texgs.volume.cameras import FRONT
 
 POLAR = 20.0  # degrees above the horizon
-CRF = 23  # of H.264: half the bytes of a film that is looked at alone, so that the page can be mailed
+CRF = 23  # of H.264; half the bytes of other films, so that the page can be mailed
 PICTURE = 320  # pixels, the longest side of a style picture
-TASKS = {  # what was asked for, by what methods follow
+TASKS = {  # questions for voters, by the kind of edits
     "style": ("The new looks follow this picture.", "The new looks follow these pictures, each in a part."),
     "instruction": ("The new looks follow this instruction:", "Instructions for parts of the scene:"),
 }
 
 
 def cell(index: int, count: int) -> tuple[int, int]:
-    """Return the column and row of a scene among so many, in a picture about as wide as high."""
+    """Return column and row of a scene in a nearly square grid of cells."""
     columns = ceil(sqrt(count))
     return index % columns, index // columns
 
@@ -40,9 +40,9 @@ def cell(index: int, count: int) -> tuple[int, int]:
 def write_film(
     path: str | Path, scenes: Sequence[Scene], size: int, frames: int, device: torch.device, title: str
 ) -> Path:
-    """Write one turn around scenes as MP4: the same cameras, background and size, pixels of a cell, for all.
+    """Write one turn around scenes as MP4, with common cameras, background and cell size in pixels.
 
-    They show all that is framed of the first scene.
+    The cameras show the frame of the first scene.
     """
     film = Film(what="orbit", frames=frames, azimuth=FRONT, polar=POLAR, width=size)
     lens = film.lens(scenes[0].framed())
@@ -52,7 +52,7 @@ def write_film(
 
 
 def mosaic(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the pictures [H, W, 3] of one size in their cells; cells without one are white."""
+    """Arrange equally large pictures [H, W, 3] in cells; empty cells are white."""
     height, width = pictures[0].shape[:2]
     places = [cell(index, len(pictures)) for index in range(len(pictures))]
     columns, rows = (1 + max(place) for place in zip(*places, strict=True))
@@ -82,7 +82,7 @@ def ballot_page(study: str, questions: Sequence[Question], films: Sequence[bytes
 
 
 def entry(number: int, question: Question, film: bytes) -> dict[str, Any]:
-    """Return what the template reads of a question."""
+    """Return a question as values for the template."""
     count = len(question.options)
     words = list(dict.fromkeys(question.followed.values())) if question.follows == "instruction" else []
     places = [dict(zip(("column", "row"), cell(index, count + 1), strict=True)) for index in range(count + 1)]
@@ -102,7 +102,7 @@ def entry(number: int, question: Question, film: bytes) -> dict[str, Any]:
 
 
 def picture_uri(path: str) -> str:
-    """Return a picture, made small, for the attribute of a tag; nothing but its pixels."""
+    """Return a small copy of a picture as a data URI, without metadata."""
     file = io.BytesIO()
     with open_picture(path) as picture:
         small = picture.convert("RGB")
@@ -112,10 +112,10 @@ def picture_uri(path: str) -> str:
 
 
 def policy_hash(text: str) -> str:
-    """Return how a Content-Security-Policy names a style or a script that it allows."""
+    """Return the hash of a style or script for a Content-Security-Policy."""
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 
 def text_of(name: str) -> str:
-    """Return a file beside this one."""
+    """Read a file beside this one."""
     return files("texgs.study").joinpath(name).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Ballots that voters send, read and checked: CSV files that the page of a study saves."""
+"""Read and check ballots: CSV files that the page of a study saves."""
 
 import csv
 from collections.abc import Iterable, Sequence
@@ -10,13 +10,13 @@ from texgs.core.io import reading
 from texgs.study.questions import Question, Study, read_key
 
 COLUMNS = ["study", "ballot", "question", "option", "rank"]
-MOST_BYTES = 1 << 20
-WHAT, ADVICE = "a ballot", "ask the voter for the file that the page saves"
+MAX_BYTES = 1 << 20
+FILE_WORDS, ADVICE = "a ballot", "ask the voter for the file that the page saves"
 
 
 @dataclass(frozen=True)
 class Ballot:
-    """What one voter has ranked."""
+    """The ranks given by one voter."""
 
     ballot: str  # random id
     ranks: Sequence[Sequence[int]]  # by question, by option; 1 is the best
@@ -82,19 +82,21 @@ def read_ballot(study: Study, path: Path) -> Ballot:
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
-    """Return the lines of a ballot by column, at least one."""
-    with reading(path, WHAT, ADVICE):
-        if path.stat().st_size > MOST_BYTES:
-            raise ArgumentError(f"{path}: expected {WHAT} of at most {MOST_BYTES} bytes; is it another file?")
+    """Return the lines of a ballot by column; at least one is required."""
+    with reading(path, FILE_WORDS, ADVICE):
+        if path.stat().st_size > MAX_BYTES:
+            raise ArgumentError(
+                f"{path}: expected {FILE_WORDS} of at most {MAX_BYTES} bytes; is it another file?"
+            )
         lines = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
     header, *rows = lines or [[]]
     if header != COLUMNS or any(len(row) != len(COLUMNS) for row in rows) or not rows:
-        raise ArgumentError(f"{path}: expected {WHAT} with the columns {', '.join(COLUMNS)}; {ADVICE}")
+        raise ArgumentError(f"{path}: expected {FILE_WORDS} with the columns {', '.join(COLUMNS)}; {ADVICE}")
     return [dict(zip(COLUMNS, row, strict=True)) for row in rows]
 
 
 def ranks_of(where: str, question: Question, given: Sequence[tuple[str, str]]) -> list[int]:
-    """Return the rank of each option of a question, of which a ballot has options and ranks."""
+    """Return the rank of each option of a question, from a ballot's options and ranks."""
     count, ranks = len(question.letters), dict(given)
     expected = sorted(str(rank) for rank in range(1, count + 1))
     if sorted(option for option, _ in given) != list(question.letters) or sorted(ranks.values()) != expected:

@@ -1,4 +1,4 @@
-"""User study: which edited scenes are compared in which question, and the key that tells what was shown.
+"""User study: the edited scenes compared in each question, and the key that identifies them.
 
 A question shows the scenes of one data set that follow the same pictures or the same instructions, side by
 side in random order and without names, as in the paper (section User Study).
@@ -19,12 +19,12 @@ from texgs.core.names import SCENE, STYLE
 from texgs.report.metrics_files import Record, of
 from texgs.report.results import EditResult, FitResult, SceneResult
 
-KINDS = {"style": "image-driven", "instruction": "text-driven"}  # of questions, by what methods follow
+KINDS = {"style": "image-driven", "instruction": "text-driven"}  # kinds of questions, by what methods follow
 
 
 @dataclass(frozen=True)
 class Compared:
-    """What gets votes: an edit of the fits of a recipe."""
+    """The subject of votes: an edit of the fits of a recipe."""
 
     recipe: str
     edit: str
@@ -39,17 +39,17 @@ class Option(Compared):
 
     @property
     def compared(self) -> Compared:
-        """Return what its votes are for."""
+        """Return the subject of its votes."""
         return Compared(self.recipe, self.edit, self.method)
 
 
 @dataclass(frozen=True)
 class Question:
-    """Clips that are ranked among themselves; the letter of an option is that of its place."""
+    """Clips to rank; an option's letter follows from its place."""
 
     dataset: str
     follows: str  # a key of KINDS
-    followed: dict[str, str]  # the picture or the words, by model
+    followed: dict[str, str]  # picture or instruction, by model
     original: str  # file of the scene before the edits
     pictures: list[str]  # files of the pictures that methods follow
     options: list[Option]
@@ -64,13 +64,13 @@ class Question:
 class Study:
     """All questions, in their order."""
 
-    study: str  # digest of what voters see
+    study: str  # digest of the content for voters
     seed: int
     questions: list[Question]
 
 
 def questions_of(records: Iterable[Record[Any]], edits: Sequence[str], seed: int) -> list[Question]:
-    """Return all questions that edited scenes give, those by pictures first, with options in random order.
+    """Return all questions for edited scenes, those about pictures first, with options in random order.
 
     Without names of edits all are compared.
     """
@@ -124,7 +124,7 @@ def question_of(
 
 
 def original_of(dataset: str, fits: set[str], records: Sequence[Record[Any]]) -> Path:
-    """Return the scene before the edits: of the fits that are closest to their test views."""
+    """Return the unedited scene, of the fits closest to their test views."""
     scenes = {
         fit_of(record): record.path.with_name(SCENE)
         for record in of(SceneResult, records)
@@ -149,7 +149,7 @@ def fit_of(record: Record[Any]) -> str:
 
 
 def rank_name(rank: int, count: int) -> str:
-    """Return what voters read: of four best, second-best, second-worst and worst, as in the paper."""
+    """Return the name of a rank; of four best, second-best, second-worst and worst, as in the paper."""
     if rank in (1, count):
         return "best" if rank == 1 else "worst"
     if rank == 2:
@@ -158,7 +158,7 @@ def rank_name(rank: int, count: int) -> str:
 
 
 def write_key(path: str | Path, study: Study) -> Path:
-    """Write which scene each option is: JSON that voters do not get."""
+    """Write the scene of each option as JSON, hidden from voters."""
     return write_json(path, asdict(study))
 
 

@@ -1,4 +1,4 @@
-"""Rankings of the same methods by several people, counted, and how far they are from chance."""
+"""Counts of rankings of the same methods by several people, and their statistical tests."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Rankings:
     """Votes on one data set, or on several."""
 
     methods: Sequence[Compared]
-    counts: np.ndarray  # [M, M] votes: of a method, a rank; the best is first
-    ranks: np.ndarray | None = None  # [B, M] of each method in each ranking; None where only counts are known
+    counts: np.ndarray  # [M, M] votes by method and rank; the best rank is first
+    ranks: np.ndarray | None = None  # [B, M] of each method in each ranking, if known
 
     @classmethod
     def of(cls, methods: Sequence[Compared], ranks: np.ndarray) -> Rankings:
@@ -29,7 +29,7 @@ class Rankings:
 
     @property
     def number(self) -> int:
-        """Return how many rankings there are."""
+        """Return the number of rankings."""
         return int(self.counts[0].sum())
 
     @property
@@ -43,7 +43,7 @@ class Rankings:
         return Rankings(methods, self.counts[order], None if self.ranks is None else self.ranks[:, order])
 
 
-def pooled(several: Sequence[Rankings]) -> Rankings:
+def pool(several: Sequence[Rankings]) -> Rankings:
     """Return all votes of rankings of the same methods in the same order."""
     known = [each.ranks for each in several if each.ranks is not None]
     ranks = np.concatenate(known) if len(known) == len(several) else None
@@ -51,7 +51,7 @@ def pooled(several: Sequence[Rankings]) -> Rankings:
 
 
 def firsts(votes: Rankings) -> list[Any]:
-    """Test the share of first ranks of each method exactly, against being as often the best as each other."""
+    """Test the share of first ranks of each method exactly, against equal shares."""
     from scipy.stats import binomtest  # slow to import
 
     return [binomtest(first, votes.number, 1 / len(votes.methods)) for first in votes.counts[:, 0].tolist()]
@@ -64,7 +64,7 @@ def interval(first: Any) -> tuple[float, float]:
 
 
 def friedman(votes: Rankings) -> tuple[float, float] | None:
-    """Return Friedman's statistic and p, by its chi-squared approximation, for methods that are ranked alike.
+    """Return Friedman's statistic and p (chi-squared approximation) under equal ranks of all methods.
 
     Each ranking is a block. Two methods have none: their shares of first ranks say the same.
     """

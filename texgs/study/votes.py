@@ -1,4 +1,4 @@
-"""Table and figure of a user study: how people rank methods, beside the votes in the paper's appendix."""
+"""Table and figure of a user study: ranks of methods beside the votes in the paper's appendix."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ from texgs.report.metrics_files import Record, of
 from texgs.report.published import intended_dataset, paper, volumes
 from texgs.report.results import EditResult
 from texgs.report.sections import Figure, data_uri
-from texgs.report.table import UNPUBLISHED, Column, Table
+from texgs.report.table import UNPUBLISHED_CELL, Column, Table
 from texgs.study.ballots import Votes
 from texgs.study.questions import KINDS, Compared, rank_name
-from texgs.study.rankings import CONFIDENCE, Rankings, firsts, friedman, interval, pooled
+from texgs.study.rankings import CONFIDENCE, Rankings, firsts, friedman, interval, pool
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-METHODS = {"style": "image_npse", "instruction": "text_npse"}  # the paper's files that name those of a kind
-PUBLISHED = ("best", "second_best", "second_worst", "worst")  # columns of the paper's file
+METHODS = {"style": "image_npse", "instruction": "text_npse"}  # the paper's files of methods, by kind
+PAPER_COLUMNS = ("best", "second_best", "second_worst", "worst")  # columns of the paper's file
 LABELS = ("kind", "data set", "follows", "recipe", "edit", "method")
 STATISTICS = (
-    Column("mean rank", 2, UNPUBLISHED),
-    Column("first", 2, UNPUBLISHED),
-    Column("from", 2, UNPUBLISHED),
-    Column("to", 2, UNPUBLISHED),
-    Column("p (binomial)", None, UNPUBLISHED),
-    Column("chi2 (Friedman)", 2, UNPUBLISHED),
-    Column("p (Friedman)", None, UNPUBLISHED),
+    Column("mean rank", 2, UNPUBLISHED_CELL),
+    Column("first", 2, UNPUBLISHED_CELL),
+    Column("from", 2, UNPUBLISHED_CELL),
+    Column("to", 2, UNPUBLISHED_CELL),
+    Column("p (binomial)", None, UNPUBLISHED_CELL),
+    Column("chi2 (Friedman)", 2, UNPUBLISHED_CELL),
+    Column("p (Friedman)", None, UNPUBLISHED_CELL),
 )
-THE_PAPER = "the paper"  # edit in rows of its votes
-NO_BALLOTS = "only counts are published"
-TOO_FEW_METHODS = "needs three methods"
+PAPER_LABEL = "the paper"  # edit column in rows of the paper's votes
+NO_BALLOTS_NOTE = "only counts are published"
+TOO_FEW_NOTE = "needs three methods"
 WIDTH, DPI = 5.0, 150  # inches of a chart
-BAR_HEIGHT, CHART_MARGIN = 0.35, 1.0  # inches of a bar, and of what is above and below all of a chart
+BAR_HEIGHT, CHART_MARGIN = 0.35, 1.0  # inches: a bar, and the space above and below a chart
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,27 +55,27 @@ class Panel:
 
 
 def study_table(records: Sequence[Record[Any]], votes: Votes | None) -> Table:
-    """Return the table of a study; without votes the paper's, where some jobs edit data sets of it."""
+    """Return the table of a study; without votes, the paper's table if jobs edit its data sets."""
     is_shown = votes or any(intended_dataset(edit) in volumes() for edit in of(EditResult, records))
     table = user_study(votes)
     return table if is_shown else replace(table, rows=[])
 
 
 def user_study(votes: Votes | None) -> Table:
-    """Return the table of a study; without votes only those of the paper.
+    """Return the table of a study; without votes, only the paper's votes.
 
     Votes are added up over the data sets on which the same methods were compared.
     """
     groups = panels_by_kind(votes)
     ranks = max(len(panels[0].votes.methods) for _, panels in groups)
     rows = [row for kind, panels in groups for row in rows_of(kind, panels)]
-    numbered = [Column(f"rank {rank}", 0, UNPUBLISHED) for rank in range(1, ranks + 1)]
-    names = [Column(title, None, UNPUBLISHED) for title in LABELS]
+    numbered = [Column(f"rank {rank}", 0, UNPUBLISHED_CELL) for rank in range(1, ranks + 1)]
+    names = [Column(title, None, UNPUBLISHED_CELL) for title in LABELS]
     return Table(caption(votes), [*names, *numbered, *STATISTICS], rows)
 
 
 def panels_by_kind(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
-    """Return kinds of questions, each with all that compare the same methods; the paper's follow ours."""
+    """Return the questions by kind and compared methods; the paper's follow ours."""
     ours, theirs = panels_of_study(votes) if votes else {}, panels_of_paper()
     return [
         (KINDS[follows], panels)
@@ -86,7 +86,7 @@ def panels_by_kind(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
 
 
 def panels_of_study(votes: Votes) -> dict[str, list[Panel]]:
-    """Return the votes of each question, by what methods follow there."""
+    """Return the votes of each question, by kind."""
     panels: dict[str, list[Panel]] = defaultdict(list)
     for place, question in enumerate(votes.study.questions):
         methods = [option.compared for option in question.options]
@@ -97,22 +97,22 @@ def panels_of_study(votes: Votes) -> dict[str, list[Panel]]:
 
 
 def panels_of_paper() -> dict[str, list[Panel]]:
-    """Return the paper's votes, by what its methods follow."""
-    keys, numbers = ({name: name for name in names} for names in (("dataset", "method"), PUBLISHED))
+    """Return the paper's votes, by kind."""
+    keys, numbers = ({name: name for name in names} for names in (("dataset", "method"), PAPER_COLUMNS))
     votes = paper("user_study", keys, numbers)
     panels: dict[str, list[Panel]] = {follows: [] for follows in METHODS}
     for follows, table in METHODS.items():
         known = set(paper(table, {"method": "method"}, {})["method"])
         for dataset, lines in votes.groupby("dataset", sort=False):
             if set(lines["method"]) == known:
-                methods = [Compared("-", THE_PAPER, name) for name in lines["method"]]
-                counts = lines[list(PUBLISHED)].to_numpy(int)
+                methods = [Compared("-", PAPER_LABEL, name) for name in lines["method"]]
+                counts = lines[list(PAPER_COLUMNS)].to_numpy(int)
                 panels[follows].append(Panel(str(dataset), "-", Rankings(methods, counts)))
     return panels
 
 
 def alike(panels: Iterable[Panel]) -> list[list[Panel]]:
-    """Return the questions with the same methods together."""
+    """Group the questions with the same methods."""
     groups: dict[tuple[object, ...], list[Panel]] = defaultdict(list)
     for panel in panels:
         groups[tuple(panel.votes.methods)].append(panel)
@@ -121,7 +121,7 @@ def alike(panels: Iterable[Panel]) -> list[list[Panel]]:
 
 def total(panels: Iterable[Panel]) -> Rankings:
     """Return all votes on questions that compare the same methods."""
-    return pooled([panel.votes for panel in panels])
+    return pool([panel.votes for panel in panels])
 
 
 def rows_of(kind: str, panels: Sequence[Panel]) -> list[dict[str, Any]]:
@@ -138,7 +138,7 @@ def rows_of(kind: str, panels: Sequence[Panel]) -> list[dict[str, Any]]:
     test, edits = friedman(votes), {method.edit for method in votes.methods}
     rows.append({**every, "follows": "-", "recipe": "-", "method": "all"})
     rows[-1]["edit"] = edits.pop() if len(edits) == 1 else "-"
-    rows[-1]["p (Friedman)"] = NO_BALLOTS if votes.ranks is None else TOO_FEW_METHODS
+    rows[-1]["p (Friedman)"] = NO_BALLOTS_NOTE if votes.ranks is None else TOO_FEW_NOTE
     if test is not None:
         rows[-1] |= {"chi2 (Friedman)": test[0], "p (Friedman)": f"{test[1]:.2g}"}
     return rows
@@ -160,7 +160,7 @@ def method_rows(votes: Rankings) -> list[dict[str, Any]]:
 
 
 def caption(votes: Votes | None) -> str:
-    """Return what the columns are, and whose votes these are."""
+    """Return the caption: the columns, and the voters."""
     ours = f"Study {votes.study.study}, {len(votes.ballots)} ballots." if votes else ""
     whose = ours or "No votes but the paper's."
     return (
@@ -183,14 +183,14 @@ def write_votes(path: str | Path, votes: Votes | None) -> Path:
 
 
 def votes_figure(votes: Votes | None) -> Figure:
-    """Return the figure as a report has it."""
+    """Return the figure for the report."""
     with TemporaryDirectory() as folder, Image.open(write_votes(Path(folder, "votes.png"), votes)) as picture:
         command = "texgs votes" if votes else ""
         return Figure("votes", "", "Votes for each rank.", data_uri(picture), command, is_narrow=True)
 
 
 def draw(axes: Axes, kind: str, panels: Sequence[Panel]) -> None:
-    """Draw a bar for each method, of its votes from the best rank to the worst."""
+    """Draw a stacked bar for each method, with its votes from the best rank to the worst."""
     from matplotlib import colormaps  # slow to import
 
     votes = total(panels)
@@ -205,11 +205,11 @@ def draw(axes: Axes, kind: str, panels: Sequence[Panel]) -> None:
     axes.set_xlabel("votes", fontsize=8)
     axes.tick_params(labelsize=8)
     axes.spines[["top", "right"]].set_visible(False)
-    source = f", {THE_PAPER}" if votes.methods[0].edit == THE_PAPER else ""
+    source = f", {PAPER_LABEL}" if votes.methods[0].edit == PAPER_LABEL else ""
     axes.set_title(f"{kind}{source}: {votes.number} rankings of {len(panels)} questions", fontsize=9)
     axes.legend(fontsize=7, ncols=count, loc="upper center", bbox_to_anchor=(0.5, -0.25), frameon=False)
 
 
 def name_of(method: Compared) -> str:
-    """Return what a bar is called."""
-    return method.method if method.edit == THE_PAPER else f"{method.edit}\n{method.recipe}"
+    """Return the label of a bar."""
+    return method.method if method.edit == PAPER_LABEL else f"{method.edit}\n{method.recipe}"

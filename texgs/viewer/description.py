@@ -13,7 +13,7 @@ from texgs.fields.files import kind_of
 from texgs.fields.part_edit import NEEDS, PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.raster.shading import MATERIAL
-from texgs.scene.bounds import STRAYS, models_of, span_of
+from texgs.scene.bounds import STRAY_SHARE, models_of, span_of
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import plain_functions
 from texgs.scene.shot import Mode
@@ -61,7 +61,7 @@ def bounds(scene: Scene, composed: Composed) -> dict[str, Any]:
             grid = open_grid(scene.volume.file)
             return {**ball, "low": grid.aabb[0], "high": grid.aabb[1], "scale": grid.scale}
     low, high = zip(
-        *(span_of(models_of(composed), framed, axis, STRAYS) for axis in np.eye(3).tolist()), strict=True
+        *(span_of(models_of(composed), framed, axis, STRAY_SHARE) for axis in np.eye(3).tolist()), strict=True
     )
     return {**ball, "low": low, "high": high, "scale": None}
 

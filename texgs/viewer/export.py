@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from texgs.fields.files import kind_of
-from texgs.scene.export import chosen, require_export, require_other, write_export
+from texgs.scene.export import require_export, require_other, single_model, write_export
 from texgs.scene.export_keys import Export
 from texgs.scene.scene import Scene
 from texgs.viewer.page_volume import page_volume
@@ -25,7 +25,7 @@ def export(path: Path, scene: Scene, keys: Export, checked: str = "", name: str 
     """
     if keys.kind_of(path) != "html":
         return write_export(path, scene, keys)
-    shown = chosen(scene, keys.model)
+    shown = single_model(scene, keys.model)
     require_other(path, scene)
     for entry in shown.models.values():
         require_export(kind_of(entry.file), "html")

@@ -25,7 +25,7 @@ from texgs.core.movie import save_png
 from texgs.metrics.quality import compare
 from texgs.report.beside_volume import scale_of
 from texgs.report.fit_figure import signed_error
-from texgs.scene.frame import quantized
+from texgs.scene.frame import quantize
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer.messages import View
@@ -170,4 +170,4 @@ def comparison(view: View, image: Tensor, truth: Tensor) -> np.ndarray:
     elif view.mode == "wipe":
         left, right = (width, 0) if view.wipe is None else [round(view.wipe * width)] * 2
         picture = torch.cat([image[:, :left], truth[:, right:]], dim=1)
-    return quantized(picture)
+    return quantize(picture)

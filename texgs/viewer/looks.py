@@ -17,13 +17,21 @@ from PIL import Image
 from texgs.core.errors import ArgumentError
 from texgs.core.names import part_file
 from texgs.edit.method import MethodKeys
-from texgs.edit.new_look import LearnedLook, LookTask, give_look, learn_look, look_task, opaque, settings_of
+from texgs.edit.new_look import (
+    LearnedLook,
+    LookTask,
+    give_look,
+    learn_look,
+    look_task,
+    readable_task,
+    settings_of,
+)
 from texgs.edit.task import parts_with_surfels
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import write_texture
 from texgs.models.instruction import understand, vocabulary
 from texgs.models.pictures import PICTURES
-from texgs.models.weights import unusable
+from texgs.models.weights import missing_advice
 from texgs.scene.frame import frame
 from texgs.scene.parts import NewLook, with_looks
 from texgs.scene.scene import Scene
@@ -122,7 +130,7 @@ class Looks:
                 quick["views"] = "all" if asked.camera else None
             choices = [settings_of("text", each) for each in ([quick] if asked.preview else [words, quick])]
         *others, last = choices
-        settings = next((each for each in others if not any(map(unusable, each.weights()))), last)
+        settings = next((each for each in others if not any(map(missing_advice, each.weights()))), last)
         if settings is last and asked.instruction:
             require_known(asked.instruction)
         return settings
@@ -131,7 +139,7 @@ class Looks:
         """Return the task with opacities for its look, measured once for a scene."""
         depends, latest = (task.scene, task.edit.parts, task.settings.factor), self._latest
         if latest is None or latest[0] != depends:  # another thread may replace it
-            self._latest = latest = (depends, opaque(task))
+            self._latest = latest = (depends, readable_task(task))
         return replace(task, scene=latest[1].scene, settings=replace(task.settings, opacity="keep"))
 
 

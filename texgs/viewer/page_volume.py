@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch.nn import functional as F
 
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.scene.scene import Scene, volume_of
 from texgs.volume.grid import Grid, Triple
 from texgs.volume.nrrd_file import REMEDY, open_grid
@@ -62,7 +62,7 @@ def page_volume(scene: Scene, budget: float) -> PageVolume:
             "volume: the scene shows several channels, and a page carries one; leave the volume out of the "
             "page, or make a data set of one channel"
         )
-    with located("volume"):
+    with errors_at("volume"):
         return within(open_grid(source.file), budget * MEGABYTE)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.names import METRICS, SCENE, SCENES, file_name, new_part_file
-from texgs.report.check import checked
+from texgs.report.check import found_sentence
 from texgs.scene.copied import require_files, write_copy
 from texgs.scene.parts import NewLook, part_names, with_looks
 from texgs.scene.scene import Scene
@@ -74,7 +74,7 @@ class SharedEdits:
 
     def checked(self, scene: Scene) -> str:
         """Return the result of `texgs check` for the models of a scene; empty where there is none."""
-        return checked(self._source, scene)
+        return found_sentence(self._source, scene)
 
     @property
     def is_saved(self) -> bool:

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from texgs import __version__
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import write_bytes
 from texgs.fields.surfels.compact import TEXEL_STEP, compact_tensors
 from texgs.fields.surfels.composition import Composition
@@ -56,7 +56,7 @@ def write_page(
     steps: str | int = "all",
 ) -> ScenePage:
     """Create or replace the page of a scene of surfels in one step; see `scene_page`."""
-    with located(path):
+    with errors_at(path):
         page = scene_page(scene, name, checked, volume, steps)
     write_bytes(path, page.text.encode())
     return page

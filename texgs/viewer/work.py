@@ -16,8 +16,8 @@ import torch
 
 from texgs.config.kept_function import keep
 from texgs.core.errors import ArgumentError
-from texgs.core.progress import let_stop, watched
-from texgs.edit.function_model import FIRST, fit_function, overlap_of
+from texgs.core.progress import let_stop, watching
+from texgs.edit.function_model import FIRST_MODEL, fit_function, overlap_of
 from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene
 from texgs.viewer.downloads import write_download
@@ -66,7 +66,7 @@ class Jobs:
 
         def watched_work() -> T:
             torch.set_num_threads(threads)
-            with watched(step):
+            with watching(step):
                 return work()
 
         return await loop.run_in_executor(self._thread, watched_work)
@@ -198,9 +198,9 @@ class Work:
         models = fit_function(edits.session, name, partial(edits.new_file, "model", name), self._device)
         try:
             for made in models:
-                more = overlap_of(edits.scene, name) if made == FIRST else ""
+                more = overlap_of(edits.scene, name) if made == FIRST_MODEL else ""
                 done = f"{name}: {made}, {monotonic() - start:.0f} s; the scene is not saved yet.{more}"
-                if made == FIRST:
+                if made == FIRST_MODEL:
                     tell(done)
         except Stopped as stopped:
             if done:

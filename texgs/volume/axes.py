@@ -1,4 +1,4 @@
-"""Axes of labelled arrays: which are x, y and z, where samples lie along them, and places on all others."""
+"""Axes of labelled arrays: which are x, y and z, positions of samples, and places on further axes."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ LETTERS = {"X": "x", "longitude": "x", "Y": "y", "latitude": "y", "Z": "z", "ver
 # Attributes of CF: codes of missing samples, scaling of packed ones, bounds of valid ones, and labels.
 CODES, PACKED = ("_FillValue", "missing_value"), {"scale_factor": 1.0, "add_offset": 0.0}
 NUMBERS = (*CODES, *PACKED, "valid_min", "valid_max", "valid_range")
-UNSIGNED = "_Unsigned"  # "true" where integers are, although the type of the array has a sign
-CF = (*NUMBERS, UNSIGNED, "axis", "standard_name", "long_name", "units", "positive")
-CF += ("cartesian_axis", "grads_dim", "_CoordinateAxisType")  # of others, known to cf_xarray
+UNSIGNED_KEY = "_Unsigned"  # "true" for unsigned integers in an array of a signed type
+CF_KEYS = (*NUMBERS, UNSIGNED_KEY, "axis", "standard_name", "long_name", "units", "positive")
+CF_KEYS += ("cartesian_axis", "grads_dim", "_CoordinateAxisType")  # of others, known to cf_xarray
 PRESSURES = ("Pa", "hPa", "kPa", "mbar", "millibar", "dbar", "decibar", "bar")
 
 
 @dataclass(frozen=True)
 class Channel:
-    """The name of a channel and the way it is shown, as far as the file says."""
+    """The name of a channel and its display settings, as far as the file has them."""
 
     label: str = ""
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)  # red, green, blue
-    window: tuple[float, float] | None = None  # values shown black, and in the full colour
+    window: tuple[float, float] | None = None  # values shown as black and as the full colour
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,10 @@ class Axis:
     size: int
     unit: str = "samples"
     start: float = 0.0
-    step: float = 1.0  # below 0 where coordinates fall
+    step: float = 1.0  # negative for falling coordinates
     is_even: bool = True
     channels: tuple[Channel, ...] = ()  # one for each sample, or none
-    letter: str = ""  # x, y, z or t, where the file says along which of them it runs
+    letter: str = ""  # x, y, z or t, if the file names the direction
 
     @property
     def kind(self) -> str:
@@ -67,14 +67,14 @@ class Axis:
 
 def attributes_of(array: Any) -> dict[str, Any]:
     """Return the attributes of CF that an array of h5py, Zarr or xarray has, with bytes as text."""
-    said = {key: np.ravel(array.attrs[key]) for key in CF if key in array.attrs}
+    said = {key: np.ravel(array.attrs[key]) for key in CF_KEYS if key in array.attrs}
     is_text = {key for key, values in said.items() if values.dtype.kind in "SUO" and values.size == 1}
     words = {key: said[key][0] for key in is_text}
     return said | {k: v.decode(errors="replace") if isinstance(v, bytes) else v for k, v in words.items()}
 
 
 def nameless(shape: Sequence[int]) -> list[str]:
-    """Return names of the axes of an array that tells none: (t, (c,)) z, y, x, or z, y, x and components."""
+    """Return default names for nameless axes: (t, (c,)) z, y, x, or z, y, x and components."""
     known = {4: "zyxc" if shape[-1] in COMPONENTS else "tzyx", 5: "tczyx"}
     is_volume = sum(n > 1 for n in shape) == 3
     return [*("" if is_volume else known.get(len(shape), ""))] or [f"?{k}" for k in range(len(shape))]
@@ -122,7 +122,7 @@ def along(name: str, size: int, places: xarray.DataArray | None = None, letter: 
 
 
 def upright(axes: Sequence[Axis]) -> tuple[list[int], str]:
-    """Return which of three axes of space are z, y and x, and a remark where that is a guess.
+    """Return which of three axes of space are z, y and x, with a remark if it is a guess.
 
     Two that are known tell the third one. Else they are z, y, x in the order they are stored.
     """

@@ -58,7 +58,7 @@ def orbit_path(count: int, polar: float, lens: Lens, start: float = FRONT) -> li
 
 
 def spread(path: Sequence[T], count: int) -> list[T]:
-    """Return so many cameras or views of a path, evenly spread and in its order; all, if it has no more."""
+    """Return `count` evenly spread cameras or views of a path in order, or all if there are no more."""
     count = min(count, len(path))
     return [path[index * len(path) // count] for index in range(count)]
 
@@ -76,7 +76,7 @@ def farthest_first(cameras: Sequence[Camera]) -> list[int]:
 
 
 def _orbit(azimuth: float, polar: float, lens: Lens) -> Camera:
-    """Return a camera with +y up everywhere, as the paper has them at the poles."""
+    """Return a camera with +y up everywhere, also at the poles, as in the paper."""
     return orbit(azimuth, max(-POLE, min(POLE, polar)), *lens)
 
 

@@ -38,11 +38,11 @@ from texgs.volume.transfer import TransferFunction, left_limit, right_limit
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64")
 OUTPUTS = ("depth", "median", "normal")
 BYTES_PER_PIXEL = 64  # of memory for a pixel
-CACHE_SIZE = 2  # sets of functions that are kept ready: two pictures that are compared take turns
-MIN_WIDTH = torch.finfo(torch.float32).tiny  # of a transfer function, in data values
-MAX_SAMPLES = 2**24  # along a ray; their numbers are floats
+CACHE_SIZE = 2  # prepared sets of functions; compared pictures take turns
+MIN_WIDTH = torch.finfo(torch.float32).tiny  # least width of a transfer function, in data values
+MAX_SAMPLES = 2**24  # samples along a ray; float32 counts them
 Prepared = tuple[Any, Any, Any]  # functions and by_cell, the arguments of the library, what these need
-PADDING = 3  # bytes behind the distances of bricks, which are loaded as words
+PADDING = 3  # bytes after the distances of bricks, which are loaded as words
 NativeVolume = native.struct("texgs_volume", "p values, i type, 3i size, 3f half")
 NativeTransfer = native.struct("texgs_transfer", "i n, p points")
 NativeView = native.struct(
@@ -63,8 +63,8 @@ class Cast:
     """What rays see; float32."""
 
     rgba: Tensor  # [H, W, 4] premultiplied
-    depth: Tensor | None = None  # [H, W] mean camera z, weighted as colours are; 0 where alpha is 0
-    median: Tensor | None = None  # [H, W] camera z at which half of the light is gone; 0 where it never is
+    depth: Tensor | None = None  # [H, W] mean camera z, weighted like colours; 0 where alpha is 0
+    median: Tensor | None = None  # [H, W] camera z at half of the light, or 0
     normal: Tensor | None = None  # [H, W, 3] mean normal, against the ray, world axes; length at most 1
 
 
@@ -148,7 +148,7 @@ class Caster:
         return Cast(**seen)
 
     def _cut(self, camera: Camera, depth_range: Tensor | None, faces: CutRange | None) -> dict[str, Any]:
-        """Return what cuts a view, as the library takes it."""
+        """Return the cuts of a view as a structure of the library."""
         size, cut = f"{camera.height} {camera.width}", {}
         if depth_range is not None:
             require({"depth_range": (depth_range, f"2 {size}")})
@@ -176,7 +176,7 @@ class Caster:
             )
 
     def _prepare(self, tfs: list[TransferFunction], by_cell: bool) -> Prepared:
-        """Return channels with their functions for the library, and where something shows."""
+        """Return channels with their functions for the library, and the visible cells."""
         if not tfs:
             raise ArgumentError("tf: expected at least one transfer function, got none")
         key, last = (tfs, by_cell), [*self._prepared]  # another thread may prepare others

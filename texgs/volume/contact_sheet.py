@@ -7,10 +7,10 @@ from PIL import Image
 
 from texgs.core.io import write_atomic
 
-COLUMNS = 6  # of a contact sheet, at most
-THUMBNAIL = 240  # pixels of the longer side of a picture on it: larger ones are reduced, smaller ones stay
+COLUMNS = 6  # largest number of columns of a contact sheet
+THUMBNAIL = 240  # pixels of a picture's longer side; larger ones are reduced
 GUTTER = 6  # pixels between its pictures
-MILLISECONDS = 80  # of a picture of an animation
+MILLISECONDS = 80  # for each picture of an animation
 
 
 def write_contact_sheet(path: str | Path, pictures: Sequence[Image.Image]) -> Path:

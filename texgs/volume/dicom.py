@@ -17,14 +17,14 @@ from pydicom.uid import MultiFrameGrayscaleWordSecondaryCaptureImageStorage as C
 from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Axis, place_on
 from texgs.volume.dicom_series import ALL, FileSeries, choose_series, phases_of, series_in
-from texgs.volume.dicom_slice import CONVERT, TIMES, Slice, slices_in
+from texgs.volume.dicom_slice import CONVERT_ADVICE, TIMES, Slice, slices_in
 from texgs.volume.grid import dims_of, require_room
 from texgs.volume.itk_image import sentence
 from texgs.volume.space import LPS
 
-GAP_TOLERANCE = 0.05  # of the distance of slices: places are rounded in files
-TILT_TOLERANCE = 0.01  # of the distance to the first slice: how far one may lie beside it
-ROUNDING = 0.01  # mm; and of the widest gap: slices that are closer are at one place
+GAP_TOLERANCE = 0.05  # tolerance in slice distances, as files round positions
+TILT_TOLERANCE = 0.01  # sideways tolerance, relative to the distance to the first slice
+ROUNDING = 0.01  # mm, and share of the widest gap; closer slices share a position
 
 
 def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any], np.ndarray]:
@@ -52,7 +52,7 @@ def read_dicom(path: Path, series: str | None, time: int) -> tuple[dict[str, Any
 
 
 def step_at(path: Path, series: str | None, time: int) -> tuple[list[Slice], int, str]:
-    """Return the slices of a step, how many steps there are, and what to say of them."""
+    """Return the slices of a step, the number of steps, and a note about them."""
     every = series_in(path) if path.is_dir() else [FileSeries([str(path)])]
     if series == ALL and len(every) > 1:
         phases, note = phases_of(every)
@@ -89,7 +89,7 @@ def steps_of(slices: list[Slice]) -> list[list[Slice]]:
 
 
 def time_tag(places: list[list[Slice]]) -> tuple[int, str]:
-    """Return index and name of the tag that tells all slices at one place apart."""
+    """Return index and name of the tag that distinguishes all slices at one position."""
     for index, name in enumerate(TIMES):
         values = [[each.times[index] for each in place] for place in places]
         if all("" not in some and len({*map(float, some)}) == len(some) for some in values):
@@ -97,7 +97,7 @@ def time_tag(places: list[list[Slice]]) -> tuple[int, str]:
     first, second = next(place for place in places if len(place) > 1)[:2]
     raise ArgumentError(
         f"{first.name} and {second.name}: expected slices at different places, got two at one, and "
-        f"no {' or '.join(TIMES)} in all that tells such slices apart; {CONVERT}"
+        f"no {' or '.join(TIMES)} in all that tells such slices apart; {CONVERT_ADVICE}"
     )
 
 
@@ -110,7 +110,7 @@ def slice_distance(slices: list[Slice]) -> float:
         is_like = each.sizes == first.sizes and np.allclose(each.spacing, first.spacing)
         if not is_like or not np.allclose(each.directions, first.directions, atol=1e-3):
             raise ArgumentError(
-                f"{each.name}: expected size, spacing and orientation of {first.name}; {CONVERT}"
+                f"{each.name}: expected size, spacing and orientation of {first.name}; {CONVERT_ADVICE}"
             )
         shift = np.abs(first.directions[:2] @ (each.place - first.place)).max()
         if shift > TILT_TOLERANCE * (each.height - first.height) + ROUNDING:
@@ -124,7 +124,7 @@ def slice_distance(slices: list[Slice]) -> float:
     if abs(gaps[worst] - step) > GAP_TOLERANCE * step:
         raise ArgumentError(
             f"{slices[worst].name} and {slices[worst + 1].name}: expected slices {step:.6g} mm apart, got "
-            f"{gaps[worst]:.6g} mm; complete the series, or {CONVERT}"
+            f"{gaps[worst]:.6g} mm; complete the series, or {CONVERT_ADVICE}"
         )
     return float(slices[-1].height - first.height) / len(gaps)
 
@@ -151,7 +151,7 @@ def samples_of_frames(slices: Sequence[Slice]) -> np.ndarray:
 
 
 def stored_frames(path: Path) -> np.ndarray:
-    """Return samples [frames, Y, X] of a file as they are stored."""
+    """Return stored samples [frames, Y, X] of a file."""
     data = pydicom.dcmread(path, force=True)
     if not data.file_meta.TransferSyntaxUID.is_encapsulated:
         return data.pixel_array.reshape(-1, data.Rows, data.Columns)

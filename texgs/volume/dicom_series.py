@@ -12,8 +12,8 @@ import SimpleITK as sitk
 from texgs.core.errors import ArgumentError
 from texgs.volume.dicom_slice import slices_in, values_in
 
-ALL = "all"  # in place of the number of a series
-OF_SERIES = ["SeriesNumber", "SeriesDescription", "TemporalPositionIdentifier", "Modality"]
+ALL = "all"  # instead of the number of a series
+SERIES_TAGS = ["SeriesNumber", "SeriesDescription", "TemporalPositionIdentifier", "Modality"]
 MAGIC, PIXELS = b"DICM", b"\xe0\x7f\x10\x00"  # of a file with 128 bytes before it; the tag of its samples
 # What orders series, and how it stands in them: the first counts that is not the same in all.
 ORDERS = {
@@ -24,7 +24,7 @@ ORDERS = {
 
 
 class FileSeries(NamedTuple):
-    """A series in a folder, as its first file tells."""
+    """A series in a folder, described by its first file."""
 
     files: Sequence[str]
     uid: str = ""
@@ -42,9 +42,9 @@ def series_in(folder: Path) -> list[FileSeries]:
     every, reader = [], sitk.ImageSeriesReader
     for uid in reader.GetGDCMSeriesIDs(str(folder)):
         files = reader.GetGDCMSeriesFileNames(str(folder), uid)
-        header = pydicom.dcmread(files[0], stop_before_pixels=True, force=True, specific_tags=OF_SERIES)
+        header = pydicom.dcmread(files[0], stop_before_pixels=True, force=True, specific_tags=SERIES_TAGS)
         first = values_in([header])
-        number, description, position, kind = (str(first.get(each, "")) for each in OF_SERIES)
+        number, description, position, kind = (str(first.get(each, "")) for each in SERIES_TAGS)
         lattice = lattice_of(Path(files[0]), len(files))
         every.append(FileSeries(files, uid, number, description or kind, position, lattice))
     names = {Path(file).name for each in every for file in each.files}
@@ -63,7 +63,7 @@ def series_in(folder: Path) -> list[FileSeries]:
 
 
 def lattice_of(file: Path, count: int) -> tuple[float, ...]:
-    """Return that of a series as `FileSeries` has it, rounded to 0.001 mm."""
+    """Return the lattice of a series for `FileSeries`, rounded to 0.001 mm."""
     try:
         first, *others = slices_in(file)
     except (ArgumentError, KeyError):  # no image, such as a report
@@ -109,7 +109,7 @@ def phases_of(every: Sequence[FileSeries]) -> tuple[list[FileSeries], str]:
 
 
 def in_order(phases: Sequence[FileSeries]) -> tuple[list[FileSeries], str]:
-    """Return series in the order of time, and what tells it."""
+    """Return series in the order of time, and the tag of the order."""
     for name, (field, pattern) in ORDERS.items():
         matches = [re.search(pattern, getattr(each, field)) for each in phases]
         numbers = {each: float(match[1]) for each, match in zip(phases, matches, strict=True) if match}

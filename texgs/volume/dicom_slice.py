@@ -1,4 +1,4 @@
-"""Slices of DICOM, files or frames of one: what headers say of them.
+"""Slices of DICOM, files or frames of one: the facts in their headers.
 
 By pydicom: GDCM knows neither frames that are no even stack, nor slopes that differ from frame to frame, nor
 doses.
@@ -12,7 +12,7 @@ import numpy as np
 import pydicom
 from pydicom.datadict import keyword_for_tag
 
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 
 # What orders slices at one place, in files of one slice and of many: the first whose values differ there.
 TIMES = {
@@ -27,7 +27,7 @@ PADDING = ("PixelPaddingValue", "PixelPaddingRangeLimit")
 # Of files whose frames have no places of their own.
 OFFSETS, DISTANCE, ORDER = "GridFrameOffsetVector", "SpacingBetweenSlices", "SliceVector"
 AS_STORED = {PLACE: (0, 0, 0), ORIENTATION: (1, 0, 0, 0, 1, 0)}
-CONVERT = "convert it: dcm2niix"  # what to do where frames or slices are no even stack
+CONVERT_ADVICE = "convert it: dcm2niix"  # advice for frames or slices without even spacing
 
 
 class Slice(NamedTuple):
@@ -39,7 +39,7 @@ class Slice(NamedTuple):
     spacing: tuple[float, float]
     place: np.ndarray  # [3] of the first sample, mm: to the left, the back and the head
     directions: np.ndarray  # [3, 3] in rows: along a row of samples, along a column, and from slice to slice
-    times: tuple[str, ...]  # what it says for `TIMES`
+    times: tuple[str, ...]  # its values for `TIMES`
     scale: tuple[float, float]  # slope and intercept
     padding: tuple[int, int] | None  # the range of stored samples that stand for none
     note: str  # for the user
@@ -62,14 +62,16 @@ def slices_in(path: Path) -> list[Slice]:
     count, groups = int(data.get("NumberOfFrames") or 1), data.get("PerFrameFunctionalGroupsSequence") or []
     shared = data.get("SharedFunctionalGroupsSequence") or [()]
     said = values_in([*(data.get("DetectorInformationSequence") or [])[:1], data, *first_items(shared[0])])
-    with located(path.name if count < 2 else f"{path.name}, a multi-frame file"):
+    with errors_at(path.name if count < 2 else f"{path.name}, a multi-frame file"):
         frames = [said | values_in(first_items(group)) for group in groups] or [said]
         if count > 1 and not groups:
             frames = place_frames(said, count)
         if len(frames) != count:
-            raise ArgumentError(f"expected places of {count} frames, got {len(frames)}; {CONVERT}")
+            raise ArgumentError(f"expected places of {count} frames, got {len(frames)}; {CONVERT_ADVICE}")
         if len(stacks := {str(each.get("StackID", "")) for each in frames}) > 1:
-            raise ArgumentError(f"expected one stack of frames, got {', '.join(sorted(stacks))}; {CONVERT}")
+            raise ArgumentError(
+                f"expected one stack of frames, got {', '.join(sorted(stacks))}; {CONVERT_ADVICE}"
+            )
         return [slice_of(path, each, k if count > 1 else None) for k, each in enumerate(frames)]
 
 
@@ -85,7 +87,7 @@ def first_items(group: Iterable[Any]) -> list[Any]:
 
 
 def place_frames(said: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """Return what is said of frames without groups of their own: doses, and slices of nuclear medicine."""
+    """Return facts about frames without own groups: doses, and slices of nuclear medicine."""
     pointers = {keyword_for_tag(int(each)) for each in np.ravel(said.get("FrameIncrementPointer", ()))}
     if OFFSETS in said:
         heights = np.ravel(said[OFFSETS]).astype(float)
@@ -93,7 +95,9 @@ def place_frames(said: dict[str, Any], count: int) -> list[dict[str, Any]]:
         heights = np.ravel(said.get(ORDER, range(count))) * float(said[DISTANCE])
     else:
         ways = ", ".join(sorted(pointers)) or "nothing"
-        raise ArgumentError(f"expected places of {count} frames, got {ways}, which tells none; {CONVERT}")
+        raise ArgumentError(
+            f"expected places of {count} frames, got {ways}, which tells none; {CONVERT_ADVICE}"
+        )
     if not AS_STORED.keys() <= said.keys():
         note = "DICOM tells no place and orientation of frames: they are taken as stored"
         said = {"note": note, **AS_STORED, **said}
@@ -103,14 +107,18 @@ def place_frames(said: dict[str, Any], count: int) -> list[dict[str, Any]]:
 
 
 def slice_of(path: Path, said: dict[str, Any], frame: int | None) -> Slice:
-    """Return a slice by what is said of it."""
+    """Make a slice from facts about it."""
     place, axes = (np.ravel(said.get(name, ())).astype(float) for name in (PLACE, ORIENTATION))
     if (place.size, axes.size) != (3, 6):
-        raise ArgumentError(f"expected a slice with its position and orientation, found none; {CONVERT}")
+        raise ArgumentError(
+            f"expected a slice with its position and orientation, found none; {CONVERT_ADVICE}"
+        )
     row, column = np.reshape(axes, (2, 3))
     directions = np.stack([row, column, np.cross(row, column)])
     if not np.allclose(directions @ directions.T, np.eye(3), atol=1e-3):
-        raise ArgumentError(f"expected rows and columns at right angles, got {axes.tolist()}; {CONVERT}")
+        raise ArgumentError(
+            f"expected rows and columns at right angles, got {axes.tolist()}; {CONVERT_ADVICE}"
+        )
     note, key = str(said.get("note", "")), next((each for each in SPACINGS if each in said), "")
     if key != SPACINGS[0]:
         taken = f"{key} is taken" if key else "samples of a slice are 1 apart"

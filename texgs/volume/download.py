@@ -29,7 +29,7 @@ def download(url: str, sha256: str, path: Path) -> None:
 
 
 def require_whole(path: Path, sha256: str) -> None:
-    """Require that a downloaded file has its checksum, and has not been damaged since."""
+    """Require that a downloaded file has its checksum and was not damaged since."""
     import pooch
 
     if pooch.file_hash(str(path)) != sha256.lower():

@@ -1,4 +1,4 @@
-"""The axis that NRRD and MetaImage may have besides x, y and z: time, channels, or layers of labels."""
+"""The extra axis of NRRD and MetaImage besides x, y and z: time, channels, or layers of labels."""
 
 import re
 from collections.abc import Iterator
@@ -13,10 +13,10 @@ from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Axis, place_on
 from texgs.volume.headers import METAIMAGE, NRRD, read_fields
 
-OF_SPACE = ("domain", "space")  # kinds of axes of NRRD
-SEQUENCE = ".seq.nrrd"  # of 3D Slicer, whose list is one of steps in time
-WORD = re.compile(r'\([^)]*\)|"[^"]*"|\S+')  # of a field of NRRD; a vector or a quoted text is one word
-TEXTS = ("type", "color")  # fields whose four words are not of four axes
+SPACE_KINDS = ("domain", "space")  # kinds of axes of NRRD
+SEQUENCE = ".seq.nrrd"  # of 3D Slicer; its list axis is time
+WORD = re.compile(r'\([^)]*\)|"[^"]*"|\S+')  # in a field of NRRD; a vector or a quoted text is one word
+TEXTS = ("type", "color")  # fields whose four words do not describe four axes
 
 
 class ExtraAxis(NamedTuple):
@@ -35,7 +35,7 @@ class ExtraAxis(NamedTuple):
 
 
 def extra_axis(path: Path, time: int | None, channel: str | None) -> tuple[ExtraAxis | None, int]:
-    """Return the axis besides those of space, and the chosen place on it, by default the first step."""
+    """Return the extra axis, and the chosen place on it, by default the first step."""
     axis = axis_of(path)
     for key, wanted in (("time", time), ("channel", channel)):
         if wanted is not None and (axis is None or axis.key != key):
@@ -46,7 +46,7 @@ def extra_axis(path: Path, time: int | None, channel: str | None) -> tuple[Extra
 
 
 def axis_of(path: Path) -> ExtraAxis | None:
-    """Return the one axis that a file has besides those of space; None if it has none, or several."""
+    """Return the only extra axis of a file, or None if there are none or several."""
     fields, _ = read_fields(path)
     if path.suffix.lower() in METAIMAGE:
         count, sizes = int(fields.get("elementnumberofchannels", "1")), fields.get("dimsize", "").split()
@@ -55,7 +55,7 @@ def axis_of(path: Path) -> ExtraAxis | None:
         return ExtraAxis(3, int(sizes[3]), "time") if len(sizes) == 4 else None
     sizes = fields.get("sizes", "").split()
     kinds = fields.get("kinds", "").split() or WORD.findall(fields.get("spacedirections", ""))
-    others = [k for k, kind in enumerate(kinds) if kind not in OF_SPACE and kind[0] != "("]
+    others = [k for k, kind in enumerate(kinds) if kind not in SPACE_KINDS and kind[0] != "("]
     if len(sizes) != 4 or len(others) > 1:
         return None
     place = others[0] if others else 3
@@ -65,7 +65,7 @@ def axis_of(path: Path) -> ExtraAxis | None:
 
 @contextmanager
 def one_volume(path: Path, axis: ExtraAxis | None) -> Iterator[Path]:
-    """Yield a header without the extra axis, for ITK, which has other rules for a fourth axis."""
+    """Yield a header without the extra axis, for ITK, which treats a fourth axis differently."""
     if axis is None:
         yield path
         return

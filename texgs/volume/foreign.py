@@ -36,11 +36,11 @@ from texgs.volume.samples import StoredSamples, stored_samples, unpack
 from texgs.volume.slabs import ArraySource, RawSource, Source, step_note
 from texgs.volume.space import LEFT_HANDED, RIGHT_HANDED, Space
 
-BY_VTK = (".vti", ".vtr", ".vts", ".pvti", ".pvtr", ".vtk", ".slc")
-DICOM = (".dcm", ".ima")  # suffixes; slices may have none, and are read by their folder
-MIN_SECONDS = 60.0  # that reading may take, of a file of any size
-BYTES_PER_SECOND = 1e6  # that reading has to keep up with, of a large file
-MAX_LINE_BYTES = 1 << 20  # bytes of the line that comes before the samples
+VTK_SUFFIXES = (".vti", ".vtr", ".vts", ".pvti", ".pvtr", ".vtk", ".slc")
+DICOM = (".dcm", ".ima")  # suffixes; slices may have none and are read by folder
+MIN_SECONDS = 60.0  # least time limit for reading
+BYTES_PER_SECOND = 1e6  # slowest accepted reading of a large file
+MAX_LINE_BYTES = 1 << 20  # of the line before the samples
 COMPLAINT = re.compile(r"error|fail|cannot|corrupt|unexpected", re.IGNORECASE)
 
 
@@ -78,7 +78,7 @@ def open_foreign(path: Path, spacing: Triple | None, origin: Triple | None, **ke
 def _lattice_of(
     reply: dict[str, Any], spacing: Triple | None, origin: Triple | None
 ) -> tuple[AxisPermutation, Triple, Triple, Space]:
-    """Return which stored axes are closest to those of space; spacing, origin and space along these."""
+    """Return the permutation of stored axes closest to space, with spacing, origin and space along it."""
     directions, name = np.array(reply["directions"]), reply.get("space", RIGHT_HANDED)
     mirror = (-1.0, 1.0, 1.0) if name == LEFT_HANDED else (1.0, 1.0, 1.0)  # the world is right-handed
     axes = AS_STORED if reply.get("is_upright") else closest(directions * mirror)
@@ -97,7 +97,7 @@ def _raw(stored: StoredSamples, dims: Dims, dtype: np.dtype, *lattice: Any) -> R
 
 
 def _kind(path: Path) -> str:
-    """Return what a file should be, for messages."""
+    """Describe the expected kind of a file, for messages."""
     return "a folder of DICOM slices" if path.is_dir() else f"a {path.suffix.lower()} file"
 
 
@@ -173,7 +173,7 @@ def image_of(
     path: Path, keys: dict[str, Any], is_header_only: bool
 ) -> tuple[dict[str, Any], np.ndarray | None]:
     """Read the lattice, and samples [Z, Y, X] unless only the header is asked for."""
-    if path.suffix.lower() in BY_VTK:
+    if path.suffix.lower() in VTK_SUFFIXES:
         from texgs.volume.vtk_image import read_vtk
 
         return read_vtk(path, keys.get("variable"))

@@ -1,4 +1,4 @@
-"""The ball of what transfer functions show of a volume, which cameras look at."""
+"""The ball of a volume's visible part under transfer functions, the target of cameras."""
 
 from collections.abc import Iterable
 from itertools import combinations, pairwise, product
@@ -15,7 +15,7 @@ SQUARE_SLACK = 1 + 1e-7  # times a squared radius: rounding, of points that near
 
 
 def frame_of(grid: Grid, tfs: Iterable[TransferFunction]) -> Frame:
-    """Return the smallest ball around all cells in which a basic transfer function shows something.
+    """Return the smallest ball around all cells that are visible under a basic transfer function.
 
     Raises:
         ArgumentError: if nothing is visible.
@@ -24,7 +24,7 @@ def frame_of(grid: Grid, tfs: Iterable[TransferFunction]) -> Frame:
 
 
 def out_of_frame(grid: Grid, tf: TransferFunction, frame: Frame) -> str:
-    """Return how far a function reaches out of a frame, in half a sentence; nothing where it does not."""
+    """Describe how far a function extends beyond a frame, in half a sentence, or ""."""
     reach = float(np.linalg.norm(shown_corners(grid, [tf]) - frame.target, axis=1).max())
     if reach <= frame.radius * SQUARE_SLACK:
         return ""
@@ -52,7 +52,7 @@ def shown_corners(grid: Grid, tfs: Iterable[TransferFunction]) -> np.ndarray:
 
 
 def shown_values(tf: TransferFunction) -> list[tuple[np.float64, np.float64]]:
-    """Return the closed ranges of values that a transfer function shows."""
+    """Return the closed ranges of values that are visible under a transfer function."""
     ranges: list[tuple[np.float64, np.float64]] = []
     for (low, before), (high, after) in pairwise(tf.opacity):
         if max(before, after) > 0:

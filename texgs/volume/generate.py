@@ -27,12 +27,12 @@ from texgs.volume.navier_stokes import (
 
 Array = np.ndarray
 ORBITAL = (4, 3, 0)  # quantum numbers n, l and m: 4f z^3
-AMPLITUDE_CUTOFF = 0.05  # of the largest along the radius of an orbital: what is farther out is cut off
-STEPS = 4096  # along the radius and the polar angle, where the largest amplitude is looked for
+AMPLITUDE_CUTOFF = 0.05  # share of the largest amplitude along the radius of an orbital; the rest is cut off
+STEPS = 4096  # along the radius and the polar angle, to search for the largest amplitude
 TURBULENCE_RESOLUTION, JETS_RESOLUTION = 64, 48  # cells of the simulation along each side; even
 DURATION = 1.5  # of turbulence; an eddy turns over in about 1. Tubes have formed by 1, then they decay
 VISCOSITY = 0.01  # of turbulence, for a box 2 pi wide and an initial speed of 1 (root mean square, per axis)
-NOISE_RESOLUTION = 16  # of the random initial motion
+NOISE_RESOLUTION = 16  # cells of the random initial motion along each side
 RADIUS, CORE = 0.42, 0.11  # of rings and of their cores, half sides of the cube
 TURN = (0.14, 0.2)  # half axes of the ellipse on which the rings turn about each other: radius and height
 CLIMB = 0.5  # of both, in a series
@@ -167,7 +167,7 @@ def _five_jets(n: int) -> Tensor:
 
 
 def _places(size: int) -> Tensor:
-    """Return where the samples of a periodic box lie along one axis, [size]."""
+    """Return the coordinates [size] of samples of a periodic box along one axis."""
     return 2 * pi / size * torch.arange(size)
 
 
@@ -223,7 +223,7 @@ GENERATORS: dict[str, Callable[..., Grid]] = {
     "jets": jets,
 }
 SERIES: dict[str, Callable[..., Grid]] = {"rings": rings, "flame": flame}
-RANDOM = ("turbulence", "jets", "flame")  # those that a seed changes, also of series
+RANDOM_GENERATORS = ("turbulence", "jets", "flame")  # generators, also of series, that depend on a seed
 
 
 def series(name: str, size: int, steps: int) -> list[Grid]:

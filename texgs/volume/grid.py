@@ -7,7 +7,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.memory import require_memory
-from texgs.volume.space import UNTOLD, Space, Triple
+from texgs.volume.space import UNKNOWN_SPACE, Space, Triple
 
 Dims = tuple[int, int, int]
 ONES, ZEROS = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
@@ -37,7 +37,7 @@ class Grid:
     spacing: Triple = ONES  # x, y, z; physical units, above 0
     origin: Triple = ZEROS  # centre of the first sample in the file's space; physical units
     others: tuple[np.ndarray, ...] = ()  # samples of further channels, of the same shape and type
-    space: Space = UNTOLD
+    space: Space = UNKNOWN_SPACE
 
     def __post_init__(self) -> None:
         check_lattice(dims_of(self.values.shape), self.values.dtype, self.spacing, self.origin)

@@ -1,4 +1,4 @@
-"""Text headers of NRRD and MetaImage files, the file with the samples, and what stands in place of a file."""
+"""Text headers of NRRD and MetaImage files, their sample files, and placeholders instead of files."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def read_fields(path: Path) -> tuple[dict[str, str], int]:
 
 
 def unit_in(fields: Mapping[str, str]) -> str:
-    """Return the unit of an NRRD's space; empty where it tells none, or several."""
+    """Return the unit of an NRRD's space, or "" if there are none or several."""
     units = set(UNIT.findall(fields.get("spaceunits", "")))
     return units.pop() if len(units) == 1 else ""
 

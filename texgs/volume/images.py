@@ -19,10 +19,10 @@ from texgs.core.memory import require_memory
 from texgs.volume.view_set import View
 
 BYTES_PER_PIXEL = 64  # of memory for a pixel of a view that is being read
-MARGIN = 11  # pixels: a window of SSIM, so that those of pixels near content end in white
+MARGIN = 11  # pixels; a window of SSIM, so that windows near content end in white
 
 
-class Box(NamedTuple):
+class PixelBox(NamedTuple):
     """The part of a view in which anything can be seen: pixels left <= x < right, top <= y < bottom.
 
     It is all that a loss needs to look at. Outside of it image and target are white, and gradients have
@@ -35,17 +35,17 @@ class Box(NamedTuple):
     right: int
     bottom: int
 
-    def union(self, other: "Box") -> "Box":
+    def union(self, other: "PixelBox") -> "PixelBox":
         """Return the smallest box around both."""
         low, high = map(min, self[:2], other[:2]), map(max, self[2:], other[2:])
-        return Box(*low, *high)
+        return PixelBox(*low, *high)
 
-    def within(self, width: int, height: int) -> "Box":
-        """Return the box and a margin, as far as they are in the image; one pixel of it at least."""
+    def within(self, width: int, height: int) -> "PixelBox":
+        """Return the box with a margin, clipped to the image, at least one pixel."""
         left = min(max(self.left - MARGIN, 0), width - 1)
         top = min(max(self.top - MARGIN, 0), height - 1)
         right = max(min(self.right + MARGIN, width), left + 1)
-        return Box(left, top, right, max(min(self.bottom + MARGIN, height), top + 1))
+        return PixelBox(left, top, right, max(min(self.bottom + MARGIN, height), top + 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Target:
     alpha: Tensor  # [H, W]
     camera: Camera
     light: Light
-    share: float = 1.0  # of all pixels of the view, where this is a part of it
+    share: float = 1.0  # of the view's pixels, for a crop
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Images:
         return replace(self, planes=self.planes[some], cameras=self.cameras[some], lights=self.lights[some])
 
     @cached_property
-    def boxes(self) -> list[Box]:
+    def boxes(self) -> list[PixelBox]:
         """Return for each view the pixels that are not white."""
         with ThreadPoolExecutor() as pool:
             return list(pool.map(content_box, self.planes.numpy()))
@@ -84,9 +84,11 @@ class Images:
         """Return width and height in pixels."""
         return self.planes.shape[3], self.planes.shape[2]
 
-    def target(self, index: int, device: torch.device | str = "cpu", around: Box | None = None) -> Target:
+    def target(
+        self, index: int, device: torch.device | str = "cpu", around: PixelBox | None = None
+    ) -> Target:
         """Return one view as floats: of `around` and all that is not white, or by default the whole."""
-        planes, camera, whole = self.planes[index], self.cameras[index], Box(0, 0, *self.size)
+        planes, camera, whole = self.planes[index], self.cameras[index], PixelBox(0, 0, *self.size)
         box = whole if around is None else self.boxes[index].union(around).within(*self.size)
         if box != whole:
             planes, camera = planes[:, box.top : box.bottom, box.left : box.right], camera.crop(*box)
@@ -150,11 +152,11 @@ def shrink(images: Images, factor: int) -> Images:
     return Images(planes, [smaller(camera, factor) for camera in images.cameras], images.lights)
 
 
-def content_box(planes: np.ndarray) -> Box:
+def content_box(planes: np.ndarray) -> PixelBox:
     """Return the pixels of an image over white and its alpha [4, H, W], uint8, that are not plain white."""
     seen = (planes[:3].min(axis=0) < 255) | (planes[3] > 0)
     if not seen.any():
         middle_y, middle_x = (size // 2 for size in seen.shape)
-        return Box(middle_x, middle_y, middle_x, middle_y)
+        return PixelBox(middle_x, middle_y, middle_x, middle_y)
     columns, rows = np.flatnonzero(seen.any(axis=0)), np.flatnonzero(seen.any(axis=1))
-    return Box(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+    return PixelBox(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)

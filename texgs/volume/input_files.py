@@ -41,6 +41,6 @@ def images_outside(folder: Path) -> list[Path]:
             frames = read_json(file)["frames"]
             images |= {folder / f"{str(frame['file_path']).removesuffix('.png')}.png" for frame in frames}
         except (ArgumentError, KeyError, TypeError):
-            continue  # the job tells what is wrong with it
+            continue  # the job reports the error
     apart = (image for image in images if not image.resolve().is_relative_to(folder.resolve()))
     return sorted(image for image in apart if image.is_file())

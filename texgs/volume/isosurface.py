@@ -1,4 +1,4 @@
-"""What a transfer function shows of a volume as geometry: a surface of triangles."""
+"""The visible part of a volume under a transfer function as a surface of triangles."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -44,20 +44,20 @@ def isosurface(values: np.ndarray, level: float, spacing: Triple, origin: Triple
 
 
 def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
-    """Return what a transfer function makes a surface of a volume: where its opacity rises to a value.
+    """Return the surface of a volume under a transfer function, where its opacity rises to a value.
 
     Where an opaque middle of its range has two sides, both are surfaces; and so are the faces of the volume's
     box, where what is opaque ends there.
     """
     grid = grid.channel(tf.channel)
-    least, most = float(np.nanmin(grid.values)), float(np.nanmax(grid.values))  # what is missing is clear
+    least, most = float(np.nanmin(grid.values)), float(np.nanmax(grid.values))  # missing samples: transparent
     span = max(most - least, 1e-30)
     require_memory(
         BYTES_PER_SAMPLE * grid.values.size, "the surface of the volume", "prepare it with reduce=2"
     )
     # In a shell of samples so low that the surface ends at the outermost of the volume.
     shelled = np.full([size + 2 for size in grid.values.shape], -OUTSIDE_FACTOR * span, np.float32)
-    signed = shelled[1:-1, 1:-1, 1:-1]  # above 0 in what is opaque
+    signed = shelled[1:-1, 1:-1, 1:-1]  # positive in opaque matter
     signed[:] = -span
     for low, high in opaque_ranges(tf, opacity):
         # A range that holds the largest values does not end there, nor does one with the smallest begin.

@@ -86,5 +86,5 @@ def _steps(fields: dict[str, str], dims: Dims) -> list[float]:
 
 
 def sentence(error: RuntimeError) -> str:
-    """Return what ITK says without the place in its source."""
+    """Return ITK's message without the location in its source."""
     return SOURCE_LINE.sub("", str(error).strip()).strip(" .!")

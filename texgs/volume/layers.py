@@ -22,7 +22,7 @@ from texgs.volume.axes import (
     METRES,
     NUMBERS,
     PACKED,
-    UNSIGNED,
+    UNSIGNED_KEY,
     Axis,
     axes_of,
     choose_places,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 MEMORY_PARTS = 4  # a layer takes at most a quarter of the free memory
 MAX_LISTED = 8  # arrays in a message
-EVERYTHING = (-np.inf, np.inf)
+ALL_VALUES = (-np.inf, np.inf)
 
 
 class LayerSource(Source):
@@ -91,7 +91,7 @@ class LayerSource(Source):
         self._first, self._kept = -1, np.empty(0)  # first slice of the layer in memory, and its samples
 
     def slices(self, start: int, stop: int) -> np.ndarray:
-        """Return samples [stop - start, Y, X], NaN where they are missing."""
+        """Return samples [stop - start, Y, X]; missing ones are NaN."""
         (sign, *signs), size = self._signs, self.dims[2]
         low, high = (start, stop) if sign > 0 else (size - stop, size - start)  # as stored
         firsts = range(low - low % self._depth, high, self._depth)[::sign]
@@ -128,9 +128,9 @@ def coding_of(attributes: Mapping[str, Any], dtype: np.dtype) -> tuple[dict[str,
             said[key] = values.astype(dtype) if key in CODES and dtype.kind == "f" else values
     coding: dict[str, Any] = {key: said[key] for key in CODES if key in said}
     coding |= {key: float(said[key][0]) for key in PACKED if key in said}
-    if str(attributes.get(UNSIGNED, "")).lower() == "true" and dtype.kind == "i":
-        coding[UNSIGNED] = "true"
-    low, high = said.get("valid_range", EVERYTHING)
+    if str(attributes.get(UNSIGNED_KEY, "")).lower() == "true" and dtype.kind == "i":
+        coding[UNSIGNED_KEY] = "true"
+    low, high = said.get("valid_range", ALL_VALUES)
     low, high = said.get("valid_min", [low])[0], said.get("valid_max", [high])[0]
     if coding.keys() & PACKED and any(np.asarray(end).dtype.kind in "iu" for end in (low, high)):
         scale, offset = (coding.get(key, default) for key, default in PACKED.items())
@@ -146,10 +146,10 @@ def decode(values: np.ndarray, coding: Mapping[str, Any], valid: tuple[float, fl
     import xarray
 
     stored = xarray.Variable([*map(str, range(values.ndim))], values, coding)
-    with warnings.catch_warnings(), np.errstate(over="ignore"):  # `prepare` tells of samples that do not fit
+    with warnings.catch_warnings(), np.errstate(over="ignore"):  # `prepare` reports samples that do not fit
         warnings.simplefilter("ignore", xarray.SerializationWarning)  # of several codes
         samples = xarray.conventions.decode_cf_variable("field", stored, decode_times=False).values
-        if valid != EVERYTHING:
+        if valid != ALL_VALUES:
             samples = np.where((samples < valid[0]) | (samples > valid[1]), np.nan, samples)
         is_new = samples.dtype.kind == "f" != values.dtype.kind
         return samples.astype(np.float32) if is_new else samples

@@ -19,7 +19,7 @@ NUMBER = re.compile(r"(\d+)(?:\.(\d+))?(?=\D*$)")
 class Moment(NamedTuple):
     """Where the volume of a step comes from: a file or folder, a step along its time, or a generator."""
 
-    name: str  # what the step is called
+    name: str  # of the step
     file: Path | None = None
     time: int | None = None
 
@@ -84,7 +84,7 @@ def are_decimal(names: Iterable[str]) -> bool:
 
 
 def number_of(name: str, has_decimals: bool) -> Fraction | None:
-    """Return the last number in the name of a step, without what tells its format."""
+    """Return the last number in the name of a step, without its suffix."""
     number = NUMBER.search(FORMAT.sub("", name))
     if number is None:
         return None

@@ -1,4 +1,4 @@
-"""How what a transfer function shows moves from one volume of a series to the next."""
+"""The motion of visible matter under a transfer function from one volume of a series to the next."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from texgs.volume.framing import shown_corners, shown_values
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 
-MARGIN = 6  # samples around what is shown
-MAX_SIDE = 96  # samples along a side that are registered; of more, blocks are averaged
+MARGIN = 6  # samples around the visible part
+MAX_SIDE = 96  # samples along a side to register; larger volumes are averaged in blocks
 LEVELS = ((4, 60), (2, 40), (1, 20))  # samples of a block, and iterations, one level after the other
 SMOOTHNESS = 0.7  # standard deviation that displacements are smoothed with after each iteration, blocks
-LOW_MARGIN = 0.1  # of the range of values that show: so far below it values still tell where matter goes
+LOW_MARGIN = 0.1  # share of the visible range; values so far below it still guide the registration
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Motion:
 
 
 def motion(before: Grid, after: Grid, tf: TransferFunction) -> Motion:
-    """Find where what a function shows of a volume is in the next one, which lies on the same lattice.
+    """Register the visible part of a volume under a function to the next one on the same lattice.
 
     Values that the function shows are registered by symmetric demons (Vercauteren et al. 2007) from coarse to
     fine, in the box in which either volume shows something. One that shows nothing is refused.
@@ -73,7 +73,7 @@ def register(images: Sequence[sitk.Image]) -> sitk.Image:
 
 
 def shown_image(grid: Grid, tf: TransferFunction, low: np.ndarray, high: np.ndarray) -> sitk.Image:
-    """Return the values of a box, relative to the range that a function shows, on a lattice in samples."""
+    """Return the values of a box, relative to a function's visible range, on a lattice in samples."""
     ranges = shown_values(tf)
     least, most = float(ranges[0][0]), float(ranges[-1][1])
     box = tuple(slice(*ends) for ends in zip(low[::-1], high[::-1], strict=True))

@@ -21,8 +21,8 @@ from texgs.volume.grid import (
 from texgs.volume.slabs import ArraySource, RawSource, Source
 from texgs.volume.space import Space
 
-MAPS = (".mrc", ".map", ".ccp4", ".rec")  # suffixes
-VERSIONS = (20140, 20141)  # of MRC, in which bytes have a sign
+MAP_SUFFIXES = (".mrc", ".map", ".ccp4", ".rec")  # suffixes
+VERSIONS = (20140, 20141)  # versions of MRC with signed bytes
 IMOD = 1146047817  # a word of headers by IMOD, with flags behind it
 
 
@@ -57,7 +57,7 @@ def open_mrc(path: Path, spacing: Triple | None, origin: Triple | None) -> Sourc
 
 
 def type_of(header: Any) -> np.dtype:
-    """Return the type of samples with its byte order; bytes have a sign where version or IMOD say so."""
+    """Return the type of samples with its byte order; bytes are signed by version or IMOD's flags."""
     from mrcfile.utils import data_dtype_from_header
 
     dtype = data_dtype_from_header(header)
@@ -67,7 +67,7 @@ def type_of(header: Any) -> np.dtype:
 
 
 def lattice_of(header: Any) -> tuple[AxisPermutation, Triple, Triple, str]:
-    """Return where the axes x, y, z come from, spacing and origin along them, and what is to say of these."""
+    """Return the permutation of axes x, y, z, spacing and origin along them, and notes."""
     stored = [int(header[name]) for name in ("mapc", "mapr", "maps")]
     if sorted(stored) != [1, 2, 3]:
         raise ArgumentError(f"expected columns, rows and sections along x, y, z, got axes {stored}")

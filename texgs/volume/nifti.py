@@ -12,9 +12,9 @@ from texgs.volume.grid import Grid, Triple, check_lattice, dims_of, require_room
 from texgs.volume.slabs import ArraySource, Source, step_note
 from texgs.volume.space import RAS, RIGHT_HANDED, Space
 
-BY_NIBABEL = (".nii", ".nii.gz", ".hdr", ".img", ".mgh", ".mgz")
-ORIENTED = ("sform_code", "qform_code", "goodRASFlag")  # fields of headers; 0: no orientation
-UNITS = {"meter": "m", "micron": "um"}  # mm if the file tells none
+NIBABEL_SUFFIXES = (".nii", ".nii.gz", ".hdr", ".img", ".mgh", ".mgz")
+ORIENTATION_FIELDS = ("sform_code", "qform_code", "goodRASFlag")  # fields of headers; 0: no orientation
+UNITS = {"meter": "m", "micron": "um"}  # default mm
 
 
 def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: int = 0) -> Source:
@@ -57,12 +57,12 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: 
 
 
 def _space_of(image: Any) -> tuple[np.ndarray, str, str, str]:
-    """Return the matrix [4, 4] from indices to places, name and unit of their space, and what is not told."""
+    """Return the matrix [4, 4] from indices to space, its name and unit, and a note on missing facts."""
     from nibabel import Nifti1Pair
 
     header, is_nifti = image.header, isinstance(image, Nifti1Pair)
     unit = UNITS.get(header.get_xyzt_units()[0], "mm") if is_nifti else "mm"
-    if any(int(header[name]) for name in ORIENTED if name in header):
+    if any(int(header[name]) for name in ORIENTATION_FIELDS if name in header):
         return image.affine, RAS, unit, ""
     # Method 1 of the standard: nibabel would mirror x.
     matrix, kind = np.diag([*header.get_zooms()[:3], 1.0]), "NIfTI" if is_nifti else "ANALYZE"

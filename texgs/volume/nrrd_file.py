@@ -7,12 +7,12 @@ from typing import BinaryIO
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading_as
 from texgs.volume.grid import Dims, Grid, Triple, byte_count
 from texgs.volume.headers import UPRIGHT_SPACING, read_fields, spacing_in, unit_in
 from texgs.volume.slabs import RawSource
-from texgs.volume.space import UNTOLD, Space
+from texgs.volume.space import UNKNOWN_SPACE, Space
 
 ALIGNMENT = 64  # bytes; where the samples of a canonical file start: cache lines, and any vector type
 NRRD_TYPES = {
@@ -31,7 +31,7 @@ def open_grid(path: str | Path) -> Grid:
     path = Path(path)
     if not path.is_file():
         raise ArgumentError(f"{path}: no such file; {REMEDY}")
-    with located(path):
+    with errors_at(path):
         first, *others = open_prepared(path)
     values = [each.mapped() for each in (first, *others)]
     return Grid(values[0], first.spacing, first.origin, tuple(values[1:]), first.space)
@@ -86,7 +86,7 @@ def write_header(
         "endian: little",
         "encoding: raw",
         f"space origin: {_vector(origin)}",
-        *(pair if space.matrix != UNTOLD.matrix else []),
+        *(pair if space.matrix != UNKNOWN_SPACE.matrix else []),
     ]
     text = ("\n".join(lines) + "\n#").encode()
     # The comment fills up; two line breaks end it and the header.

@@ -109,7 +109,7 @@ def _levels(name: str, nodes: Mapping[str, Any]) -> dict[str, list[Axis]]:
 
 
 def _channel(said: Mapping[str, Any]) -> Channel:
-    """Return a channel as it is described for OMERO, whose viewers show it in its colour and window."""
+    """Return a channel from the metadata for OMERO, with display colour and window."""
     window, color, label = said.get("window") or {}, str(said.get("color", "")), str(said.get("label", ""))
     start, end = (window.get(key, "") for key in ("start", "end"))
     if not (re.fullmatch("[0-9A-Fa-f]{6}", color) and is_number(start) and is_number(end) and start < end):
@@ -119,7 +119,7 @@ def _channel(said: Mapping[str, Any]) -> Channel:
 
 
 def _fitting(levels: list[str], nodes: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the finest level that fits, or else the last one, and a note where it is not the finest."""
+    """Return the finest level that fits, or the last one, with a note unless it is the finest."""
     room = room_for_volume()
     sizes = [prod(nodes[each].shape[-3:]) * nodes[each].dtype.itemsize for each in levels]
     name = next((each for each, size in zip(levels, sizes, strict=True) if size <= room), levels[-1])

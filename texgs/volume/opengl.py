@@ -12,7 +12,7 @@ ADVICE = (
 
 
 def offscreen_opengl() -> str:
-    """Return what renders offscreen, such as the name of a GPU."""
+    """Return the name of the offscreen renderer, such as a GPU."""
     command = [sys.executable, "-P", "-m", "texgs.volume.opengl"]
     try:
         child = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)

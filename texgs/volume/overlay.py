@@ -12,7 +12,7 @@ MAX_OPACITY = 1 - 1e-9  # opacity whose extinction is still finite
 
 
 def overlay(functions: Mapping[str, TransferFunction]) -> TransferFunction:
-    """Return one function that shows what several of a channel show together; ranges of values may overlap.
+    """Combine several functions of a channel into one; ranges of values may overlap.
 
     Where they do, matter of all of them is at one place: extinctions add up, and colours are means that these
     weigh. Elsewhere, and without an overlap, it is what `combine` returns.
@@ -30,7 +30,7 @@ def overlay(functions: Mapping[str, TransferFunction]) -> TransferFunction:
 
 
 def overlays(functions: Mapping[str, TransferFunction]) -> list[TransferFunction]:
-    """Return for each channel the function that shows what those of the channel show together."""
+    """Combine the functions of each channel into one."""
     channels = dict.fromkeys(tf.channel for tf in functions.values())
     return [
         _overlay(tuple(each for each in functions.items() if each[1].channel == channel))
@@ -59,7 +59,7 @@ def mix(
     limits = np.stack([limit(tf, values) for tf in functions])  # [F, N, 4]
     extinction = -np.log1p(-np.minimum(limits[..., 3], MAX_OPACITY))
     near = [(tf.support[0] <= values) & (values <= tf.support[1]) for tf in functions]
-    weights = extinction + 1e-12 * (np.stack(near) + 1e-12)  # where nothing is seen, colours go on
+    weights = extinction + 1e-12 * (np.stack(near) + 1e-12)  # colours continue through invisible values
     color = (weights[..., None] * limits[..., :3]).sum(axis=0) / weights.sum(axis=0)[:, None]
     return np.column_stack([color, -np.expm1(-extinction.sum(axis=0))]).clip(0, 1)
 

@@ -19,7 +19,7 @@ from texgs.volume.space import Space
 from texgs.volume.summaries import Summary, summarize
 
 Bounds = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
-FLOAT32_INTEGERS = 2**24  # up to which float32 has all whole numbers
+FLOAT32_INTEGERS = 2**24  # float32 holds all integers up to here
 Step = tuple[int, int, int]  # channel, and a slab: slices [start, stop)
 Progress = Callable[[Iterable[Step], int], Iterable[Step]]
 
@@ -119,7 +119,7 @@ def _require_disk(name: str, target: Path, needed: int) -> None:
 
 
 class _Tally:
-    """Range and bad samples of what streams past."""
+    """Range and bad samples of a stream."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -183,7 +183,7 @@ def bounds_of(dims: Dims, crop: Sequence[int] | None) -> Bounds:
 
 
 def _check_keys(nan_value: float | None, reduce: int, method: str, up: str) -> None:
-    """Refuse what is out of range."""
+    """Refuse values out of range."""
     if nan_value is not None and not (is_number(nan_value) and abs(nan_value) <= np.finfo(np.float32).max):
         raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
     check_count("reduce", reduce)

@@ -34,7 +34,7 @@ class StoredSamples(NamedTuple):
 
 
 def stored_samples(path: Path) -> StoredSamples | None:
-    """Find the samples of a header; None where they are text of MetaImage."""
+    """Find the samples of a header, or None for MetaImage's text."""
     fields, end = read_fields(path)
     samples = samples_file(path, fields)
     if not samples.is_file():
@@ -42,7 +42,7 @@ def stored_samples(path: Path) -> StoredSamples | None:
     require_itself(samples)
     offset = end if samples == path else 0
     if path.suffix.lower() in METAIMAGE:
-        for name in NUMBERS:  # ITK takes 1 where a word is no number
+        for name in NUMBERS:  # ITK reads 1 for words that are no numbers
             _ = [float(word) for word in fields.get(name, "").split()]
         is_big = _is_true(fields, "binarydatabyteordermsb") or _is_true(fields, "elementbyteordermsb")
         offset = int(fields.get("headersize", "0")) or offset

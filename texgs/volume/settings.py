@@ -81,12 +81,12 @@ def prepare_fields(
 
 
 def generated_field(volume: VolumeKeys) -> Source:
-    """Return the field of a generator, at its time where it changes."""
-    from texgs.volume.generate import GENERATORS, RANDOM, SERIES
+    """Return the field of a generator, at its time if it changes."""
+    from texgs.volume.generate import GENERATORS, RANDOM_GENERATORS, SERIES
     from texgs.volume.slabs import ArraySource
 
     name, last = str(volume.generator), volume.steps - 1
-    options: dict[str, Any] = {"seed": volume.seed} if name in RANDOM else {}
+    options: dict[str, Any] = {"seed": volume.seed} if name in RANDOM_GENERATORS else {}
     if volume.time > last or (last and name not in SERIES):
         expected = f"a step from 0 to {last}" if name in SERIES else "steps=1"
         raise ArgumentError(
@@ -118,7 +118,7 @@ def open_field(volume: VolumeKeys, path: Path | None) -> Source:
 
 
 def cached_volume(volume: VolumeKeys) -> Path:
-    """Return where a volume's file is downloaded to; another checksum, which it needs, is another file."""
+    """Return the download path of a volume, which depends on its required checksum."""
     checksum, name = volume.sha256, file_name("dataset.volume.file", Path(volume.file or "").name)
     if not checksum or not checksum.isalnum():
         raise ConfigError(

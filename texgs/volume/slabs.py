@@ -9,7 +9,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.volume.axes import Axis, Channel
 from texgs.volume.grid import ONES, ZEROS, Dims, Grid, Triple, byte_count, check_lattice
-from texgs.volume.space import UNTOLD, Space
+from texgs.volume.space import UNKNOWN_SPACE, Space
 
 SLAB_BYTES = 1 << 23  # reads of this size run at the disk's speed, and memory stays small
 
@@ -17,11 +17,11 @@ SLAB_BYTES = 1 << 23  # reads of this size run at the disk's speed, and memory s
 class Source(ABC):
     """A volume that can be read slab by slab; its lattice is as for `Grid`, its name for messages."""
 
-    note = ""  # for the user: what was chosen of several, or taken for granted
-    n_steps = 1  # of time, one of which this is
-    channels: Sequence[Channel] = ()  # of the file, one of which this is
+    note = ""  # for the user, about choices and assumptions
+    n_steps = 1  # time steps; this is one of them
+    channels: Sequence[Channel] = ()  # channels of the file; this is one of them
     channel: Channel | None = None
-    space = UNTOLD
+    space = UNKNOWN_SPACE
 
     def __init__(self, name: str, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> None:
         check_lattice(dims, dtype, spacing, origin)
@@ -29,7 +29,7 @@ class Source(ABC):
         self.dtype = dtype.newbyteorder("=")  # that of this machine
 
     def take(self, axes: Sequence[Axis], index: Sequence[int | slice]) -> None:
-        """Keep what an index of axes has chosen of steps and channels, and how many there are."""
+        """Store the chosen step and channel of an index of axes, and their numbers."""
         for axis, place in zip(axes, index, strict=False):
             if isinstance(place, int) and axis.size > 1 and axis.kind == "time":
                 self.n_steps, self.note = axis.size, step_note(place, axis.size)
@@ -55,7 +55,7 @@ class ArraySource(Source):
 
 
 class RawSource(Source):
-    """Samples as they are in memory, somewhere in a file; x is the fastest axis.
+    """Uncompressed samples somewhere in a file; x is the fastest axis.
 
     It is read with plain reads, not mapped: the resident memory is that of the slabs in use. `stored` is the
     type of a sample with its byte order, `offset` the bytes before the first one.
@@ -69,7 +69,7 @@ class RawSource(Source):
         offset: int = 0,
         spacing: Triple = ONES,
         origin: Triple = ZEROS,
-        space: Space = UNTOLD,
+        space: Space = UNKNOWN_SPACE,
     ) -> None:
         super().__init__(path.name, dims, stored, spacing, origin)
         self.space = space
@@ -80,7 +80,7 @@ class RawSource(Source):
             raise ArgumentError(f"the file is cut off: expected {expected}, found {size} bytes")
 
     def slices(self, start: int, stop: int) -> np.ndarray:
-        """Return samples [stop - start, Y, X], read anew at every call."""
+        """Read samples [stop - start, Y, X] again at every call."""
         x, y, _ = self.dims
         offset = self._offset + start * x * y * self._stored.itemsize
         values = np.fromfile(self._path, self._stored, count=(stop - start) * x * y, offset=offset)

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from zipfile import ZipFile, is_zipfile
 
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading_as
-from texgs.volume.foreign import BY_VTK, DICOM, open_foreign
+from texgs.volume.foreign import DICOM, VTK_SUFFIXES, open_foreign
 from texgs.volume.grid import Triple
 from texgs.volume.headers import METAIMAGE, NRRD, require_itself
-from texgs.volume.mrc import MAPS, open_mrc
+from texgs.volume.mrc import MAP_SUFFIXES, open_mrc
 from texgs.volume.netcdf import open_netcdf
-from texgs.volume.nifti import BY_NIBABEL, open_nifti
+from texgs.volume.nifti import NIBABEL_SUFFIXES, open_nifti
 from texgs.volume.ome_zarr import is_zarr, open_zarr
 from texgs.volume.plain import open_npy, open_raw, open_text
 from texgs.volume.slabs import Source
@@ -27,10 +27,10 @@ IMARIS = (
     "Imaris pads arrays with zeros, and tells size and extent by text that is not read: dataset.volume.crop "
     "and spacing set them"
 )
-IN_FILES = ("variable", "channel", "time")  # keys that choose an array and a part of it
-IN_PAGES = ("image", "channel", "time")  # keys that choose an image of TIFF and a part of it
+ARRAY_KEYS = ("variable", "channel", "time")  # keys that choose an array and a part of it
+IMAGE_KEYS = ("image", "channel", "time")  # keys that choose an image of TIFF and a part of it
 GZIP = b"\x1f\x8b"  # the first bytes of a gzip file
-OF_ZARR = (".zarray", ".zgroup", ".zattrs", "zarr.json")  # names in a zip of Zarr
+ZARR_NAMES = (".zarray", ".zgroup", ".zattrs", "zarr.json")  # names in a zip of Zarr
 
 
 class Format(NamedTuple):
@@ -44,7 +44,7 @@ class Format(NamedTuple):
 def open_source(
     path: str | Path, *, spacing: Triple | None = None, origin: Triple | None = None, **keys: Any
 ) -> Source:
-    """Open a volume without reading its samples where the format allows that.
+    """Open a volume, if possible without reading its samples.
 
     Formats: .raw, .bin, .dat (plain samples, described by the arguments); .npy, .npz (an array [Z, Y, X]);
     .tif, .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs that numbers count; a
@@ -75,7 +75,7 @@ def open_source(
     path = Path(path)
     said = {key: value for key, value in keys.items() if value not in (None, DEFAULTS.get(key))}
     try:
-        with located(path):
+        with errors_at(path):
             _try_to_read(path)
             return _open(path, spacing, origin, said)
     except OSError as error:
@@ -92,7 +92,7 @@ def _try_to_read(path: Path) -> None:
     if path.is_dir():
         files = (each for each in path.iterdir() if not each.name.startswith(".") and not each.is_dir())
         if first := min(files, default=None):
-            with located(first.name):
+            with errors_at(first.name):
                 require_itself(first)
     elif path.exists() and not path.is_file():
         raise ArgumentError("expected a file or a folder, got a named pipe, a device or a socket")
@@ -113,19 +113,19 @@ def holds_arrays(path: Path) -> bool:
 
 
 def tells_superior(path: Path) -> bool:
-    """Return whether the format has z point to the head, as NIfTI and DICOM have."""
+    """Return whether z points to the head in the format, as in NIfTI and DICOM."""
     kind = _format(path)
     return kind is not None and kind.is_superior
 
 
 def _format(path: Path) -> Format | None:
-    """Return the format of a file by its suffix, or of a folder by what is in it."""
+    """Return the format of a file by its suffix, or of a folder by its contents."""
     if not path.is_dir():
         return FORMATS.get(_suffix(path))
     if is_zarr(path) or _suffix(path) == ".zarr":
-        return Format(open_zarr, IN_FILES)
+        return Format(open_zarr, ARRAY_KEYS)
     if tiffs_in(path):
-        return Format(open_tiff, IN_PAGES)
+        return Format(open_tiff, IMAGE_KEYS)
     return Format(open_foreign, ("series", "time"), is_superior=True)
 
 
@@ -140,7 +140,7 @@ def _require_packing(path: Path) -> None:
     if suffix == ".zip" and is_zipfile(path):
         with reading_as("a folder or zip of Zarr"), ZipFile(path) as archive:
             names = archive.namelist()
-        if not any(name.endswith(OF_ZARR) for name in names):
+        if not any(name.endswith(ZARR_NAMES) for name in names):
             raise ArgumentError(f"expected a zip of Zarr, got one of {', '.join(names[:3])} ...; unpack it")
 
 
@@ -169,17 +169,17 @@ def _open_imaris(path: Path, spacing: Triple | None, origin: Triple | None, **ke
 
 FORMATS: dict[str, Format] = {
     **dict.fromkeys((".raw", ".bin", ".dat"), Format(open_raw, ("dims", "dtype", "endian", "skip"))),
-    **dict.fromkeys((".tif", ".tiff"), Format(open_tiff, IN_PAGES)),
+    **dict.fromkeys((".tif", ".tiff"), Format(open_tiff, IMAGE_KEYS)),
     ".npy": Format(open_npy),
     ".npz": Format(open_npy, ("variable",)),
-    **dict.fromkeys(BY_NIBABEL, Format(open_nifti, ("time",), is_superior=True)),
+    **dict.fromkeys(NIBABEL_SUFFIXES, Format(open_nifti, ("time",), is_superior=True)),
     **dict.fromkeys((*NRRD, *METAIMAGE), Format(open_foreign, ("channel", "time"))),
     ".gipl": Format(open_foreign),
-    **dict.fromkeys((*MAPS, *(f"{suffix}.gz" for suffix in MAPS)), Format(open_mrc)),
-    **dict.fromkeys(BY_VTK, Format(open_foreign, ("variable",))),
+    **dict.fromkeys((*MAP_SUFFIXES, *(f"{suffix}.gz" for suffix in MAP_SUFFIXES)), Format(open_mrc)),
+    **dict.fromkeys(VTK_SUFFIXES, Format(open_foreign, ("variable",))),
     **dict.fromkeys(DICOM, Format(open_foreign, ("time",), is_superior=True)),
-    **dict.fromkeys(HDF5, Format(open_netcdf, IN_FILES)),
-    ".ims": Format(_open_imaris, IN_FILES),
-    **dict.fromkeys((".zip", ".ozx"), Format(open_zarr, IN_FILES)),
+    **dict.fromkeys(HDF5, Format(open_netcdf, ARRAY_KEYS)),
+    ".ims": Format(_open_imaris, ARRAY_KEYS),
+    **dict.fromkeys((".zip", ".ozx"), Format(open_zarr, ARRAY_KEYS)),
     **dict.fromkeys((".txt", ".txt.gz"), Format(open_text, ("dims", "column"))),
 }

@@ -21,7 +21,7 @@ class Space:
     """A file's space, and the way there: from lengths along the axes of a lattice, or from the world."""
 
     name: str = RIGHT_HANDED
-    unit: str = ""  # of lengths, such as mm; empty where the file tells none
+    unit: str = ""  # of lengths, such as mm; "" if unknown
     matrix: list[list[float]] = field(default_factory=lambda: np.eye(4).tolist())  # [4, 4]
 
     def __post_init__(self) -> None:
@@ -33,7 +33,7 @@ class Space:
 
     @classmethod
     def along(cls, vectors: np.ndarray, name: str = RIGHT_HANDED, unit: str = "") -> Space:
-        """Return a space with axes along the rows of vectors [3, 3]; what is not finite tells nothing."""
+        """Return a space with axes along the rows of vectors [3, 3]; non-finite ones are ignored."""
         matrix = np.eye(4)
         if np.isfinite(vectors).all():
             matrix[:3, :3] = (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).T
@@ -56,7 +56,7 @@ class Space:
 
     @property
     def is_mirrored(self) -> bool:
-        """Return whether what is clockwise in the world is not so in the space."""
+        """Return whether the map from the world to the space changes handedness."""
         return bool(np.linalg.det(self.axes) < 0)
 
     def points(self, places: np.ndarray) -> np.ndarray:
@@ -79,4 +79,4 @@ class Space:
         return dict(zip("XYZ" + ahead + behind, [*unit, *unit, *-unit], strict=False)).get(letter)
 
 
-UNTOLD = Space()
+UNKNOWN_SPACE = Space()

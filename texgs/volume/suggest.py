@@ -1,4 +1,4 @@
-"""Basic transfer functions for a volume whose user has none, from its histogram."""
+"""Suggest basic transfer functions for a volume from its histogram."""
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
@@ -24,7 +24,7 @@ COLORS = (
     (0.78, 0.48, 0.70),  # mauve
     (0.20, 0.36, 0.70),  # blue
 )
-MAX_CLASSES = 5  # classes, where the user does not say
+MAX_CLASSES = 5  # default number of classes, at most
 SHELL_COUNT = 3  # classes of a histogram without peaks but the background
 SINGLE_OPACITY = 0.3  # opacity of the only function
 MAX_LABELS = 32  # a histogram with no more values than this holds labels
@@ -34,10 +34,10 @@ EMPTY_SHARE = 2e-4  # of the voxels outside the most frequent bin: a bin with fe
 EMPTY_COUNT = 8.0  # ... and so is one with fewer voxels than this
 VALLEY_DEPTH = 0.3  # a valley is this much (natural log of counts) below the peaks on both sides: 26 percent
 TAIL_AREA = 0.03  # width (of the range) times share (of the foreground) that makes the tail of a peak a class
-LOW_SHARE = 0.1  # of the foreground's voxels, that makes values below the background worth showing
+LOW_SHARE = 0.1  # share of the foreground's voxels that makes values below the background worth showing
 
 
-def suggested(
+def suggest(
     known: Mapping[str, Any], count: int | None = None, channel: Channel | None = None
 ) -> dict[str, TransferFunction]:
     """Propose basic transfer functions with disjoint supports: TF01, TF02, ... in ascending order of value.
@@ -140,7 +140,7 @@ def _mode(counts: Array) -> int:
 
 
 def _classes(counts: Array, log: Array, dip: float) -> tuple[list[Class], list[Class]]:
-    """Return classes that the histogram shows, and those that are only a tail of the background."""
+    """Return the classes of the histogram, and those that are only a tail of the background."""
     mode = _mode(counts)
     basins = list(pairwise([0, *_valleys(log, dip), len(log)]))
     low, high = next(c for c in basins if c[0] <= mode < c[1])
@@ -182,7 +182,7 @@ def _valleys(log: Array, dip: float) -> list[int]:
 
 
 def _foot(log: Array) -> int:
-    """Find where a peak that starts at bin 0 ends: the point farthest below the line to its last bin.
+    """Find the end of a peak that starts at bin 0: the point farthest below the line to its last bin.
 
     The triangle method (Zack et al. 1977). A peak that falls ever faster ends half way.
     """

@@ -12,7 +12,7 @@ import numpy as np
 from texgs.core.io import read_json, write_json
 from texgs.volume.grid import Dims, Triple
 from texgs.volume.slabs import Source, slab_bounds
-from texgs.volume.space import UNTOLD, Space
+from texgs.volume.space import UNKNOWN_SPACE, Space
 from texgs.volume.suggest import looks_like_labels
 
 Counted = dict[str, Any]  # minimum, maximum, histogram, and its scale: "linear" or "log"
@@ -38,8 +38,8 @@ class Summary:
     minimum: float
     maximum: float
     histogram: tuple[int, ...]  # counts in 256 equal bins over [minimum, maximum]
-    robust: Counted | None = None  # what functions are suggested from, where that is another histogram
-    space: Space = UNTOLD
+    robust: Counted | None = None  # histogram for suggestions, if different
+    space: Space = UNKNOWN_SPACE
 
     @property
     def voxels(self) -> int:
@@ -48,7 +48,7 @@ class Summary:
 
     @property
     def note(self) -> str:
-        """Say how many samples are left out where functions are suggested; nothing where none are."""
+        """Describe how many samples suggestions ignore, or ""."""
         if not self.robust or not (n_outside := self.voxels - sum(self.robust["histogram"])):
             return ""
         ends = f"[{self.robust['minimum']:g}, {self.robust['maximum']:g}]"
@@ -65,7 +65,7 @@ def summarize(source: Source, minimum: float, maximum: float, shared: Ends = (0.
 
 
 def robust_histogram(source: Source, whole: Counted, shared: Ends) -> Counted | None:
-    """Return the histogram that functions are suggested from; None where that is the whole one.
+    """Return the histogram for suggestions, or None if it is the whole one.
 
     A sample is far out of the range that neighbours share only where none beside it is like it. Few of these
     are outliers, as hot pixels are. Far below a CT in air lies padding. Decades are counted by logarithms.
@@ -102,7 +102,7 @@ def _count_within(source: Source, low: float, high: float) -> Counted:
 def count_samples(source: Source, minimum: float, maximum: float, scale: str = "linear") -> Counted:
     """Count samples in equal bins over a range, or over its logarithms ("log"); reads the volume once."""
     to = partial(np.log, dtype=np.float64) if scale == "log" else np.asarray
-    with np.errstate(divide="ignore", invalid="ignore"):  # of outliers that have no logarithm
+    with np.errstate(divide="ignore", invalid="ignore"):  # outliers without a logarithm
         ends = float(to(minimum)), float(to(maximum))
         counts = np.sum([histogram(to(slab), *ends) for slab in slabs(source)], axis=0)
     return {"minimum": minimum, "maximum": maximum, "histogram": tuple(counts.tolist()), "scale": scale}
@@ -127,7 +127,7 @@ def histogram(values: np.ndarray, minimum: float, maximum: float) -> np.ndarray:
 
 
 def summary_file(volume: Path) -> Path:
-    """Return the file beside a prepared volume that says what is in it."""
+    """Return the path of the summary beside a prepared volume."""
     return volume.with_suffix(".json")
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import read_json, reading_as, write_json
 from texgs.core.names import is_number
 from texgs.volume.transfer import TransferFunction
@@ -17,7 +17,7 @@ Point = tuple[float, float, float, float]
 FORMAT, VERSION = "texgs-tf", 1
 SPACES = ("RGB", "HSV", "Lab", "Diverging", "Lab/CIEDE2000", "Step")  # at VTK's number of each
 SAMPLES = 256  # shared by the segments of a function that is not linear, four each at least
-LINEAR_POINTS = 64  # points of colour, from which on its space makes no difference between two of them
+LINEAR_POINTS = 64  # points of colour; with more, the colour space makes no difference
 END_OFFSET = 1e-6  # of a segment: how close to its ends it is sampled
 
 
@@ -30,7 +30,7 @@ def read_tf(path: str | Path) -> TransferFunction:
     given over [0, 1]: see `TransferFunction.scaled`.
     """
     data = read_json(path)
-    with located(path), reading_as("a transfer function"):
+    with errors_at(path), reading_as("a transfer function"):
         if isinstance(data, dict) and data.get("format") == FORMAT:
             return _from_ours(data)
         presets = data if isinstance(data, list) else [data]
@@ -122,7 +122,7 @@ def _sampled_color(points: Sequence[Point], space: int, wrap: bool) -> Any:
 
 
 def _sampled_opacity(nodes: Sequence[Point]) -> Any:
-    """Return points of opacities that have midpoints or sharpnesses."""
+    """Return points of opacities with midpoints or sharpnesses."""
     from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 
     function = vtkPiecewiseFunction()

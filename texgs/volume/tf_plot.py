@@ -1,4 +1,4 @@
-"""A picture of transfer functions over the histogram of their volume, and of what they show."""
+"""A plot of transfer functions over the histogram of their volume, with casts of each."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def plot(
 
 
 def casts_of(grid: Grid, basic: Mapping[str, TransferFunction]) -> dict[str, np.ndarray]:
-    """Return small pictures [S, S, 3] over white of what each function shows, and all of them."""
+    """Return small pictures [S, S, 3] over white of the volume under each function, and under all."""
     caster, light = Caster(grid, Appearance()), Light("headlight")
     camera = orbit(30.0, 20.0, *frame_of(grid, basic.values()).lens(width=CAST_PIXELS, height=CAST_PIXELS))
     shown = {name: [tf] for name, tf in basic.items()} | {"all": overlays(basic)}

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading_as
 from texgs.volume.axes import Axis, choose_places
 from texgs.volume.grid import ONES, ZEROS, Grid, Triple, require_room
@@ -29,7 +29,7 @@ from texgs.volume.tiff_images import (
 
 # None, deflate, packbits and LZMA: others need imagecodecs.
 READABLE_COMPRESSIONS = (1, 8, 32773, 32946, 34925)
-PAGES_IN_MEMORY = 2  # one as it is decoded, and its place in the slab
+PAGES_IN_MEMORY = 2  # one being decoded, and its place in the slab
 LOSS_WORDS = ("subset", "incompletely")  # words of warnings about lost samples
 NO_SPACING = "TIFF tells no spacing, so that samples are 1 apart; dataset.volume.spacing sets it"
 
@@ -62,7 +62,7 @@ class PageSource(Source):
         """Return one slice, which must be like the first and have all of its samples."""
         import tifffile
 
-        with located(file), reading_as("a TIFF file"), complaints_raised(), tifffile.TiffFile(file) as tiff:
+        with errors_at(file), reading_as("a TIFF file"), raise_complaints(), tifffile.TiffFile(file) as tiff:
             tiff.filehandle.seek(offset or tiff.pages.first.offset)
             page = tifffile.TiffPage(tiff, index=0)
             values = page.asarray()
@@ -92,7 +92,7 @@ def open_tiff(
             f"expected slices of one format, got {files[0].name} and {others[0].name}; move those of one away"
         )
     what = f"TIFF files, but {files[0].name} is none" if path.is_dir() else "a TIFF file"
-    with reading_as(what), complaints_raised(), tifffile.TiffFile(files[0]) as tiff:
+    with reading_as(what), raise_complaints(), tifffile.TiffFile(files[0]) as tiff:
         images = images_in(tiff)
         is_slices = path.is_dir() and not is_set(images, files)
         if is_slices and len(tiff.pages) != 1:
@@ -153,7 +153,7 @@ def _kind(page: Any) -> tuple[tuple[int, int], np.dtype]:
 
 
 @contextmanager
-def complaints_raised() -> Iterator[None]:
+def raise_complaints() -> Iterator[None]:
     """Raise what tifffile only logs: lost pages, for one. Other warnings are about metadata, and dropped."""
     records: list[logging.LogRecord] = []
     logger = logging.getLogger("tifffile")

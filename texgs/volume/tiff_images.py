@@ -38,7 +38,7 @@ def images_in(tiff: Any) -> list[Any]:
 
 
 def is_set(images: Sequence[Any], files: Sequence[Path]) -> bool:
-    """Return whether files are those of one OME-TIFF, which has to be in a folder of its own."""
+    """Return whether files form one OME-TIFF, which needs its own folder."""
     names = {file_of(page).name for image in images for page in image if page is not None}
     others = [file.name for file in files if file.name not in names]
     if len(names) > 1 and others:
@@ -50,7 +50,7 @@ def is_set(images: Sequence[Any], files: Sequence[Path]) -> bool:
 
 
 def choose_image(images: Sequence[Any], wanted: str | None, tiff: Any) -> tuple[Any, str]:
-    """Return the image of a name or number, and a note of what was taken without one.
+    """Return an image by name or number, with a note about a default choice.
 
     That is the only volume, or the only one with pages in an open file, which may be None.
     """
@@ -76,7 +76,7 @@ def is_volume(image: Any) -> bool:
 
 
 def axes_of(image: Any, labels: Sequence[str]) -> tuple[list[Axis], str]:
-    """Return the axes of an image before Y and X, and a remark where time takes the place of z."""
+    """Return the axes of an image before Y and X, with a remark if time replaces z."""
     letters, shape = image.get_axes(squeeze=False).rstrip("S"), image.get_shape(squeeze=False)
     if not letters.endswith("YX"):
         raise ArgumentError(f"expected pages with Y and X, got the axes {letters}; store it again so")

@@ -80,7 +80,7 @@ class TransferFunction:
         return self.with_values(lambda t: (1 - t) * low + t * high)
 
     def in_support(self) -> "TransferFunction":
-        """Return the same function without points beyond its support, where nothing is shown."""
+        """Return the function without points outside its support, where it is transparent."""
         low, high = self.support
         return self.with_points(_cut(self.opacity, low, high), _cut(self.color, low, high))
 
@@ -185,13 +185,13 @@ def row_text(row: Iterable[Any]) -> str:
 
 
 def combine(basic: Mapping[str, TransferFunction]) -> TransferFunction:
-    """Return one transfer function that shows what the basic ones of a channel show together."""
+    """Combine the disjoint basic transfer functions of a channel into one."""
     if not basic:
         raise ArgumentError("transfer functions: expected at least one, got none")
     check_disjoint(basic)
     opacity: list[tuple[float, ...]] = []
     color: list[tuple[float, ...]] = []
-    end = 0.0  # of what the functions so far show
+    end = 0.0  # end of the functions so far
     for tf in sorted(basic.values(), key=lambda each: each.support):
         low, high = tf.support
         points = _cut(tf.opacity, low, high)

@@ -1,4 +1,4 @@
-"""What a folder of views has beside them: a turntable, depth and normals, and times of other renderers."""
+"""Further files of a folder of views: a turntable, depth and normals, and times of other renderers."""
 
 import sys
 import time
@@ -39,7 +39,7 @@ def renderer_for(kind: str, grid: Grid, appearance: Appearance, channel: int) ->
 def vtk_frame_ms(
     grid: Grid, appearance: Appearance, tf: TransferFunction, shot: Sequence[View], title: str
 ) -> float | None:
-    """Return the median milliseconds of views that VTK renders; None where it cannot, offscreen."""
+    """Return the median milliseconds of views rendered by VTK, or None if it cannot render offscreen."""
     try:
         vtk = renderer_for("vtk", grid, appearance, tf.channel)
     except DeviceError as error:

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.image import open_picture, read_rgba
 from texgs.core.io import read_json, reading_as, write_json
 from texgs.core.light import HEADLIGHT, Light
@@ -44,8 +44,8 @@ class ViewSet:
 
     folder: Path
     train: list[View]
-    test: list[View]  # empty where the folder has no transforms_test.json
-    metadata: dict[str, Any]  # what transforms_train.json says beside lens and frames: volume, tf, aabb ...
+    test: list[View]  # empty without transforms_test.json
+    metadata: dict[str, Any]  # further facts of transforms_train.json: volume, tf, aabb ...
     relit: list[View] = field(default_factory=list)  # more test views, under other lights; of a volume alone
 
 
@@ -118,7 +118,7 @@ def _image_path(path: Path, index: int, frame: Mapping[str, Any]) -> Path:
 
 
 def _size(path: Path, values: Mapping[str, Any], images: Sequence[Path]) -> tuple[int, int]:
-    """Return width and height that the file states, or those of its first image; all have them."""
+    """Return width and height from the file, or of its first image; all images share them."""
     sizes = []
     for image in images:
         with open_picture(image) as picture:
@@ -141,7 +141,7 @@ def _light(where: str, frame: Mapping[str, Any]) -> Light:
         raise ArgumentError(f"{where}: light: expected the kind headlight or directional, got {light!r}")
     if light["kind"] == "headlight":
         return HEADLIGHT
-    with located(where):
+    with errors_at(where):
         return Light("directional", _number(where, light, "azimuth"), _number(where, light, "polar"))
 
 

@@ -87,7 +87,7 @@ class ViewKeys:
     turntable: int = key(24, "number of frames of the turntable", least=1)
 
     def lens(self, frame: Frame | None) -> Lens:
-        """Return what all cameras have in common.
+        """Return the common lens of all cameras.
 
         Args:
             frame: what is visible of the volume; None where views are from elsewhere, as the paper has them.

@@ -13,7 +13,7 @@ from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline 
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import dims_of, require_room
 
-IN_XML = (".vti", ".vtr", ".vts", ".pvti", ".pvtr")  # suffixes
+XML_SUFFIXES = (".vti", ".vtr", ".vts", ".pvti", ".pvtr")  # suffixes
 TAIL = 1024  # bytes; more than the end tag and whatever blanks an editor left behind it
 SPACING_TOLERANCE = 0.01  # of a distance: coordinates are often rounded to float32
 
@@ -23,7 +23,7 @@ def read_vtk(path: Path, variable: str | None = None) -> tuple[dict[str, Any], n
     window = vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(window)
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    if path.suffix.lower() in IN_XML:
+    if path.suffix.lower() in XML_SUFFIXES:
         require_whole(path)
     reader = pyvista.get_reader(str(path))
     reader.reader.UpdateInformation()
@@ -69,7 +69,7 @@ def field_of(image: Any, variable: str | None = None) -> tuple[dict[str, Any], n
 
 
 def choose_array(image: Any, variable: str | None) -> tuple[np.ndarray, bool, str]:
-    """Return the array to take, whether it is one of cells, and what to tell of others.
+    """Return the array to read, whether it has cell data, and a note about other arrays.
 
     Those of points come first, also where cells have one of that name.
     """
@@ -107,7 +107,7 @@ def require_whole(path: Path) -> None:
 
 
 def check_claim(reader: Any) -> None:
-    """Require that what a header claims fits into memory; only headers of XML are read before samples."""
+    """Require that the claims of a header fit into memory; only XML headers are read before samples."""
     information = reader.GetOutputInformation(0)
     if information is not None and information.Has(Pipeline.WHOLE_EXTENT()):
         extent = np.array(information.Get(Pipeline.WHOLE_EXTENT()), np.int64)
@@ -117,11 +117,11 @@ def check_claim(reader: Any) -> None:
 
 
 def first_message(window: Any) -> str:
-    """Return the first error or warning that VTK has printed instead of raising it; empty for none.
+    """Return the first error or warning that VTK printed instead of raising it, or "".
 
     Without the place in VTK's source, and the address of the object.
     """
-    output = window.GetOutput()  # bytes where a damaged file is quoted that is no text
+    output = window.GetOutput()  # bytes if a damaged file is quoted
     text = output.decode(errors="replace") if isinstance(output, bytes) else output
     message = next(filter(str.strip, text.split("\n\n")), "")
     bare = " ".join(re.sub(r"(?m)^(ERROR|(Generic )?Warning): In.*", "", message).split())

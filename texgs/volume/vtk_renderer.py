@@ -27,7 +27,7 @@ from texgs.volume.opengl import offscreen_opengl
 from texgs.volume.render import Appearance, directions
 from texgs.volume.transfer import TransferFunction
 
-TABLE = 8192  # entries that resolve the transfer function; VTK doubles it, and drivers have 16384 or more
+TABLE = 8192  # entries of the transfer function; VTK doubles them, and drivers support at least 16384
 
 
 class VtkRenderer:

@@ -7,7 +7,7 @@ from texgs.config.case import Case
 from texgs.config.dataset import Dataset
 from texgs.config.project import members
 from texgs.config.schema import Config
-from texgs.core.errors import ConfigError, MissingDataError, located
+from texgs.core.errors import ConfigError, MissingDataError, errors_at
 from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import Kind, kinds, require
 from texgs.fields.surfels.material import require_material
@@ -56,10 +56,10 @@ def check_basic_tfs(dataset: Dataset) -> None:
     check_channels(dataset)
     basic = {}
     for name, points in dataset.basic_tfs.items():
-        with located(f"{dataset.name}: basic TF {name}"):
+        with errors_at(f"{dataset.name}: basic TF {name}"):
             opacity, color = tuple(points.opacity), tuple(points.color)
             basic[name] = TransferFunction(opacity, color, dataset.number_of(points))
-    with located(f"{dataset.name}: basic TFs", " "):
+    with errors_at(f"{dataset.name}: basic TFs", " "):
         check_disjoint(basic)
 
 

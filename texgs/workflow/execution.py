@@ -16,7 +16,7 @@ from texgs.core.io import write_json
 from texgs.core.keys import ValueMismatch, typed
 from texgs.core.progress import curve_logger
 from texgs.edit.method import NO_METHOD
-from texgs.report.results import Result, plain
+from texgs.report.results import Result, as_mapping
 from texgs.volume.settings import cached_volume
 from texgs.workflow import result, tracked
 from texgs.workflow.job import Job, settings_file
@@ -90,7 +90,7 @@ def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
             "command": job.command,
             "run": recorded.id,
             "result": type(outcome.result).__name__,
-            "numbers": plain(outcome.result),
+            "numbers": as_mapping(outcome.result),
             "pictures": dict(job.stage.rule.shown if outcome.pictures is None else outcome.pictures),
         }
         write_json(work / result.METRICS, metrics)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from texgs.config.case import Case
 from texgs.config.compose import preset
-from texgs.config.gallery import AS_FITTED, GalleryCell, GalleryRow, Grid, GridKeys, ShotKeys
+from texgs.config.gallery import NO_EDIT, GalleryCell, GalleryRow, Grid, GridKeys, ShotKeys
 from texgs.config.project import members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
@@ -97,7 +97,7 @@ def together(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys:
     if (row.show and column.show and row.show != column.show) or not (has_volume or show == "scene"):
         show = ""
     changes = [*row.changes, *column.changes]
-    edit, view = said["edit"] or AS_FITTED, said["view"] or FRONT
+    edit, view = said["edit"] or NO_EDIT, said["view"] or FRONT
     return ShotKeys(**{**said, "show": show, "edit": edit, "view": view, "changes": changes})
 
 
@@ -114,8 +114,8 @@ def cell_of(config: Config, shot: ShotKeys, where: str) -> tuple[GalleryCell, Pa
     if shot.box and not is_inside(shot.box):
         raise ConfigError(f"{where}.box: expected left, top and side, from 0 to 1, got {shot.box}")
     of_fit, edit = fit_of(config, shot, where), str(shot.edit)
-    is_plain = edit == AS_FITTED
-    scene = f"{fit_folder(of_fit)}/{AS_FITTED if is_plain else edit_folder(of_fit, edit)}"
+    is_plain = edit == NO_EDIT
+    scene = f"{fit_folder(of_fit)}/{NO_EDIT if is_plain else edit_folder(of_fit, edit)}"
     said = {each.name: getattr(shot, each.name) for each in fields(GalleryCell)[1:]}
     return GalleryCell(scene, **said), made("compose", of_fit) if is_plain else sibling(of_fit, edit)
 
@@ -155,10 +155,10 @@ def recipes_of(config: Config) -> list[str]:
 def takers(config: Config, edit: str, where: str) -> list[str]:
     """Return the recipes of the experiment that an edit works on."""
     recipes = recipes_of(config)
-    if edit == AS_FITTED:
+    if edit == NO_EDIT:
         return recipes
     if edit not in config.edits and edit not in (known := known_edits(config)):
-        expected = ", ".join([AS_FITTED, *known])
+        expected = ", ".join([NO_EDIT, *known])
         raise ConfigError(f"{where}.edit: expected one of {expected}, got {edit}{close(edit, known)}")
     method = method_of(preset("edit", edit).edit)
     if not config.fits:

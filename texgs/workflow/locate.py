@@ -5,7 +5,7 @@ from pathlib import Path
 from texgs.config.dataset import Dataset
 from texgs.config.project import check_name
 from texgs.config.schema import Config
-from texgs.core.errors import ArgumentError, ConfigError, MissingDataError, located
+from texgs.core.errors import ArgumentError, ConfigError, MissingDataError, errors_at
 from texgs.core.io import is_there
 from texgs.volume.basic_tfs import BasicTF
 from texgs.volume.moments import in_time, matching
@@ -65,7 +65,7 @@ def series_files(config: Config) -> list[Path]:
             f"dataset.series of {name}: expected volume.file to be one of them, got {own} beside "
             f"{files[0]} to {files[-1].name}"
         )
-    with located(f"dataset.series of {name}"):
+    with errors_at(f"dataset.series of {name}"):
         return [moment.file for moment in in_time(files) if moment.file]
 
 

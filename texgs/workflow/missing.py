@@ -33,7 +33,7 @@ def missing_weights(config: Config) -> list[str]:
     return [
         f"edit {config.edit.name}: {why}" + (f", and {word} does without them" if word else "")
         for name, word in needed(config.edit).items()
-        if (why := weights.unusable(name))
+        if (why := weights.missing_advice(name))
     ]
 
 

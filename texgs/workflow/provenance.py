@@ -16,7 +16,7 @@ from typing import Any
 from texgs import __version__
 from texgs.core.memory import MIB, peak_memory
 from texgs.edit.method import NO_METHOD
-from texgs.models.weights import titled
+from texgs.models.weights import title_of
 
 PACKAGES = (  # whose code decides results
     *("torch", "numpy", "scipy", "kornia", "opencv-python-headless", "pillow", "matplotlib", "av"),
@@ -42,7 +42,7 @@ def record(
         "git_sha": git_revision(),
         "inputs": identity["inputs"],
         "made_from": made_from,
-        "weights": {titled(name): sha for name, sha in settings.get("weights", {}).items()},
+        "weights": {title_of(name): sha for name, sha in settings.get("weights", {}).items()},
         "versions": versions(),
         "machine": machine(),
     }

@@ -11,7 +11,7 @@ from texgs.core.errors import ConfigError
 from texgs.core.names import close
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import method_of
-from texgs.models.weights import unusable
+from texgs.models.weights import missing_advice
 from texgs.workflow.edits import chain_of
 from texgs.workflow.missing import needed
 
@@ -41,7 +41,9 @@ def chosen_edit(keys: StandIns, name: str, case: Case) -> Choice:
 
     def lacks(other: str) -> list[str]:
         edits = [each.config.edit for each in chain_of(case.edited(other))]
-        return list(filter(unusable, dict.fromkeys(weights for edit in edits for weights in needed(edit))))
+        return list(
+            filter(missing_advice, dict.fromkeys(weights for edit in edits for weights in needed(edit)))
+        )
 
     taken, absent = chosen(keys, "edits", name, lacks)
     if taken == name:

@@ -11,7 +11,7 @@ from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.composition import Composition, Part
+from texgs.fields.surfels.composition import Composition, EditableModel
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fields.surfels.texels import offsets_of
@@ -114,7 +114,7 @@ def test_highlights_have_the_tint_of_their_part():
     model, first = ball(4, shared=False), torch.arange(150) < 60
     gold, blue = (1.0, 0.7, 0.3), (0.0, 0.0, 1.0)
     edits = [PartEdit(specular=3.0, shininess=0.5, tint=gold), PartEdit(specular=2.0, tint=blue)]
-    part = Part(model, [first])
+    part = EditableModel(model, [first])
     base, gain = part.shade(part.apply(edits), CAMERA, SIDE, "shaded")
     p = {name: x.double() for name, x in model.parameters.items()}
     k_s, beta = torch.where(first, 0.4, 0.6), torch.where(first, 20.0, 10.0)

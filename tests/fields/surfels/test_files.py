@@ -16,7 +16,7 @@ from texgs.core.geometry import quats_to_matrices
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.step_file import FORMAT as STEP
-from texgs.fields.surfels.step_file import TURNS, UNITS, at_step, write_step
+from texgs.fields.surfels.step_file import TURNING_TENSORS, UNITS, at_step, write_step
 from texgs.fields.surfels.texels import mean_texels, owners
 from texgs.fields.surfels.variants import FORMAT, with_texture, write_texture
 
@@ -141,9 +141,9 @@ def test_a_step_comes_back_up_to_half_a_unit_and_the_rest_is_the_key_model(tmp_p
     step = moved(key)
     back = at_step(key, write_step(tmp_path / "s", key, step, {"file": "v"})).parameters
     for name in UNITS.keys() & back.keys():
-        if name not in TURNS:
+        if name not in TURNING_TENSORS:
             torch.testing.assert_close(back[name], step.parameters[name], atol=0.51 * UNITS[name], rtol=1e-6)
-    for name in TURNS:
+    for name in TURNING_TENSORS:
         turned = (quats_to_matrices(x) for x in (back[name], step.parameters[name]))
         torch.testing.assert_close(*turned, atol=1e-3, rtol=0)
     assert all(back[name] is key.parameters[name] for name in TEXTURE)

@@ -20,7 +20,7 @@ from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import labels_of, with_variants, write_texture
-from texgs.scene.export import joined
+from texgs.scene.export import join_surfels
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
@@ -108,7 +108,7 @@ def test_what_other_programs_read_has_the_edits_of_segments():
     scene = Composition([model], [[HALF]])
     split = Composition([only(model, ~HALF), only(model, HALF)])
     edits = [PartEdit(palette=(0, 1, 0)), PartEdit(opacity=0.5)]
-    result, expected = joined(scene.parts, edits), joined(split.parts, edits)
+    result, expected = join_surfels(scene.parts, edits), join_surfels(split.parts, edits)
     for mask, part in ((~HALF, slice(75)), (HALF, slice(75, 150))):
         for name, values in result.parameters.items():  # torch rounds the last few in another way, those
             assert_close(values[mask], expected.parameters[name][part])  # that fill no vector of the CPU

@@ -8,7 +8,13 @@ import torch
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.samples import sample
 from texgs.core.camera import orbit
-from texgs.fields.surfels.texels import footprint, lean, owners, spread, untextured
+from texgs.fields.surfels.texels import (
+    footprint,
+    owners,
+    reduce_constant_textures,
+    spread_colors,
+    with_single_texels,
+)
 
 CAMERA = orbit(30, 20, 4, 40, 48, 48)
 
@@ -22,9 +28,9 @@ def test_shares_are_those_of_the_gaussian_over_six_deviations():
 
 def test_without_texture_each_surfel_has_the_mean_under_its_gaussian():
     model = sample("texture", n=20)
-    p, plain = model.parameters, untextured(model)
+    p, plain = model.parameters, with_single_texels(model)
     assert len(plain.parameters["texels"]) == 20
-    spread_out = spread(plain.parameters["texels"], plain, model)
+    spread_out = spread_colors(plain.parameters["texels"], plain, model)
     place, surfel = owners(p)
     for index in range(20):
         own = place[surfel == index]
@@ -36,12 +42,12 @@ def test_without_texture_each_surfel_has_the_mean_under_its_gaussian():
 def test_a_lean_model_looks_the_same_with_a_texel_for_each_plain_surfel():
     model = sample("texture", n=60)
     plain = torch.arange(60) % 3 > 0
-    p, small = model.parameters, untextured(model, plain)
+    p, small = model.parameters, with_single_texels(model, plain)
     place, surfel = owners(p)
-    texels = spread(small.parameters["texels"], small, model)
+    texels = spread_colors(small.parameters["texels"], small, model)
     texels[place] = torch.where(plain[surfel, None], texels[place], p["texels"][place])
     mixed = replace(model, parameters={**p, "texels": texels})
-    assert torch.equal(lean(mixed).parameters["texels"], small.parameters["texels"])
+    assert torch.equal(reduce_constant_textures(mixed).parameters["texels"], small.parameters["texels"])
     counts = p["sizes"].long().prod(1)
     assert len(small.parameters["texels"]) == int(torch.where(plain, 1, counts).sum())
     torch.testing.assert_close(small.render(CAMERA).color, mixed.render(CAMERA).color, atol=1e-6, rtol=0)
@@ -50,6 +56,6 @@ def test_a_lean_model_looks_the_same_with_a_texel_for_each_plain_surfel():
 
 @pytest.mark.parametrize("model", [sample("texture", n=9), sample("shading", n=9), gaussians(5)])
 def test_what_has_nothing_to_spare_stays_as_it_is(model):
-    assert len(lean(model)) == len(model)
+    assert len(reduce_constant_textures(model)) == len(model)
     for name, x in model.tensors("appearance").items() if hasattr(model, "tensors") else ():
-        assert torch.equal(lean(model).tensors("appearance")[name], x)
+        assert torch.equal(reduce_constant_textures(model).tensors("appearance")[name], x)

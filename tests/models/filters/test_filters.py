@@ -119,7 +119,7 @@ def test_tint_keeps_light_and_dark():
 def test_tones_of_more_pixels_than_are_sorted_are_the_same(monkeypatch):
     views = plain_views(color=(0.2, 0.4, 0.9))
     tone = surface_of(views)[0].tone
-    monkeypatch.setattr("texgs.models.filters.surface.MOST_SORTED_PIXELS", len(tone) // 8)
+    monkeypatch.setattr("texgs.models.filters.surface.MAX_SORTED_PIXELS", len(tone) // 8)
     assert_close(surface_of(views)[0].tone, tone, atol=0.01, rtol=0)
 
 

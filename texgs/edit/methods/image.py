@@ -51,7 +51,7 @@ class ImageKeys(OpacityKeys, StyleKeys):
     textured: bool = key(True, "each texel learns, or each surfel one colour: the paper's ablation")
 
     def recipe_of(self, seed: int = 0) -> Recipe:
-        """Return the recipe, with what the configuration changes about it."""
+        """Return the recipe with the changes from the configuration."""
         from texgs.edit.recipe import preset
 
         changes: dict[str, Any] = {"pattern": self.pattern, "is_textured": self.textured, "seed": seed}
@@ -61,14 +61,14 @@ class ImageKeys(OpacityKeys, StyleKeys):
         return preset(self.recipe, **changes)
 
     def weights(self) -> dict[str, str]:
-        """Return those of the recipe, and what finds an object in the picture."""
+        """Return the weights for the recipe, and for the mask model of the picture."""
         recipe = self.recipe_of()
         vgg = {"vgg16": "recipe=patches"} if recipe.needs_vgg else {}
         clip = {self.clip: "lambda_s=1"} if recipe.needs_clip else {}
         return {**vgg, **super().weights(), **clip}
 
     def numbers(self) -> dict[str, Any]:
-        """Return those of the recipe."""
+        """Return the numbers of the recipe."""
         return vars(self.recipe_of())
 
 
@@ -116,7 +116,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
 
 
 def how(recipes: Sequence[Recipe], clip: str) -> str:
-    """Return what the edit of some parts works with, for tables; `clip` is the backbone of a CLIP term."""
+    """Describe the losses of an edit for tables; `clip` is the backbone of a CLIP term."""
     names = {
         "VGG-16": any(recipe.needs_vgg for recipe in recipes),
         clip: any(recipe.needs_clip for recipe in recipes),

@@ -1,4 +1,4 @@
-"""What methods share that follow an instruction: what it says, and what edits views by it."""
+"""Common parts of methods that follow an instruction: its keys, and the editor of views."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.method import MethodKeys
-from texgs.models.catalogue import HUB, PINNED, PIPELINES
+from texgs.models.catalogue import HUB, PINNED_PATTERN, PIPELINES
 from texgs.models.weights import locate, pipeline_files
 
 if TYPE_CHECKING:
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
     from texgs.models.guidance import Guidance
 
-SHOWN_VIEWS = 6  # edited views in the picture of them
+SHOWN_VIEWS = 6  # edited views to show
 EDITORS = f"instruct_pix2pix, {', '.join(PIPELINES)}, {HUB}, a folder of diffusers, an address or filters"
 WEB = ("http://", "https://")
 
 
 @dataclass(frozen=True)
 class InstructionKeys(MethodKeys):
-    """What to do, and what edits the views. The scales are those of TexGS-VolVis."""
+    """The instruction, and the editor of the views. The scales are those of TexGS-VolVis."""
 
     instruction: str = key("", "what to do, such as 'make it gold'")
     guidance: str = key("instruct_pix2pix", f"what edits the views: {EDITORS}, which need no weights")
@@ -40,7 +40,7 @@ class InstructionKeys(MethodKeys):
     )
 
     def opened(self, device: torch.device) -> Guidance:
-        """Return what edits the views."""
+        """Open the editor of the views."""
         from texgs.models.editors import Endpoint, ImagePipeline
         from texgs.models.filters import ProceduralFilters
         from texgs.models.guidance import Disagreeing
@@ -62,7 +62,7 @@ class InstructionKeys(MethodKeys):
         return Disagreeing(editor, self.disagreement) if self.disagreement else editor
 
     def check(self) -> None:
-        """Require an instruction that the guidance understands, and a guidance that there is."""
+        """Require a known guidance, and an instruction that it understands."""
         from texgs.models.instruction import require_instruction, understand
 
         instruction, name = require_instruction(self.instruction), self.guidance
@@ -72,18 +72,18 @@ class InstructionKeys(MethodKeys):
             raise ArgumentError(f"{self.node}.guidance: expected {EDITORS}, got {name!r}")
 
     def weights(self) -> dict[str, str]:
-        """Return the diffusion model, where one that texgs finds edits the views."""
+        """Return the diffusion model if texgs finds its weights."""
         known = self.known_editor()
         return {known: "guidance=filters"} if known else {}
 
     def known_editor(self) -> str:
-        """Return the name of the weights that edit the views; nothing where texgs does not find them."""
+        """Return the name of the editor's weights, or "" if texgs does not find them."""
         if self.guidance == "instruct_pix2pix":
             return "instruct-pix2pix"
-        return self.guidance if self.guidance in PIPELINES or PINNED.fullmatch(self.guidance) else ""
+        return self.guidance if self.guidance in PIPELINES or PINNED_PATTERN.fullmatch(self.guidance) else ""
 
     def files(self) -> dict[str, Path]:
-        """Return the files of a pipeline in a folder, where that edits the views."""
+        """Return the files of the pipeline if it is in a folder."""
         folder = Path(self.guidance)
         paths = [folder / each for names in pipeline_files(folder) for each in names]
         return {f"guidance.{index}": path for index, path in enumerate(filter(Path.is_file, paths))}
@@ -94,7 +94,7 @@ class InstructionKeys(MethodKeys):
 
 
 def write_views(folder: Path, rows: Mapping[str, Sequence[np.ndarray]]) -> dict[str, str]:
-    """Write views.png, a row of pictures [H, W, 3] each before and after edits; return what it shows."""
+    """Write views.png, rows of pictures [H, W, 3] before and after edits; return its description."""
     from texgs.core.figures import write_grid
 
     titles = [f"view {index + 1}" for index in range(len(next(iter(rows.values()))))]

@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 SHOWN_VIEWS = 3  # views of the segment around the object
 POLAR = 20.0  # polar angle of these views, degrees
-DIMMED = 0.15  # opacity of what is not in the segment, in its picture
+DIM_OPACITY = 0.15  # opacity outside the segment, in its picture
 
 
 @dataclass(frozen=True)
 class SegmentKeys(MethodKeys, MaskKeys):
-    """Where is clicked, and how masks become surfels."""
+    """The clicks, and how masks select surfels."""
 
     model: str = key("", "model whose part it is; may be left out where there is one")
     name: str = key("part", "name of the segment")
@@ -45,7 +45,7 @@ class SegmentKeys(MethodKeys, MaskKeys):
     )
 
     def places(self) -> list[list[float]]:
-        """Return the clicks, those beside the part last, as shares of the sides of the view."""
+        """Return the clicks as shares of the view's sides, those off the part last."""
         places = normalized_clicks("edit.segment.points", [*self.points, *self.others])
         if not self.points:
             raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
@@ -54,13 +54,13 @@ class SegmentKeys(MethodKeys, MaskKeys):
         return places
 
     def check(self) -> None:
-        """Require a name, clicks, and a number of views that an icosphere has."""
+        """Require a name, clicks, and the view count of an icosphere."""
         require_name(self.name, "edit.segment.name")
         self.places()
         frequency_of(self.views, "edit.segment.views")
 
     def weights(self) -> dict[str, str]:
-        """Return those of what finds the part."""
+        """Return the weights of the mask model."""
         return mask_weights(self.masks)
 
     def adds(self, models: Sequence[str]) -> Sequence[str]:
@@ -102,7 +102,7 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
 
 
 def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
-    """Return the cameras of the training views that vote on a model; none where others vote."""
+    """Return the cameras of the training views that vote on a model; none if other views vote."""
     from texgs.volume.images import smaller
 
     if task.settings.voters != "training":
@@ -111,7 +111,7 @@ def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
 
 
 def clicks_of(settings: SegmentKeys, lens: Lens, device: torch.device) -> Clicks:
-    """Return clicks in pixels of a view through a lens."""
+    """Return clicks in pixels of a lens's image."""
     import torch
 
     from texgs.core.camera import orbit
@@ -125,7 +125,7 @@ def clicks_of(settings: SegmentKeys, lens: Lens, device: torch.device) -> Clicks
 
 
 def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
-    """Write edit.png: the view clicked on with its mask, and the segment in it and around, the rest faint."""
+    """Write edit.png: the clicked view with its mask, and views of the segment with the rest dimmed."""
     import torch
 
     from texgs.core.figures import write_grid
@@ -134,7 +134,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
     from texgs.volume.cameras import orbit_path
 
     model, lifted = made.model, made.lifted
-    faint = lifted.mask.new_ones(len(model), dtype=torch.float32).masked_fill(~lifted.mask, DIMMED)
+    faint = lifted.mask.new_ones(len(model), dtype=torch.float32).masked_fill(~lifted.mask, DIM_OPACITY)
     opacities = (model.parameters["opacities"].sigmoid() * faint).clamp(1e-6, 1 - 1e-6).logit()
     dimmed = Surfels({**model.parameters, "opacities": opacities}, model.shading, model.metadata)
 

@@ -1,4 +1,4 @@
-"""What methods share that follow a picture: which picture, which object of it, and how views are compared."""
+"""Common parts of methods that follow a picture: the picture, its object, and the losses."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StyleKeys(MethodKeys):
-    """The picture, and the object of it that counts."""
+    """The picture, and its object that counts."""
 
     style: str = key("strokes", "picture that texgs paints (strokes, glass, marble, ...), or a picture file")
     region: list[Any] = key([], "clicks on the object of the picture that counts, as shares; default all")
     masks: str = key("mobile_sam", "what finds that object; grabcut needs no weights", choices=MASKS)
 
     def check(self) -> None:
-        """Require a picture that is there, and clicks on it."""
+        """Require an existing picture, and clicks inside it."""
         require_picture(self.style, f"{self.node}.style")
         normalized_clicks(f"{self.node}.region", self.region)
 
     def weights(self) -> dict[str, str]:
-        """Return what finds the object, where that needs weights."""
+        """Return the weights of the mask model, if it needs any."""
         return mask_weights(self.masks) if self.region else {}
 
     def files(self) -> dict[str, Path]:
-        """Return the picture's file, where it is one."""
+        """Return the picture's file, unless it is one of texgs."""
         path = Path(self.style)
         return {"style": path} if path.is_file() else {}
 
@@ -52,7 +52,7 @@ class StyleKeys(MethodKeys):
         return Path(self.style).name
 
     def picture(self) -> StylePicture | None:
-        """Return the picture, of it the object that was clicked on."""
+        """Read the picture, restricted to the object that was clicked on."""
         import torch
 
         from texgs.models.sam import mask_model
@@ -69,7 +69,7 @@ class StyleKeys(MethodKeys):
 
 @dataclass(frozen=True)
 class FeatureKeys(StyleKeys):
-    """How views that learn the style are compared with it."""
+    """How views are compared with the style."""
 
     nnfm: float = key(1.0, "weight of NNFM on VGG-16; 0 needs no weights", least=0)
     patches: float = key(0.0, "weight of the sliced Wasserstein distance of patches", least=0)
@@ -77,7 +77,7 @@ class FeatureKeys(StyleKeys):
     sampled: bool = key(False, "features are drawn at random and searched roughly, for CPUs")
 
     def check(self) -> None:
-        """Require a picture, and that something is compared with it."""
+        """Require a picture, and at least one loss."""
         if not self.nnfm and not self.patches:
             raise ArgumentError(
                 f"{self.node}.nnfm, {self.node}.patches: expected a weight above 0 for one of them, got 0 "
@@ -86,16 +86,16 @@ class FeatureKeys(StyleKeys):
         super().check()
 
     def weights(self) -> dict[str, str]:
-        """Return VGG where features are compared, and what finds the object."""
+        """Return VGG if features are compared, and the weights of the mask model."""
         without = "nnfm=0" if self.patches else ""
         return {**({"vgg16": without} if self.nnfm > 0 else {}), **super().weights()}
 
     def stylize(self, work: StyleWork, name: str, model: Any, views: Sequence[View]) -> tuple[Any, Losses]:
-        """Return a model of this name with the style of its picture, by training views; and the losses."""
+        """Stylize a model on training views; return it with the losses."""
         raise NotImplementedError
 
     def recipe(self, iterations: int, seed: int, **changes: Any) -> Recipe:
-        """Return the losses, with changes to other fields of `Recipe`."""
+        """Return a `Recipe` with these losses and other changes."""
         from texgs.edit.recipe import Recipe
 
         exact: dict[str, Any] = {} if self.sampled else dict.fromkeys(("queries", "positions", "dimensions"))
@@ -115,7 +115,7 @@ class FeatureKeys(StyleKeys):
 
 @dataclass(frozen=True, eq=False)
 class StyleWork:
-    """Pictures on their way onto the parts of a scene, and what there is to tell about it."""
+    """Pictures for the parts of a scene, with losses and notes for the report."""
 
     task: Task[Any]
     vgg: Vgg | None
@@ -124,14 +124,14 @@ class StyleWork:
     notes: dict[str, Any] = field(default_factory=dict)
 
     def picture(self, part: str) -> StylePicture:
-        """Return what a part follows."""
+        """Return the picture that a part follows."""
         picture = self.task.settings_for(part).picture()
         assert picture is not None
         self.pictures[part] = picture
         return picture
 
     def write_pictures(self) -> dict[str, str]:
-        """Write style.png, or one for each part where pictures differ; return what they show."""
+        """Write style.png, or one per part if pictures differ; return descriptions."""
         import torch
 
         from texgs.core.image import write_png
@@ -168,9 +168,9 @@ def run(task: Task[FeatureKeys]) -> EditedScene:
 
 
 def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
-    """Return the picture of texgs of this name, or of a file; it is the value of a key.
+    """Read a picture of texgs by name, or a picture file; `key` is named in errors.
 
-    Of it counts what `find` returns, see `read_style`; by default all.
+    Only the region that `find` returns counts, see `read_style`; by default all.
     """
     from texgs.edit.style_picture import StylePicture, read_style
     from texgs.models.pictures import PICTURES, picture
@@ -186,7 +186,7 @@ def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
 
 
 def require_picture(name: str, key: str) -> None:
-    """Require one of the pictures of texgs, or a file that can be read as one."""
+    """Require a picture of texgs, or a readable picture file."""
     from texgs.models.pictures import PICTURES
 
     if name not in PICTURES:

@@ -25,7 +25,7 @@ STYLES = "edit.stylerf.styles"
 
 @dataclass(frozen=True)
 class ArfKeys(FeatureKeys):
-    """How colours of voxels take on a style (ARF, Zhang et al. 2022)."""
+    """Stylize the colours of voxels (ARF, Zhang et al. 2022)."""
 
     epochs: float = key(10.0, "rounds through the training views, for the style", least=0)
     ray_epochs: float = key(1.0, "rounds through the rays of recoloured views before that", least=0)
@@ -37,7 +37,7 @@ class ArfKeys(FeatureKeys):
     def stylize(
         self, work: StyleWork, name: str, model: Voxels, views: Sequence[View]
     ) -> tuple[Voxels, Losses]:
-        """Give a grid the style of its picture; features see half of the resolution, and the style too."""
+        """Stylize a grid; features of views and style are computed at half resolution."""
         from texgs.edit.voxels import stylize_voxels
         from texgs.volume.images import load
 
@@ -50,7 +50,7 @@ class ArfKeys(FeatureKeys):
 
 @dataclass(frozen=True)
 class StyleSplatKeys(FeatureKeys):
-    """How colours of 3D Gaussians take on a style (StyleSplat, Jain et al. 2024)."""
+    """Stylize the colours of 3D Gaussians (StyleSplat, Jain et al. 2024)."""
 
     iterations: int = key(2000, "steps of the style, of one view each", least=0)
     rate: float = key(0.005, "learning rate of zeroth harmonics; the others have a twentieth", above=0)
@@ -58,7 +58,7 @@ class StyleSplatKeys(FeatureKeys):
     def stylize(
         self, work: StyleWork, name: str, model: Gaussians, views: Sequence[View]
     ) -> tuple[Gaussians, Losses]:
-        """Give Gaussians the style of their picture; features see every pixel."""
+        """Stylize Gaussians; features are computed at full resolution."""
         from texgs.edit.gaussians import stylize_gaussians
         from texgs.volume.images import smaller
 
@@ -70,7 +70,7 @@ class StyleSplatKeys(FeatureKeys):
 
 @dataclass(frozen=True)
 class StyleRfKeys(FeatureKeys):
-    """How palette colours take on styles (StyleRF-VolVis, Tang et al. 2024)."""
+    """Stylize palette colours (StyleRF-VolVis, Tang et al. 2024)."""
 
     styles: list[str] = key(
         [], "a picture for each palette colour of the fit, whatever looks say; default: `style` for all"
@@ -81,7 +81,7 @@ class StyleRfKeys(FeatureKeys):
     variation: float = key(1.0, "weight of total variation of the image", least=0)
 
     def check(self) -> None:
-        """Require pictures that are there."""
+        """Require existing pictures."""
         super().check()
         for name in self.styles:
             require_picture(name, STYLES)
@@ -95,12 +95,12 @@ class StyleRfKeys(FeatureKeys):
             )
 
     def files(self) -> dict[str, Path]:
-        """Return the pictures that are files."""
+        """Return the picture files."""
         several = {f"style{i}": Path(name) for i, name in enumerate(self.styles) if Path(name).is_file()}
         return {**super().files(), **several}
 
     def picture(self) -> StylePicture | None:
-        """Return the style of all palette colours; None where each has its own."""
+        """Return the common style of all palette colours, or None."""
         return None if self.styles else super().picture()
 
     def followed(self) -> str:
@@ -110,7 +110,7 @@ class StyleRfKeys(FeatureKeys):
     def stylize(
         self, work: StyleWork, name: str, model: PaletteField, views: Sequence[View]
     ) -> tuple[PaletteField, Losses]:
-        """Give palette colours the styles of their pictures; features see half of the resolution."""
+        """Stylize palette colours; features are computed at half resolution."""
         from texgs.edit.palette_style import stylize_palette
         from texgs.volume.images import load
 

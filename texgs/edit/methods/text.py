@@ -1,4 +1,4 @@
-"""Text-driven editing of textures (the paper's section Text-Driven NPSE): what an instruction says."""
+"""Text-driven editing of textures (the paper's section Text-Driven NPSE)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TextKeys(OpacityKeys, InstructionKeys):
-    """What to do, what edits the views, and how texels follow."""
+    """The instruction, the editor of the views, and how texels follow."""
 
     recipe: str = key(
         "default",
@@ -45,7 +45,7 @@ class TextKeys(OpacityKeys, InstructionKeys):
     size: int = key(512, "longer side of the six views", "pixels", least=64)
 
     def recipe_of(self) -> TextRecipe:
-        """Return the recipe, with what the configuration changes about it."""
+        """Return the recipe with the changes from the configuration."""
         from texgs.edit.text import RECIPES
 
         recipe = replace(RECIPES[self.recipe], is_textured=self.textured)
@@ -53,12 +53,12 @@ class TextKeys(OpacityKeys, InstructionKeys):
         return replace(recipe, **{name: value for name, value in chosen.items() if value is not None})
 
     def numbers(self) -> dict[str, Any]:
-        """Return those of the recipe."""
+        """Return the numbers of the recipe."""
         return vars(self.recipe_of())
 
 
 def run(task: Task[TextKeys]) -> EditedScene:
-    """Give the parts the look; write views.png with the views that were edited."""
+    """Give the parts the look; write views.png with the edited views."""
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
     from texgs.volume.images import smaller

@@ -1,4 +1,4 @@
-"""The paper's baselines that edit training views again and again while a field learns from them."""
+"""The paper's baselines that keep editing training views while a field learns from them."""
 
 from __future__ import annotations
 
@@ -24,9 +24,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class UpdateKeys(InstructionKeys):
-    """How a field follows views that are edited again and again."""
+    """How a field follows repeatedly edited views."""
 
-    keeps_renders = False  # edits stay close to views of the fitted model, and not to the training views
+    keeps_renders = (
+        False  # whether edits stay close to renders of the fitted model instead of the training views
+    )
 
     frozen: bool = key(False, "geometry stays as it is, bit for bit: the paper's second comparison")
     l1: float = key(0.8, "weight of the absolute difference to edited views", least=0)
@@ -34,15 +36,15 @@ class UpdateKeys(InstructionKeys):
     lpips: float = key(0.0, "weight of LPIPS on VGG-16; 0 needs no weights", least=0)
 
     def schedule(self, views: int) -> UpdateSchedule:
-        """Return when which of so many views are edited."""
+        """Return the schedule of edits for a number of views."""
         raise NotImplementedError
 
     def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Learner:
-        """Return a field that learns from views in so many iterations."""
+        """Return a learner for a number of iterations on views."""
         raise NotImplementedError
 
     def check(self) -> None:
-        """Require an instruction, a loss and a schedule that there can be."""
+        """Require an instruction, a loss and a possible schedule."""
         super().check()
         if not (self.l1 or self.dssim or self.lpips):
             raise ArgumentError(
@@ -51,7 +53,7 @@ class UpdateKeys(InstructionKeys):
         self.schedule(1)
 
     def weights(self) -> dict[str, str]:
-        """Return those of the guidance, and of LPIPS where it counts."""
+        """Return the weights of the guidance, and of LPIPS if it is used."""
         return super().weights() | (dict.fromkeys(("vgg16", "lpips_vgg"), "lpips=0") if self.lpips else {})
 
 
@@ -94,14 +96,14 @@ def run(task: Task[UpdateKeys]) -> EditedScene:
 
 
 def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float], ...]:
-    """Return one range of noise for all rounds."""
+    """Check a range of noise levels, the same for all rounds."""
     if len(noise) != 2 or not 0 <= noise[0] <= noise[1] <= 1:
         raise ArgumentError(f"{where}: expected two shares from 0 to 1, the smaller one first, got {noise}")
     return ((noise[0], noise[1]),)
 
 
 def rates_of_3dgs(zeroth: float, means_final: float) -> CommonRates:
-    """Return the rates at which fits of 3DGS end, but for two."""
+    """Return the final rates of 3DGS, with two exceptions."""
     return CommonRates(1.6e-4, 0.001, 0.005, 0.05, zeroth, zeroth / 20, means_final, 1.0)
 
 
@@ -115,12 +117,12 @@ class Igs2gsKeys(UpdateKeys):
     rates: CommonRates = key(rates_of_3dgs(0.0025, 0.01), "learning rates")
 
     def schedule(self, views: int) -> UpdateSchedule:
-        """Edit all views in passes, and learn from each when it is edited."""
+        """Edit all views in passes, and learn from each after its edit."""
         levels = noise_range("edit.igs2gs.noise", self.noise)
         return UpdateSchedule(self.passes, self.every, learned="newest", levels=levels)
 
     def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Any:
-        """Return Gaussians that learn."""
+        """Return Gaussians with Adam."""
         from texgs.edit.gaussians import GaussianLearner
 
         return GaussianLearner(model, images, loss, iterations, self.rates, self.frozen)
@@ -152,7 +154,7 @@ class DgeKeys(UpdateKeys):
         return UpdateSchedule(self.rounds, self.every, self.views, self.views, "random", "round", levels)
 
     def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Any:
-        """Return Gaussians that learn, and may be removed."""
+        """Return Gaussians with Adam and pruning."""
         from texgs.edit.gaussians import GaussianLearner
 
         return GaussianLearner(model, images, loss, iterations, self.rates, self.frozen, self.prune)
@@ -179,7 +181,7 @@ class In2nKeys(UpdateKeys):
         return UpdateSchedule(rounds, self.every, views=1, levels=noise_range("edit.in2n.noise", self.noise))
 
     def learner(self, model: Any, images: Any, loss: Any, iterations: int) -> Any:
-        """Return a grid that learns."""
+        """Return a grid that learns from patches."""
         from texgs.edit.voxels import VoxelLearner, VoxelRates
 
         rates = VoxelRates(0.0 if self.frozen else self.density, self.sh, self.sh)

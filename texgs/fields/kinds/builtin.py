@@ -1,4 +1,4 @@
-"""The kinds of field of texgs. Light is baked into all but surfels, of which edits change opacity alone."""
+"""The kinds of field of texgs. All but surfels have baked light; edits change only their opacity."""
 
 from texgs.fields.kinds import ALL, Kind
 

@@ -1,4 +1,4 @@
-"""A field of small networks with palette colours, or free ones after an edit (StyleRF-VolVis).
+"""A field of small networks with palette colours, or free colours after an edit (StyleRF-VolVis).
 
 Unlike the authors' (Tang et al. 2024), it fills the box around the object instead of a fixed cube, all shares
 of the palette mix where theirs keep the largest alone, and weights are as fitted, without a running mean.
@@ -15,15 +15,15 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError, DeviceError, ShapeError, located
+from texgs.core.errors import ArgumentError, DeviceError, ShapeError, errors_at
 from texgs.core.io import reading_as
 from texgs.core.tensor_file import read_tensor_file, write_tensor_file
 from texgs.fields.field import Asked, Role, UnlitField, UnlitScene, require_depth, sizes_in_mib
 from texgs.fields.palette.networks import Parameters, free_color, light, network_shapes, palette_color
 from texgs.fields.palette.rendering import (
     RAYS,
+    DensePoints,
     Geometry,
-    Points,
     merge_points,
     points_on,
     view_harmonics,
@@ -34,16 +34,16 @@ from texgs.raster import Render
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxels import camera_rays
 
-LEAST_WEIGHT = 1e-4  # weight of points whose colours are looked at
-OCCUPANCY_SIDE = 128  # places along each side of the two lattices of the authors
+MIN_WEIGHT = 1e-4  # least weight of a point whose colour is evaluated
+OCCUPANCY_SIDE = 128  # points along each side of the authors' two lattices
 FORMAT = "texgs-palette"
 VERSION = 1
-GRID = ("masks", "density")  # its tensors, before networks
+GRID_TENSORS = ("masks", "density")  # tensors of the grid
 
 
 @dataclass(frozen=True, eq=False)
 class PaletteField(UnlitField):
-    """Networks on the CPU, lit as their views were: light does not change them."""
+    """Networks on the CPU with baked light."""
 
     kind: ClassVar[str] = "palette"
 
@@ -57,7 +57,7 @@ class PaletteField(UnlitField):
 
     @property
     def device(self) -> torch.device:
-        """The CPU."""
+        """Always the CPU."""
         return self.parameters["palette.colors"].device
 
     @property
@@ -66,20 +66,20 @@ class PaletteField(UnlitField):
         return self.parameters["palette.colors"]
 
     def to(self, device: torch.device | str) -> Self:
-        """Return the same field, which is rendered on the CPU alone."""
+        """Return the field itself; it renders on the CPU only."""
         if torch.device(device).type != "cpu":
             raise DeviceError(f"device: expected cpu, got {device}; palette fields are rendered on the CPU")
         return self
 
     def tensors(self, role: Role) -> dict[str, Tensor]:
-        """Return raw parameters by network and layer, geometry with the grid's densities."""
+        """Return raw parameters by network and layer; geometry includes the grid's densities."""
         placed = {name: x for name, x in self.parameters.items() if name.startswith("density.")}
         if role == "geometry":
             return {"grid": self.geometry.grid.rows, **placed}
         return {name: x for name, x in self.parameters.items() if name not in placed}
 
-    def color(self, points: Points, harmonics: Tensor) -> Tensor:
-        """Return colours [n, 3] of points: free ones or else those of the palette, and light.
+    def color(self, points: DensePoints, harmonics: Tensor) -> Tensor:
+        """Return lit colours [n, 3] of points: free colours if there are any, otherwise palette colours.
 
         `harmonics` [n, 16] are those of the directions of their rays.
         """
@@ -110,7 +110,7 @@ class PaletteField(UnlitField):
 
 
 class PaletteScene(UnlitScene[PaletteField]):
-    """Fields that are drawn together, see `UnlitScene`; opacity is a factor on densities, which add up."""
+    """Several fields in one scene, see `UnlitScene`; densities add up, opacity is a factor on them."""
 
     def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
         background, outputs, depth_range = asked
@@ -138,7 +138,7 @@ class PaletteScene(UnlitScene[PaletteField]):
             points = points.take((points.distance >= near[points.ray]) & (points.distance < far[points.ray]))
             several.append(points._replace(depth=factor * points.depth))
         points, owner = merge_points(several)
-        shows = visible_points(points, LEAST_WEIGHT)
+        shows = visible_points(points, MIN_WEIGHT)
         owner, harmonics = owner[shows.chosen], view_harmonics(rays)
         values = torch.ones(len(owner), 5)
         values[:, 4] = shows.points.distance
@@ -165,10 +165,10 @@ def write_palette(path: str | Path, field: PaletteField) -> Path:
 
 
 def read_palette(path: str | Path) -> PaletteField:
-    """Read a file of a palette field as `write_palette` writes it, bit for bit. Nothing in it is executed."""
+    """Read a file of `write_palette` bit for bit. Nothing in it is executed."""
     description, tensors = read_tensor_file(Path(path), FORMAT, VERSION)
-    with located(path), reading_as("networks and a grid", "write it again"):
-        networks = {name: x for name, x in tensors.items() if name not in GRID}
+    with errors_at(path), reading_as("networks and a grid", "write it again"):
+        networks = {name: x for name, x in tensors.items() if name not in GRID_TENSORS}
         check.finite(density=tensors["density"], **networks)
         geometry = _geometry(tensors, description)
         _check_networks(networks, geometry.levels)
@@ -182,7 +182,7 @@ def _geometry(tensors: Mapping[str, Tensor], description: Mapping[str, Any]) -> 
 
 
 def _check_networks(networks: Mapping[str, Tensor], levels: HashLevels) -> None:
-    """Require all networks, those of free colours perhaps, in the right shapes."""
+    """Require all networks in the right shapes; free colours are optional."""
     colors = check.shape("palette.colors", networks["palette.colors"], "P 3")["P"]
     absent = {"base"} if any(name.startswith("free.") for name in networks) else {"base", "free"}
     shapes = {

@@ -15,12 +15,12 @@ from torch.nn import functional as F
 
 from texgs.raster.hash_encoding import HashLevels, encode
 
-HIDDEN = 64
-GEOMETRY = 15  # features of a point that the density network hands on
+HIDDEN_WIDTH = 64
+GEOMETRY_FEATURES = 15  # features of a point from the density network
 HARMONICS = 16  # spherical harmonics of the direction
-LEAST_SHARE = 0.05  # share of a palette colour before shares are made to add up to 1
-MOST_DENSITY = 15.0  # its logarithm: more would overflow
-TABLE = 1e-4  # largest entry at the start
+MIN_SHARE = 0.05  # least share of a palette colour, before normalisation
+MAX_LOG_DENSITY = 15.0  # larger logarithms would overflow
+MAX_TABLE_ENTRY = 1e-4  # largest entry of a table at the start
 TABLES = ("density", "palette", "free")  # networks with a hash grid
 
 Parameters = Mapping[str, Tensor]
@@ -28,24 +28,24 @@ Activation = Callable[[Tensor], Tensor]
 
 
 class PaletteColor(NamedTuple):
-    """What the palette network says about points."""
+    """Output of the palette network at points."""
 
     color: Tensor  # [n, 3] without light
-    shares: Tensor  # [n, P] of the palette's colours, 1 together
+    shares: Tensor  # [n, P] of the palette's colours, summing to 1
     offsets: Tensor  # [n, P, 3] of these colours
 
 
 def network_shapes(levels: HashLevels, colors: int) -> dict[str, tuple[int, int]]:
-    """Return the shapes of all tensors for so many palette colours, by network and layer."""
+    """Return the shapes of all tensors for a number of palette colours, by network and layer."""
     table, features = (levels.rows, 2), levels.width
     widths = {
-        "density": [features, HIDDEN, 1 + GEOMETRY],
-        "trunk": [HARMONICS + GEOMETRY, HIDDEN, HIDDEN],
-        "base": [HIDDEN, 3],
-        "palette": [features, HIDDEN, GEOMETRY],
-        "mixture": [GEOMETRY, 4 * colors + 1],
-        "light": [HIDDEN, HIDDEN, HIDDEN, 1],
-        "free": [features, HIDDEN, HIDDEN, 3],
+        "density": [features, HIDDEN_WIDTH, 1 + GEOMETRY_FEATURES],
+        "trunk": [HARMONICS + GEOMETRY_FEATURES, HIDDEN_WIDTH, HIDDEN_WIDTH],
+        "base": [HIDDEN_WIDTH, 3],
+        "palette": [features, HIDDEN_WIDTH, GEOMETRY_FEATURES],
+        "mixture": [GEOMETRY_FEATURES, 4 * colors + 1],
+        "light": [HIDDEN_WIDTH, HIDDEN_WIDTH, HIDDEN_WIDTH, 1],
+        "free": [features, HIDDEN_WIDTH, HIDDEN_WIDTH, 3],
     }
     layers = {
         f"{name}.{layer}": (after, before)
@@ -58,12 +58,12 @@ def network_shapes(levels: HashLevels, colors: int) -> dict[str, tuple[int, int]
 def new_networks(
     names: Collection[str], levels: HashLevels, colors: int, generator: torch.Generator
 ) -> dict[str, Tensor]:
-    """Make random networks: tables near 0, layers uniform up to in^-0.5 as of torch; no palette."""
+    """Make random networks: tables near 0, layers uniform up to in^-0.5 as in torch; no palette."""
     networks = {}
     for name, shape in network_shapes(levels, colors).items():
         network, part = name.split(".")
         if network in names and part != "colors":
-            most = TABLE if part == "table" else shape[1] ** -0.5
+            most = MAX_TABLE_ENTRY if part == "table" else shape[1] ** -0.5
             networks[name] = most * (2 * torch.rand(shape, generator=generator) - 1)
     return networks
 
@@ -71,7 +71,7 @@ def new_networks(
 def density(points: Tensor, parameters: Parameters, levels: HashLevels) -> tuple[Tensor, Tensor]:
     """Return the density [n], per world unit, and features [n, 15] for the networks of light."""
     out = perceptron(encode(points, parameters["density.table"], levels), parameters, "density")
-    return out[:, 0].clamp_max(MOST_DENSITY).exp(), out[:, 1:]
+    return out[:, 0].clamp_max(MAX_LOG_DENSITY).exp(), out[:, 1:]
 
 
 def base_color(geometry: Tensor, harmonics: Tensor, parameters: Parameters) -> Tensor:
@@ -80,7 +80,7 @@ def base_color(geometry: Tensor, harmonics: Tensor, parameters: Parameters) -> T
 
 
 def light(geometry: Tensor, harmonics: Tensor, parameters: Parameters) -> Tensor:
-    """Return what the direction adds to all three channels, [n, 1]."""
+    """Return the contribution [n, 1] of the direction to all three channels."""
     return perceptron(_trunk(geometry, harmonics, parameters), parameters, "light")
 
 
@@ -91,7 +91,7 @@ def palette_color(points: Tensor, parameters: Parameters, levels: HashLevels) ->
     colors = parameters["palette.colors"]
     out = perceptron(features, parameters, "mixture")
     raw, offsets, radiance = out.split([len(colors), 3 * len(colors), 1], dim=1)
-    shares = F.softplus(raw) + LEAST_SHARE
+    shares = F.softplus(raw) + MIN_SHARE
     shares = shares / shares.sum(1, keepdim=True)
     offsets = offsets.unflatten(1, (-1, 3))
     mixed = (shares[..., None] * (colors + offsets)).sum(1)
@@ -99,7 +99,7 @@ def palette_color(points: Tensor, parameters: Parameters, levels: HashLevels) ->
 
 
 def free_color(points: Tensor, parameters: Parameters, levels: HashLevels) -> Tensor:
-    """Return colours [n, 3] without light that can be anything; not bounded."""
+    """Return unlit, unbounded free colours [n, 3]."""
     return perceptron(encode(points, parameters["free.table"], levels), parameters, "free", F.elu)
 
 
@@ -114,5 +114,5 @@ def perceptron(x: Tensor, parameters: Parameters, name: str, activation: Activat
 
 
 def _trunk(geometry: Tensor, harmonics: Tensor, parameters: Parameters) -> Tensor:
-    """Return features [n, 64] that the colour of the base fit and the light share."""
+    """Return the features [n, 64] shared by the base colour and the light."""
     return F.relu(perceptron(torch.cat([harmonics, geometry], dim=1), parameters, "trunk"))

@@ -1,4 +1,4 @@
-"""Rays through fields of networks: where they are dense, what of that shows, and its blended colours."""
+"""Rays through fields of networks: points with density, the visible ones, and their blended colours."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,9 +18,9 @@ RAYS = 8192  # rays at a time
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Where a field is: the density network, looked at where a coarse grid has density.
+    """The geometry of a field: its density network, evaluated where a coarse grid has density.
 
-    The grid's own densities only tell where a ray may end.
+    The grid's own densities only decide where a ray may end.
     """
 
     grid: VoxelGrid  # of degree 0
@@ -33,12 +33,12 @@ class Geometry:
         return self.march.step * self.grid.spacing
 
     def unit(self, points: Tensor) -> Tensor:
-        """Place world points [n, 3] in the cube around the grid's box, whose sides become 1."""
+        """Map world points [n, 3] to the unit cube around the grid's box."""
         side = self.grid.spacing * (max(self.grid.size) - 1)
         return (points - points.new_tensor(self.grid.lower)) / side
 
 
-class Points(NamedTuple):
+class DensePoints(NamedTuple):
     """Points on rays, ray by ray and front to back."""
 
     at: Tensor  # [n, 3] in the unit cube
@@ -47,17 +47,17 @@ class Points(NamedTuple):
     depth: Tensor  # [n] optical: density times length
     features: Tensor  # [n, 15] of the density network
 
-    def take(self, chosen: Tensor) -> "Points":
-        """Return some of them."""
-        return Points(*(x[chosen] for x in self))
+    def take(self, chosen: Tensor) -> "DensePoints":
+        """Select some points."""
+        return DensePoints(*(x[chosen] for x in self))
 
 
-class Shown(NamedTuple):
-    """The points whose colours count."""
+class VisiblePoints(NamedTuple):
+    """The points with enough weight in their rays."""
 
-    points: Points  # n of them
-    weights: Tensor  # [n] in the colours of their rays
-    chosen: Tensor  # bool, among all points
+    points: DensePoints  # n of them
+    weights: Tensor  # [n] blending weights
+    chosen: Tensor  # bool, mask of all points
 
     def blend(self, values: Tensor, n_rays: int) -> Tensor:
         """Return weighted sums [N, C] of values [n, C] for each ray."""
@@ -65,14 +65,14 @@ class Shown(NamedTuple):
         return values.new_zeros(n_rays, values.shape[1]).index_add_(0, self.points.ray, weighted)
 
 
-def points_on(rays: Tensor, geometry: Geometry, parameters: Parameters) -> Points:
-    """Return all points on rays [N, 6] that the grid lets through, with their densities."""
+def points_on(rays: Tensor, geometry: Geometry, parameters: Parameters) -> DensePoints:
+    """Return all points on rays [N, 6] inside the grid's dense cells, with their densities."""
     points, ray = ray_points(geometry.grid, rays, geometry.march)
     origin, direction = rays[ray].split(3, dim=1)
     distance = ((points - origin) * direction).sum(1) / direction.square().sum(1)
     at = geometry.unit(points)
     sigma, features = density(at, parameters, geometry.levels)
-    return Points(at, ray, distance, geometry.length * sigma, features)
+    return DensePoints(at, ray, distance, geometry.length * sigma, features)
 
 
 def blending_weights(depth: Tensor, ray: Tensor) -> Tensor:
@@ -91,11 +91,11 @@ def blending_weights(depth: Tensor, ray: Tensor) -> Tensor:
     return (torch.exp(-passed) * -torch.expm1(-depth)).float()
 
 
-def visible_points(points: Points, weight_min: float) -> Shown:
+def visible_points(points: DensePoints, weight_min: float) -> VisiblePoints:
     """Choose the points with a weight above `weight_min`."""
     weights = blending_weights(points.depth, points.ray)
     chosen = weights > weight_min
-    return Shown(points.take(chosen), weights[chosen], chosen)
+    return VisiblePoints(points.take(chosen), weights[chosen], chosen)
 
 
 def view_harmonics(rays: Tensor) -> Tensor:
@@ -103,12 +103,12 @@ def view_harmonics(rays: Tensor) -> Tensor:
     return harmonics(normalize(rays[:, 3:], dim=1))
 
 
-def merge_points(several: list[Points]) -> tuple[Points, Tensor]:
-    """Merge points of several fields in the order of their rays, and return the field [n] that each is of.
+def merge_points(several: list[DensePoints]) -> tuple[DensePoints, Tensor]:
+    """Merge the points of several fields in the order of rays; return also the field [n] of each.
 
     Densities of fields add up: a ray meets the points of all of them, each with its own depth.
     """
-    points = Points(*map(torch.cat, zip(*several, strict=True)))
+    points = DensePoints(*map(torch.cat, zip(*several, strict=True)))
     field = torch.repeat_interleave(torch.arange(len(several)), torch.tensor([len(p.ray) for p in several]))
     order = points.distance.argsort(stable=True)
     order = order[points.ray[order].argsort(stable=True)]

@@ -1,4 +1,4 @@
-"""Compact files of basic models: texels in fixed steps, the rest in half precision, packed by xz."""
+"""Compact files of basic models: quantised texels, the rest in half precision, packed by xz."""
 
 import json
 import lzma
@@ -15,7 +15,7 @@ from torch.nn.functional import normalize
 
 from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading, write_bytes
 from texgs.core.memory import require_memory
 from texgs.core.ply_file import is_ply
@@ -27,16 +27,16 @@ from texgs.fields.surfels.texels import mean_texels, offsets_of, owners, with_fi
 FORMAT = "texgs-compact"
 VERSION = 1
 MAGIC = b'{"texgs-compact":'
-TEXEL_STEP = 1 / 128  # unit of texels: none is off by more than 1/256, a level of an 8-bit picture
-MOST_STEPS = 2**23  # units of a texel; float32 holds so many exactly
+TEXEL_STEP = 1 / 128  # unit of texels; errors stay below 1/256, a level of an 8-bit picture
+MAX_STEPS = 2**23  # units of a texel that float32 holds exactly
 TEXTURE_TENSORS = ("texels", "sizes", "offsets")
 EXACT_TENSORS = (
     "means",
     "palette",
 )  # half precision would move surfels by up to a tenth of a pixel at 800x800
-LONGEST_HEADER = 2**20  # bytes, of the tensors' names and shapes
-COPIES = 6  # copies of the tensors in memory: texels are bytes in the file and floats in a model
-MEMORY = 2**28  # bytes that unpacking may use besides its result; these files need 9 MiB
+MAX_HEADER_BYTES = 2**20  # bytes, of the tensors' names and shapes
+COPIES = 6  # copies of the tensors in memory; texels are bytes in files, floats in models
+MEMORY = 2**28  # bytes for unpacking besides its result; our files need 9 MiB
 
 
 def write_compact(
@@ -57,7 +57,7 @@ def write_compact(
     model = model.to("cpu")
     if seen is not None:
         model = _without_unseen(model, seen.cpu())
-    with located(path):
+    with errors_at(path):
         packed = lzma.compress(save(compact_tensors(model, step)), preset=6)
     return write_bytes(path, json.dumps(header, separators=(",", ":")).encode() + b"\n" + packed)
 
@@ -76,11 +76,11 @@ def read_compact(path: str | Path) -> Surfels:
 
 
 def open_model(path: str | Path) -> Surfels:
-    """Read a file of a model, lossless, compact or PLY, told apart by how it begins."""
+    """Read a file of a model: lossless, compact or PLY, recognised by its first bytes."""
     path = Path(path)
     if is_ply(path):
         return read_ply(path)
-    with suppress(OSError), path.open("rb") as file:  # the reader says what is wrong
+    with suppress(OSError), path.open("rb") as file:  # the reader reports the error
         is_compact = file.read(len(MAGIC)) == MAGIC
         return read_compact(path) if is_compact else read_model(path)
     return read_model(path)
@@ -90,7 +90,7 @@ def open_model(path: str | Path) -> Surfels:
 def seen_surfels(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
     """Return which surfels [N] bool are blended into a pixel of any view.
 
-    Edits that make a model more transparent can show others.
+    Edits that make a model more transparent can reveal others.
     """
     seen = torch.zeros_like(model.parameters["opacities"], dtype=torch.bool)
     for camera in cameras:
@@ -127,11 +127,11 @@ def _without_unseen(model: Surfels, seen: Tensor) -> Surfels:
 
 
 def _rounded(name: str, values: Tensor) -> np.ndarray:
-    """Return values in half precision where that can hold them."""
+    """Round values to half precision if its range holds them."""
     half = values.half()
     is_turn = name in ("quats", "normals")
-    if is_turn and not torch.equal(half.float(), values):  # those of a compact file stay as they are
-        half = normalize(values, dim=1).half()  # any length is the same rotation, but half has few of them
+    if is_turn and not torch.equal(half.float(), values):  # values from a compact file stay unchanged
+        half = normalize(values, dim=1).half()  # the length does not matter, but half precision is coarse
     exact = name in EXACT_TENSORS or values.shape == (1,) or not bool(half.isfinite().all())
     return (values if exact else half).contiguous().numpy()
 
@@ -140,9 +140,9 @@ def _texture(p: Mapping[str, Tensor], step: float) -> dict[str, np.ndarray]:
     """Return sizes, and `codes` of texels in steps as green, red - green, blue - green: these are alike."""
     texels = p["texels"].detach()[owners(p)[0]]
     steps = (texels.double() / step).round()
-    if bool((steps.abs() > MOST_STEPS).any()):
+    if bool((steps.abs() > MAX_STEPS).any()):
         raise ArgumentError(
-            f"texels: expected at most {MOST_STEPS * step:g}, got {float(texels.abs().max()):g}; "
+            f"texels: expected at most {MAX_STEPS * step:g}, got {float(texels.abs().max()):g}; "
             "write a lossless model file"
         )
     red, green, blue = steps.int().T
@@ -164,7 +164,7 @@ def codes_of(whole: Tensor) -> np.ndarray:
 
 
 def _header(path: Path, line: bytes) -> dict[str, Any]:
-    """Read the first line; its version is judged before the rest."""
+    """Read the first line; check its version before the rest."""
     if not line.startswith(MAGIC):
         raise ArgumentError(f"{path}: expected a {FORMAT} file, got one of another format; read_model reads "
                             "lossless ones")  # fmt: skip
@@ -184,10 +184,10 @@ def _header(path: Path, line: bytes) -> dict[str, Any]:
 
 
 def _unpacked(path: Path, packed: bytes) -> bytes:
-    """Unpack the safetensors file in an xz stream: what its header says it is long, and nothing more."""
+    """Unpack the safetensors file in an xz stream, no longer than its header says."""
     stream = lzma.LZMADecompressor(lzma.FORMAT_XZ, MEMORY)
     start = _taken(stream, 8, packed)
-    header = _taken(stream, min(int.from_bytes(start, "little"), LONGEST_HEADER))
+    header = _taken(stream, min(int.from_bytes(start, "little"), MAX_HEADER_BYTES))
     ends = [each["data_offsets"][1] for name, each in json.loads(header).items() if name != "__metadata__"]
     n_bytes = max(ends, default=0)
     what = f"{path}: a model of {n_bytes} bytes, as its header says,"
@@ -200,7 +200,7 @@ def _unpacked(path: Path, packed: bytes) -> bytes:
 
 
 def _taken(stream: lzma.LZMADecompressor, count: int, packed: bytes = b"") -> bytes:
-    """Take the next bytes of a stream, fewer where it ends."""
+    """Take the next bytes of a stream, fewer at its end."""
     unpacked = b"" if stream.eof else stream.decompress(packed, count)
     while len(unpacked) < count and not stream.eof and not stream.needs_input:
         unpacked += stream.decompress(b"", count - len(unpacked))
@@ -208,7 +208,7 @@ def _taken(stream: lzma.LZMADecompressor, count: int, packed: bytes = b"") -> by
 
 
 def _parameters(stored: dict[str, np.ndarray], step: float) -> dict[str, Tensor]:
-    """Return tensors of a model, float32, as `write_compact` has stored them."""
+    """Return float32 tensors of a model from the tensors of `write_compact`."""
     codes = stored.pop("codes", None)
     parameters = {name: torch.from_numpy(x.copy()) for name, x in stored.items()}
     if codes is not None:

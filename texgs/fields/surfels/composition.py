@@ -1,4 +1,4 @@
-"""Basic models as one scene: geometry and texels are joined once, edits cost a frame no copy of them."""
+"""Basic models as one scene: geometry and texels are joined once, and edits copy neither."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,13 +22,15 @@ from texgs.fields.surfels.variants import labels_of
 from texgs.raster import Render, Texture, rasterize
 from texgs.raster.shading import MATERIAL
 
-DISC = 1e6  # opacity that makes a surfel a disc with a sharp rim
-NARROW = 1 / sqrt(2 * log(DISC / 0.5))  # scale at which this disc has a radius of one standard deviation
+DISC_OPACITY = 1e6  # opacity that makes a surfel a disc with a sharp rim
+DISC_SCALE = 1 / sqrt(
+    2 * log(DISC_OPACITY / 0.5)
+)  # scale at which this disc has a radius of one standard deviation
 
 
 @dataclass(frozen=True, eq=False)
 class Edited:
-    """What edits make of a model, from wherever it is seen and under whatever light."""
+    """A model with edits applied, independent of view and light."""
 
     colors: Tensor  # [N, 3] c_ind without texels
     material: tuple[Tensor, Tensor, Tensor, Tensor]  # k_a, k_d, k_s and beta, [N] or [1]
@@ -36,8 +38,8 @@ class Edited:
     tint: Tensor | None  # [N, 3] or [3] colour of highlights; None: white
 
 
-class Part:
-    """What edits and lights change of one relightable model, ready for use.
+class EditableModel:
+    """The attributes of one relightable model that edits and lights change.
 
     Masks [N] bool are those of its segments. Methods take the edit of what no segment holds, and one for each
     segment behind it.
@@ -48,13 +50,13 @@ class Part:
             raise ArgumentError("model: expected stage shading or texture, got surfels; fit shading first")
         p = model.parameters
         self.model, self.segments = model, len(masks)
-        self.colors, self.palette = p["colors"], p.get("palette")  # offsets from a palette, if there is one
+        self.colors, self.palette = p["colors"], p.get("palette")  # offsets from a palette, if any
         self.material = material(p, model.shading.material)  # factors, [N] or [1]
         self.opacities = p["opacities"].sigmoid()
         self.labels = labels_of(masks, len(model)) if masks else None  # [N] number of the segment, or 0
 
     def per_surfel(self, values: Sequence[float]) -> float | Tensor:
-        """Return the value of each surfel's edit [N]; a plain number where all are the same."""
+        """Return the value of each surfel's edit [N], or a number if all are the same."""
         if self.labels is None or all(value == values[0] for value in values):
             return values[0]
         return self.opacities.new_tensor(values)[self.labels]
@@ -72,7 +74,7 @@ class Part:
         return self.colors + torch.stack(palettes)[self.labels]
 
     def apply(self, edits: Sequence[PartEdit]) -> Edited:
-        """Return what edits make of the model."""
+        """Apply edits to the model."""
         a, d, s, b = (
             self.material[name] * self.per_surfel([getattr(edit, name) for edit in edits])
             for name in MATERIAL
@@ -100,13 +102,13 @@ class Part:
         return base.clamp_(0, 1), torch.zeros_like(gain) if look == "discs" else gain
 
     def opacity(self, edits: Sequence[PartEdit]) -> Tensor:
-        """Return opacities [N] with the edits' factors; 0 where surfels are hidden: nothing is drawn."""
+        """Return opacities [N] with the edits' factors; 0 for hidden surfels."""
         factor = self.per_surfel([edit.opacity if edit.visible else 0.0 for edit in edits])
         return (self.opacities * factor).clamp_max(1)
 
 
 class Composition(Composed):
-    """Relightable models as one scene on one device; `segments` are of each the masks [N] bool."""
+    """Relightable models as one scene on one device; `segments` are the masks [N] bool of each."""
 
     def __init__(self, models: Sequence[Surfels], segments: Sequence[Sequence[Tensor]] | None = None) -> None:
         if not models:
@@ -115,7 +117,7 @@ class Composition(Composed):
         if len(passes) > 1:
             raise ArgumentError(f"models: expected one low_pass, got {passes}; fit them by one recipe")
         masks = [()] * len(models) if segments is None else segments
-        self.parts = [Part(model, own) for model, own in zip(models, masks, strict=True)]
+        self.parts = [EditableModel(model, own) for model, own in zip(models, masks, strict=True)]
         self.options = models[0].shading.options
         geometries = [geometry(model.parameters)[:3] for model in models]
         self.means, self.quats, self.scales = (torch.cat(x) for x in zip(*geometries, strict=True))
@@ -129,7 +131,7 @@ class Composition(Composed):
 
     @property
     def palettes(self) -> list[tuple[float, ...]]:
-        """The palette of each model as fitted; black for a model without one."""
+        """The fitted palette of each model; black for a model without one."""
         given = (part.palette for part in self.parts)
         return [(0.0, 0.0, 0.0) if palette is None else tuple(palette.tolist()) for palette in given]
 
@@ -146,7 +148,7 @@ class Composition(Composed):
             background = self.means.new_full((3,), float(look not in MATERIAL))
         scales = self.scales
         if look == "discs":
-            scales, opacities = NARROW * scales, torch.where(opacities > 0, DISC, 0.0)
+            scales, opacities = DISC_SCALE * scales, torch.where(opacities > 0, DISC_OPACITY, 0.0)
         draw = partial(
             rasterize,
             *(self.means, self.quats, scales, opacities),
@@ -164,7 +166,7 @@ class Composition(Composed):
     def _edited(self, edits: Sequence[PartEdit] | None) -> tuple[list[Edited], Tensor]:
         """Return all models with their edits, and opacities [N]; kept while only the camera moves."""
         own = None if edits is None else list(edits)
-        latest = self._latest  # another thread may put another one there
+        latest = self._latest  # another thread may replace it
         if latest is None or latest[0] != own:
             pairs = zip(self.parts, by_part(self.parts, own), strict=True)
             edited = [part.apply(each) for part, each in pairs]
@@ -172,8 +174,8 @@ class Composition(Composed):
         return latest[1:]
 
 
-def by_part(parts: Sequence[Part], edits: Sequence[PartEdit] | None) -> list[Sequence[PartEdit]]:
-    """Return the edits of each part: of what no segment holds, and of each segment. None changes nothing."""
+def by_part(parts: Sequence[EditableModel], edits: Sequence[PartEdit] | None) -> list[Sequence[PartEdit]]:
+    """Return the edits of each model: its own, then one for each segment. None changes nothing."""
     counts = [1 + part.segments for part in parts]
     edits = [PartEdit()] * sum(counts) if edits is None else edits
     if len(edits) != sum(counts):
@@ -184,7 +186,7 @@ def by_part(parts: Sequence[Part], edits: Sequence[PartEdit] | None) -> list[Seq
 
 
 def join_textures(models: Sequence[Surfels]) -> tuple[Tensor, Tensor, Tensor]:
-    """Join texels [T, 3], sizes [N, 2] and offsets [N] of models; surfels without any get one texel of 0."""
+    """Join texels [T, 3], sizes [N, 2] and offsets [N] of models; untextured surfels get a texel of 0."""
     textures, count = [], 0
     for model in models:
         p, n = model.parameters, len(model)

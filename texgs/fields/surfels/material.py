@@ -1,19 +1,19 @@
-"""Which Blinn-Phong factors the materials of surfels can express. Without torch: plans are checked by it."""
+"""The Blinn-Phong factors that materials of surfels can express. Without torch, for checks of plans."""
 
 from collections.abc import Mapping
 
 from texgs.core.errors import ArgumentError
 
-RANGES = {  # that factors can be in, by the range of materials, see `fit.material_range`; others have none
+RANGES = {  # of factors, by `fit.material_range`; other factors are not bounded
     "bounded": dict.fromkeys(("ambient", "diffuse", "specular"), (0.0, 1.0)) | {"shininess": (1.0, 100.0)},
-    "paper": {"specular": (0.0, 5.0), "shininess": (0.0, 50.0)},  # those of the release
+    "paper": {"specular": (0.0, 5.0), "shininess": (0.0, 50.0)},  # as in the release
 }
 
-MARGIN = 1e-4  # of a range, to its ends, which no material reaches
+MARGIN = 1e-4  # least distance from the ends of a range, relative to its width
 
 
 def require_material(factors: Mapping[str, float], kind: str) -> None:
-    """Require factors that a range of materials can express."""
+    """Require factors inside a range of materials."""
     for name, (low, high) in RANGES[kind].items():
         if not low < factors[name] < high:
             raise ArgumentError(
@@ -23,7 +23,7 @@ def require_material(factors: Mapping[str, float], kind: str) -> None:
 
 
 def nearest_material(factors: Mapping[str, float], kind: str) -> dict[str, float]:
-    """Return the factors that a range of materials can express and that are nearest to others."""
+    """Clamp factors to a range of materials."""
     nearest = dict(factors)
     for name, (low, high) in RANGES[kind].items():
         margin = MARGIN * (high - low)

@@ -1,4 +1,4 @@
-"""A basic model: raw parameters of surfels, and what turns them into geometry, material and colour."""
+"""A basic model: raw parameters of surfels, and their conversion to geometry, material and colour."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
@@ -16,11 +16,15 @@ from texgs.raster.shading import MATERIAL
 
 SHAPES = {"means": "N 3", "quats": "N 4", "scales": "N 2", "opacities": "N", "sh": "N K 3", "colors": "N 3"}
 SHAPES |= {"normals": "N 4", "palette": "3", "texels": "T 3", "sizes": "N 2", "offsets": "N"}
-TEXTURE = ("palette", "texels", "sizes", "offsets")
-# What the paper counts, and what we store; every tensor of a model is in one group.
-COUNTED = {"geometry": GEOMETRY, "shading": ("normals", *MATERIAL), "texture": ("texels",)}
-STORED = {"geometry": GEOMETRY, "shading": ("sh", "colors", "normals", *MATERIAL), "texture": TEXTURE}
-RELEASED = 100  # bytes of a surfel in the files of the authors' release, beside its texels
+TEXTURE_TENSORS = ("palette", "texels", "sizes", "offsets")
+# Tensors that the paper counts, and tensors that we store; each is in one group.
+COUNTED_TENSORS = {"geometry": GEOMETRY, "shading": ("normals", *MATERIAL), "texture": ("texels",)}
+STORED_TENSORS = {
+    "geometry": GEOMETRY,
+    "shading": ("sh", "colors", "normals", *MATERIAL),
+    "texture": TEXTURE_TENSORS,
+}
+RELEASE_BYTES = 100  # bytes of a surfel without texels in files of the authors' release
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +64,7 @@ class Surfels(Splats):
                 raise ArgumentError(f"{name}: expected [{n}] or [1], got {list(given[name].shape)}")
 
     def rasterized(self, camera: Camera, opacity: float | Tensor | None = None, **shown: Any) -> Render:
-        """Rasterize, see `Splats`; normals in the image are those that light sees."""
+        """Rasterize, see `Splats`; the image has the normals used for shading."""
         render = super().rasterized(camera, opacity, **shown)
         if render.normal is None or "normals" not in self.parameters:
             return render
@@ -81,13 +85,13 @@ class Surfels(Splats):
                 group: sum(x.nbytes for x in map(self.parameters.get, names) if x is not None)
                 for group, names in by.items()
             }
-            for by in (COUNTED, STORED)
+            for by in (COUNTED_TENSORS, STORED_TENSORS)
         )
-        return sizes_in_mib(counted, stored, RELEASED * len(self) + counted["texture"])
+        return sizes_in_mib(counted, stored, RELEASE_BYTES * len(self) + counted["texture"])
 
     @property
     def stage(self) -> Literal["surfels", "shading", "texture"]:
-        """The phase that the model has gone through."""
+        """The last phase of the model's fit."""
         if "texels" in self.parameters:
             return "texture"
         return "shading" if "ambient" in self.parameters else "surfels"

@@ -9,12 +9,12 @@ import torch
 from torch import Tensor
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading_as
 from texgs.core.names import is_number
 from texgs.core.tensor_file import read_tensor_file, require_json, write_tensor_file
 from texgs.fields.splats import GEOMETRY
-from texgs.fields.surfels.model import SHAPES, TEXTURE, Surfels
+from texgs.fields.surfels.model import SHAPES, TEXTURE_TENSORS, Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Texture
 from texgs.raster.arguments import check_texture
@@ -22,9 +22,13 @@ from texgs.raster.shading import MATERIAL
 
 FORMAT = "texgs-model"
 VERSION = 1
-SHADED = (*GEOMETRY, "colors", *MATERIAL)
-NEEDED = {"surfels": (*GEOMETRY, "sh"), "shading": SHADED, "texture": (*SHADED, *TEXTURE)}  # by stage
-DTYPES = {"sizes": torch.int32, "offsets": torch.int64}  # all others are float32
+SHADED_TENSORS = (*GEOMETRY, "colors", *MATERIAL)
+STAGE_TENSORS = {
+    "surfels": (*GEOMETRY, "sh"),
+    "shading": SHADED_TENSORS,
+    "texture": (*SHADED_TENSORS, *TEXTURE_TENSORS),
+}  # by stage
+DTYPES = {"sizes": torch.int32, "offsets": torch.int64}  # all other tensors are float32
 
 
 def write_model(path: str | Path, model: Surfels) -> Path:
@@ -45,8 +49,8 @@ def write_model(path: str | Path, model: Surfels) -> Path:
 
 
 def describe(path: str | Path, model: Surfels) -> dict[str, Any]:
-    """Describe a model for the JSON of a file at `path`, and check that its tensors can be written."""
-    with located(path):
+    """Return the JSON description of a model for a file at `path`, and check its tensors."""
+    with errors_at(path):
         _check(model, model.stage)
     optics, metadata = asdict(model.shading), dict(model.metadata)
     description = {"version": VERSION, "stage": model.stage, "optics": optics, "metadata": metadata}
@@ -55,7 +59,7 @@ def describe(path: str | Path, model: Surfels) -> dict[str, Any]:
 
 
 def read_model(path: str | Path) -> Surfels:
-    """Read a model file as `write_model` writes it, bit for bit, to the CPU. Nothing in it is executed.
+    """Read a file of `write_model`, bit for bit, to the CPU. Nothing in it is executed.
 
     Raises:
         ArgumentError, ShapeError: if the file is missing, no safetensors, cut short, of another program or a
@@ -65,8 +69,8 @@ def read_model(path: str | Path) -> Surfels:
 
 
 def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Surfels:
-    """Make a model of the tensors of a file and its description (see `describe`)."""
-    with located(path), reading_as("stage, optics and metadata in the header", "write the file again"):
+    """Make a model from the tensors and the description of a file, see `describe`."""
+    with errors_at(path), reading_as("stage, optics and metadata in the header", "write the file again"):
         stage, shading = str(description["stage"]), _optics(description["optics"])
         model = Surfels(tensors, shading, dict(description["metadata"]))
         _check(model, stage)
@@ -83,11 +87,11 @@ def _optics(stored: dict[str, Any]) -> ShadingModel:
 
 
 def _check(model: Surfels, stage: str) -> None:
-    """Require the tensors of a stage with finite values, of the right type, in a layout that can be drawn."""
+    """Require the tensors of a stage, with finite values, right types and a valid texture layout."""
     given = model.parameters
-    if stage not in NEEDED:
-        raise ArgumentError(f"expected stage {', '.join(NEEDED)}, got {stage!r}")
-    for name in NEEDED[stage]:
+    if stage not in STAGE_TENSORS:
+        raise ArgumentError(f"expected stage {', '.join(STAGE_TENSORS)}, got {stage!r}")
+    for name in STAGE_TENSORS[stage]:
         if name not in given:
             raise ArgumentError(f"expected tensor {name} at stage {stage}, got {', '.join(given)}")
     for name, tensor in given.items():
@@ -97,5 +101,5 @@ def _check(model: Surfels, stage: str) -> None:
             raise ArgumentError(f"{name}: expected {dtype}, got {tensor.dtype}; convert it")
     check.finite(**given)
     if "texels" in given:
-        texels, sizes, offsets = (given[name] for name in TEXTURE[1:])
+        texels, sizes, offsets = (given[name] for name in TEXTURE_TENSORS[1:])
         check_texture(Texture(given["colors"], given["opacities"], texels, sizes, offsets), len(model))

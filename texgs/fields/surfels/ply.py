@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.geometry import quats_to_matrices
 from texgs.core.io import reading
 from texgs.core.memory import require_memory
@@ -18,7 +18,7 @@ from texgs.core.ply_file import read_vertices
 from texgs.core.tensor_file import load_torch
 from texgs.fields.ply_columns import (
     Told,
-    numbered,
+    numbered_columns,
     splat_columns,
     take,
     take_geometry,
@@ -34,14 +34,14 @@ from texgs.raster.arguments import check_texture
 from texgs.raster.shading import Y00
 
 FLAVOURS = ("2dgs", "3dgs", "release")
-FLAT = float(np.float32(math.log(1e-6)))  # third scale of a surfel for viewers of 3D Gaussians
-RELEASE = {  # our name of a factor by the release's, in the order of its files
+FLAT_SCALE = float(np.float32(math.log(1e-6)))  # third scale of a surfel for viewers of 3D Gaussians
+RELEASE = {  # our names of factors by the release's, in the order of its files
     "diffuse_factor": "diffuse",
     "shininess": "shininess",
     "ambient_factor": "ambient",
     "specular_factor": "specular",
 }
-(_, MOST_SPECULAR), (_, MOST_SHININESS) = RANGES["paper"].values()  # of the release
+(_, MOST_SPECULAR), (_, MOST_SHININESS) = RANGES["paper"].values()  # as in the release
 BESIDE = "the release writes it beside the surfels"
 
 
@@ -65,14 +65,14 @@ def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs", told: Tol
     if flavour == "release" and model.stage == "surfels":
         raise ArgumentError(f"{path}: release needs a model with shading, got stage surfels; use 2dgs")
     parameters = {name: x.detach().cpu() for name, x in model.parameters.items()}
-    with located(path):
+    with errors_at(path):
         check.finite(**parameters)
         columns = _columns(Surfels(parameters, model.shading), flavour)
     return write_columns(path, columns, told=told)
 
 
 def read_ply(path: str | Path) -> Surfels:
-    """Read surfels from a PLY file of 2DGS, of the paper's release, or of 3DGS where Gaussians are flat.
+    """Read surfels from a PLY file of 2DGS, of the paper's release, or of 3DGS with flat Gaussians.
 
     Files are told apart by their properties. Those of the release become models of stage shading with
     material "paper" and colours of at least 0, as it clamps them, or of stage texture where textures lie
@@ -81,7 +81,7 @@ def read_ply(path: str | Path) -> Surfels:
     """
     path = Path(path)
     vertices = read_vertices(path)
-    with located(path):
+    with errors_at(path):
         parameters = _geometry(vertices)
         if "ambient_factor" not in (vertices.dtype.names or ()):
             parameters["sh"] = take_harmonics(vertices)
@@ -103,18 +103,18 @@ def _columns(model: Surfels, flavour: str) -> dict[str, Tensor]:
     sh = p["sh"] if model.stage == "surfels" else ((_color(p) - 0.5) / Y00)[:, None]  # [N, K, 3]
     if flavour == "release":
         place = dict(zip("xyz", p["means"].T, strict=True))
-        dark = numbered("f_rest", sh.new_zeros(len(model), 45))  # its loader expects as many
-        shape = numbered("scale", p["scales"]) | numbered("rot", p["quats"])
-        common = {"opacity": p["opacities"]} | numbered("normal", normals) | shape
-        return place | numbered("f_dc", sh[:, 0]) | dark | common | _release_material(model)
+        dark = numbered_columns("f_rest", sh.new_zeros(len(model), 45))  # the release's loader expects them
+        shape = numbered_columns("scale", p["scales"]) | numbered_columns("rot", p["quats"])
+        common = {"opacity": p["opacities"]} | numbered_columns("normal", normals) | shape
+        return place | numbered_columns("f_dc", sh[:, 0]) | dark | common | _release_material(model)
     if flavour == "3dgs":
-        third = torch.full_like(p["opacities"], FLAT)[:, None]
+        third = torch.full_like(p["opacities"], FLAT_SCALE)[:, None]
         p = {**p, "scales": torch.cat([p["scales"], third], dim=1)}
     return splat_columns(p, normals, sh)
 
 
 def _color(p: Mapping[str, Tensor]) -> Tensor:
-    """Return c_ind of each surfel [N, 3]; in float64, so that harmonics of it are rounded once."""
+    """Return c_ind of each surfel [N, 3] in float64, so that harmonics are rounded only once."""
     if "texels" not in p:
         return p["colors"].double()
     return p["colors"].double() + p["palette"].double() + mean_texels(p)
@@ -139,12 +139,12 @@ def _release_material(model: Surfels) -> dict[str, Tensor]:
 
 
 def _geometry(vertices: np.ndarray) -> dict[str, Tensor]:
-    """Take raw geometry, of flat Gaussians too."""
+    """Read raw geometry, also of flat Gaussians."""
     geometry = take_geometry(vertices, 2)
     names = vertices.dtype.names or ()
-    if "scale_2" in names and "ambient_factor" not in names:  # the release has one without meaning
+    if "scale_2" in names and "ambient_factor" not in names:  # the release writes a meaningless one
         third = take(vertices, "scale_2")[:, 0]
-        thick = (third > FLAT) & (third > geometry["scales"].amax(1) - math.log(10))
+        thick = (third > FLAT_SCALE) & (third > geometry["scales"].amax(1) - math.log(10))
         if bool(thick.any()):
             raise ArgumentError(
                 f"expected flat Gaussians, got {int(thick.sum())} of {len(thick)} with a third axis above a "
@@ -154,7 +154,7 @@ def _geometry(vertices: np.ndarray) -> dict[str, Tensor]:
 
 
 def _appearance(vertices: np.ndarray, folder: Path) -> dict[str, Tensor]:
-    """Take colour and material of the release's surfels, and textures where the file has no colour."""
+    """Read colour and material of the release's surfels, and textures if the file has no colour."""
     factors = take(vertices, *RELEASE)
     parameters = {ours: factors[:, k].contiguous() for k, ours in enumerate(RELEASE.values())}
     if "mappings_0" in (vertices.dtype.names or ()):
@@ -184,7 +184,7 @@ def _textures(folder: Path, n: int) -> dict[str, Tensor]:
 
 
 def _transposed(sizes: Tensor, starts: Tensor, offsets: Tensor) -> Tensor:
-    """Find where the release has each of our texels [T]: its neighbours lie along v, ours along u."""
+    """Return the release's index of each of our texels [T]; its neighbours lie along v, ours along u."""
     surfel = torch.repeat_interleave(sizes.prod(1))  # [T]
     k = torch.arange(len(surfel)) - offsets[surfel]
     n_u, n_v = sizes[surfel].unbind(1)
@@ -192,7 +192,7 @@ def _transposed(sizes: Tensor, starts: Tensor, offsets: Tensor) -> Tensor:
 
 
 def _arrays(path: Path) -> tuple[Tensor, Tensor]:
-    """Read texels [T, 3] float32, and of each surfel texels along u, along v and its first [N, 3]."""
+    """Read texels [T, 3] float32, and for each surfel the counts along u and v and the first texel [N, 3]."""
     with reading(path, "texture_dc and texture_dims as npz", BESIDE):
         with zipfile.ZipFile(path) as archive:
             n_bytes = sum(entry.file_size for entry in archive.infolist())
@@ -203,7 +203,7 @@ def _arrays(path: Path) -> tuple[Tensor, Tensor]:
 
 
 def _palette(path: Path) -> Tensor:
-    """Read [3], clamped as the release does when it reads it."""
+    """Read the palette colour [3], clamped as by the release."""
     with reading(path, "a palette as the release saves it, a list of one tensor and a number", BESIDE):
         captured, _ = load_torch(path)
         palette = captured[0].detach()

@@ -1,4 +1,4 @@
-"""How surfels get their colours in a view: the shading model, its material, lights and the viewer."""
+"""The colours of surfels in a view: shading model, material, lights and viewer."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -14,22 +14,22 @@ from texgs.fields.surfels.material import RANGES, require_material
 from texgs.raster import Options, Texture
 from texgs.raster.shading import MATERIAL, Ranges, between, blinn_phong, spherical_harmonics
 
-FAR = 1e4  # world units: a viewer so far away sees all surfels from one direction
-LEAST_SHARE = 1e-6  # share of ambient or of diffuse light, so that its logit is finite
+FAR_DISTANCE = 1e4  # world units; from so far away, all surfels are seen from one direction
+MIN_SHARE = 1e-6  # least share of ambient or diffuse light, to keep its logit finite
 
 
 @dataclass(frozen=True)
 class ShadingModel:
-    """What belongs to a model because it was fitted with it."""
+    """The options of a fit that belong to the model."""
 
-    low_pass: float = 6.0  # of the rasterizer, see texgs.raster.Options
-    material: Literal["bounded", "paper"] = "bounded"  # how raw material becomes factors
-    local_viewer: bool = True  # whether directions to viewer and headlight differ from surfel to surfel
+    low_pass: float = 6.0  # option of the rasterizer, see texgs.raster.Options
+    material: Literal["bounded", "paper"] = "bounded"  # mapping of raw material to factors
+    local_viewer: bool = True  # whether each surfel has its own direction to viewer and headlight
     facing: bool = True  # whether lights shine on the side that faces the viewer, or on both
 
     @property
     def options(self) -> Options:
-        """For the rasterizer."""
+        """Options of the rasterizer."""
         return Options(low_pass=self.low_pass)
 
     def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light) -> Tensor | Texture:
@@ -39,7 +39,7 @@ class ShadingModel:
             return spherical_harmonics(p["sh"], p["means"], camera.position)
         colors = p["colors"] + p["palette"] if "texels" in p else p["colors"]
         raw, ranges = (p[name] for name in MATERIAL), RANGES[self.material]
-        base, gain = self.lit(colors, raw, p, camera, light, ranges)  # clamped, as renderers of volumes do
+        base, gain = self.lit(colors, raw, p, camera, light, ranges)  # clamped, as in volume renderers
         return Texture(base, gain, p["texels"], p["sizes"], p["offsets"]) if "texels" in p else base
 
     def lit(
@@ -55,7 +55,7 @@ class ShadingModel:
 
         A viewer who is not local is far behind the camera. Normals of their own come before those of surfels.
         """
-        viewer = camera.position if self.local_viewer else -FAR * camera.viewmat[2, :3]
+        viewer = camera.position if self.local_viewer else -FAR_DISTANCE * camera.viewmat[2, :3]
         toward = None if light.kind == "headlight" else light.direction(camera).to(camera.viewmat)
         turns = p.get("normals", p["quats"])
         a, d, s, b = factors
@@ -64,7 +64,7 @@ class ShadingModel:
 
 
 def seen_normals(parameters: Mapping[str, Tensor], camera: Camera) -> Tensor:
-    """Return the unit normals [N, 3] that light sees, on the side that faces a camera."""
+    """Return the unit normals [N, 3] for shading, on the side that faces a camera."""
     normals = quats_to_matrices(parameters.get("normals", parameters["quats"]))[..., 2]
     along = (normals * (camera.position - parameters["means"])).sum(dim=1, keepdim=True)
     return torch.where(along < 0, -normals, normals)
@@ -73,7 +73,7 @@ def seen_normals(parameters: Mapping[str, Tensor], camera: Camera) -> Tensor:
 def material(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
     """Return factors k_a, k_d, k_s and beta by name, [N] or [1]; differentiable.
 
-    Those that have a range, see `RANGES`, go through a sigmoid; others are as they are.
+    Factors with a range, see `RANGES`, go through a sigmoid; others are used unchanged.
     """
     ranges = RANGES[kind]
     return {
@@ -95,7 +95,7 @@ def raw_material(
 
 
 def in_full_light(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
-    """Return the same surfels with colours scaled so that k_a + k_d is 1: views stay as they are.
+    """Scale the colours of surfels so that k_a + k_d is 1, without changing any view.
 
     Views cannot tell brighter colours from more light. A colour is then what is seen where light falls
     straight onto a surface, as in a transfer function. Materials without ranges of k_a and k_d stay.
@@ -104,5 +104,5 @@ def in_full_light(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tens
         return dict(parameters)
     factors = material(parameters, kind)
     light = factors["ambient"] + factors["diffuse"]  # [N] or [1]
-    scaled = {name: (factors[name] / light).logit(eps=LEAST_SHARE) for name in ("ambient", "diffuse")}
+    scaled = {name: (factors[name] / light).logit(eps=MIN_SHARE) for name in ("ambient", "diffuse")}
     return {**parameters, **scaled, "colors": parameters["colors"] * light[:, None]}

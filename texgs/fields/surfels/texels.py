@@ -1,4 +1,4 @@
-"""The list of the texels of all surfels: the surfel that each belongs to, and the colours without light."""
+"""The list of the texels of all surfels: their owners, and their colours without light."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -21,7 +21,7 @@ def owners(parameters: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
 
 
 def offsets_of(sizes: Tensor) -> Tensor:
-    """Return the index [N], int64, of each surfel's first texel, textures of sizes [N, 2] being in order."""
+    """Return the index [N], int64, of each surfel's first texel, for ordered textures of sizes [N, 2]."""
     counts = sizes.long().prod(dim=1)
     return counts.cumsum(dim=0) - counts
 
@@ -35,7 +35,7 @@ def mean_texels(parameters: Mapping[str, Tensor]) -> Tensor:
 
 
 def footprint(sizes: Tensor) -> Tensor:
-    """Return the share [T] of each texel in its surfel, in their order, which falls off like the Gaussian."""
+    """Return the Gaussian weight [T] of each texel in its surfel, in order; each surfel's sum to 1."""
     owner = torch.repeat_interleave(sizes.long().prod(dim=1))  # [T]
     place = torch.arange(len(owner), device=owner.device) - offsets_of(sizes)[owner]
     columns, rows = sizes.long().unbind(dim=1)
@@ -46,7 +46,7 @@ def footprint(sizes: Tensor) -> Tensor:
     return gaussian / total[owner]
 
 
-def untextured(model: Surfels, surfels: Tensor | None = None) -> Surfels:
+def with_single_texels(model: Surfels, surfels: Tensor | None = None) -> Surfels:
     """Return the model with one texel, the mean under its Gaussian, for some surfels [N] bool, or for all."""
     p = model.parameters
     place, surfel = owners(p)
@@ -57,8 +57,8 @@ def untextured(model: Surfels, surfels: Tensor | None = None) -> Surfels:
     return with_first_texels(replace(model, parameters={**p, "texels": texels}), whole)
 
 
-def spread(colors: Tensor, plain: Surfels, model: Surfels) -> Tensor:
-    """Return colours of a model's texels [T, 3], in their places, from one colour for each surfel.
+def spread_colors(colors: Tensor, plain: Surfels, model: Surfels) -> Tensor:
+    """Spread one colour per surfel over a model's texels [T, 3], in their places.
 
     Colours are in places of the texels of the plain model: the same surfels, of which the first texel counts.
     """
@@ -67,8 +67,8 @@ def spread(colors: Tensor, plain: Surfels, model: Surfels) -> Tensor:
     return texels.index_copy_(0, place, colors[plain.parameters["offsets"][surfel]])
 
 
-def lean(field: Field) -> Field:
-    """Give surfels whose texels are all the same one: they look as before. Other fields stay as they are."""
+def reduce_constant_textures(field: Field) -> Field:
+    """Reduce constant textures to one texel, without changing the look. Other fields stay unchanged."""
     if not isinstance(field, Surfels) or field.stage != "texture":
         return field
     place, surfel = owners(field.parameters)
@@ -79,7 +79,7 @@ def lean(field: Field) -> Field:
 
 
 def with_first_texels(model: Surfels, whole: Tensor) -> Surfels:
-    """Leave the first texel alone to surfels that are not whole [N] bool; textures come in their order."""
+    """Keep only the first texel of surfels outside the mask `whole` [N]; textures come in order."""
     p = model.parameters
     place, surfel = owners(p)
     kept = whole[surfel]
@@ -98,7 +98,7 @@ def bare_colors(model: Surfels) -> Tensor:
     return p["palette"] + offsets + p["texels"]
 
 
-def recolored(model: Surfels, colors: Tensor, surfels: Tensor | None = None) -> Surfels:
+def with_colors(model: Surfels, colors: Tensor, surfels: Tensor | None = None) -> Surfels:
     """Return the model with other colours without light: offsets are their means, texels the differences.
 
     Highlights are added to the colour of a surfel and clamped before its texels are: the mean has to be in

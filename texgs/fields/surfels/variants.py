@@ -1,4 +1,4 @@
-"""Variants of a model's texture, such as a style: their files, and segments that have one of their own."""
+"""Variants of a model's texture, such as a style: their files, and segments with their own variant."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError, located
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.tensor_file import read_tensor_file, write_tensor_file
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import owners
@@ -22,9 +22,9 @@ LAYOUT = {"texels": (3, torch.float32), "sizes": (2, torch.int32), "colors": (3,
 def write_texture(path: str | Path, model: Surfels, metadata: Mapping[str, Any] | None = None) -> Path:
     """Write texels, in the order of their surfels, and colours of a model, in one step.
 
-    Sizes of the textures tell which model they are of.
+    The sizes of the textures identify the model.
 
-    Metadata are JSON, such as what the style is.
+    Metadata are JSON, such as the name of the style.
     """
     if model.stage != "texture":
         raise ArgumentError(f"{path}: expected a model of stage texture, got {model.stage}")
@@ -35,10 +35,10 @@ def write_texture(path: str | Path, model: Surfels, metadata: Mapping[str, Any] 
 
 
 def with_texture(model: Surfels, path: str | Path) -> Surfels:
-    """Return the model with the texels and colours of a file, which may have no colours."""
+    """Return the model with the texels of a file, and its colours if it has any."""
     _, texture = read_tensor_file(Path(path), FORMAT, VERSION)
     p = model.parameters
-    with located(path):
+    with errors_at(path):
         _require_texels(texture)
         if model.stage != "texture" or not torch.equal(texture["sizes"], p["sizes"].cpu()):
             raise ArgumentError(
@@ -54,7 +54,7 @@ def with_texture(model: Surfels, path: str | Path) -> Surfels:
 
 
 def _require_texels(texture: Mapping[str, Tensor]) -> None:
-    """Require texels and sizes, of the right type, that fit each other; colours only where there are some."""
+    """Require texels and sizes that match, of the right types; colours are optional."""
     given = {name: (*x.shape[1:], x.dtype) for name, x in texture.items()}
     are_known = {"colors": (3, torch.float32), **given} == LAYOUT
     if not are_known or len(texture["texels"]) != int(texture["sizes"].long().prod(1).sum()):
@@ -62,7 +62,7 @@ def _require_texels(texture: Mapping[str, Tensor]) -> None:
 
 
 def labels_of(masks: Sequence[Tensor], n: int) -> Tensor:
-    """Return the number of each surfel's segment [N], int64, counted from 1; 0 where no segment holds it.
+    """Return the number of each surfel's segment [N], int64, counted from 1; 0 outside all segments.
 
     A surfel that several masks hold belongs to the first: later segments get what earlier ones left.
     """

@@ -9,10 +9,10 @@ def run(measured: MeasuredScene) -> dict[str, Any]:
     """Score views with CLIP, or say why not."""
     from texgs.core.progress import progress
     from texgs.models.clip import Clip, clip_scores
-    from texgs.models.weights import unusable
+    from texgs.models.weights import missing_advice
 
     if measured.weights[measured.clip] is None:
-        return {"clip_missing": unusable(measured.clip)}
+        return {"clip_missing": missing_advice(measured.clip)}
     if not all(measured.captions):
         return {"clip_missing": "the edit has no captions"}
     clip = Clip.load(measured.clip, measured.shown.device)

@@ -1,4 +1,4 @@
-"""Metric `consistency`: how alike views are where they see the same, near and far along the test path."""
+"""Metric `consistency`: agreement of views on their common part, near and far along the test path."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def run(measured: MeasuredScene) -> Pairs:
-    """Compare views with those nearby and farther along the path, as they look with the scene's light.
+    """Compare views with others near and far along the path, under the scene's light.
 
     Fields that have light in their colours can be compared with others so. Nothing is measured where no two
     views see the same, as of a scene that is nowhere opaque.
@@ -23,7 +23,7 @@ def run(measured: MeasuredScene) -> Pairs:
 
 
 class Pairs:
-    """Views of a scene and those later on the path, warped into them by the depth of its geometry."""
+    """Compares views of a scene with later ones on the path, warped by the depth of its geometry."""
 
     def __init__(self, measured: MeasuredScene) -> None:
         from texgs.fields.files import kind_of
@@ -48,11 +48,11 @@ class Pairs:
         return SeenFrame(shown.color.clamp(0, 1), getattr(surface, self.depth), surface.alpha, camera)
 
     def see(self, view: SeenView) -> None:
-        """Compare a view with those on the path that are `SHORT` and `LONG` views later."""
-        from texgs.metrics.consistency import LONG, SHORT, difference
+        """Compare a view with the views `SHORT_RANGE` and `LONG_RANGE` later on the path."""
+        from texgs.metrics.consistency import LONG_RANGE, SHORT_RANGE, difference
 
         distance = partial(self.lpips.changed, view.layers) if self.lpips else None
-        for name, apart in (("short", SHORT), ("long", LONG)):
+        for name, apart in (("short", SHORT_RANGE), ("long", LONG_RANGE)):
             if view.place + apart < len(self.measured.cameras):
                 first, second = self.frame(view.place), self.frame(view.place + apart)
                 compared = difference(first, second, distance)
@@ -68,7 +68,7 @@ class Pairs:
 
 
 def without_hidden(geometry: Scene, scene: Scene) -> Scene:
-    """Return the models of the geometry but those that the scene hides; all where it hides everything."""
+    """Return the geometry without hidden models, or all of it if everything is hidden."""
     hidden = {name for name, model in scene.models.items() if not model.edit.visible}
     shown = {name: model for name, model in geometry.models.items() if name not in hidden}
     return replace(geometry, models=shown or geometry.models)

@@ -1,4 +1,4 @@
-"""Metric `frame_times`: how long frames of the edited scene take."""
+"""Metric `frame_times`: rendering times of the edited scene."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from texgs.core.camera import Camera
 
 WARM_UP_FRAMES = 3
-TIMED_FRAMES = 8  # spread over the path: their mean is within 2 % of that of all
+TIMED_FRAMES = 8  # spread over the path; their mean is within 2 % of the mean of all
 
 
 def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], title: str) -> list[float]:
-    """Measure the milliseconds of each frame after some that are not counted."""
+    """Measure the milliseconds of each frame after some warm-up frames."""
     import torch
 
     from texgs.core.progress import progress
@@ -35,7 +35,7 @@ def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], 
 
 
 def run(measured: MeasuredScene) -> dict[str, float]:
-    """Render frames that are spread over the test path."""
+    """Render frames spread over the test path."""
     from texgs.volume.cameras import spread
 
     scene, composition = measured.after, measured.shown

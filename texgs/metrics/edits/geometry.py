@@ -1,4 +1,4 @@
-"""Metric `geometry`: whether an edit has left the geometry as it was."""
+"""Metric `geometry`: whether an edit left the geometry unchanged."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def run(measured: MeasuredScene) -> dict[str, bool]:
-    """Compare the stored geometry of all models; factors on opacities and hidden parts do not count."""
+    """Compare the stored geometry of all models; opacity factors and hidden parts do not count."""
     from torch import equal
 
     before, after = map(geometry, measured.scenes)
@@ -22,7 +22,7 @@ def run(measured: MeasuredScene) -> dict[str, bool]:
 
 
 def geometry(scene: Scene) -> dict[tuple[str, str], Tensor]:
-    """Return the tensors of the geometry of all models, by the names of the model and of the tensor."""
+    """Return the geometry tensors of all models, by model and tensor name."""
     opened = {name: model.open()[0] for name, model in scene.models.items()}
     return {(name, key): x for name, field in opened.items() for key, x in field.tensors("geometry").items()}
 

@@ -1,6 +1,6 @@
-"""Metric `retrieval`: how far framed views are from each picture of texgs, with colours and by the pattern.
+"""Metric `retrieval`: distances of framed views from each picture of texgs, by colours and by pattern.
 
-From these distances tables tell the place of the picture that a look follows, see `places_among`.
+From these distances tables compute the rank of the picture that a look follows, see `places_among`.
 """
 
 from collections import Counter
@@ -11,19 +11,19 @@ from texgs.metrics.metric import Measure, MeasuredScene, Metric
 
 
 def run(measured: MeasuredScene) -> dict[str, Any]:
-    """Measure distances of the scene as it is shown; nothing without weights, or where it shows nothing."""
-    from texgs.metrics.retrieval import known, scene_likeness
+    """Measure distances of the visible scene; nothing without weights or visible parts."""
+    from texgs.metrics.retrieval import scene_likeness, style_likeness
     from texgs.models.pictures import PICTURES
 
     seen = measured.vgg and scene_likeness(measured.after, measured.shown, measured.vgg)
     if not seen:
         return {}
-    far = seen.distances(known(measured.shown.device))
+    far = seen.distances(style_likeness(measured.shown.device))
     return {f"far_by_{kind}": dict(zip(PICTURES, each.tolist(), strict=True)) for kind, each in far.items()}
 
 
 def places_among(looks: Sequence[tuple[str, Mapping[str, Any]]]) -> list[dict[str, int]]:
-    """Return the place of the picture that each look of a scene follows, 1 for the nearest, by measures.
+    """Return the rank of the picture that each look of a scene follows, 1 for the nearest, by measure.
 
     A picture that is near to all looks says little about one, so the mean over the looks is taken from the
     distances to it. It takes two looks at least, that were compared with the same pictures. Pictures

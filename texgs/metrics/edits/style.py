@@ -1,4 +1,4 @@
-"""Metric `style`: how far views that an edit was not learned from are from the picture that it follows."""
+"""Metric `style`: the distance of held-out views from the picture that an edit follows."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
     from texgs.metrics.style import StyleTarget
     from texgs.scene.scene import Scene
 
-QUERIES = 250  # features of a view that are searched for: more say the same
+QUERIES = 250  # features of a view to match; more give the same result
 
 
 def run(measured: MeasuredScene) -> Distances | dict[str, float]:
     """Measure NNFM and Gram distances of all, or of the models with a picture each, means over them.
 
-    Nothing is measured of looks that follow words or several pictures, or where a model is nowhere opaque.
+    Nothing is measured for looks that follow words or several pictures, or if a model is nowhere opaque.
     """
     return Distances(measured) if measured.styles and measured.vgg else {}
 
 
 class Distances:
-    """Distances of views to pictures."""
+    """Measures distances of views to pictures."""
 
     def __init__(self, measured: MeasuredScene) -> None:
         self.measured = measured
@@ -36,7 +36,7 @@ class Distances:
         self.distances: list[list[tuple[float, float]]] = [[] for _ in self.targets]
 
     def target(self, style: Style) -> StyleTarget:
-        """Return what views are compared with: of a picture its region, or all where that is all thin."""
+        """Return the features of a picture's region, or of all of it if the region is too thin."""
         import torch
 
         from texgs.metrics.style import StyleTarget
@@ -48,7 +48,7 @@ class Distances:
         return StyleTarget.of(rows)
 
     def features(self, image: Tensor, share: Tensor) -> Tensor:
-        """Return the features [n, C] that styles are compared by, of what has a share [H, W] of an image."""
+        """Return the features [n, C] of the part of an image with a share [H, W]."""
         from texgs.metrics.style import on_object
         from texgs.models.vgg import STYLE_LAYERS
 
@@ -57,13 +57,13 @@ class Distances:
         return on_object([layer[0] for layer in layers], share.to(image.device))
 
     def see(self, view: SeenView) -> None:
-        """Compare a view; VGG-16 runs again for each model that follows a picture of its own."""
+        """Measure a view; VGG-16 runs again for each model with its own picture."""
         for style, target, pairs in zip(self.measured.styles, self.targets, self.distances, strict=True):
             rows = self.seen(view, style)
             pairs += [target.distances(rows, QUERIES, view.place)] if len(rows) else []
 
     def seen(self, view: SeenView, style: Style) -> Tensor:
-        """Return the features [n, C] of what follows a picture."""
+        """Return the features [n, C] of the part that follows a picture."""
         from texgs.metrics.style import on_object
         from texgs.models.vgg import STYLE_LAYERS
 
@@ -73,15 +73,15 @@ class Distances:
         shown = opened.render(self.measured.cameras[view.place], alone.light, alone.edits)
         return self.features(shown.color.clamp(0, 1).permute(2, 0, 1), shown.alpha)
 
-    @cache  # noqa: B019, for the few models of a scene, as long as it is measured
+    @cache  # noqa: B019, only for the few models of a scene
     def alone(self, name: str) -> tuple[Scene, Composed]:
-        """Return the scene of one model, and the same opened."""
+        """Return the scene of one model, and its composition."""
         scene = self.measured.after
         scene = replace(scene, models={name: scene.models[name]})
         return scene, scene.open(self.measured.shown.device)
 
     def values(self) -> dict[str, float]:
-        """Return the means over views and pictures; nothing where one is seen in no view."""
+        """Return the means over views and pictures; nothing if a picture's part is in no view."""
         if not all(self.distances):
             return {}
         means = [map(fmean, zip(*pairs, strict=True)) for pairs in self.distances]

@@ -1,4 +1,4 @@
-"""The offline counterpart of a diffusion model: a guidance made of procedural filters."""
+"""The offline counterpart of a diffusion model: a guidance of procedural filters."""
 
 from collections.abc import Callable
 from functools import partial

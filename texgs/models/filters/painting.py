@@ -20,7 +20,7 @@ PAPER = (0.97, 0.96, 0.92)
 INK = (0.07, 0.07, 0.10)
 GRAPHITE = (0.20, 0.20, 0.23)
 HATCHES = ((0.62, 0.55, 0.56), (-0.66, 0.52, 0.54), (0.10, 0.95, -0.30))  # directions across the lines
-STEEP = 0.4  # sine between surface and hatch below which its lines would be bands
+STEEP_SINE = 0.4  # least sine between surface and hatch; below it, lines widen into bands
 GOLD = ((0.30, 0.16, 0.03), (0.93, 0.66, 0.20), (1.00, 0.92, 0.60))  # dark, middle, light
 SILVER = ((0.22, 0.23, 0.26), (0.70, 0.72, 0.75), (0.97, 0.98, 1.00))
 COPPER = ((0.25, 0.09, 0.05), (0.80, 0.42, 0.25), (1.00, 0.80, 0.65))
@@ -53,7 +53,7 @@ def hatching(surface: Surface) -> Tensor:
         gap = (phase - phase.floor() - 0.5).abs() / sine  # distance along the surface to the line's middle
         dark = ((0.88 - 0.24 * layer - surface.tone) / 0.3).clamp(0, 1)
         line = surface.ramp((gap - (0.10 + 0.20 * dark)) / 1.6) * (0.35 + 0.65 * dark) * (dark > 0)
-        ink = torch.maximum(ink, line * ((sine - STEEP) / 0.15).clamp(0, 1))
+        ink = torch.maximum(ink, line * ((sine - STEEP_SINE) / 0.15).clamp(0, 1))
     return _mix(PAPER, GRAPHITE, ink * (0.55 + 0.75 * grain).clamp(0, 1))
 
 
@@ -107,7 +107,7 @@ def watercolour(surface: Surface) -> Tensor:
     points = surface.points
     pool = fractal_noise(points * 0.30, 0, octaves=3)
     level = 5.0 * pool
-    rim = torch.exp(-((torch.remainder(level, 1.0) - 0.08) / 0.07).square())  # where a wash has dried last
+    rim = torch.exp(-((torch.remainder(level, 1.0) - 0.08) / 0.07).square())  # where a wash dried last
     grain = value_noise(points * 4.5, 9)
     density = 0.30 * (level.floor() - 1).clamp_min(0) + 0.45 * rim + 0.25 * (grain - 0.5)
     density = (density + 0.35 * (1 - surface.shade)).clamp(0.03, 1.3)
@@ -134,7 +134,7 @@ def cartoon(surface: Surface) -> Tensor:
 
 
 def _saturated(colors: Tensor, factor: float) -> Tensor:
-    """Return colours [P, 3] farther from the grey of their luminance."""
+    """Saturate colours [P, 3]."""
     from kornia.enhance import adjust_saturation_with_gray_subtraction
 
     saturated: Tensor = adjust_saturation_with_gray_subtraction(colors.T[..., None], factor)[..., 0].T
@@ -209,7 +209,7 @@ def mosaic(surface: Surface) -> Tensor:
 
 
 def tint(surface: Surface, color: tuple[float, float, float]) -> Tensor:
-    """Return one colour [P, 3], as much lighter or darker as the scene was than its mean."""
+    """Return one colour [P, 3] with the relative brightness of the scene."""
     luma = luminance(surface.color)
     ratio = (luma / luma.mean().clamp_min(1e-3))[:, None]
     wanted = _color(surface, color)

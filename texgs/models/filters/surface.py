@@ -1,4 +1,4 @@
-"""What a filter paints on, pixels as points on surfaces, and noise in space.
+"""The canvas of filters: pixels as points on surfaces, and noise in space.
 
 Noise comes without tables: the same point has the same value in every view and on every device.
 """
@@ -14,10 +14,10 @@ from torch import Tensor
 from texgs.models.guidance import EditViews
 
 CELLS = 26.0  # patterns along the longest side of the scene
-KEY_LIGHT = (-0.45, 0.75, 0.48)  # direction of the light that a drawing's tone is made by, fixed in the world
-SOLID_ALPHA = 0.02  # alpha from which a pixel shows enough of the scene to be painted
+KEY_LIGHT = (-0.45, 0.75, 0.48)  # direction of the light for the tone of drawings, fixed in the world
+SOLID_ALPHA = 0.02  # least alpha of a pixel to paint
 WHITE_QUANTILE = 0.95  # quantile of luminance that counts as white
-MOST_SORTED_PIXELS = 2**24  # pixels whose quantile torch takes; of more, some count
+MAX_SORTED_PIXELS = 2**24  # largest input of torch.quantile; larger images are sampled
 PRIMES = (73856093, 19349663, 83492791)  # of the usual hash of cells (Teschner et al. 2003)
 
 
@@ -47,7 +47,7 @@ def surface_of(views: EditViews) -> tuple[Surface, Tensor]:
     unit = _side(points) / CELLS
     shade = 0.5 + 0.5 * (normals @ normals.new_tensor(KEY_LIGHT))
     luma = luminance(color)
-    some = luma[:: 1 + len(luma) // MOST_SORTED_PIXELS]
+    some = luma[:: 1 + len(luma) // MAX_SORTED_PIXELS]
     white = some.quantile(WHITE_QUANTILE).clamp_min(1e-3) if len(some) else luma.new_ones(())
     tone = shade * (luma / white).clamp(0, 1)
     pixel = _pixel(views, points) / unit
@@ -63,7 +63,7 @@ def luminance(colors: Tensor) -> Tensor:
 
 
 def _side(points: Tensor) -> float:
-    """Return about the longest side of what is seen, world units: a power of sqrt 2, stable over views."""
+    """Return the approximate longest side of the visible scene, world units; a power of sqrt 2, so stable."""
     side = float((points.amax(dim=0) - points.amin(dim=0)).max()) if len(points) else 1.0
     return float(2 ** (round(2 * log2(max(side, 1e-6))) / 2))
 
@@ -77,13 +77,13 @@ def _pixel(views: EditViews, points: Tensor) -> float:
 
 
 def cell_keys(cells: Tensor) -> Tensor:
-    """Return numbers [...] int32 that tell integer cells [..., 3] int32 apart, for `cell_hash`."""
+    """Return keys [...] int32 of integer cells [..., 3] int32, for `cell_hash`."""
     x, y, z = (cells[..., axis] * prime for axis, prime in enumerate(PRIMES))
     return x ^ y ^ z
 
 
 def cell_hash(keys: Tensor, seed: int) -> Tensor:
-    """Return uniform numbers [...] in [0, 1) of the keys [...] of cells, as if random."""
+    """Hash keys [...] of cells to pseudo-random uniform numbers [...] in [0, 1)."""
     h = keys ^ ((seed * 2654435761 + 2**31) % 2**32 - 2**31)
     for shift, factor in ((16, 0x7FEB352D), (15, 0x846CA68B - 2**32)):  # a finaliser that mixes all 32 bits
         h = (h ^ _shifted(h, shift)) * factor
@@ -91,7 +91,7 @@ def cell_hash(keys: Tensor, seed: int) -> Tensor:
 
 
 def _shifted(bits: Tensor, count: int) -> Tensor:
-    """Return 32 bits moved to the right, with zeros in front."""
+    """Shift 32 bits to the right, filling with zeros."""
     return (bits >> count) & (2 ** (32 - count) - 1)
 
 

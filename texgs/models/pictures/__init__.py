@@ -1,4 +1,4 @@
-"""Style pictures of texgs, files beside this one: own work, in which nobody else has a right.
+"""Style pictures of texgs, files beside this one: own work, without rights of others.
 
 `python -m tools.style_likeness` describes them for the metric `retrieval`. Most were computed: git has the
 program, `tools/style_pictures.py`, at e0f84421.
@@ -39,7 +39,7 @@ SIZE = 512  # pixels of each side of a file
 
 def picture(name: str, size: int = SIZE) -> Tensor:
     """Read one of `PICTURES`, square and resized: [3, size, size] in [0, 1]."""
-    import torch  # not at the top: a plan of edits asks for the names only
+    import torch  # slow; a plan of edits needs only the names
 
     if name not in PICTURES:
         raise ArgumentError(f"picture: expected one of {', '.join(PICTURES)}, got {name!r}")

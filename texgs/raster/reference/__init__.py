@@ -1,4 +1,4 @@
-"""The rasterizer and the losses as definitions in plain torch, readable and slow."""
+"""Reference definitions of the rasterizer and the losses in plain torch, readable and slow."""
 
 from texgs.raster.reference.render import rasterize, splat
 

@@ -1,4 +1,4 @@
-"""What the definitions of surfels and of 3D Gaussians have in common."""
+"""Common parts of the definitions of surfels and 3D Gaussians."""
 
 import math
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ class Fragments:
 
 
 def depth_order(depth: Tensor, opacities: Tensor, options: Options) -> Tensor:
-    """Return the indices [M] of what a view keeps of N, front to back; equal depths keep their order."""
+    """Return the indices [M] of the kept among N primitives, front to back; the sort is stable."""
     kept = (depth > options.near) & (opacities >= options.alpha_min)
     order = torch.argsort(depth, stable=True)
     return order[kept[order]]
@@ -35,7 +35,7 @@ def alpha_of(opacity: Tensor, rho: Tensor, options: Options) -> Tensor:
 
 
 def within(fragments: Fragments, depth_range: Tensor | None) -> Fragments:
-    """Return fragments without alpha where they are outside of depth ranges [2, H, W], if any."""
+    """Set alpha to 0 for fragments outside of the depth ranges [2, H, W], if any."""
     if depth_range is None:
         return fragments
     near, far = depth_range.flatten(1)[..., None]  # [P, 1] each

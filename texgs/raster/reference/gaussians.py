@@ -1,7 +1,7 @@
 """The definition of 3D Gaussians (Kerbl et al. 2023, 3DGS): ellipses on screen by EWA splatting.
 
-The perspective projection is replaced by its derivative at the mean (Zwicker et al. 2002): what is seen of a
-Gaussian is a Gaussian in the image, with the depth of its mean everywhere.
+The perspective projection is linearised at the mean (Zwicker et al. 2002): a Gaussian projects to a Gaussian
+in the image, with the depth of its mean everywhere.
 """
 
 import math
@@ -14,8 +14,8 @@ from texgs.core.geometry import quats_to_matrices
 from texgs.raster.reference.fragments import Fragments, alpha_of, depth_order, half_extents, largest_rho
 from texgs.raster.types import Options
 
-MARGIN = 0.3  # of half the field of view, beyond which the derivative is taken at its edge
-LEAST_RATIO = 2.5e-5  # of squared areas without and with the dilation, as in 3DGS: bounds its gradient
+MARGIN = 0.3  # share of half the field of view; farther outside, the derivative is taken at the edge
+MIN_RATIO = 2.5e-5  # of squared areas without and with the dilation; bounds the gradient, as in 3DGS
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def project(
     dilated = covariance + options.dilation * torch.eye(2).to(covariance)
     opacity = opacities[index]
     if options.antialiased:
-        opacity = opacity * (area(covariance) / area(dilated)).clamp(min=LEAST_RATIO).sqrt()
+        opacity = opacity * (area(covariance) / area(dilated)).clamp(min=MIN_RATIO).sqrt()
     centre = (mean @ K.T)[:, :2] / mean[:, 2:]
     if shift is not None:
         centre = centre + shift[index]
@@ -65,8 +65,8 @@ def area(covariance: Tensor) -> Tensor:
 def derivative(mean: Tensor, K: Tensor, size: tuple[int, int]) -> Tensor:
     """Return the derivative [N, 2, 3] of the pixel by the camera point, at points [N, 3].
 
-    Far outside of the view it grows without bound; there it is taken at the edge of a field of view that is
-    wider by MARGIN, as in 3DGS.
+    Far outside of the view it grows without bound. There it is taken at the edge of a field of view wider by
+    MARGIN, as in 3DGS.
     """
     focal, principal = K.diagonal()[:2], K[:2, 2]
     extent = torch.tensor(size).to(K)

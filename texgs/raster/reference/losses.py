@@ -16,7 +16,7 @@ def similarities(image: Tensor, target: Tensor) -> Tensor:
 
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:
-    """Return their mean."""
+    """Return the mean structural similarity of [H, W, C] images."""
     return similarities(image, target).mean()
 
 

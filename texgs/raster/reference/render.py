@@ -24,7 +24,7 @@ from texgs.raster.types import (
     check_primitive,
 )
 
-TEXTURE_SIGMA = 3.0  # a texture spans so many standard deviations to either side of the mean
+TEXTURE_SIGMA = 3.0  # standard deviations that a texture spans to either side of the mean
 
 
 def rasterize(
@@ -96,7 +96,7 @@ def splat(
 
 
 def kind_of(scales: Tensor) -> ModuleType:
-    """Return the module that defines what is drawn: `project`, `intersect` and `visible_radii`."""
+    """Return the module with `project`, `intersect` and `visible_radii` of the primitive."""
     return gaussians if are_gaussians(scales) else surfels
 
 
@@ -157,7 +157,7 @@ def expected_depth(weights: Tensor, depth: Tensor) -> Tensor:
 
 
 def median_depth(weights: Tensor, light: Tensor, depth: Tensor) -> Tensor:
-    """Return camera z [P] of the last fragment that more than half of the light reaches; 0 where none is."""
+    """Return camera z [P] of the last fragment that more than half of the light reaches, or 0."""
     candidates = (weights > 0) & (light > 0.5)  # [P, M]
     position = torch.arange(1, depth.shape[1] + 1, device=depth.device)
     last = torch.cat([position.new_zeros(len(depth), 1), candidates * position], 1).amax(1)  # 0: none
@@ -173,7 +173,7 @@ def distortion(weights: Tensor, depth: Tensor, options: Options) -> Tensor:
 
 
 def statistics(weights: Tensor, radii: Tensor, index: Tensor, n: int) -> Statistics:
-    """Return contribution of each of n primitives, from weights [P, M] and radii [M] of those at `index`."""
+    """Return the contribution of each of n primitives, given weights [P, M] and radii [M] at `index`."""
     weights = weights.detach()
     # the padding serves images without pixels
     highest = torch.nn.functional.pad(weights, (0, 0, 0, 1)).amax(0)
@@ -182,7 +182,7 @@ def statistics(weights: Tensor, radii: Tensor, index: Tensor, n: int) -> Statist
 
 
 def scatter(values: Tensor, index: Tensor, n: int) -> Tensor:
-    """Return the values of what was kept at their places among all n; 0 elsewhere."""
+    """Scatter the values of kept primitives to their places among all n; 0 elsewhere."""
     return values.new_zeros(n, *values.shape[1:]).index_copy(0, index, values)
 
 

@@ -1,4 +1,4 @@
-"""The definition of surfels (Huang et al. 2024): how their planes map to pixels, and where rays meet them."""
+"""The definition of surfels (Huang et al. 2024): projection of their planes, and intersection with rays."""
 
 import math
 from dataclasses import dataclass

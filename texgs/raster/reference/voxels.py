@@ -51,7 +51,7 @@ def render_rays(
 
 
 def crossing(origin: Tensor, direction: Tensor, high: Tensor, step: float) -> tuple[Tensor, Tensor]:
-    """Return where rays enter the box from 0 to `high`, and how many samples they have in it, [N] each."""
+    """Return where rays enter the box from 0 to `high`, and the number of samples inside, [N] each."""
     faces = torch.stack([-origin / direction, (high - origin) / direction])  # [2, N, 3]
     near = faces.amin(0).amax(1).clamp_min(0)
     far = faces.amax(0).amin(1)

@@ -29,7 +29,7 @@ def work(settings: OfEdit, inputs: dict[str, Path], output: Path) -> Outcome:
     It reads `scene`, and for each model `views.MODEL`, the transforms_train.json of its views.
     """
     from texgs.core.check import torch_device
-    from texgs.edit.task import Task, edited_by
+    from texgs.edit.task import Task, run_method
     from texgs.report.before_after import write_before_and_after, write_convergence
     from texgs.scene.scene_file import read_scene, write_scene
 
@@ -49,7 +49,7 @@ def work(settings: OfEdit, inputs: dict[str, Path], output: Path) -> Outcome:
         settings.followed,
     )
     start = time.monotonic()
-    edited = edited_by(method, task)
+    edited = run_method(method, task)
     seconds = time.monotonic() - start  # of all methods alike: with what they read and write
     write_scene(output / SCENE, edited.scene)
     result = EditResult(

@@ -56,13 +56,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     from texgs.core.check import torch_device
     from texgs.core.figures import write_grid
-    from texgs.report.gallery import GalleryRenderer, rendered
+    from texgs.report.gallery import GalleryRenderer, render_rows
 
     scenes = {name: path for name, path in inputs.items() if name != "volume"}
     device, shown, captions = torch_device(settings.fit.device), [], {}
     renderer = GalleryRenderer(scenes, settings.views.fov_y, settings.size, device)
     for grid in settings.grids:
-        taken = rendered(grid, renderer, f"{settings.dataset}: {grid.name}")
+        taken = render_rows(grid, renderer, f"{settings.dataset}: {grid.name}")
         shown += [
             Shown(grid.name, row, column, each.psnr)
             for row, line in taken.items()

@@ -47,7 +47,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     from texgs.core.check import torch_device
     from texgs.fields.files import open_field
-    from texgs.metrics.surface import compare, sample, seen
+    from texgs.metrics.surface import are_visible, compare, sample
     from texgs.report.mesh_figure import write_mesh_figure
     from texgs.scene.mesh import fuse, write_mesh
     from texgs.volume.framing import smallest_ball
@@ -65,7 +65,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     write_mesh(output / "reference.ply", reference)
     points, whole = sample(mesh, MEASURED), sample(reference, MEASURED)
     small = [smaller(camera, max(1, camera.width // VISIBLE)) for camera in cameras]
-    visible = seen(whole, small, 2 * keys.voxel)
+    visible = are_visible(whole, small, 2 * keys.voxel)
     errors = compare(points, whole[visible], keys.tolerance)
     title = f"{settings.dataset}/{settings.tf}, recipe {settings.fit.name}: {len(mesh.triangles):,} triangles"
     lens = smallest_ball(reference.vertices).lens(settings.fov_y)

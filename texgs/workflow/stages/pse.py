@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from texgs.core.progress import progress
 from texgs.fields.kinds import kinds
-from texgs.report.results import BELOW, COMPARED, Comparison, PseResult
+from texgs.report.results import BELOW_WORDS, COMPARED_VIEWS, PseResult, ViewComparison
 from texgs.workflow.inputs import has_scene, scene_and_volume
 from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfScene
@@ -38,10 +38,10 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     scene = read_scene(inputs["scene"])
     device = torch_device(settings.fit.device)
     composition, twin = scene.open(device), None if scene.volume is None else Twin(scene, device)
-    cameras = orbit_path(COMPARED, POLAR, settings.views.lens(scene.frame))
+    cameras = orbit_path(COMPARED_VIEWS, POLAR, settings.views.lens(scene.frame))
     can = kinds()[settings.fit.field].can
     groups = {"pse": chain(scene, composition.palettes, can), "relight": light_sweep(scene)}
-    done: dict[str, list[Comparison]] = {group: [] for group in groups}
+    done: dict[str, list[ViewComparison]] = {group: [] for group in groups}
     for group, scenes in groups.items():
         rows: dict[str, list[np.ndarray]] = {}
         steps = progress(scenes.items(), len(scenes), title=f"{settings.dataset}: {group}", unit="edit")
@@ -52,12 +52,15 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
             for name, image in shown.items():
                 rows.setdefault(name, []).append(image)
         write_grid(output / f"{group}.png", rows, [caption(entry) for entry in done[group]])
-    captions, checked = {name: words + (BELOW if twin else ".") for name, words in PICTURES.items()}, None
+    captions, checked = (
+        {name: words + (BELOW_WORDS if twin else ".") for name, words in PICTURES.items()},
+        None,
+    )
     if twin is not None:
         words = CHECKED, settings.fit.seed, output / "check.json"
         checked = check(scene, composition, twin, settings.views.lens(scene.frame), *words)
         captions["check.png"] = f"{checked.sentence} The worst of {CHECKED}."
-    return Outcome(PseResult(COMPARED, done["pse"], done["relight"], checked), captions)
+    return Outcome(PseResult(COMPARED_VIEWS, done["pse"], done["relight"], checked), captions)
 
 
 STAGE = Stage(

@@ -11,7 +11,7 @@ from texgs.core.memory import MIB
 from texgs.core.names import SCENE
 from texgs.core.progress import progress
 from texgs.fields.kinds import kinds
-from texgs.report.results import BELOW, COMPARED, StepsResult
+from texgs.report.results import BELOW_WORDS, COMPARED_VIEWS, StepsResult
 from texgs.volume.settings import VolumeKeys
 from texgs.workflow.inputs import has_scene, is_series, scene_and_volume, without
 from texgs.workflow.locate import series_files
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import torch
 
     from texgs.core.lens import Lens
-    from texgs.report.results import Comparison
+    from texgs.report.results import ViewComparison
     from texgs.scene.scene import Scene
 
 STEP = "step."  # before the numbers of files among inputs
@@ -62,13 +62,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     write_grid(output / "steps.png", rows, [caption(entry) for entry in measures])
     write_film(output / "time.mp4", scene, settings, device)
     size = sum(scene.timeline.model(name, 0).stat().st_size for name in scene.models) / MIB
-    result = StepsResult(steps, COMPARED, size, measures, seconds / (steps - 1) if is_whole else None)
-    return Outcome(result, {"steps.png": SHOWN + BELOW})
+    result = StepsResult(steps, COMPARED_VIEWS, size, measures, seconds / (steps - 1) if is_whole else None)
+    return Outcome(result, {"steps.png": SHOWN + BELOW_WORDS})
 
 
 def measured(
     scene: Scene, lens: Lens, device: torch.device, title: str
-) -> tuple[list[Comparison], dict[str, list[np.ndarray]]]:
+) -> tuple[list[ViewComparison], dict[str, list[np.ndarray]]]:
     """Return how close steps are to their volumes, and some pictures of them in rows."""
     import numpy as np
 
@@ -79,7 +79,7 @@ def measured(
     names = scene.timeline.steps
     spread = np.linspace(0, len(names) - 1, max(MEASURED, len(names) // EVERY + 1))
     listed = sorted(set(spread.round().astype(int).tolist()))
-    cameras, measures, rows = orbit_path(COMPARED, POLAR, lens), [], dict[str, list[np.ndarray]]()
+    cameras, measures, rows = orbit_path(COMPARED_VIEWS, POLAR, lens), [], dict[str, list[np.ndarray]]()
     for step in progress(listed, len(listed), title=title, unit="step"):
         shown = scene.at(step)
         entry, pictures = compare_views(names[step], shown, shown.open(device), Twin(shown, device), cameras)
@@ -116,7 +116,7 @@ STAGE = Stage(
         (SCENE, "steps.png"),
         target="scenes",
         gpu=("fit",),
-        shown={"steps.png": SHOWN + BELOW},
+        shown={"steps.png": SHOWN + BELOW_WORDS},
     ),
     inputs=inputs,
     work=work,
