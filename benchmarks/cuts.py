@@ -25,7 +25,7 @@ from texgs.scene.cut_view import FACE_ALPHA, cut_view, face_alpha, slab_view
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene
 from texgs.scene.twin import Twin, range_of
-from texgs.workflow.stage import made
+from texgs.workflow.stage import result_file
 
 SIZE, COUNT, SEED = 400, 20, 0  # pixels of either side, shots, and seed of these
 FACING, DEEPEST = 55.0, 0.6  # most degrees from normal to camera; most radii from a plane to the centre
@@ -44,7 +44,7 @@ def measured(dataset: str) -> pd.DataFrame:
     """Return the numbers of a data set by cases and ways."""
     words = (f"dataset={dataset}", "fit=quick", f"views.width={SIZE}", f"views.height={SIZE}")
     texgs(["compose", *words])
-    scene = read_scene(made("compose", compose(words)))
+    scene = read_scene(result_file("compose", compose(words)))
     composed, twin = scene.open(), Twin(scene)
     edited = list(chain(scene, composed.palettes, ("palette", "relight")).values())[-1]
     cases = {"a plane": (scene, 1), "three planes": (scene, 3), "a plane, edited": (edited, 1)}

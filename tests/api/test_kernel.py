@@ -8,7 +8,7 @@ import pytest
 from jupyter_client.manager import start_new_kernel
 
 from texgs.core.cache import sha256
-from texgs.workflow.result import FILES, recorded
+from texgs.workflow.result import FILES, file_checksums
 
 SECONDS = 300  # of a cell, on a machine that has much else to do
 BEFORE = """
@@ -63,7 +63,7 @@ def whole(folder):
     """The names of all results of jobs, whose files are as their checksums say."""
     results = [path.parent for path in folder.rglob(FILES) if not path.parent.name.endswith(".work")]
     for result in results:
-        assert all(sha256(result / name) == known for name, known in recorded(result).items())
+        assert all(sha256(result / name) == known for name, known in file_checksums(result).items())
     return {result.name for result in results}
 
 

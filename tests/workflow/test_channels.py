@@ -18,7 +18,7 @@ from texgs.volume.view_set import read_views
 from texgs.workflow.checks import check_basic_tfs
 from texgs.workflow.execution import ensure
 from texgs.workflow.job import settings_digest
-from texgs.workflow.stage import made
+from texgs.workflow.stage import result_file
 from texgs.workflow.stage_table import STAGES, jobs
 
 SHELL = {"opacity": [[30.0, 0.0], [80.0, 0.5], [99.0, 0.5]], "color": [[30.0, 0.1, 0.2, 0.9]]}
@@ -63,7 +63,7 @@ def run(stage, config):
 
 def views_of(config, tf):
     run("views", replace(config, tf=tf))
-    return read_views(made("views", config, tf=tf).parent)
+    return read_views(result_file("views", config, tf=tf).parent)
 
 
 def test_views_of_a_function_are_those_of_a_data_set_of_its_channel(both, image, tmp_path):
@@ -99,7 +99,7 @@ def test_the_volume_is_prepared_once_for_all_functions_and_again_for_other_chann
 
 def test_metrics_and_summary_tell_of_all_channels(both):
     run("transfer", both)
-    folder = made("volume", both).parent
+    folder = result_file("volume", both).parent
     summary, metrics = read_json(folder / "volume.json"), read_json(folder / "metrics.json")["numbers"]
     assert list(summary["channels"]) == ["DAPI", "1"]
     assert metrics["maximum"] == max(each["maximum"] for each in summary["channels"].values())

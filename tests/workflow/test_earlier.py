@@ -10,7 +10,7 @@ import pytest
 from texgs.core.cache import Checksums
 from texgs.core.io import write_json
 from texgs.workflow import result
-from texgs.workflow.graph import Graph, earlier
+from texgs.workflow.graph import Graph, earlier_results
 
 VIEWS, FIT, EDIT = (
     Path("results/engine", name) for name in ("TF01/views", "TF01/quick/texture", "edits/gold")
@@ -43,7 +43,7 @@ def results(tmp_path, monkeypatch):
 
 def shown(jobs):
     """Folders of the results that tables show beside those of some jobs, and those that they do not."""
-    files, outdated = earlier("results", Graph(jobs, {"": list(jobs)}), Checksums())
+    files, outdated = earlier_results("results", Graph(jobs, {"": list(jobs)}), Checksums())
     return {str(Path(file).parent) for file in files}, {entry.what for entry in outdated}
 
 
@@ -52,14 +52,14 @@ def test_whole_results_of_other_runs_are_shown():
     assert shown(job(FIT, {"settings": "a"}, VIEWS) | job(VIEWS, {"settings": "v"})) == ({str(EDIT)}, set())
     (EDIT / "model.safetensors").write_text("damaged")
     assert shown({}) == ({str(VIEWS), str(FIT)}, {str(EDIT)})
-    (entry,) = earlier("results", Graph(), Checksums())[1]
+    (entry,) = earlier_results("results", Graph(), Checksums())[1]
     assert entry.why == "model.safetensors is damaged or missing; run its job again"
 
 
 def test_an_edit_of_a_fit_that_has_been_made_anew_is_left_out_and_told():
     make(FIT, {"settings": "b"})
     assert shown({}) == ({str(VIEWS), str(FIT)}, {str(EDIT)})
-    (entry,) = earlier("results", Graph(), Checksums())[1]
+    (entry,) = earlier_results("results", Graph(), Checksums())[1]
     assert entry.why == f"comes from {FIT}, which has been made anew since; run its job again"
 
 
@@ -70,7 +70,7 @@ def test_what_comes_from_it_is_left_out_however_far():
     assert shown({}) == ({str(VIEWS), str(FIT), str(EDIT)}, set())
     make(VIEWS, {"settings": "w"}, "views")
     assert shown({}) == ({str(VIEWS)}, {str(FIT), str(EDIT)})
-    assert {entry.why.partition(",")[0] for entry in earlier("results", Graph(), Checksums())[1]} == {
+    assert {entry.why.partition(",")[0] for entry in earlier_results("results", Graph(), Checksums())[1]} == {
         f"comes from {VIEWS}"
     }
 
@@ -94,13 +94,13 @@ def test_a_copy_is_of_its_own_results():
     """Whatever becomes of those that it was copied from."""
     shutil.copytree("results", "kept")
     make(FIT, {"settings": "b"})
-    assert not earlier("kept", Graph(), Checksums())[1]
+    assert not earlier_results("kept", Graph(), Checksums())[1]
     copies = [Path("kept", *folder.parts[1:]) for folder in (FIT, EDIT)]
     make(copies[0], {"settings": "b"})
-    assert [entry.what for entry in earlier("kept", Graph(), Checksums())[1]] == [str(copies[1])]
+    assert [entry.what for entry in earlier_results("kept", Graph(), Checksums())[1]] == [str(copies[1])]
 
 
 def test_a_result_of_a_stage_that_is_gone_is_left_out_and_told():
     make(Path("results/engine/projection"), {"settings": "p"}, "projection")
-    (entry,) = earlier("results", Graph(), Checksums())[1]
+    (entry,) = earlier_results("results", Graph(), Checksums())[1]
     assert entry.why == "is of the stage projection, which is not there any more; remove the folder"

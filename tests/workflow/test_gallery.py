@@ -10,7 +10,7 @@ from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
 from texgs.workflow.stage_table import STAGES
-from texgs.workflow.sweep import changes
+from texgs.workflow.sweep import variant_words
 
 GALLERY = STAGES["gallery"]
 ENGINE = ("dataset=engine", "fit=quick")
@@ -187,7 +187,7 @@ def test_every_experiment_with_a_gallery_is_named_like_it_and_shows_scenes_of_it
     (tmp_path / "vortex" / "TF01" / "transforms_train.json").write_text("{}")
     words = (f"experiment={experiment}", f"dataset={dataset}", f"data_folder={tmp_path}")
     config = compose(words)
-    variant = next(iter(changes(config)), "")
+    variant = next(iter(variant_words(config)), "")
     config = compose((*words, f"variant={variant}", *(f"fit={name}" for name in config.fits[:1])))
     assert config.gallery.name == experiment
     assert GALLERY.applies(config)

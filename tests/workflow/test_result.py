@@ -45,11 +45,11 @@ def test_a_result_is_complete_with_all_its_files_as_they_were(output):
     assert [path.name for path in output.parent.iterdir()] == ["views"]
     (output / "train" / "r.png").write_text("One")
     assert not result.is_complete(output, Checksums())
-    assert result.damaged(output, None) == ["train/r.png"]
+    assert result.damaged_files(output, None) == ["train/r.png"]
     (output / "train" / "r.png").write_text("one")
     assert result.is_complete(output, Checksums())
     (output / "train" / "r.png").unlink()
-    assert result.damaged(output, None) == ["train/r.png"]
+    assert result.damaged_files(output, None) == ["train/r.png"]
 
 
 @pytest.mark.parametrize("damage", [None, "[1]", '{"train/r.p'])
@@ -58,7 +58,7 @@ def test_a_result_whose_list_of_files_cannot_be_read_is_not_replaced(output, dam
     (output / "notes.txt").write_text("mine")
     (output / result.FILES).unlink() if damage is None else (output / result.FILES).write_text(damage)
     assert not result.is_complete(output, Checksums())
-    assert result.recorded(output) == {}
+    assert result.file_checksums(output) == {}
     for identity in (MINE, OTHER):
         refused(
             lambda identity=identity: result.claim(output, identity), r"views/\.files\.json: cannot be read"
@@ -69,10 +69,10 @@ def test_a_result_whose_list_of_files_cannot_be_read_is_not_replaced(output, dam
 def test_a_damaged_stamp_is_of_no_job(output):
     make(output)
     (output / result.STAMP).write_text('{"stage": "vie')
-    assert result.stamped(output) is None
+    assert result.stamp_of(output) is None
     make(output, content="two")
     assert result.is_complete(output, Checksums())
-    assert result.stamped(output) == MINE
+    assert result.stamp_of(output) == MINE
 
 
 def test_the_result_before_stays_until_there_is_a_better_one(output):
@@ -83,7 +83,7 @@ def test_the_result_before_stays_until_there_is_a_better_one(output):
     assert files(output) == before
     make(output, OTHER, "two")
     assert (output / "train" / "r.png").read_text() == "two"
-    assert result.stamped(output) == OTHER
+    assert result.stamp_of(output) == OTHER
 
 
 def test_an_interrupted_run_goes_on_and_that_of_another_job_does_not(output):
@@ -156,7 +156,7 @@ def test_files_that_the_user_puts_there_while_the_job_works_are_not_lost(output)
     (output / "mine.yaml").rename(output.with_name("mine.yaml"))
     assert result.claim(output, OTHER) == work
     result.publish(output)
-    assert result.stamped(output) == OTHER
+    assert result.stamp_of(output) == OTHER
 
 
 def test_a_folder_of_others_or_a_link_is_refused(output):

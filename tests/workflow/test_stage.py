@@ -10,7 +10,7 @@ from texgs.core.errors import ConfigError
 from texgs.core.keys import typed
 from texgs.workflow.job import settings_digest, settings_file
 from texgs.workflow.locate import source_file, tf_names, views_folder
-from texgs.workflow.stage import plain
+from texgs.workflow.stage import plain_values
 from texgs.workflow.stage_table import STAGES
 
 TF = ("dataset=turbulence", "tf=TF01")
@@ -134,4 +134,4 @@ def test_all_settings_have_a_field_of_their_dataclass(name):
     settings = STAGES[name].settings(compose(WORDS.get(name, ("dataset=turbulence",))))
     if STAGES[name].place in ("edit", "edit_metrics"):
         settings["weights"] = {"vgg16": "0123", "lpips_vgg": None}
-    assert is_part(settings, plain(typed(STAGES[name].schema, settings)))
+    assert is_part(settings, plain_values(typed(STAGES[name].schema, settings)))

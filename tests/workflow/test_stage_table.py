@@ -13,7 +13,7 @@ from texgs.core.errors import ConfigError
 from texgs.report.results import Result
 from texgs.workflow import stage_table
 from texgs.workflow.execution import require_outcome
-from texgs.workflow.stage import Outcome, Rule, read, selected
+from texgs.workflow.stage import Outcome, Rule, read, values_read
 from texgs.workflow.stage_table import STAGES, by_name, require_stage
 
 TOYS = Path(__file__).parent  # a folder without results
@@ -65,7 +65,7 @@ def rule(**changes):
         (lambda: among_all(**rule(folder="{dataset}/transfer")), "folder .* {dataset}/transfer twice"),
         (lambda: replace(STAGE, work=Untyped.bare).schema, "stage projection: work: .* got none"),
         (lambda: replace(STAGE, work=Untyped.number).schema, "stage projection: work: .* got int"),
-        (lambda: selected(Misspelt, compose(())), r"Misspelt\.width: .* 'widths'"),
+        (lambda: values_read(Misspelt, compose(())), r"Misspelt\.width: .* 'widths'"),
         (lambda: type("Misplaced", (Result,), {}, section="datas"), "Misplaced: section"),
         (lambda: require_outcome(STAGE, None, TOYS), "stage projection: work: .* got NoneType"),
         (lambda: require_outcome(STAGE, Outcome(Plain(1)), TOYS), "work: .* got Plain"),

@@ -11,7 +11,7 @@ from texgs.core.errors import ConfigError
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.stage import edit_folder, fit_folder
 from texgs.workflow.stage_table import STAGES
-from texgs.workflow.sweep import as_sweep, swept, variants
+from texgs.workflow.sweep import as_sweep, swept_values, variants
 
 SEEDS = "expected seeds of a sweep in sweep.seeds"
 OVERRIDES = "expected overrides of views, fit, device or edit"
@@ -123,8 +123,8 @@ def test_a_sweep_is_named_after_its_keys_and_other_words_stay():
 
 def test_swept_values_are_told_in_full():
     words = as_sweep(("views.train.frequency=2,3", "fit.seed=0,1", "dataset=engine"))
-    assert swept(variants_of(words)[1].config) == {"views.train.frequency": "2", "fit.seed": "1"}
-    assert swept(compose(("fit.seed=3",))) == {}
+    assert swept_values(variants_of(words)[1].config) == {"views.train.frequency": "2", "fit.seed": "1"}
+    assert swept_values(compose(("fit.seed=3",))) == {}
 
 
 @pytest.mark.parametrize(

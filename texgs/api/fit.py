@@ -117,13 +117,13 @@ def compose_in(
 ) -> Path:
     """Run the stages up to the scene with results in a folder; return the scene's file."""
     from texgs.workflow.execution import Task, ensure
-    from texgs.workflow.stage import made
+    from texgs.workflow.stage import result_file
     from texgs.workflow.stage_table import STAGES, jobs
 
     config = configuration(volume, functions, words, folder)
     known = {stage.output(each): Task(stage, each) for stage, each in jobs(config)}
     ensure(STAGES["compose"], config, known, tell=lambda line: None, warn=warnings.warn)
-    return made("compose", config)
+    return result_file("compose", config)
 
 
 def configuration(

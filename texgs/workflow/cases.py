@@ -24,7 +24,7 @@ from texgs.workflow.edits import edits_of
 from texgs.workflow.stage import edit_folder
 from texgs.workflow.stage_table import STAGES
 from texgs.workflow.stand_ins import Choice, Lacking, check_stand_ins, chosen_data_set, chosen_edit
-from texgs.workflow.sweep import changes, is_of_edits, variants
+from texgs.workflow.sweep import is_of_edits, variant_words, variants
 
 OF_A_UNION = ("experiments", "common_overrides", "per_dataset", "on_missing")  # keys that a union may set
 NO_SWEEPS = ("sweeps={}", "sweeps=null", "sweep=none")  # how users switch sweeps off
@@ -71,7 +71,10 @@ class Cases:
         config = case.config
         check_lists(config)
         self.note_lists(case, config)
-        listed, aimed = named(case) or config.datasets, merged(self.unsaid(config.per_dataset), aimed)
+        listed, aimed = (
+            named_data_sets(case) or config.datasets,
+            merge_words(self.unsaid(config.per_dataset), aimed),
+        )
 
         def of(name: str) -> Case:
             return case.but(f"dataset={name}", *aimed.get(name, ()))
@@ -138,7 +141,7 @@ class Cases:
         config = case.unedited.config
         if not self.takes(config, f"data set {config.dataset.name}"):
             return
-        cases = self.by_sweep[config.sweep.name if changes(config) else ""]
+        cases = self.by_sweep[config.sweep.name if variant_words(config) else ""]
         edited = [(each, *self.possible_edits(each, is_one_of_several)) for each in variants(case)]
         if len({len(edits) for _, edits, _ in edited}) > 1:
             return  # some variants alone compare nothing, and a gallery shows all
@@ -183,12 +186,12 @@ def cases_of(words: Words, lacking: Lacking) -> Cases:
     Raises:
         ConfigError: naming the word or the key of an experiment that is wrong.
     """
-    case, aimed = apart(words)
-    config, wanted = case.config, named(case)
+    case, aimed = split_aimed(words)
+    config, wanted = case.config, named_data_sets(case)
     skips = config.on_missing == "skip" and (not wanted or case.says("on_missing") is not None)
     cases, names = Cases(case, lacking, skips), set[str]()
     of_union = cases.unsaid(config.per_dataset) if config.experiments else {}
-    per_dataset = merged(of_union, aimed)
+    per_dataset = merge_words(of_union, aimed)
     for experiment in experiments_of(case):
         names |= cases.add_experiment(experiment, wanted, per_dataset)
     if not names:
@@ -202,7 +205,7 @@ def cases_of(words: Words, lacking: Lacking) -> Cases:
     return cases
 
 
-def apart(words: Words) -> tuple[Case, WordsOf]:
+def split_aimed(words: Words) -> tuple[Case, WordsOf]:
     """Return the words for all data sets as a case, and the words for single data sets."""
     known = {*members("dataset")} - {each.name for each in fields(Dataset)}
     shared: list[str] = []
@@ -238,7 +241,7 @@ def experiments_of(case: Case) -> list[Case]:
     return experiments
 
 
-def named(case: Case) -> list[str]:
+def named_data_sets(case: Case) -> list[str]:
     """Return the data sets that the words name."""
     if case.says("datasets") is not None:
         return case.config.datasets
@@ -246,7 +249,7 @@ def named(case: Case) -> list[str]:
     return [] if name is None else [name]
 
 
-def merged(first: Mapping[str, Sequence[str]], then: Mapping[str, Sequence[str]]) -> WordsOf:
+def merge_words(first: Mapping[str, Sequence[str]], then: Mapping[str, Sequence[str]]) -> WordsOf:
     """Return words for single data sets, where the second ones win."""
     known = members("dataset")
     if unknown := [name for name in first if name not in known]:

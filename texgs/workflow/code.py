@@ -25,7 +25,7 @@ NATIVE = "texgs.raster.native"  # the module that calls the native library
 READS_DATA = b"importlib.resources"  # in modules that do
 DATA = (".css", ".csv", ".html", ".j2", ".js", ".safetensors", ".tex", ".webp", ".yaml")
 CACHE = "sources.json"  # in the cache folder
-MOST = 3000  # sources in it
+MAX_SOURCES = 3000  # sources in it
 
 
 class Sources:
@@ -43,7 +43,7 @@ class Sources:
         """Return the digest of what counts of a source, then the names that it imports from texgs."""
         if not self._known:
             kept = recall(cache_folder() / CACHE, self._key)
-            self._known = kept if isinstance(kept, dict) and len(kept) < MOST else {}
+            self._known = kept if isinstance(kept, dict) and len(kept) < MAX_SOURCES else {}
             self._kept = len(self._known)
         found = hashlib.sha256(source).hexdigest()
         if found not in self._known:

@@ -21,7 +21,7 @@ from texgs.volume.settings import cached_volume
 from texgs.workflow import result, tracked
 from texgs.workflow.job import Job, settings_file
 from texgs.workflow.locate import source_file
-from texgs.workflow.missing import needed, require_same
+from texgs.workflow.missing import require_same, weights_needed
 from texgs.workflow.provenance import record
 from texgs.workflow.runs import run
 from texgs.workflow.stage import Outcome, Stage
@@ -70,7 +70,9 @@ def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
     identity = job.identity()
     inputs = job.inputs.items()
     made_from = {
-        name: relpath(path, job.output) for name, path in inputs if path.name in result.recorded(path.parent)
+        name: relpath(path, job.output)
+        for name, path in inputs
+        if path.name in result.file_checksums(path.parent)
     }
     work = result.claim(job.output, identity, is_fresh=is_fresh)
     with run(
@@ -174,7 +176,7 @@ def perform(
     checksums, config = Checksums.load(), task.config
     job = task.job(checksums)
     if task.stage.place == "edit" and (force or not job.is_done()):
-        for name in needed(config.edit):
+        for name in weights_needed(config.edit):
             locate(name)
         job = task.job(checksums)  # with what was downloaded
     if job.replaces_other():

@@ -14,8 +14,8 @@ from texgs.core.names import close
 from texgs.edit.method import NO_METHOD, method_of
 from texgs.workflow.edits import chain_of
 from texgs.workflow.inputs import prepared_volume, sibling, with_recipe
-from texgs.workflow.stage import edit_folder, fit_folder, made
-from texgs.workflow.sweep import changes
+from texgs.workflow.stage import edit_folder, fit_folder, result_file
+from texgs.workflow.sweep import variant_words
 
 FRONT, SIDE, ABOVE = [-90.0, 20.0], [0.0, 20.0], [-130.0, 50.0]  # azimuth, polar angle of cameras, degrees
 
@@ -47,7 +47,7 @@ def gallery_of(config: Config) -> list[tuple[Grid, dict[str, Path]]]:
     for name in names:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name) or names.count(name) > 1:
             raise ConfigError(f"gallery.grids: expected different names of files, got {name!r}")
-    return [filled(config, grid) for grid in grids]
+    return [fill_grid(config, grid) for grid in grids]
 
 
 def all_looks(config: Config) -> GridKeys:
@@ -67,7 +67,7 @@ def all_looks(config: Config) -> GridKeys:
     return GridKeys("gallery", words, rows, columns)
 
 
-def filled(config: Config, grid: GridKeys) -> tuple[Grid, dict[str, Path]]:
+def fill_grid(config: Config, grid: GridKeys) -> tuple[Grid, dict[str, Path]]:
     """Return a grid with its pictures, and the files of their scenes by name."""
     where, files = f"gallery.grids.{grid.name}", dict[str, Path]()
     titles = [row.title for row in grid.rows]
@@ -75,7 +75,7 @@ def filled(config: Config, grid: GridKeys) -> tuple[Grid, dict[str, Path]]:
         raise ConfigError(f"{where}: expected rows with different titles, got {repeated[0]!r} twice")
     has_volume = config.dataset.views_folder is None
     cells = [
-        [cell_of(config, together(row, column, has_volume), where) for column in grid.columns]
+        [cell_of(config, combine_shots(row, column, has_volume), where) for column in grid.columns]
         for row in grid.rows
     ]
     kept = [number for number in range(len(grid.columns)) if any(row[number][0].show for row in cells)]
@@ -90,7 +90,7 @@ def filled(config: Config, grid: GridKeys) -> tuple[Grid, dict[str, Path]]:
     return Grid(grid.name, caption, [grid.columns[number].title for number in kept], rows), files
 
 
-def together(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys:
+def combine_shots(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys:
     """Return what a row and a column say of the place that they share, with defaults for the rest."""
     said = {each.name: getattr(column, each.name) or getattr(row, each.name) for each in fields(ShotKeys)}
     show = said["show"] or "scene"
@@ -117,7 +117,7 @@ def cell_of(config: Config, shot: ShotKeys, where: str) -> tuple[GalleryCell, Pa
     is_plain = edit == NO_EDIT
     scene = f"{fit_folder(of_fit)}/{NO_EDIT if is_plain else edit_folder(of_fit, edit)}"
     said = {each.name: getattr(shot, each.name) for each in fields(GalleryCell)[1:]}
-    return GalleryCell(scene, **said), made("compose", of_fit) if is_plain else sibling(of_fit, edit)
+    return GalleryCell(scene, **said), result_file("compose", of_fit) if is_plain else sibling(of_fit, edit)
 
 
 def is_inside(box: list[float]) -> bool:
@@ -137,7 +137,7 @@ def fit_of(config: Config, shot: ShotKeys, where: str) -> Config:
         raise ConfigError(f"{where}.fit: {shot.edit} does not work on {shot.fit}; choose another recipe")
     if not able:
         raise ConfigError(f"{where}.edit: {shot.edit} works on none of {', '.join(recipes)}; add a recipe")
-    variants = list(changes(config))
+    variants = list(variant_words(config))
     variant = shot.variant or (variants[0] if len(variants) == 1 else "")
     if variant not in (variants or [""]):
         expected = f"one of {', '.join(variants)}" if variants else "none without a sweep"

@@ -19,7 +19,7 @@ from texgs.workflow.cases import Cases, LeftOut, cases_of
 from texgs.workflow.checks import check_basic_tfs, check_edit, check_fit
 from texgs.workflow.job import Job
 from texgs.workflow.missing import lacking, missing_weights
-from texgs.workflow.result import damaged, fingerprint, is_complete, stamped
+from texgs.workflow.result import damaged_files, fingerprint, is_complete, stamp_of
 from texgs.workflow.stage_table import STAGES
 from texgs.workflow.stage_table import jobs as jobs_of
 
@@ -59,7 +59,7 @@ class Graph:
             job = self.run[folder]
             self._replaced[folder] = (
                 not all(path.exists() for path in job.inputs.values())
-                or stamped(job.output) != job.identity()
+                or stamp_of(job.output) != job.identity()
                 or any(self.is_replaced(path.parent.as_posix()) for path in job.inputs.values())
             )
         return self._replaced[folder]
@@ -109,7 +109,7 @@ def graph_of(words: Words, checksums: Checksums) -> tuple[Cases, Graph]:
     return cases, graph
 
 
-def earlier(
+def earlier_results(
     results: str, of_run: Graph, checksums: Checksums
 ) -> tuple[dict[str, str], dict[LeftOut, list[str]]]:
     """Return the whole results of earlier runs, which tables and the report show beside those of a run.
@@ -127,7 +127,7 @@ def earlier(
                 continue
             why = f"is of the stage {facts['stage']}, which is not there any more; remove the folder"
             outdated[LeftOut(folder, why)] = []
-        elif lost := damaged(Path(folder), checksums):
+        elif lost := damaged_files(Path(folder), checksums):
             outdated[LeftOut(folder, f"{lost[0]} is damaged or missing; run its job again")] = []
 
     @cache
@@ -154,7 +154,7 @@ def earlier(
 
 def current_records(results: str | Path) -> tuple[list[Record[Any]], list[metrics_files.LeftOut]]:
     """Read the whole results below a folder that come from what is there now, and what is left out."""
-    files, outdated = earlier(str(results), Graph(), Checksums.load())
+    files, outdated = earlier_results(str(results), Graph(), Checksums.load())
     records, old = read_known(files)
     left_out = [metrics_files.LeftOut(each.what, each.why, places) for each, places in outdated.items()]
     return records, [*left_out, *old]

@@ -12,8 +12,8 @@ from texgs.core.errors import ConfigError, MissingDataError
 from texgs.edit.method import NO_METHOD
 from texgs.fitting.kinds import fit_specs
 from texgs.workflow.locate import require_volume, tf_names, views_folder
-from texgs.workflow.stage import edit_folder, folder_of, made, plain
-from texgs.workflow.sweep import changes, fit_variant
+from texgs.workflow.stage import edit_folder, folder_of, plain_values, result_file
+from texgs.workflow.sweep import fit_variant, variant_words
 
 MODEL = "model."  # before the names of models among inputs
 
@@ -46,7 +46,7 @@ def is_series(config: Config) -> bool:
 
 def is_swept(config: Config) -> bool:
     """Return whether the configuration is of a sweep."""
-    return bool(changes(config))
+    return bool(variant_words(config))
 
 
 def is_first_recipe(config: Config) -> bool:
@@ -57,13 +57,15 @@ def is_first_recipe(config: Config) -> bool:
 def prepared_volume(config: Config) -> dict[str, Path]:
     """Return what stage `volume` writes."""
     require_volume(config.dataset)
-    return {"volume": made("volume", config)}
+    return {"volume": result_file("volume", config)}
 
 
 def view_set(config: Config, tf: str | None = None) -> dict[str, Path]:
     """Return the views: those that stage `views` renders, or those that the data set consists of."""
     given = views_folder(config, tf)
-    return {"views": made("views", config, tf=tf) if given is None else given / "transforms_train.json"}
+    return {
+        "views": result_file("views", config, tf=tf) if given is None else given / "transforms_train.json"
+    }
 
 
 def start_of_fit(config: Config) -> dict[str, Path]:
@@ -77,7 +79,7 @@ def start_of_fit(config: Config) -> dict[str, Path]:
 
 def model_of(stage: str) -> Callable[[Config], dict[str, Path]]:
     """Return the model that a stage of the fit writes, and the views, as a function."""
-    return lambda config: {"model": made("phase", config, stage), **view_set(config)}
+    return lambda config: {"model": result_file("phase", config, stage), **view_set(config)}
 
 
 def start_of_shading(config: Config) -> dict[str, Path]:
@@ -96,7 +98,7 @@ def models_of_scene(config: Config) -> dict[str, Path]:
     if config.tf is not None:
         raise ConfigError(f"tf: a scene has all basic TFs of its data set; leave out tf={config.tf}")
     phase = last_phase(config)
-    return {f"{MODEL}{name}": made("phase", config, phase, name) for name in tf_names(config)}
+    return {f"{MODEL}{name}": result_file("phase", config, phase, name) for name in tf_names(config)}
 
 
 def models_and_volume(config: Config) -> dict[str, Path]:
@@ -107,12 +109,12 @@ def models_and_volume(config: Config) -> dict[str, Path]:
 
 def fitted_scene(config: Config) -> Path:
     """Return the scene.yaml before any edit, of all steps where the data set is a series."""
-    return made("steps" if is_series(config) else "compose", config)
+    return result_file("steps" if is_series(config) else "compose", config)
 
 
 def scene_and_volume(config: Config) -> dict[str, Path]:
     """Return the scene with all that it names."""
-    return {"scene": made("compose", config), **models_and_volume(config)}
+    return {"scene": result_file("compose", config), **models_and_volume(config)}
 
 
 def scene_before(config: Config) -> Path:
@@ -129,7 +131,7 @@ def scene_before(config: Config) -> Path:
 
 def sibling(config: Config, name: str) -> Path:
     """Return the scene.yaml that another edit of the same fit writes."""
-    return folder_of("edit", config).with_name(edit_folder(config, name)) / made("edit", config).name
+    return folder_of("edit", config).with_name(edit_folder(config, name)) / result_file("edit", config).name
 
 
 def shown_tfs(config: Config) -> dict[str, Any]:
@@ -166,7 +168,7 @@ def view_settings(config: Config) -> dict[str, Any]:
 
 def without(table: Any, *names: str) -> dict[str, Any]:
     """Return a table of the configuration without some of its keys."""
-    return {name: value for name, value in plain(table).items() if name not in names}
+    return {name: value for name, value in plain_values(table).items() if name not in names}
 
 
 def with_recipe(config: Config, name: str) -> Config:

@@ -17,7 +17,7 @@ from texgs.core.names import METRICS
 from texgs.workflow import result
 from texgs.workflow.missing import weights_of
 from texgs.workflow.stage import Stage
-from texgs.workflow.sweep import swept
+from texgs.workflow.sweep import swept_values
 
 LISTED_KEYS = 3  # of settings, in a message
 
@@ -43,7 +43,7 @@ class Job:
         settings, weights = stage.settings(config), weights_of(stage, config, checksums)
         named = {} if weights is None else {"weights": weights}
         files, by_hand = (stage.inputs(config), stage.output(config)), command(stage, config, words)
-        return cls(stage, {**settings, **named}, *files, checksums, swept(config), by_hand)
+        return cls(stage, {**settings, **named}, *files, checksums, swept_values(config), by_hand)
 
     def identity(self) -> dict[str, Any]:
         """Return what the job's result depends on: settings, code and the contents of input files."""
@@ -56,14 +56,14 @@ class Job:
 
     def replaces_other(self) -> bool:
         """Return whether the folder holds a result of other settings, which the job would replace."""
-        known = result.stamped(self.output) or {}
+        known = result.stamp_of(self.output) or {}
         return (self.output / METRICS).exists() and known.get("settings") != settings_digest(self.settings)
 
     def require_same_settings(self, results: str) -> None:
         """Require that the job replaces no result of other settings, whatever weights that had."""
         if not self.replaces_other():
             return
-        known = result.stamped(self.output) or {}
+        known = result.stamp_of(self.output) or {}
         there = read_settings(Path(results, ".conf", f"{known.get('stage')}-{known.get('settings')}.yaml"))
         keys = difference(there, self.settings)
         if there and not keys:
@@ -80,7 +80,7 @@ class Job:
         if not result.is_complete(self.output, self.checksums):
             return False
         return all(path.exists() for path in self.inputs.values()) and (
-            result.stamped(self.output) == self.identity()
+            result.stamp_of(self.output) == self.identity()
         )
 
 

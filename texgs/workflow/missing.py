@@ -11,7 +11,7 @@ from texgs.models import weights
 from texgs.workflow.stage import Stage
 from texgs.workflow.stage_table import jobs
 
-SHOWN = 12  # digits of checksums in settings
+CHECKSUM_DIGITS = 12  # digits of checksums in settings
 
 
 def lacking(config: Config) -> list[str]:
@@ -32,12 +32,12 @@ def missing_weights(config: Config) -> list[str]:
     """Return what is said of weights that an edit needs and cannot work with; nothing is downloaded."""
     return [
         f"edit {config.edit.name}: {why}" + (f", and {word} does without them" if word else "")
-        for name, word in needed(config.edit).items()
+        for name, word in weights_needed(config.edit).items()
         if (why := weights.missing_advice(name))
     ]
 
 
-def needed(edit: EditKeys) -> Mapping[str, str]:
+def weights_needed(edit: EditKeys) -> Mapping[str, str]:
     """Return names of the weights that an edit needs, each with the word that does without."""
     if edit.method == NO_METHOD:
         return {}
@@ -55,7 +55,7 @@ def weights_of(stage: Stage, config: Config, checksums: Checksums) -> dict[str, 
     if stage.name == "edit_metrics":
         names = ["vgg16", "lpips_vgg", config.metric.clip]
     elif stage.place == "edit":
-        names = list(needed(config.edit))
+        names = list(weights_needed(config.edit))
     else:
         return None
     return {name: _short(name, checksums) for name in names}
@@ -63,7 +63,7 @@ def weights_of(stage: Stage, config: Config, checksums: Checksums) -> dict[str, 
 
 def _short(name: str, checksums: Checksums) -> str | None:
     digest = weights.checksum(name, checksums)
-    return digest and digest[:SHOWN]
+    return digest and digest[:CHECKSUM_DIGITS]
 
 
 def require_same(recorded: Mapping[str, str | None]) -> None:

@@ -20,7 +20,7 @@ from texgs.core.errors import ConfigError
 from texgs.core.io import read_json, write_bytes
 from texgs.volume.settings import cached_volume
 from texgs.workflow.cases import LeftOut
-from texgs.workflow.graph import earlier, graph_of
+from texgs.workflow.graph import earlier_results, graph_of
 from texgs.workflow.job import Job, settings_file
 from texgs.workflow.notes import note_results, note_tables
 from texgs.workflow.stage import Rule, edit_folder, fit_folder
@@ -67,23 +67,23 @@ class Plan:
         """Return the metrics files of all jobs of a target; of galleries also those of sweeps."""
         places = [rule.name for rule in RULES.values() if rule.target == name]
         sweeps = self.sweeps if "gallery" in places else [""]
-        return [file for sweep in sweeps for file in self.done(*places, sweep=sweep)]
+        return [file for sweep in sweeps for file in self.metrics_of(*places, sweep=sweep)]
 
     def swept(self) -> list[str]:
         """Return the sweeps that have fits, by name."""
-        return sorted(name for name in self.sweeps if name and self.done("phase", sweep=name))
+        return sorted(name for name in self.sweeps if name and self.metrics_of("phase", sweep=name))
 
-    def told(self, *places: str) -> list[str]:
+    def metrics_shown(self, *places: str) -> list[str]:
         """Return the metrics files that tables read, of some places, and all that is shown of sweeps."""
         swept = [rule.name for rule in RULES.values() if rule.swept]
-        of_sweeps = [file for name in self.swept() for file in self.done(*swept, sweep=name)]
-        return sorted({*self.done(*places), *of_sweeps})
+        of_sweeps = [file for name in self.swept() for file in self.metrics_of(*swept, sweep=name)]
+        return sorted({*self.metrics_of(*places), *of_sweeps})
 
     def gpus(self, rule: Rule) -> int:
         """Return how many GPUs a job of a rule takes."""
         return int(any(use in self.gpu for use in rule.gpu))
 
-    def done(self, *places: str, sweep: str = "") -> list[str]:
+    def metrics_of(self, *places: str, sweep: str = "") -> list[str]:
         """Return the metrics files of all jobs that have one of some places, of a sweep or of none."""
         folders = self.sweeps.get(sweep, ())
         return sorted(f"{folder}/metrics.json" for folder in folders if self.jobs[folder]["place"] in places)
@@ -133,8 +133,8 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     results = Path(config.results).as_posix()  # as the folders of the jobs have it
     if results == ".":
         raise ConfigError("results: expected a folder of its own, got the current one; choose another")
-    others, outdated = earlier(results, graph, checksums)
-    jobs = {folder: plain(job, results) for folder, job in graph.jobs.items()}
+    others, outdated = earlier_results(results, graph, checksums)
+    jobs = {folder: plain_job(job, results) for folder, job in graph.jobs.items()}
     note_results(graph.jobs.values(), [job["settings"] for job in jobs.values()])
     uses = {"views" for each in configs if each.views.renderer == "gpu"}
     uses |= {"fit" for each in configs if each.device.name == "cuda"}
@@ -156,7 +156,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     return plan, list(graph.missing)
 
 
-def plain(job: Job, results: str) -> dict[str, Any]:
+def plain_job(job: Job, results: str) -> dict[str, Any]:
     """Return a job in plain values; its settings file is written."""
     return {
         "stage": job.stage.name,

@@ -84,10 +84,10 @@ def claim(output: Path, identity: dict[str, Any], *, is_fresh: bool = False) -> 
     """
     require_own(output)
     work = work_folder(output)
-    if is_fresh or stamped(work) != identity:
+    if is_fresh or stamp_of(work) != identity:
         shutil.rmtree(work, ignore_errors=True)
-        if not is_fresh and stamped(output) == identity:
-            lost = damaged(output, None)
+        if not is_fresh and stamp_of(output) == identity:
+            lost = damaged_files(output, None)
             output.rename(work)  # first: a folder without its records is taken for somebody else's
             for name in (*lost, METRICS, FILES):
                 (work / name).unlink(missing_ok=True)
@@ -120,7 +120,7 @@ def recover(output: Path) -> None:
     shutil.rmtree(old, ignore_errors=True)
 
 
-def stamped(folder: Path) -> Any:
+def stamp_of(folder: Path) -> Any:
     """Return the identity of the job that a folder is of; None where there is none that can be read."""
     try:
         return read_json(folder / STAMP)
@@ -128,7 +128,7 @@ def stamped(folder: Path) -> Any:
         return None
 
 
-def recorded(folder: Path) -> dict[str, str]:
+def file_checksums(folder: Path) -> dict[str, str]:
     """Return checksums of the files of a complete result, by their names; none where they cannot be read."""
     try:
         known = read_json(folder / FILES)
@@ -137,14 +137,14 @@ def recorded(folder: Path) -> dict[str, str]:
     return known if isinstance(known, dict) else {}
 
 
-def damaged(output: Path, checksums: Checksums | None) -> list[str]:
+def damaged_files(output: Path, checksums: Checksums | None) -> list[str]:
     """Return the files of a complete result that are missing or not what they were.
 
     What is not known of files, without checksums anything, is read.
     """
     if not (output / FILES).exists():
         return []
-    if not (known := recorded(output)):
+    if not (known := file_checksums(output)):
         return [FILES]
     checksum = sha256 if checksums is None else checksums.of
     return [
@@ -156,7 +156,7 @@ def damaged(output: Path, checksums: Checksums | None) -> list[str]:
 
 def is_complete(output: Path, checksums: Checksums) -> bool:
     """Return whether a result is there with all its files, as they were made."""
-    return (output / FILES).exists() and (output / METRICS).exists() and not damaged(output, checksums)
+    return (output / FILES).exists() and (output / METRICS).exists() and not damaged_files(output, checksums)
 
 
 def require_own(output: Path) -> None:
@@ -169,7 +169,7 @@ def require_own(output: Path) -> None:
         raise ArgumentError(
             f"{output}: expected an empty folder or one of texgs, got other files; move them away"
         )
-    if not (known := recorded(output)):
+    if not (known := file_checksums(output)):
         raise ArgumentError(
             f"{output / FILES}: cannot be read, so nothing tells which files there are yours; move those out "
             f"of {output}, then remove it"
@@ -189,24 +189,24 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
     A file from elsewhere counts with its contents, see `checksum_of_input`.
     """
     folder = path.parent
-    made_files = recorded(folder)
+    made_files = file_checksums(folder)
     is_foreign = path.exists() and path.name not in made_files
     if (folder / FILES).exists() and not is_foreign:
         made = [(name, sha) for name, sha in made_files.items() if name not in (METRICS, TIMES)]
-        return combined_checksum([*made, (STAMP, json.dumps(stamped(folder), sort_keys=True))])
+        return combined_checksum([*made, (STAMP, json.dumps(stamp_of(folder), sort_keys=True))])
     return checksum_of_input(path, checksums)
 
 
 def require_intact(path: Path) -> None:
     """Require of an input that the result it belongs to is as it was made; reads all of its files."""
     folder = path.parent
-    if not (lost := damaged(folder, None)):
+    if not (lost := damaged_files(folder, None)):
         return
     checksums = Checksums.load()  # whoever looks next shall look at the file itself
     for name in lost:
         checksums.forget(folder / name)
     checksums.save()
-    maker = (stamped(folder) or {}).get("stage", "the stage before")
+    maker = (stamp_of(folder) or {}).get("stage", "the stage before")
     raise ArgumentError(
         f"{folder / lost[0]}: missing or damaged since {maker} made it; "
         "run the same command again to repair it"

@@ -23,7 +23,7 @@ from texgs.workflow.code import code_digest
 from texgs.workflow.sweep import edit_variant, fit_variant
 
 RULES: dict[str, "Rule"] = {}  # those of all stages, by name; texgs.workflow.stage_table fills it
-EVERY = 1024  # threads, of which a job gets as many as there are
+ALL_THREADS = 1024  # threads, of which a job gets as many as there are
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Stage:
 
     def settings(self, config: Config) -> dict[str, Any]:
         """Return what a job reads, as plain lists and dicts."""
-        return cast(dict[str, Any], plain({"stage": self.name, **selected(self.schema, config)}))
+        return cast(dict[str, Any], plain_values({"stage": self.name, **values_read(self.schema, config)}))
 
     def output(self, config: Config) -> Path:
         """Return the folder of the job's files."""
@@ -124,7 +124,7 @@ def read(source: str | Callable[[Config], Any]) -> Any:
     return field(metadata={"read": attrgetter(source) if isinstance(source, str) else source})
 
 
-def selected(schema: type[Any], config: Config) -> dict[str, Any]:
+def values_read(schema: type[Any], config: Config) -> dict[str, Any]:
     """Return the values that the fields of a dataclass, and of its parts, read of a configuration."""
     hints, values = get_type_hints(schema), {}
     for each in fields(schema):
@@ -135,17 +135,17 @@ def selected(schema: type[Any], config: Config) -> dict[str, Any]:
                 where = f"{schema.__module__}: {schema.__name__}.{each.name}"
                 raise ConfigError(f"{where}: reads what the configuration has not: {error}") from error
         elif is_dataclass(part := hints[each.name]):
-            values[each.name] = selected(cast(type[Any], part), config)
+            values[each.name] = values_read(cast(type[Any], part), config)
     return values
 
 
-def plain(value: Any) -> Any:
+def plain_values(value: Any) -> Any:
     """Return a value of a configuration, or tables and lists of them, as plain dicts and lists."""
     if is_dataclass(value):
-        return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
+        return {each.name: plain_values(getattr(value, each.name)) for each in fields(value)}
     if isinstance(value, Mapping):
-        return {str(name): plain(each) for name, each in value.items()}
-    return [plain(each) for each in value] if isinstance(value, list | tuple) else value
+        return {str(name): plain_values(each) for name, each in value.items()}
+    return [plain_values(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def folder_of(rule: str, config: Config, phase: str = "", tf: str | None = None) -> Path:
@@ -161,7 +161,7 @@ def folder_of(rule: str, config: Config, phase: str = "", tf: str | None = None)
     )
 
 
-def made(rule: str, config: Config, phase: str = "", tf: str | None = None) -> Path:
+def result_file(rule: str, config: Config, phase: str = "", tf: str | None = None) -> Path:
     """Return the file of a job that other jobs ask for."""
     return folder_of(rule, config, phase, tf) / RULES[rule].files[0]
 

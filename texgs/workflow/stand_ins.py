@@ -13,7 +13,7 @@ from texgs.edit.keys import EditKeys
 from texgs.edit.method import method_of
 from texgs.models.weights import missing_advice
 from texgs.workflow.edits import chain_of
-from texgs.workflow.missing import needed
+from texgs.workflow.missing import weights_needed
 
 Lacking = Callable[[Config], Sequence[str]]  # sentences on what a configuration lacks on this machine
 
@@ -42,7 +42,9 @@ def chosen_edit(keys: StandIns, name: str, case: Case) -> Choice:
     def lacks(other: str) -> list[str]:
         edits = [each.config.edit for each in chain_of(case.edited(other))]
         return list(
-            filter(missing_advice, dict.fromkeys(weights for edit in edits for weights in needed(edit)))
+            filter(
+                missing_advice, dict.fromkeys(weights for edit in edits for weights in weights_needed(edit))
+            )
         )
 
     taken, absent = chosen(keys, "edits", name, lacks)
@@ -72,7 +74,7 @@ def chosen(
 def recipe_without(taken: EditKeys, other: EditKeys) -> str:
     """Return in brackets what an edit does in place of the weights that another one needs."""
     keys = method_of(taken).of(taken)
-    words = [word.rpartition(".")[2].partition("=") for word in needed(other).values()]
+    words = [word.rpartition(".")[2].partition("=") for word in weights_needed(other).values()]
     values = [value for key, _, value in words if str(getattr(keys, key, None)) == value]
     return f" ({', '.join(values)})" if values else ""
 

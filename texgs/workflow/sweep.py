@@ -18,12 +18,15 @@ from texgs.core.errors import ConfigError
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import NO_METHOD
 
-OF_FITS = ("views", "fit", "device")  # groups of keys that change fits
-OF_EDITS = "edit"
-SEEDS = {"fit.seed": "seeds", "edit.seed": "edit_seeds"}  # for each key the list in `sweep` with its values
+FIT_GROUPS = ("views", "fit", "device")  # groups of keys that change fits
+EDIT_GROUP = "edit"
+SEED_LISTS = {
+    "fit.seed": "seeds",
+    "edit.seed": "edit_seeds",
+}  # for each key the list in `sweep` with its values
 OF_NUMBERS, OF_KINDS = "views", "kinds_of_views"  # the paper's sweep over numbers, and views=ONE,OTHER
 ELSEWHERE = {  # keys whose values have a list of their own
-    **{key: f"sweep.{listed}" for key, listed in SEEDS.items()},
+    **{key: f"sweep.{listed}" for key, listed in SEED_LISTS.items()},
     **dict.fromkeys(("edit", "edit.name", "edits"), "edits=[...]"),
     **dict.fromkeys(("dataset", "datasets"), "datasets=[...]"),
     **{key: f"{key}=[...]" for key in ("fits", "experiments", "sweep.seeds", "sweep.edit_seeds")},
@@ -56,8 +59,10 @@ def as_sweep(words: Words) -> Words:
 
     swept = [word for word in words if has_several(word)]
     rest = tuple(word for word in words if word not in swept)
-    seeds = tuple(f"sweep.{SEEDS[key_of(x)]}=[{','.join(several(x))}]" for x in swept if key_of(x) in SEEDS)
-    over = [word for word in swept if key_of(word) not in SEEDS]
+    seeds = tuple(
+        f"sweep.{SEED_LISTS[key_of(x)]}=[{','.join(several(x))}]" for x in swept if key_of(x) in SEED_LISTS
+    )
+    over = [word for word in swept if key_of(word) not in SEED_LISTS]
     chosen = [word for word in rest if key_of(word) == "sweep" and word != "sweep=none"]
     if over and chosen:
         raise ConfigError(f"{over[0]}: {chosen[0]} has variants of its own; leave out one of the two")
@@ -85,7 +90,7 @@ def combinations(over: Words) -> Mapping[str, Words]:
     return overrides
 
 
-def changes(config: Config) -> Mapping[str, Words]:
+def variant_words(config: Config) -> Mapping[str, Words]:
     """Return the overrides of each variant of the sweep, by name; none without a sweep."""
     sweep = config.sweep
     if sweep.over and sweep.variants:
@@ -97,7 +102,7 @@ def changes(config: Config) -> Mapping[str, Words]:
         if given:
             raise ConfigError("sweep.name: expected a name for the table of the variants, got none")
         return {}
-    if not given and all(len(getattr(sweep, listed)) < 2 for listed in SEEDS.values()):
+    if not given and all(len(getattr(sweep, listed)) < 2 for listed in SEED_LISTS.values()):
         raise ConfigError(
             f"sweep {sweep.name}: expected variants, keys to sweep over or several seeds, got none of them"
         )
@@ -106,14 +111,14 @@ def changes(config: Config) -> Mapping[str, Words]:
 
 def is_of_edits(config: Config) -> bool:
     """Return whether the variants change edits, by keys or seeds; their folders are then named after them."""
-    variants = changes(config)
-    named = any(group_of(change) == OF_EDITS for listed in variants.values() for change in listed)
+    variants = variant_words(config)
+    named = any(group_of(change) == EDIT_GROUP for listed in variants.values() for change in listed)
     return bool(variants) and (named or len(config.sweep.edit_seeds) > 1)
 
 
 def fit_variant(config: Config) -> str:
     """Return the variant in the folder of a fit: `6` of `quick-6`; empty where all variants share fits."""
-    return own_name(config, config.variant, OF_FITS) if is_of_edits(config) else config.variant
+    return own_name(config, config.variant, FIT_GROUPS) if is_of_edits(config) else config.variant
 
 
 def edit_variant(config: Config) -> str:
@@ -126,17 +131,17 @@ def own_name(config: Config, variant: str, groups: Sequence[str]) -> str:
 
     In a sweep over keys it is that of their values, so that all variants with the same ones share it.
     """
-    own = [change for change in changes(config).get(variant, ()) if group_of(change) in groups]
+    own = [change for change in variant_words(config).get(variant, ()) if group_of(change) in groups]
     if not own or not config.sweep.over:
         return variant if own else ""
     return "-".join(label(change.partition("=")[2]) for change in own)
 
 
-def swept(config: Config) -> dict[str, str]:
+def swept_values(config: Config) -> dict[str, str]:
     """Return what makes a configuration another one than the rest of its sweep: values as text, by keys."""
-    listed = changes(config).get(config.variant, ())
+    listed = variant_words(config).get(config.variant, ())
     texts = {key_of(change): change.partition("=")[2] for change in listed}
-    texts |= {key: "" for key, seeds in SEEDS.items() if len(getattr(config.sweep, seeds)) > 1}
+    texts |= {key: "" for key, seeds in SEED_LISTS.items() if len(getattr(config.sweep, seeds)) > 1}
     return {key: str(value_at(config, key)) if "." in key else text for key, text in texts.items()}
 
 
@@ -146,7 +151,7 @@ def variants(case: Case) -> list[Case]:
     Variants that change the views have a folder of their own for them, unless they name one.
     """
     config = case.config
-    by_variant, sweep = changes(config), config.sweep
+    by_variant, sweep = variant_words(config), config.sweep
     if not by_variant:
         return [case]
     check_variants(by_variant)
@@ -170,7 +175,7 @@ def variants(case: Case) -> list[Case]:
 def own_views(config: Config, name: str) -> Words:
     """Return the word that gives a variant a folder for its views, where it changes them and names none."""
     own = own_name(config, name, ("views",))
-    is_named = "views.name" in map(key_of, changes(config)[name])
+    is_named = "views.name" in map(key_of, variant_words(config)[name])
     return (f"views.name=views-{own.replace('.', '_')}",) if own and not is_named else ()
 
 
@@ -194,7 +199,7 @@ def check_variants(by_variant: Mapping[str, Sequence[str]]) -> None:
         for change in listed:
             if elsewhere := ELSEWHERE.get(key_of(change)):
                 raise ConfigError(f"sweep.variants.{name}: got {change}, whose values go to {elsewhere}")
-            if group_of(change) not in (*OF_FITS, OF_EDITS):
+            if group_of(change) not in (*FIT_GROUPS, EDIT_GROUP):
                 raise ConfigError(
                     f"sweep.variants.{name}: expected overrides of views, fit, device or edit, got {change}; "
                     "the rest is the same for all variants"
@@ -203,7 +208,7 @@ def check_variants(by_variant: Mapping[str, Sequence[str]]) -> None:
 
 def check_seeds(config: Config) -> None:
     """Require seeds, each once, and none that would not count."""
-    for key, listed in SEEDS.items():
+    for key, listed in SEED_LISTS.items():
         seeds, own = getattr(config.sweep, listed), value_at(config, key)
         if not seeds:
             raise ConfigError(f"sweep.{listed}: expected at least one, got none")
@@ -216,8 +221,8 @@ def check_seeds(config: Config) -> None:
 def check_edits(case: Case) -> None:
     """Require of each edit of a sweep of edits alone that its variants differ."""
     config = case.config
-    listed = {key_of(change) for each in changes(config).values() for change in each}
-    if len(config.sweep.edit_seeds) > 1 or any(group_of(key) != OF_EDITS for key in listed):
+    listed = {key_of(change) for each in variant_words(config).values() for change in each}
+    if len(config.sweep.edit_seeds) > 1 or any(group_of(key) != EDIT_GROUP for key in listed):
         return
     tables = {key.split(".")[1] for key in listed}
     for edit in [case.edited(name).config.edit for name in config.edits] or [config.edit]:

@@ -93,7 +93,7 @@ def log_result(run: Run, job: Job, metrics: Mapping[str, Any]) -> None:
     run.log({name: metrics[name] for name in ("seconds", "peak_memory_mib")} | scalars(metrics["numbers"]))
     for step, values in curves(metrics["numbers"]):
         run.log(values, step)
-    checksums = result.recorded(job.output)
+    checksums = result.file_checksums(job.output)
     for file in job.stage.rule.files[:1]:
         run.tag({"file": (job.output / file).as_posix(), "file.sha256": checksums[file]})
     for picture in (*metrics["pictures"], result.METRICS):

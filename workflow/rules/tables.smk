@@ -3,7 +3,7 @@
 
 rule tables:
     input:
-        metrics=PLAN.told(*{place for table in TABLES for place in table.places}),
+        metrics=PLAN.metrics_shown(*{place for table in TABLES for place in table.places}),
         note=PLAN.notes["tables"],
     output:
         f"<results>/tables/{DOCUMENT}",
@@ -21,7 +21,7 @@ rule tables:
 
 rule report:
     input:
-        metrics=PLAN.told(*RULES),
+        metrics=PLAN.metrics_shown(*RULES),
         note=PLAN.notes["report"],
     output:
         report("<results>/report.html", caption="../report/report.rst", category="report"),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from texgs.report.results import ComparisonResult
 from texgs.workflow.inputs import is_first_recipe, is_fit, is_swept, last_phase, view_set, with_recipe
-from texgs.workflow.stage import Config, Outcome, Rule, Stage, made, read
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, read, result_file
 from texgs.workflow.stages.settings import OfTF
 
 
@@ -36,7 +36,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 def inputs(config: Config) -> dict[str, Path]:
     """Return the last models of all recipes of the experiment, by recipe, and the views."""
     fits = [with_recipe(config, name) for name in config.fits]
-    models = {each.fit.name: made("phase", each, last_phase(each)) for each in fits}
+    models = {each.fit.name: result_file("phase", each, last_phase(each)) for each in fits}
     return {**models, **view_set(config)}
 
 

@@ -11,7 +11,7 @@ from texgs.report.results import EditMeasures
 from texgs.volume.view_settings import ViewKeys
 from texgs.workflow.edits import edited_scene
 from texgs.workflow.inputs import fitted_scene, view_settings, with_recipe
-from texgs.workflow.stage import EVERY, Config, Outcome, Rule, Stage, made, read
+from texgs.workflow.stage import ALL_THREADS, Config, Outcome, Rule, Stage, read, result_file
 from texgs.workflow.stages.settings import OfEdit
 
 if TYPE_CHECKING:
@@ -85,8 +85,8 @@ def inputs(config: Config) -> dict[str, Path]:
     Where the experiment has several recipes, surfaces are those of its first, for all edits alike.
     """
     first = with_recipe(config, config.fits[0]) if config.fits else config
-    scenes = {"scene": made("edit", config), "before": fitted_scene(config)}
-    return {**edited_scene(config), **scenes, "geometry": made("compose", first)}
+    scenes = {"scene": result_file("edit", config), "before": fitted_scene(config)}
+    return {**edited_scene(config), **scenes, "geometry": result_file("compose", first)}
 
 
 def applies(config: Config) -> bool:
@@ -103,7 +103,7 @@ STAGE = Stage(
         "edit_metrics",
         "{dataset}/scene/{fit}/edit_metrics/{edit}",
         target="edits",
-        threads=EVERY,  # it measures frames, too
+        threads=ALL_THREADS,  # it measures frames, too
         gpu=("fit",),
         swept=True,
     ),

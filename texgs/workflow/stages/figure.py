@@ -8,7 +8,7 @@ from pathlib import Path
 from texgs.fitting.kinds import fit_specs
 from texgs.report.results import Result
 from texgs.workflow.inputs import is_fit, view_set
-from texgs.workflow.stage import Config, Outcome, Rule, Stage, made, read
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, read, result_file
 from texgs.workflow.stages.settings import OfTF, Recipe
 
 
@@ -62,7 +62,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 def inputs(config: Config) -> dict[str, Path]:
     """Return the models that the phases of the fit write, and the views."""
     phases = fit_specs()[config.fit.field].phases
-    return {**{name: made("phase", config, name) for name in phases}, **view_set(config)}
+    return {**{name: result_file("phase", config, name) for name in phases}, **view_set(config)}
 
 
 STAGE = Stage(

@@ -18,7 +18,7 @@ from texgs.workflow.galleries import gallery_command, gallery_grids, gallery_inp
 from texgs.workflow.inputs import has_scene, is_first_recipe
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import OfScene, OfVolume
-from texgs.workflow.sweep import changes
+from texgs.workflow.sweep import variant_words
 
 if TYPE_CHECKING:
     from texgs.core.figures import Row
@@ -97,7 +97,7 @@ def given_rows(settings: Settings, inputs: Mapping[str, Path]) -> list[Row]:
 
 def applies(config: Config) -> bool:
     """Return whether this is the first of the recipes and variants of an experiment with scenes to show."""
-    variants = list(changes(config))
+    variants = list(variant_words(config))
     shows_all = len(config.edits) > 1 and not variants
     if not has_scene(config) or not (config.gallery.grids or shows_all):
         return False

@@ -10,7 +10,7 @@ from texgs.edit.method import methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import PageResult
 from texgs.workflow.inputs import fitted_scene, is_fit, is_swept, models_of_scene
-from texgs.workflow.stage import Config, Outcome, Rule, Stage, made, read
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, read, result_file
 from texgs.workflow.stages.settings import FitLabel, OfDataset
 
 SHOWN = "The scene: open it to turn it, to move its light, and to change colours and opacities."
@@ -46,7 +46,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 def inputs(config: Config) -> dict[str, Path]:
     """Return the scene of an edit, or the one as fitted, with its models."""
-    scene = fitted_scene(config) if is_fit(config) else made("edit", config)
+    scene = fitted_scene(config) if is_fit(config) else result_file("edit", config)
     return {"scene": scene, **models_of_scene(config)}
 
 

@@ -7,7 +7,7 @@ from statistics import fmean, median
 
 from texgs.report.results import TimingResult
 from texgs.workflow.inputs import has_scene, scene_and_volume
-from texgs.workflow.stage import EVERY, Outcome, Rule, Stage
+from texgs.workflow.stage import ALL_THREADS, Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfScene
 
 FRAMES = 61  # spread over the path: more say the same
@@ -54,7 +54,7 @@ STAGE = Stage(
         "timing",
         "{dataset}/scene/{fit}/timing",
         target="scenes",
-        threads=EVERY,  # other jobs would be measured with it
+        threads=ALL_THREADS,  # other jobs would be measured with it
         gpu=("fit",),
     ),
     inputs=scene_and_volume,

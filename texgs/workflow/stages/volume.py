@@ -14,7 +14,7 @@ from texgs.report.results import VolumeResult
 from texgs.volume.settings import VolumeKeys, open_field, prepare_fields
 from texgs.workflow.inputs import has_volume, without
 from texgs.workflow.locate import source_file
-from texgs.workflow.stage import Config, Outcome, Rule, Stage, plain, read
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, plain_values, read
 from texgs.workflow.stages.settings import OfDataset
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     write_summaries(target, summaries, settings.channels)
     ends = min(each.minimum for each in summaries), max(each.maximum for each in summaries)
     whole = replace(summaries[0], minimum=ends[0], maximum=ends[1])
-    told, size = {name: plain(getattr(whole, name)) for name in TOLD}, target.stat().st_size
+    told, size = {name: plain_values(getattr(whole, name)) for name in TOLD}, target.stat().st_size
     if size > (free := free_memory()):
         sys.stderr.write(
             f"{settings.dataset}: the volume has {size / GIB:.3g} GiB, but {free / GIB:.3g} GiB of memory "
