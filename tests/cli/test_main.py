@@ -57,15 +57,12 @@ def test_an_error_is_one_sentence_and_code_2(monkeypatch, capsys):
     ("words", "message"),
     [
         (["rnu"], "texgs rnu: no such verb, did you mean run?"),
-        (["zzz", "a song"], "texgs zzz: no such verb; texgs --help lists all"),
         ([], "texgs: the following arguments are required: VERB; see texgs --help"),
         (["doctor", "--bogus"], "texgs doctor: unrecognized arguments: --bogus; see texgs doctor --help"),
         (
             ["render", "a", "--widht=9"],
             "texgs render: unrecognized arguments: --widht=9, did you mean --width?",
         ),
-        (["segment", "a", "TF01"], "texgs segment: unrecognized arguments: TF01; see texgs segment --help"),
-        (["run", "--zzz"], "snakemake: unrecognized arguments: --zzz; see snakemake --help"),
         (["run", "--jobs"], "snakemake: argument --jobs/-j: expected one argument; see snakemake --help"),
         (["run", "--cores", "x"], "texgs run: Error parsing number of cores (--cores, -c): must be integer"),
     ],

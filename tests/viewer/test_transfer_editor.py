@@ -5,11 +5,8 @@ from dataclasses import replace
 from urllib.parse import quote
 
 import numpy as np
-import pytest
 
 from tests.config.kept import project
-from tests.fields.surfels.test_composition import ball
-from tests.scene.test_twin import HIGH, LOW, sphere_volume
 from tests.viewer.in_browser import (
     JPEG,
     WAIT,
@@ -23,20 +20,8 @@ from tests.viewer.in_browser import (
     shown,
     still,
 )
-from texgs.fields.surfels.model_file import write_model
-from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.viewer.standalone import web_file
-
-
-@pytest.fixture
-def sphere_file(tmp_path):
-    """Two balls that claim to be a sphere."""
-    files = {name: write_model(tmp_path / f"{name}.safetensors", ball(1)) for name in ("low", "high")}
-    models = {name: SceneModel(file) for name, file in files.items()}
-    return write_scene(
-        tmp_path / "scene.yaml", Scene(models, volume=sphere_volume(tmp_path, low=LOW, high=HIGH))
-    )
 
 
 def test_what_is_dragged_is_the_volume_that_texgs_renders(chromium, sphere_file):
