@@ -35,15 +35,6 @@ def test_a_crash_of_the_opengl_probe_is_a_finding(monkeypatch):
     assert "libegl1" in finding.advice
 
 
-def test_a_cache_that_cannot_be_written_is_named(monkeypatch, tmp_path):
-    file = tmp_path / "file"
-    file.touch()
-    monkeypatch.setenv("TEXGS_CACHE", str(file / "cache"))
-    finding = doctor.cache()
-    assert finding.state == "missing"
-    assert "TEXGS_CACHE" in finding.advice
-
-
 def test_weights_are_listed(monkeypatch, tmp_path):
     for name in ("TEXGS_WEIGHTS", "TEXGS_CACHE", "TORCH_HOME", "HF_HOME"):
         monkeypatch.setenv(name, str(tmp_path))
@@ -72,7 +63,13 @@ def test_a_machine_on_which_no_stage_can_run_is_broken(monkeypatch, tmp_path):
     assert finding.found.startswith("no no-such-package, torch 2.")
 
 
-def test_a_user_without_a_home_is_told_what_to_set(monkeypatch):
+def test_a_cache_that_cannot_be_is_told_with_what_to_set(monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("TEXGS_CACHE", str(tmp_path / "file" / "cache"))
+    finding = doctor.cache()
+    assert finding.state == "missing"
+    assert "TEXGS_CACHE" in finding.advice
+
     def none():
         raise RuntimeError("Could not determine home directory.")
 

@@ -22,6 +22,9 @@ def test_help_lists_every_verb(capsys):
             main([verb, "--help"])
         out = capsys.readouterr().out
         assert out.startswith(f"usage: texgs {verb} [-h]")
+    with pytest.raises(SystemExit):
+        main(["--version"])
+    assert capsys.readouterr().out == f"texgs {__version__}\n"
     assert "views.fov_y=30.0" in out
     assert "dataset=" in out
 
@@ -36,12 +39,6 @@ def test_a_mistake_in_a_stage_of_ones_own_is_one_sentence(tmp_path):
     told = "texgs: texgs.workflow.stages.broken, line 2: TypeError where it is imported: Rule.__init__() got "
     assert done.stderr.startswith(f"{told}an unexpected keyword argument 'filse'")
     assert len(done.stderr.splitlines()) == 1
-
-
-def test_version(capsys):
-    with pytest.raises(SystemExit):
-        main(["--version"])
-    assert capsys.readouterr().out == f"texgs {__version__}\n"
 
 
 def test_an_error_is_one_sentence_and_code_2(monkeypatch, capsys):
