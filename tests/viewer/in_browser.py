@@ -61,6 +61,7 @@ def opened_file(chromium, file, link=LINK, ratio=1, size=(800, 500)):
     page = chromium.new_page(
         viewport=dict(zip(("width", "height"), size, strict=True)), device_scale_factor=ratio
     )
+    page.set_default_timeout(WAIT)
     wrong, asked = [], []
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)

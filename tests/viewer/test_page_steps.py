@@ -18,7 +18,18 @@ from torch.nn.functional import normalize
 
 from tests.viewer.drawing import closeness, unpacked
 from tests.viewer.drawn_scenes import BEGIN, COUNT, scene_of_series
-from tests.viewer.in_browser import LINK, PLACE, WAIT, expect, served, settle, shown, standalone, still
+from tests.viewer.in_browser import (
+    LINK,
+    PLACE,
+    WAIT,
+    expect,
+    opened_file,
+    served,
+    settle,
+    shown,
+    standalone,
+    still,
+)
 from tests.viewer.in_browser import opened as opened_viewer
 from texgs.cli.main import main
 from texgs.core.camera import orbit
@@ -142,6 +153,8 @@ def test_what_is_on_screen_follows(opened, scene):
     page = opened()
     for time in (0, 4):
         slider(page).fill(str(time))
+        page.wait_for_timeout(300)
+        settle(page)
         size = page.locator("#picture").evaluate("picture => [picture.height, picture.width]")
         rendered = expected(scene.at(time), np.empty(size))
         assert closeness(shown(page), rendered[:-50]) > CLOSE - 10
@@ -214,18 +227,15 @@ def test_the_volume_is_that_of_one_step(opened, scene):
     assert page.get_by_label("Show", exact=True).input_value() == "volume"
 
 
-def test_a_damaged_step_is_told_and_the_others_stay(opened, scene, tmp_path):
-    page = opened()
+def test_a_damaged_step_is_told_and_the_others_stay(chromium, scene, tmp_path):
     text, file = page_steps(scene).packed[4], tmp_path / "page.html"
-    whole = scene.series.file.with_name("scene.html").read_text()
-    file.write_text(whole.replace(text, text[: len(text) // 8 * 4]))
-    page.goto(file.as_uri() + LINK)
-    settle(page)
-    slider(page).fill("4")
-    expect(page.get_by_text("The scene in this page cannot be unpacked")).to_be_visible()
-    slider(page).fill("3")
-    picture = saved(page)
-    assert closeness(picture, expected(scene.at(3), picture)) > CLOSE
+    file.write_text(scene_page(scene, "x").text.replace(text, text[: len(text) // 8 * 4]))
+    with opened_file(chromium, file) as page:
+        slider(page).fill("4")
+        expect(page.get_by_text("The scene in this page cannot be unpacked")).to_be_visible()
+        slider(page).fill("3")
+        picture = saved(page)
+        assert closeness(picture, expected(scene.at(3), picture)) > CLOSE
 
 
 def test_the_viewer_asks_which_steps_a_page_holds(chromium, scene):
