@@ -102,16 +102,11 @@ def test_parts_that_are_missing_are_told_once_after_the_last_phase(viewed, capsy
     assert "parts are missing" not in capsys.readouterr().err
 
 
-def test_a_material_per_surfel_on_request(seeded):
+def test_materials_of_each_surfel_and_normals_of_their_own_or_of_planes(seeded):
     main(["shading", *TINY, "fit.materials=surfel", "fit.shading.losses.smoothness=0.01"])
-    ambient = read_model(seeded / "shading" / "model.safetensors").parameters["ambient"]
-    assert len(ambient) == 400
-    assert ambient.std() > 0.01
-
-
-def test_light_sees_normals_of_their_own_or_those_of_planes(seeded):
-    main(["shading", *TINY])
     p = read_model(seeded / "shading" / "model.safetensors").parameters
+    assert len(p["ambient"]) == 400
+    assert p["ambient"].std() > 0.01
     assert not torch.equal(p["normals"], p["quats"]), "both have learned"
     main(["shading", *TINY, "fit.normals=surfel", "--replace"])
     assert "normals" not in read_model(seeded / "shading" / "model.safetensors").parameters

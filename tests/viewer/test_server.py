@@ -112,16 +112,12 @@ async def test_frames_are_those_of_the_renderer(browser, client, scene_file, tmp
 
 
 @on_page
-async def test_a_still_has_what_a_check_has_found_in_its_metadata(browser, client, scene_file):
+async def test_a_still_has_what_a_check_has_found_or_says_what_is_wrong(browser, client, scene_file):
     scene, file = client.server_side.edits.scene, scene_file.with_name(f"{scene_file.stem}-check.json")
     for models, told in ((checksum_of(scene), "At least 30 dB"), ("others", None)):
         write_json(file, {"models": models, "sentence": "At least 30 dB"})
         _, png, _ = await still(client, json.dumps({"camera": CAMERA}))
         assert Image.open(io.BytesIO(png)).info.get("Comment") == told
-
-
-@on_page
-async def test_a_still_without_a_view_says_so(browser, client):
     for query, message in (("", b"JSON"), ("[]", b"expected keys with values"), ("{}", b"camera")):
         status, text, _ = await still(client, query)
         assert status == 400
@@ -206,9 +202,9 @@ async def test_pages_share_edits_and_their_history(browser, client):
 @on_page
 async def test_pages_cut_the_scene(browser, client):
     up = {"normal": [0, 2, 0], "offset": 0.5}
-    edit = {"type": "edit", "part": "", "key": "cuts", "step": 1, "title": "two planes"}
-    for value in ({"planes": [up]}, {"planes": [up, up], "faces": "unlit"}):
-        await browser.send(**edit, value=value)
+    edit = {"type": "edit", "part": "", "key": "cuts", "step": 1}
+    await browser.send(**edit, value={"planes": [up]})
+    await browser.send(**edit, value={"planes": [up, up], "faces": "unlit"}, title="two planes")
     cuts = (await browser.past("two planes"))["scene"]["cuts"]
     assert cuts == {"planes": 2 * [{"normal": [0, 1, 0], "offset": 0.25}], "box": None, "faces": "unlit"}
     assert isolated(client.server_side.edits.scene, "TF01").cuts == NO_CUTS, "clicks select what is whole"
