@@ -62,7 +62,8 @@ def test_views_show_what_all_transfer_functions_show(folder):
     inner = "+dataset.basic_tfs.TF02={opacity: [[0.9, 0], [0.95, 1], [1, 1]], color: [[0.9, 1, 0, 0]]}"
     assert main(["views", *TINY, outer, inner, "views.radius=null", "views.step=0.25"]) == 0
     views = {tf: read_views(folder / tf / "views") for tf in ("TF01", "TF02")}
-    tfs = [TransferFunction.from_dict(each.metadata["tf"]) for each in views.values()]
+    told = [each.metadata["tf"] for each in views.values()]
+    tfs = [TransferFunction(tf["opacity"], tf["color"]) for tf in told]
     lens = frame_of(open_grid(folder / "volume" / "volume.nrrd"), tfs).lens(30.0, 48, 32)
     for each in views.values():
         assert float(each.train[0].camera.position.norm()) == pytest.approx(lens.radius, rel=1e-4)
