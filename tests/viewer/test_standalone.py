@@ -60,11 +60,6 @@ def page(chromium, file):
         yield page
 
 
-@pytest.fixture(scope="module")
-def blank(chromium):
-    return chromium.new_page()
-
-
 def shown(page):
     """What the canvas shows [H, W, 3]."""
     page.locator("#marks").evaluate(HIDE)
@@ -203,26 +198,6 @@ def test_a_plane_cuts_the_page_and_words_make_the_same_cut(page, file, scene, fo
     settle(page)
     assert differ(page, file, cuts=cuts) <= LEVELS
     assert differ(page, file) > 50, "it takes something away"
-
-
-@pytest.mark.parametrize(
-    ("part", "key", "value", "title"),
-    [
-        ("TF01", "opacity", 0.123456, "TF01 opacity 0.1235"),
-        ("", "time", 12345, "time 12345"),
-        ("TF01", "palette", [1, 0.5, 0], "TF01 palette #ff8000"),
-        ("TF01/a", "visible", False, "TF01/a visible off"),
-        ("TF01", "palette", None, "TF01 palette reset"),
-        ("", "light", {"polar": 12.4}, "light polar 12°"),
-        ("", "cuts", {"planes": [{}], "box": None, "faces": "unlit"}, "cuts 1 plane, unlit"),
-        ("", "cuts", {"planes": [], "faces": "unlit"}, "cuts none"),
-    ],
-)
-def test_steps_have_titles(blank, part, key, value, title):
-    blank.evaluate(
-        f"() => {{ {standalone.joined_modules('state.js')} globalThis.state = modules['state.js']; }}"
-    )
-    assert blank.evaluate("edit => state.titleOf(edit)", {"part": part, "key": key, "value": value}) == title
 
 
 def test_the_words_at_an_input_are_in_its_name(page):
