@@ -47,7 +47,7 @@ def test_the_standalone_page_turns_around_what_is_seen_and_zooms_to_what_is_belo
         page.mouse.move(box["x"] + 100, box["y"] + 60)
         page.mouse.wheel(0, -300)
         after = camera_of(page)
-        distance = float(-before.viewmat[2, :3] @ before.position)  # of the target, which is the origin
+        distance = float(-before.viewmat[2, :3] @ before.position)  # of the target, near the origin
         ray = torch.linalg.inv(before.K) @ torch.tensor([100.0, 60.0, 1.0])
         point = before.viewmat[:3, :3].T @ (distance * ray - before.viewmat[:3, 3])
         place, depth = after.project(point)

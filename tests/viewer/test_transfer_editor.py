@@ -158,7 +158,7 @@ def test_a_function_is_kept_in_its_data_set(chromium, tmp_path, monkeypatch):
     with served(scene) as (_, address), opened(chromium, address) as page:
         page.get_by_role("button", name="over *", exact=True).click()
         page.get_by_role("button", name="Keep in data set").click()
-        expect(page.get_by_text(re.compile("over on .* overlaps TF02 on"))).to_be_visible(timeout=WAIT)
+        expect(page.get_by_text(re.compile("over: .*do not overlap"))).to_be_visible(timeout=WAIT)
         page.get_by_role("button", name="TF03 *", exact=True).click()
         page.get_by_role("button", name="Keep in data set").click()
         expect(page.get_by_text("TF03 is a basic transfer function")).to_be_visible(timeout=WAIT)
