@@ -1,7 +1,6 @@
 """Fits from Python: the stages of the workflow without a project, and the fit in seconds."""
 
 import json
-import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -11,6 +10,7 @@ import pytest
 
 import texgs
 from tests.fitting.short_fits import shorten
+from tests.refusals import refused
 from texgs.api.fit import compose_in, configuration
 from texgs.core.errors import ArgumentError, ConfigError, DeviceError
 from texgs.core.geometry import quats_to_matrices
@@ -54,16 +54,6 @@ def test_it_is_what_the_workflow_makes(scene, folder):
     assert numbers["numbers"]["width"] == 32
 
 
-def test_a_fit_in_seconds_has_the_histogram_too(ball, tmp_path, monkeypatch):
-    shorten(monkeypatch, frequency=1, surfels=300, iterations=20)
-    with pytest.raises(ArgumentError, match="overrides: not for the recipe now"):
-        texgs.fit(ball, TFS, "now", overrides=SMALL)
-    made = texgs.fit(ball, {"inner": TFS["inner"]}, "now", size=32, folder=tmp_path)
-    assert Origins(made.session.scene).transfer["maximum"] == ball.summary.maximum
-    with pytest.raises(DeviceError, match="device: expected cpu or cuda, got gpu"):
-        texgs.fit(ball, TFS, device="gpu")
-
-
 def test_a_saved_scene_keeps_its_volume_and_the_histogram(scene, ball, tmp_path):
     saved = read_scene(scene.save(tmp_path / "kept"))
     assert saved.volume.file == tmp_path / "kept" / "volume.nrrd"
@@ -96,13 +86,7 @@ def test_results_are_a_table(scene, folder):
     file = folder / "ball" / "inner" / "quick" / "texture" / "metrics.json"
     assert row.psnr == json.loads(file.read_text())["numbers"]["psnr"]
     assert (row.dataset, row.recipe) == ("ball", "quick")
-    with pytest.raises(ArgumentError, match="expected results of texgs run, got none"):
-        texgs.results(folder / "nothing")
-    copy = folder / "copy" / "ball"
-    shutil.copytree(folder / "ball", copy)
-    with pytest.raises(ArgumentError, match="got those of the same job in"):
-        texgs.results(folder)
-    shutil.rmtree(copy.parent)
+    refused(lambda: texgs.results(folder / "nothing"), "expected results of texgs run, got none")
 
 
 def test_results_of_a_stage_need_nothing_but_their_folder(tmp_path):
@@ -169,6 +153,7 @@ def test_models_in_seconds(ball, monkeypatch, tmp_path):
     assert scene.psnr(views=2, width=24) > 15
     assert texgs.open(tmp_path).parts == scene.parts
     assert read_scene(tmp_path / "scene.yaml").volume.file == tmp_path / "ball.nrrd"
+    assert Origins(scene.session.scene).transfer["maximum"] == ball.summary.maximum
 
 
 @pytest.mark.parametrize(
@@ -178,21 +163,20 @@ def test_models_in_seconds(ball, monkeypatch, tmp_path):
         ({"recipe": "quik"}, ArgumentError, "recipe: expected one of now, .*, got quik, did you mean quick?"),
         ({"seed": -1}, ArgumentError, "seed: expected a whole number from 0 on, got -1"),
         ({"size": 8}, ArgumentError, "size: expected a whole number of pixels, at least 16, got 8"),
-        ({"size": "big"}, ArgumentError, "size: expected a whole number of pixels, at least 16, got 'big'"),
         ({"overrides": "views.step=3"}, ArgumentError, "overrides: expected a list of words such as"),
-        ({"overrides": [3]}, ArgumentError, "overrides: expected a list of words such as"),
         ({"overrides": ["views.trian=3"]}, ConfigError, "views.trian: no such key"),
         ({"functions": [TFS["inner"], TFS["inner"]]}, ArgumentError, "TF01 and TF02"),
         ({"functions": {1: TFS["inner"]}}, ArgumentError, "functions: expected names that are words, got 1;"),
         ({"functions": {"1x": TFS["inner"]}}, ConfigError, "1x"),
         ({"functions": TFS["inner"].scaled(0, 9)}, ArgumentError, "expected a range within the data"),
         ({"recipe": "now", "functions": {"a/b": TFS["inner"]}}, ArgumentError, "functions"),
+        ({"recipe": "now", "overrides": SMALL}, ArgumentError, "overrides: not for the recipe now"),
+        ({"device": "gpu"}, DeviceError, "device: expected cpu or cuda, got gpu"),
     ],
 )
 def test_what_cannot_be_fitted_is_told_before_a_fit(ball, change, error, words, monkeypatch):
     monkeypatch.setattr("texgs.fitting.now.fit_now", None)
-    with pytest.raises(error, match=words):
-        texgs.fit(**{"volume": ball, "functions": TFS, "size": 32, **change})
+    refused(lambda: texgs.fit(**{"volume": ball, "functions": TFS, "size": 32, **change}), words, error)
 
 
 def test_an_interrupted_fit_goes_on(ball, monkeypatch, tmp_path):

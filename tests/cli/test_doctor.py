@@ -22,13 +22,8 @@ def test_only_a_required_thing_fails(capsys):
 
 
 def test_a_broken_probe_does_not_stop_the_others():
-    def broken():
-        raise AttributeError("undefined symbol")
-
-    finding = examine(broken)
-    assert finding.state == "missing"
-    assert "AttributeError: undefined symbol" in finding.found
-    assert show([("weights", finding)]) == 1
+    finding = examine({}.__getitem__)
+    assert (finding.state, show([("weights", finding)])) == ("missing", 1)
 
 
 def test_a_crash_of_the_opengl_probe_is_a_finding(monkeypatch):
@@ -40,33 +35,19 @@ def test_a_crash_of_the_opengl_probe_is_a_finding(monkeypatch):
     assert "libegl1" in finding.advice
 
 
-def test_a_cache_that_cannot_be_written_is_named(monkeypatch, tmp_path):
-    file = tmp_path / "file"
-    file.touch()
-    monkeypatch.setenv("TEXGS_CACHE", str(file / "cache"))
-    finding = doctor.cache()
-    assert finding.state == "missing"
-    assert "TEXGS_CACHE" in finding.advice
-
-
 def test_weights_are_listed(monkeypatch, tmp_path):
     for name in ("TEXGS_WEIGHTS", "TEXGS_CACHE", "TORCH_HOME", "HF_HOME"):
         monkeypatch.setenv(name, str(tmp_path))
     finding = doctor.weights()
     assert (finding.state, finding.found[:14]) == ("missing", "none of vgg16,")
-    folder = tmp_path / "clip-vit-base-patch32"
-    folder.mkdir()
-    for name in ("config.json", "model.safetensors"):
+    (folder := tmp_path / "clip-vit-base-patch32").mkdir()
+    for name in ("config.json", "model.safetensors", "vocab.json"):
         (folder / name).touch()
-    assert doctor.weights().state == "missing", "without its tokenizer it is of no use"
-    (folder / "vocab.json").touch()
     finding = doctor.weights()
     assert finding.state == "ok"
     assert finding.found.startswith("clip-vit-base-patch32; not vgg16, ")
     (tmp_path / "mobile_sam.pt").touch()
-    finding = doctor.weights()
-    assert finding.state == "warning"
-    assert "expected the weights of mobile_sam with checksum" in finding.found
+    assert doctor.weights().state == "warning", "another file of that name"
 
 
 def test_a_machine_on_which_no_stage_can_run_is_broken(monkeypatch, tmp_path):
@@ -82,13 +63,13 @@ def test_a_machine_on_which_no_stage_can_run_is_broken(monkeypatch, tmp_path):
     assert finding.found.startswith("no no-such-package, torch 2.")
 
 
-def test_the_configurations_of_a_project_are_named(monkeypatch, tmp_path):
-    (tmp_path / "conf").mkdir()
-    monkeypatch.chdir(tmp_path)
-    assert doctor.configuration().found.startswith(f"{tmp_path / 'conf'} and ")
+def test_a_cache_that_cannot_be_is_told_with_what_to_set(monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("TEXGS_CACHE", str(tmp_path / "file" / "cache"))
+    finding = doctor.cache()
+    assert finding.state == "missing"
+    assert "TEXGS_CACHE" in finding.advice
 
-
-def test_a_user_without_a_home_is_told_what_to_set(monkeypatch):
     def none():
         raise RuntimeError("Could not determine home directory.")
 

@@ -5,18 +5,11 @@ from dataclasses import replace
 
 import pytest
 
+from tests.refusals import refused
 from texgs.cli.main import main
 from texgs.core.errors import TexgsError
 from texgs.fields.kinds import kinds
 from texgs.workflow.plan import make
-
-CPU_ONLY = "device: expected cpu for fit={}, which fits {}, got cuda"
-PLENOXELS = CPU_ONLY.format("plenoxels", "voxels")
-FITS = "fit.field: texgs {} fits {}, but fit={} has field {};"
-AMBIENT = "fit.first_material.ambient: expected a value between 0 and 1, as material_range=bounded has"
-ABLE = "fit.field: texgs {} expects a fit of {}, but fit={} has field {}; choose another fit"
-OTHER = FITS.format("gaussians", "gaussians", "quick", "surfels") + " run texgs texture"
-DOUBLING = "fit.voxels.stages: expected sides that double from one to the next, got"
 
 
 @pytest.fixture(autouse=True)
@@ -28,55 +21,46 @@ def empty(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("words", "named"),
     [
-        ("texture fit=gaussians_quick", FITS.format("texture", "surfels", "gaussians_quick", "gaussians")),
-        ("gaussians fit=quick", OTHER),
-        ("comparison fit=quick", "fits: expected several recipes to compare, such as fits=[quick,demo]"),
-        ("comparison fits=[quick,plenoxels] device=cuda", PLENOXELS),
-        ("voxels fit=plenoxels device=cuda", PLENOXELS),
-        ("compose fit=plenoxels device=cuda", PLENOXELS),
-        ("palette fit=stylerf_quick device=cuda", CPU_ONLY.format("stylerf_quick", "palette")),
-        ("surfels fit=paper fit.material_range=bounded", AMBIENT),
-        ("surfels fit=quick fit.texture.texels=0", "fit.texture.texels: expected"),
-        ("page fit=stylerf", ABLE.format("page", "surfels", "stylerf", "palette")),
-        ("steps fit=gaussians", ABLE.format("steps", "surfels", "gaussians", "gaussians")),
-        ("steps fit=demo", "dataset.series of sphere: expected the steps of a series in time, got none"),
+        ("texture fit=gaussians_quick", "fit.field: texgs texture fits surfels, .* gaussians"),
+        ("gaussians fit=quick", "fit.field: .* surfels; run texgs texture"),
+        ("comparison fit=quick", "fits: expected several recipes to compare"),
+        ("comparison fits=[quick,plenoxels] device=cuda", "device: .* fit=plenoxels, which fits voxels"),
+        ("compose fit=plenoxels device=cuda", "device: .* fit=plenoxels"),
+        ("palette fit=stylerf_quick device=cuda", "device: .* fit=stylerf_quick, which fits palette"),
+        ("surfels fit=paper fit.material_range=bounded", "fit.first_material.ambient: "),
+        ("surfels fit=quick fit.texture.texels=0", "fit.texture.texels: "),
+        ("page fit=stylerf", "fit.field: texgs page expects a fit of surfels, .* palette"),
+        ("steps fit=gaussians", "fit.field: texgs steps expects a fit of surfels, .* gaussians"),
+        ("steps fit=demo", "dataset.series of sphere: "),
+        ("views dataset=vortex tf=TF01", "data set vortex: starts from views, it has no volume"),
     ],
 )
-def test_a_verb_wants_a_fit_that_it_can_work_on(capsys, words, message):
-    assert main([*words.split(), "dataset=sphere", "dataset.volume.size=16", "tracking=none"]) == 2
-    assert message in capsys.readouterr().err.splitlines()[-1]
-
-
-@pytest.mark.parametrize("verb", ["volume", "transfer", "views", "mesh"])
-def test_a_verb_of_a_volume_wants_a_data_set_with_one(capsys, verb):
-    assert main([verb, "dataset=vortex", "tf=TF01", "tracking=none"]) == 2
-    assert "data set vortex: starts from views, it has no volume" in capsys.readouterr().err.splitlines()[-1]
+def test_a_verb_wants_a_fit_and_a_data_set_that_it_can_work_on(capsys, words, named):
+    verb, *rest = words.split()
+    assert main([verb, "dataset=sphere", "dataset.volume.size=16", "tracking=none", *rest]) == 2
+    assert re.search(named, capsys.readouterr().err.splitlines()[-1])
 
 
 @pytest.mark.parametrize(
-    ("keys", "message"),
+    ("keys", "named"),
     [
         (["fit.voxels.rays=1", "fit.voxels.run=2"], r"fit.voxels.run: expected at most rays \(1\), got 2"),
-        (["fit.voxels.stages=[{side: 64}, {side: 100}]"], rf"{DOUBLING} \[64, 100\]"),
-        (["fit.voxels.stages=[]"], rf"{DOUBLING} \[\]"),
-        (["fit.voxels.stages=[{side: 600}, {side: 1200}]"], r"stages.*side: expected at most 1024, got 1200"),
-        (["fit.voxels.step=0.01"], r"fit.voxels.step: expected at least 0.1, got 0.01"),
-        (["fit.voxels.step=100"], r"fit.voxels.step: expected at most 8, got 100"),
-        (["device=cuda"], CPU_ONLY.format("plenoxels_quick", "voxels")),
+        (["fit.voxels.stages=[{side: 64}, {side: 100}]"], r"fit.voxels.stages: .* \[64, 100\]"),
+        (["fit.voxels.stages=[]"], r"fit.voxels.stages: .* \[\]"),
+        (["fit.voxels.step=100"], "fit.voxels.step: expected at most 8, got 100"),
+        (["device=cuda"], "device: .* fit=plenoxels_quick"),
     ],
 )
-def test_what_does_not_fit_each_other_is_told_by_verbs_and_runs(capsys, keys, message):
+def test_what_does_not_fit_each_other_is_told_by_verbs_and_runs(capsys, keys, named):
     words = ["dataset=sphere", "fit=plenoxels_quick", *keys]
     assert main(["voxels", *words, "tracking=none"]) == 2
-    assert re.search(message, capsys.readouterr().err.splitlines()[-1])
-    with pytest.raises(TexgsError, match=message):
-        make(tuple(words))
+    assert re.search(named, capsys.readouterr().err.splitlines()[-1])
+    refused(lambda: make(tuple(words)), named, TexgsError)
 
 
 def test_a_mesh_wants_a_field_with_depth(monkeypatch, capsys):
     monkeypatch.setitem(kinds(), "voxels", replace(kinds()["voxels"], depth=""))
     assert main(["mesh", "fit=plenoxels_quick", "dataset=sphere", "tracking=none"]) == 2
-    told = "texgs mesh expects a fit of gaussians or palette or surfels, but fit=plenoxels_quick has"
-    assert f"fit.field: {told}" in capsys.readouterr().err
+    assert "fit.field: texgs mesh expects a fit of gaussians or palette or surfels" in capsys.readouterr().err

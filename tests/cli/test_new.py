@@ -12,7 +12,7 @@ import yaml
 from PIL import Image
 
 from tests.volume.zarr_files import LABELS, all_axes, axes_of, write_image
-from texgs.cli import new, new_tfs
+from texgs.cli import new_tfs
 from texgs.cli.main import main
 from texgs.config.compose import compose, recompose
 from texgs.config.project import ROOT, groups, members
@@ -24,7 +24,6 @@ from texgs.volume.transfer import TransferFunction
 
 # no text to YAML, or no name of a file
 NO_NAMES = ["no", "on", "null", "true", "Off", "nan", "inf", "1e3", "a" * 300]
-DOCUMENT = "name: mine\ntitle: another\nvolume: {file: scan.npy}\n"
 
 
 @pytest.fixture
@@ -142,14 +141,11 @@ def test_one_channel_of_several_is_a_data_set_as_ever(conf, scan):
     assert not grid.others
 
 
-@pytest.mark.parametrize("labels", [[], ["a b", "a_b"], ["a", ""]])
-def test_channels_whose_labels_are_no_names_have_numbers(conf, scan, labels):
-    path = cells(conf.parent, scan, labels)
+def test_channels_whose_labels_are_no_names_have_numbers(conf, scan):
+    path = cells(conf.parent, scan, ["a b", "a_b"])
     assert main(["new", str(path), "--name", "two"]) == 0
     tfs = compose(("dataset=two",)).dataset.basic_tfs
     assert {name: tf.channel for name, tf in tfs.items()} == {"channel_0": "0", "channel_1": "1"}
-    (second,) = open_grid("results/two/volume/volume.nrrd").others
-    np.testing.assert_array_equal(second, np.load(scan) + 10)
 
 
 @pytest.mark.parametrize(
@@ -231,10 +227,7 @@ def test_channels_count_for_the_memory(conf, scan, monkeypatch):
 def test_channels_have_no_steps_in_time(conf, scan, capsys):
     path = cells(conf.parent, scan, ["a", "b"])
     assert main(["new", str(path), "--series", str(path)]) == 2
-    assert (
-        "dataset.series of cells: expected one channel, got a, b; name it by dataset.volume.channel, or "
-        "leave out the series\n" in capsys.readouterr().err
-    )
+    assert "dataset.series of cells: expected one channel, got a, b" in capsys.readouterr().err
     assert not (conf / "dataset").exists()
 
 
@@ -277,8 +270,6 @@ def test_z_of_nifti_points_up_and_keys_may_have_their_whole_name(conf, scan):
         (["missing.nrrd"], "missing.nrrd"),
         (["{scan}", "rreduce=2"], "dataset.volume.rreduce: no such key"),
         (["{scan}", "--name", "a/b"], "--name: expected a letter"),
-        (["{scan}", "dims=[1,2,3]"], "leave them out"),
-        (["{scan}", "--count", "0"], "count"),
         (["{scan}", "--count", "2", "--tf", "a.json"], "--count: expected none beside --tf"),
         (["{scan}", "file=b.npy"], "in front, to be the only file"),
         (["{scan}", "--series", "{scan}"], "expected two files at least"),
@@ -299,18 +290,12 @@ def test_mistakes_write_nothing(conf, scan, capsys, words, message):
     "folder",
     ["\U0001f52c scans", "x\u200dy", "no: [1, #2]", 'it\'s "quoted"', "tab\tline\nend", "back\\slash $HOME"],
 )
-def test_any_path_is_read_again(conf, scan, tmp_path, folder):
+def test_any_path_is_read_again_without_a_way_back_in_it(conf, scan, tmp_path, folder):
     file = tmp_path / folder / "scan.npy"
     file.parent.mkdir()
     scan.rename(file)
-    assert main(["new", str(file), "--name", "mine"]) == 0
+    assert main(["new", f"{folder}/../{folder}/scan.npy", "--name", "mine"]) == 0
     assert compose(("dataset=mine",)).dataset.volume.file == str(file)
-
-
-def test_the_path_that_is_written_has_no_way_back_in_it(conf, scan, tmp_path):
-    (tmp_path / "other").mkdir()
-    assert main(["new", f"other/../{scan.name}", "--name", "mine"]) == 0
-    assert compose(("dataset=mine",)).dataset.volume.file == str(scan)
 
 
 @pytest.mark.parametrize("name", ["${oc.env:HOME}.npy", "${.npy", "a\udcff.npy"])
@@ -361,25 +346,14 @@ def test_tfs_from_files_keep_every_digit(conf, scan, tmp_path):
     assert [tuple(point) for point in read.opacity] == list(tf.opacity)
 
 
-def test_a_document_that_is_read_as_something_else_is_not_written(conf, scan, capsys, monkeypatch):
-    monkeypatch.setattr(new, "document", lambda config, keys: DOCUMENT)
-    assert main(["new", str(scan), "--name", "mine"]) == 2
-    assert "mine: expected to read" in capsys.readouterr().err
-    assert not conf.exists()
-
-
-def test_what_it_writes_composes(tmp_path, monkeypatch, capsys):
-    assert main(["init", str(tmp_path / "mine")]) == 0
+def test_a_project_composes_and_is_left_as_it_is(tmp_path, monkeypatch, capsys):
+    assert main(["init", str(tmp_path)]) == 0
     assert "README.md" in capsys.readouterr().out
-    monkeypatch.chdir(tmp_path / "mine")
+    monkeypatch.chdir(tmp_path)
     assert "example" in members("experiment")
     assert "engine" in members("dataset")
     assert "README" not in groups()
     assert compose(("experiment=example",)).fit.name == "demo"
-
-
-def test_a_project_is_left_as_it_is(tmp_path, capsys):
-    assert main(["init", str(tmp_path)]) == 0
     (tmp_path / "README.md").write_text("mine")
     files = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     assert main(["init", str(tmp_path)]) == 0

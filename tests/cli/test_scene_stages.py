@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -64,21 +63,12 @@ def test_a_view_beside_its_volume(results, tmp_path, monkeypatch, capsys):
     assert width > 2 * height
     film = [*size, "--path", "orbit", "--frames", "2", "--output", "film.gif"]
     assert main(["render", str(path), "--compare", *film]) == 0
-    target = ["--target", "-0.1", "-.05", "0.2"]  # as viewer and pages print it
-    assert main(["render", str(path), *target, *size, "--output", "target.png"]) == 0
-    for words, message in (
-        (["--mode", "normal"], "--compare: expected --mode shaded, got normal"),
-        (["--gain", "17"], "gain: expected 1 to 16, got 17"),
-    ):
-        assert main(["render", str(path), "--compare", *words]) == 2
-        assert message in capsys.readouterr().err
     assert main(["edit", str(path), "cut=x,0", "--output", "cut.yaml"]) == 0
     assert main(["render", "cut.yaml", "--compare", *size]) == 2
     assert "got a cut one that shows its volume; take cuts back" in capsys.readouterr().err
     assert main(["render", "cut.yaml", "--compare", "fitted", *size, "--output", "c.png"]) == 0
-    for file in (path, path.with_name("mine.yaml")):
-        assert main(["edit", str(path), "cut=x,0", "--output", str(file)]) == 2
-        assert "is a result of the workflow, which makes it anew" in capsys.readouterr().err
+    assert main(["edit", str(path), "cut=x,0", "--output", str(path.with_name("mine.yaml"))]) == 2
+    assert "is a result of the workflow, which makes it anew" in capsys.readouterr().err
     old = write_scene("old.yaml", replace(scene, volume=None))
     assert main(["render", str(old), "--compare", "--output", "none.png"]) == 2
     assert "old.yaml: volume: expected the volume that the scene was made from" in capsys.readouterr().err
@@ -170,14 +160,3 @@ def test_the_report_needs_no_other_file_and_takes_titles_as_text(tmp_path, monke
     text = (tmp_path / "results" / "report.html").read_text()
     assert all(told in text for told in ("31.25", "a &lt;b&gt; edit", "not measured"))
     assert "http" not in text.replace("http-equiv", "")
-
-
-def test_a_film_moves_the_last_plane(results, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    path, size = results / "compose" / "scene.yaml", ["--width", "48", "--path", "cut", "--frames", "3"]
-    assert main(["render", str(path), *size]) == 2
-    assert "path cut: expected a scene that a plane cuts, got none" in capsys.readouterr().err
-    assert main(["edit", str(path), "cut=x,0", "--output", "cut.yaml"]) == 0
-    assert main(["render", "cut.yaml", *size, "--output", "frames"]) == 0
-    first, middle, last = (np.asarray(Image.open(each)) for each in sorted(Path("frames").iterdir()))
-    assert first.std() > middle.std() > last.std() > 0, "the last frame still shows something"

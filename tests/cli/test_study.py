@@ -102,37 +102,14 @@ def named(text):
     return re.findall(rf"\b\w*(?:{names})\w*", text, flags=re.IGNORECASE)
 
 
-def test_the_seed_decides_the_order_and_the_id_is_that_of_the_clips(results, tmp_path):
-    for name, words in {"a": [], "b": [], "c": ["--seed", "1"]}.items():
-        assert main(["study", *SMALL, "--edits", *EDITS, *words, "--output", name]) == 0
-    a, b, c = (key(tmp_path / name) for name in "abc")
-    assert a == b
-    assert (tmp_path / "a" / "ballot.html").read_bytes() == (tmp_path / "b" / "ballot.html").read_bytes()
-    assert len(a["questions"]) == 1
-    assert a["questions"][0]["options"] != c["questions"][0]["options"]
-    assert a["study"] in (tmp_path / "a" / "ballot.html").read_text()
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["--edits", "arf_quick"], "engine arf_quick"),
-        (["--size", "8"], "--size: "),
-        (["--frames", "0"], "--frames: "),
-        (["results=nothing"], "nothing: "),
-    ],
-)
-def test_a_study_that_cannot_be_made_leaves_nothing(results, tmp_path, capsys, words, told):
-    assert main(["study", *words, "--output", "out"]) == 2
-    assert told in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_study_is_made_once_of_one_copy_of_results_and_counted_with_ballots(results, capsys):
     def refused(verb, told):
         assert main(verb) == 2
         assert told in capsys.readouterr().err
 
+    refused(["study", "--edits", "arf_quick"], "engine arf_quick")
+    refused(["study", "results=nothing"], "nothing: ")
+    assert not (results / "study").exists()
     copy = shutil.copytree(results / "engine", results / "before" / "engine")
     refused(["study", *SMALL], "same job in")
     refused(["votes"], "results/study/key.json: ")

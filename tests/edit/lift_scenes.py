@@ -8,8 +8,11 @@ from tests.fitting.scenes import logit
 from texgs.core.lens import Lens
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.raster import rasterize
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
 from texgs.volume.cameras import icosphere
 
 RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.2, 0.9)
@@ -34,6 +37,12 @@ def two_balls(opacity=0.95, n=1500):
     """A red and a blue ball that hide each other from some sides."""
     red = shell(n, 0.25, (-0.3, 0.0, 0.0), RED, opacity)
     return joined(red, shell(n, 0.25, (0.3, 0.1, 0.1), BLUE, opacity, seed=1))
+
+
+def write_two_balls(folder):
+    """Write scene.yaml, with a model of both balls beside it."""
+    file = write_model(folder / "balls.safetensors", two_balls()[0])
+    return write_scene(folder / "scene.yaml", Scene({"balls": SceneModel(file)}))
 
 
 def nested(opacity=0.3, n=2500):

@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from texgs.cli.main import main
+from texgs.core.camera import orbit
 
 expect = pytest.importorskip("playwright.sync_api", reason="needs Playwright").expect
 
@@ -55,15 +56,38 @@ def opened(chromium, address, ratio=1):
 
 
 @contextmanager
-def standalone(chromium, scene_file, ratio=1):
-    """The page of an export at the known camera."""
-    file = scene_file.with_suffix(".html")
-    assert main(["export", str(scene_file), "--to", str(file)]) == 0
-    page = chromium.new_page(viewport={"width": 800, "height": 500}, device_scale_factor=ratio)
-    page.goto(file.as_uri() + LINK)
-    page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
+def opened_file(chromium, file, link=LINK, ratio=1, size=(800, 500)):
+    """A page that is opened as a file. It must log no error, and ask for nothing."""
+    page = chromium.new_page(
+        viewport=dict(zip(("width", "height"), size, strict=True)), device_scale_factor=ratio
+    )
+    page.set_default_timeout(WAIT)
+    wrong, asked = [], []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(file.as_uri() + link)
+    page.wait_for_selector("#picture:not([hidden])", timeout=WAIT)
+    settle(page)
     yield page
     page.close()
+    assert wrong == []
+    assert [url for url in asked if not url.startswith(("data:", "blob:", file.as_uri()))] == []
+
+
+@contextmanager
+def standalone(chromium, scene_file, *words, ratio=1, link=LINK):
+    """The page of an export with some words, at the known camera."""
+    file = scene_file.with_suffix(".html")
+    assert main(["export", str(scene_file), "--to", str(file), *words]) == 0
+    with opened_file(chromium, file, link, ratio) as page:
+        yield page
+
+
+def settle(page):
+    """Wait for the frame in full that follows a movement."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
 
 
 def rendered(scene_file, page, *words):
@@ -91,8 +115,22 @@ def pixels(png):
 def shown(page):
     """Pixels of the picture on the screen, without what lies over its last rows."""
     page.wait_for_timeout(500)
+    page.wait_for_selector("#picture:not([aria-busy=true])", timeout=WAIT)
     page.locator("#marks").evaluate(HIDE)
     return pixels(page.locator("#picture").screenshot())[:-50]
+
+
+def camera_of(page):
+    """The camera that the command of the view has, once it stays."""
+    options = page.locator("#options")
+    commands = ["", options.inner_text()]
+    while commands[-1] != commands[-2]:
+        page.wait_for_timeout(800)
+        commands.append(options.inner_text())
+    words = re.sub(r" -(\d)", r" =\1", commands[-1]).split("--")[1:]
+    numbers = {name: [float(x.replace("=", "-")) for x in rest] for name, *rest in map(str.split, words)}
+    angles = [numbers[name][0] for name in ("azimuth", "polar", "radius", "fov")]
+    return orbit(*angles, *(int(numbers[name][0]) for name in ("width", "height")), numbers["target"])
 
 
 def save_as(page, name):

@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from tests.fields.surfels.test_composition import ball
+from tests.refusals import refused
 from tests.scene.test_twin import HIGH
 from tests.viewer.drawing import Drawing, closeness, view_of
 from tests.viewer.drawn_scenes import (
@@ -23,7 +24,6 @@ from tests.viewer.drawn_scenes import (
 )
 from texgs.core.camera import orbit
 from texgs.core.cuts import Box, Cuts, Plane
-from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
@@ -59,25 +59,24 @@ WIDE = TransferFunction(((0.1, 0), (0.2, 0.3), (0.9, 0.1)), ((0.1, 0.9, 0.2, 0.1
 TILTED = Cuts([Plane([1.0, 2.0, 0.5], 0.2), Plane([0.0, 0.0, -1.0], 0.3)], Box([-0.6] * 3, [0.5] * 3))
 CUTS = Cuts([Plane([1.0, 0.2, 0.0], 0.1), Plane([0.0, 1.0, 0.3], 0.2)])
 BOX = Cuts(box=Box([-0.3, -0.4, -0.2], [0.2, 0.3, 0.4]))
+FACE_LIGHTS = ("shaded", "unlit")
 VOLUMES = {"sphere": lambda: sphere(40), "waves": waves, "flat": lambda: waves((24, 2, 20), (1, 3, 1))}
 PARTS = [PartEdit(), PartEdit(palette=(0.1, 0.6, 0.2)), PartEdit(opacity=0.4, specular=3.0)]
-EDITS = {  # of the model with two segments, and of the next one
-    "hidden": (PartEdit(), PartEdit(visible=False)),
-    "faint": (PartEdit(opacity=0.15), PartEdit()),
-    "opaque": (PartEdit(opacity=20.0), PartEdit()),
-    "recoloured": (PartEdit(palette=(0.9, 0.1, 0.3)), PartEdit()),
-    "tinted": (
-        PartEdit(specular=4.0, shininess=0.2, tint=(1.0, 0.7, 0.2)),
-        PartEdit(tint=(0.2, 0.4, 1.0)),
-    ),
-    "material": (PartEdit(ambient=0.3, diffuse=1.7, specular=4.0, shininess=0.2), PartEdit()),
-}
+GLOSSY = {"specular": 4.0, "shininess": 0.2}
+EDITS = [  # of the model with two segments, and of the next one
+    (PartEdit(), PartEdit(visible=False)),
+    (PartEdit(opacity=0.15), PartEdit()),
+    (PartEdit(opacity=20.0), PartEdit()),
+    (PartEdit(palette=(0.9, 0.1, 0.3)), PartEdit()),
+    (PartEdit(**GLOSSY, tint=(1.0, 0.7, 0.2)), PartEdit(tint=(0.2, 0.4, 1.0))),
+    (PartEdit(**GLOSSY, ambient=0.3, diffuse=1.7), PartEdit()),
+]
 OF_VOLUMES = [
     PartEdit(visible=False),
     PartEdit(opacity=0.3),
     PartEdit(opacity=5.0, palette=(0.1, 0.8, 0.2)),
-    PartEdit(ambient=0.2, diffuse=1.5, specular=3.0, shininess=0.3),
-    PartEdit(specular=3.0, shininess=0.3, tint=(1.0, 0.5, 0.1)),
+    PartEdit(**GLOSSY, ambient=0.2, diffuse=1.5),
+    PartEdit(**GLOSSY, tint=(1.0, 0.5, 0.1)),
 ]
 FAINT = [PartEdit(opacity=0.1)] * 3 + [PartEdit(opacity=0.1, palette=(0.2, 0.2, 0.9)), PartEdit(opacity=0.1)]
 LATER = {  # edits of a series that hold through time
@@ -85,10 +84,12 @@ LATER = {  # edits of a series that hold through time
     "cuts": Cuts([Plane([0.0, 1.0, 0.2], 0.2)]),
     "background": (0.2, 0.3, 0.5),
     "volume": None,
-    "edits": [PartEdit(opacity=0.4, specular=3.0), PartEdit(palette=(0.9, 0.2, 0.1), opacity=2.0)],
+    "edits": [
+        PartEdit(opacity=0.4, specular=3.0),
+        PartEdit(palette=(0.9, 0.2, 0.1), opacity=2.0),
+        PartEdit(diffuse=1.5),
+    ],
 }
-LATER["edits"].append(PartEdit(diffuse=1.5))
-
 
 WITHOUT_FLOAT_BLEND = """() => {
   const known = WebGL2RenderingContext.prototype.getExtension;
@@ -136,51 +137,42 @@ def changed(scene, edits=(), time=None, functions=(), **fields):
     return replace(scene, models=models, **fields)
 
 
-def on_volumes(change, mode, least=LEAST, camera=CAMERA):
-    """Cases of one change of each scene with a volume."""
-    return [(name, camera, mode, change, least) for name in VOLUMES]
+def cases(names, cameras, modes, changes, limit):
+    """All of them by all others: scene, camera, mode, change, limit."""
+    return [(*each, limit) for each in product(names, cameras, modes, changes)]
 
 
-TRIED = (("high", WIDE), ("new", HIGH))
-CASES = [  # scene, camera, mode, what is changed, and the least PSNR in dB, or how many levels and where else
-    *(
-        ("parts", c, "shaded", {"light": light}, LEVELS)
-        for c, light in product(CAMERAS, (HEADLIGHT, SIDE, BELOW))
+TRIED = {"functions": (("high", WIDE), ("new", HIGH))}
+LIGHTS = [{"light": light} for light in (HEADLIGHT, SIDE, BELOW)]
+FACES = [{"cuts": replace(cuts, faces=faces), "light": SIDE} for cuts in (CUTS, BOX) for faces in FACE_LIGHTS]
+TIMES = [{"time": time} for time in (4, 0, 1, BEGIN)]
+CASES = [  # the limit is the least PSNR in dB, or how many levels, or both where something is cut
+    *cases(["parts"], CAMERAS, ["shaded"], LIGHTS, LEVELS),
+    *cases(["parts"], CAMERAS[:1], MODES, [{"light": SIDE}], LEVELS),
+    *cases(
+        *(["parts"], CAMERAS[1:2], ["shaded"]),
+        [{"light": SIDE, "edits": [own, *PARTS[1:], other]} for own, other in EDITS],
+        LEVELS,
     ),
-    *(("parts", CAMERAS[0], mode, {"light": SIDE}, LEVELS) for mode in MODES),
-    *(
-        ("parts", CAMERAS[1], "shaded", {"light": SIDE, "edits": [own, *PARTS[1:], other]}, LEVELS)
-        for own, other in EDITS.values()
-    ),
-    *(
-        ("parts", c, mode, {"cuts": TILTED}, "cut")
-        for c, mode in product(CAMERAS, ("shaded", "depth", "discs"))
-    ),
-    *(
-        ("parts", c, "shaded", {"light": each, "edits": FAINT}, 1)
-        for c, each in product(CAMERAS, (HEADLIGHT, SIDE))
-    ),
+    *cases(["parts"], CAMERAS, ["shaded", "depth", "discs"], [{"cuts": TILTED}], "cut"),
+    *cases(["parts"], CAMERAS, ["shaded"], [{**light, "edits": FAINT} for light in LIGHTS[:2]], 1),
     ("parts", CAMERAS[0], "depth", {"edits": [PartEdit(opacity=0.02)] * 5}, 1),  # nothing says what is near
-    *(("halves", c, "shaded", {"light": SIDE}, LEVELS) for c in CAMERAS),
+    *cases(["halves"], CAMERAS, ["shaded"], [{"light": SIDE}], LEVELS),
     ("halves", CAMERAS[0], "shaded", {"edits": [PartEdit(opacity=0.1)] * 5}, 1),
     ("bright", CAMERAS[0], "shaded", {}, LEVELS),
-    *(
-        case
-        for camera, light in product((CAMERA, FROM_BELOW), (HEADLIGHT, SIDE))
-        for case in on_volumes({"light": light}, "volume", LEAST, camera)
-    ),
-    *(case for edit in OF_VOLUMES for case in on_volumes({"edits": [edit]}, "volume")),
-    *(case for mode in ("volume", "shaded") for case in on_volumes({"functions": TRIED}, mode)),
-    *(
-        case
-        for cuts, faces, mode in product((CUTS, BOX), ("shaded", "unlit"), ("volume", "shaded"))
-        for case in on_volumes({"cuts": replace(cuts, faces=faces), "light": SIDE}, mode, LEAST - 3)
-    ),
+    *cases(VOLUMES, [CAMERA, FROM_BELOW], ["volume"], LIGHTS[:2], LEAST),
+    *cases(VOLUMES, [CAMERA], ["volume"], [{"edits": [edit]} for edit in OF_VOLUMES], LEAST),
+    *cases(VOLUMES, [CAMERA], ["volume", "shaded"], [TRIED], LEAST),
+    *cases(VOLUMES, [CAMERA], ["volume", "shaded"], FACES, LEAST - 3),
     # A volume has one material: models with others are seen below faces.
-    *on_volumes({"edits": [PartEdit(ambient=0.2, diffuse=0.1)], "cuts": CUTS, "light": SIDE}, "shaded", 40.0),
-    *(("series", NEAR, "shaded", {"time": time}, CLOSE) for time in (4, 0, 1, BEGIN)),
-    *(("series", NEAR, "normal", {"time": time}, CLOSE - 6) for time in (4, 0, 1, BEGIN)),
-    *(("series", NEAR, "shaded", {"time": time, **LATER}, CLOSE - 12) for time in (0, 4)),
+    *cases(
+        *(VOLUMES, [CAMERA], ["shaded"]),
+        [{"edits": [PartEdit(ambient=0.2, diffuse=0.1)], "cuts": CUTS, "light": SIDE}],
+        40.0,
+    ),
+    *cases(["series"], [NEAR], ["shaded"], TIMES, CLOSE),
+    *cases(["series"], [NEAR], ["normal"], TIMES, CLOSE - 6),
+    *cases(["series"], [NEAR], ["shaded"], [{**time, **LATER} for time in TIMES[:2]], CLOSE - 12),
 ]
 
 
@@ -207,10 +199,8 @@ def test_halves_are_used_where_floats_cannot_be_blended(drawing):
 
 @pytest.mark.parametrize("name", VOLUMES)
 def test_cuts_with_looks_have_faces_of_the_volume_over_the_models(chromium, tmp_path, name):
-    texture, scene = (
-        write_texture(tmp_path / "look.safetensors", ball(1)),
-        scene_of_volume(tmp_path, VOLUMES[name]()),
-    )
+    texture = write_texture(tmp_path / "look.safetensors", ball(1))
+    scene = scene_of_volume(tmp_path, VOLUMES[name]())
     models = {**scene.models, "low": replace(scene.models["low"], texture=texture)}
     opened = Drawing(chromium, replace(scene, models=models, cuts=CUTS), has_volume=True)
     styled = opened.scene
@@ -239,31 +229,30 @@ DEPTH = """([camera, scene, mode, pixel]) => {
 }"""
 
 
+def depth_at(opened, scene, mode, column, row):
+    """Where the page finds something at a pixel."""
+    words = [view_of(CAMERA), opened.describe(scene), mode, [column, row]]
+    return opened.page.evaluate(DEPTH, words)
+
+
 @pytest.mark.parametrize("name", VOLUMES)
-def test_depths_of_the_volume_are_those_of_the_caster(drawing, name):
-    """A double click turns around what the mode shows: the volume here, or the models."""
+def test_a_double_click_turns_around_what_the_mode_shows(drawing, name):
+    """The volume or the models at the depth of the caster or the rasterizer, or else a face of a cut."""
     opened, scene = drawing(name), drawing(name).scene
     volume = Twin(scene)._caster.cast(combine(scene.volume.tfs), CAMERA, HEADLIGHT, ("depth",))
     models = scene.open().render(CAMERA, HEADLIGHT, scene.edits, outputs=("depth",))
     row, column = divmod(int(volume.rgba[..., 3].argmax()), CAMERA.width)
     for mode, expected in (("volume", volume), ("shaded", models)):
-        words = [view_of(CAMERA), opened.describe(scene), mode, [column, row]]
-        assert opened.page.evaluate(DEPTH, words) == pytest.approx(
+        assert depth_at(opened, scene, mode, column, row) == pytest.approx(
             float(expected.depth[row, column]), abs=5e-3
         )
-        assert opened.page.evaluate(DEPTH, [*words[:3], [0, 0]]) is None, "the background"
-
-
-@pytest.mark.parametrize("name", VOLUMES)
-def test_a_point_of_a_face_is_of_the_volume(drawing, name):
-    """What is behind it may be far away, or nothing."""
-    opened, scene = drawing(name), drawing(name).scene
+        assert depth_at(opened, scene, mode, 0, 0) is None, "the background"
     cut = replace(scene, cuts=CUTS)
     seen = Twin(cut).render(CAMERA, cut, scene.open().palettes, range_of(CUTS, CAMERA), outputs=("depth",))
     face = torch.where(range_of(CUTS, CAMERA).face >= 0, seen.alpha, 0.0)
     row, column = divmod(int(face.argmax()), CAMERA.width)
-    words = [view_of(CAMERA), opened.describe(cut), "shaded", [column, row]]
-    assert opened.page.evaluate(DEPTH, words) == pytest.approx(float(seen.depth[row, column]), abs=5e-3)
+    found = depth_at(opened, cut, "shaded", column, row)
+    assert found == pytest.approx(float(seen.depth[row, column]), abs=5e-3)
 
 
 @pytest.mark.parametrize("name", VOLUMES)
@@ -335,5 +324,4 @@ def test_texels_that_no_page_can_hold_are_refused(tmp_path):
     model = ball(5)
     model.parameters["texels"][3, 1] = 300
     scene = Scene({"A": SceneModel(write_model(tmp_path / "a.safetensors", model))})
-    with pytest.raises(ArgumentError, match=r"^texels: expected at most 255.992, got 300; fit"):
-        pack(scene.open())
+    refused(lambda: pack(scene.open()), "^texels: expected at most 255.992, got 300")

@@ -1,29 +1,13 @@
 """A double click makes what is seen there the middle of the picture, in both pages."""
 
-import re
-
 import pytest
 import torch
 
-from tests.viewer.in_browser import WAIT, expect, opened, served, standalone
-from texgs.core.camera import orbit
+from tests.viewer.in_browser import WAIT, camera_of, expect, opened, served, standalone
 from texgs.scene.scene_file import read_scene
 
 SEEN = (0.52, 0.44)  # parts of the picture
 BACKGROUND = "There is only background."
-
-
-def camera_of(page):
-    """The camera that the command of the view has, once it stays."""
-    options = page.locator("#options")
-    commands = ["", options.inner_text()]
-    while commands[-1] != commands[-2]:
-        page.wait_for_timeout(800)
-        commands.append(options.inner_text())
-    words = re.sub(r" -(\d)", r" =\1", commands[-1]).split("--")[1:]
-    numbers = {name: [float(x.replace("=", "-")) for x in rest] for name, *rest in map(str.split, words)}
-    angles = [numbers[name][0] for name in ("azimuth", "polar", "radius", "fov")]
-    return orbit(*angles, *(int(numbers[name][0]) for name in ("width", "height")), numbers["target"])
 
 
 def turns_around_what_is_seen(page, scene):
@@ -53,6 +37,19 @@ def test_a_double_click_turns_the_viewer_around_what_is_seen(chromium, scene_fil
         turns_around_what_is_seen(page, read_scene(scene_file))
 
 
-def test_a_double_click_turns_the_standalone_page_around_what_is_seen(chromium, scene_file):
+def test_the_standalone_page_turns_around_what_is_seen_and_zooms_to_what_is_below_the_pointer(
+    chromium, scene_file
+):
     with standalone(chromium, scene_file) as page:
         turns_around_what_is_seen(page, read_scene(scene_file))
+        page.locator("#picture").press("Home")
+        before, box = camera_of(page), page.locator("#picture").bounding_box()
+        page.mouse.move(box["x"] + 100, box["y"] + 60)
+        page.mouse.wheel(0, -300)
+        after = camera_of(page)
+        distance = float(-before.viewmat[2, :3] @ before.position)  # of the target, near the origin
+        ray = torch.linalg.inv(before.K) @ torch.tensor([100.0, 60.0, 1.0])
+        point = before.viewmat[:3, :3].T @ (distance * ray - before.viewmat[:3, 3])
+        place, depth = after.project(point)
+        assert 0 < float(depth) < 0.9 * distance
+        torch.testing.assert_close(place, torch.tensor([100.0, 60.0]), atol=1.5, rtol=0)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.refusals import refused
 from tests.viewer.pages import TOKEN, on_page, origin, page
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
-from texgs.core.errors import ArgumentError
 from texgs.edit.new_look import learn_look
 from texgs.edit.readable import MATERIALS
 from texgs.fields.part_edit import PartEdit
@@ -50,13 +50,24 @@ def look(**values):
     return {"type": "look", "parts": [], "style": "", "instruction": "", "preview": False, **values}
 
 
+async def tried(browser, **values):
+    """The parts that a preview is on, once it is there."""
+    await browser.send(**look(**values, preview=True))
+    return (await browser.next("trial"))["parts"]
+
+
+async def cancelled(browser):
+    """The parts that have a preview after a cancellation."""
+    await browser.send(type="cancel")
+    return (await browser.next("trial"))["parts"]
+
+
 @on_page
 async def test_a_preview_shows_on_its_page_alone_and_changes_nothing(browser, client, scene_file):
     async with page(client) as other:
         await other.next("scene")
         before = await picture(browser)
-        await browser.send(**look(style="glass", preview=True))
-        assert (await browser.next("trial"))["parts"] == ["TF01", "TF02"]
+        assert await tried(browser, style="glass") == ["TF01", "TF02"]
         assert np.abs(await picture(browser) - before).mean() > 3
         assert (await picture(browser, before=True) == before).all()
         assert (await picture(other) == before).all()
@@ -64,8 +75,7 @@ async def test_a_preview_shows_on_its_page_alone_and_changes_nothing(browser, cl
         stills = [await still(client, **query, page=number) for number in ("1", "2", "none")]
         assert stills[0] != stills[1] == stills[2], "the other page and strangers see what all share"
         assert client.server_side.edits.state()["past"] == []
-        await browser.send(type="cancel")
-        assert (await browser.next("trial"))["parts"] == []
+        assert await cancelled(browser) == []
         assert (await picture(browser) == before).all()
     assert not [path for path in scene_file.parent.iterdir() if path.is_dir()]
 
@@ -73,18 +83,17 @@ async def test_a_preview_shows_on_its_page_alone_and_changes_nothing(browser, cl
 @on_page
 async def test_a_look_is_one_step_and_written_beside_the_scene(browser, scene_file):
     before = await picture(browser)
-    gold = look(parts=["TF01"], instruction="turn it into gold")
-    await browser.send(**{**gold, "preview": True})
-    await browser.next("trial")
-    tried = await picture(browser)
-    await browser.send(**gold)
+    gold = {"parts": ["TF01"], "instruction": "turn it into gold"}
+    await tried(browser, **gold)
+    preview = await picture(browser)
+    await browser.send(**look(**gold))
     news = await browser.next("notice")
     assert news["level"] == "info"
     assert "turn it into gold: procedural filters" in news["text"]
     await browser.past("TF01 turn it into gold")
     after = await picture(browser)
     assert np.abs(after - before).mean() > 1
-    assert (after == tried).all(), "the preview has the highlights of gold, too"
+    assert (after == preview).all(), "the preview has the highlights of gold, too"
     await browser.send(type="save", name="gold.yaml")
     await browser.next("notice")
     await browser.send(type="undo")
@@ -102,15 +111,13 @@ async def test_a_look_is_one_step_and_written_beside_the_scene(browser, scene_fi
 @on_page
 async def test_words_are_tried_from_one_side_and_change_nothing(browser, client):
     before = await picture(browser)
-    gold = look(instruction="turn it into gold")
-    await browser.send(**{**gold, "preview": True, "camera": SHOT["camera"]})
-    await browser.next("trial")
-    tried = await picture(browser)
+    await tried(browser, instruction="turn it into gold", camera=SHOT["camera"])
+    preview = await picture(browser)
     assert client.server_side.edits.state()["past"] == []
-    await browser.send(**gold)
+    await browser.send(**look(instruction="turn it into gold"))
     await ended(browser)
     made = await picture(browser)
-    assert np.abs(tried - made).mean() < 0.5 * np.abs(made - before).mean(), "from this side it is alike"
+    assert np.abs(preview - made).mean() < 0.5 * np.abs(made - before).mean(), "from this side it is alike"
 
 
 def test_previews_of_words_are_made_by_filters_all_else_by_a_network_that_is_there(monkeypatch, tmp_path):
@@ -129,15 +136,15 @@ def test_previews_of_words_are_made_by_filters_all_else_by_a_network_that_is_the
 async def test_textures_on_their_way_are_shown_as_opaque_as_they_become(browser, client, monkeypatch):
     """Also those of a faint part, which the look makes more opaque."""
     monkeypatch.setattr("texgs.viewer.looks.SECONDS_BETWEEN", 0.0)
-    edits, tried, try_on = client.server_side.edits, [], Page.try_on
-    monkeypatch.setattr(Page, "try_on", lambda own, looks: tried.append(looks) or try_on(own, looks))
+    edits, shown, try_on = client.server_side.edits, [], Page.try_on
+    monkeypatch.setattr(Page, "try_on", lambda own, looks: shown.append(looks) or try_on(own, looks))
     await browser.send(type="edit", part="TF02", key="opacity", value=0.1)
     await browser.past("TF02 opacity 0.1")
     await browser.send(**look(parts=["TF02"], style="dots"))
     assert (await browser.next("trial"))["parts"] == ["TF02"]
     await ended(browser)
     assert edits.state()["past"] == ["TF02 opacity 0.1", "TF02 dots"]
-    *on_their_way, last = tried
+    *on_their_way, last = shown
     assert last is None
     opacity = edits.scene.models["TF02"].edit.opacity
     assert opacity > 0.1
@@ -153,21 +160,13 @@ async def test_a_picture_of_the_user_is_taken_in(browser, client, tmp_path):
     async with client.post(path, params={"name": "noise.png"}, data=content, headers=headers) as answer:
         name = await answer.text()
     assert name == "1 noise.png"
-    await browser.send(**look(style=name, preview=True))
-    assert (await browser.next("trial"))["parts"] == ["TF01", "TF02"]
+    assert await tried(browser, style=name) == ["TF01", "TF02"]
     for bad, message in (("../x.png", "expected a name that a file can have"), ("x.png", "x.png: ")):
         async with client.post(path, params={"name": bad}, data=b"no", headers=headers) as answer:
             assert answer.status == 400
             text = await answer.text()
             assert message in text
             assert str(tmp_path) not in text
-    Image.new("1", (13_000, 13_000)).save(tmp_path / "large.png")
-    large = (tmp_path / "large.png").read_bytes()
-    async with client.post(path, params={"name": "large.png"}, data=large, headers=headers) as answer:
-        assert answer.status == 400
-        assert await answer.text() == (
-            "large.png: expected a picture of at most 50 million pixels, got 13000 x 13000; scale it down"
-        )
     async with client.post(path, params={"name": "a.png"}, data=content) as answer:
         assert answer.status == 403
     async with client.post(path, data=bytes(33 * 2**20), headers=headers) as answer:
@@ -177,16 +176,11 @@ async def test_a_picture_of_the_user_is_taken_in(browser, client, tmp_path):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({}, "look: expected a picture or an instruction, got both or none"),
         ({"style": "dots", "instruction": "gold"}, "look: expected a picture or an instruction"),
-        ({"style": "nothing"}, "style: expected one of strokes"),
         ({"style": "/etc/passwd"}, "style: expected one of strokes"),
-        ({"instruction": "a cathedral"}, "'a cathedral': expected what filters know (stipple"),
-        ({"instruction": "a cathedral", "preview": True}, "'a cathedral': expected what filters know (sti"),
-        ({"instruction": "gold", "camera": {"azimuth": 3}}, "camera.target: expected a value, got none"),
+        ({"instruction": "${oc.env:HOME}"}, "'${oc.env:HOME}': expected what filters know"),  # no reference
+        ({"instruction": "a cathedral", "preview": True}, "'a cathedral': expected what filters know"),
         ({"style": "dots", "parts": ["TF09"]}, "edit.parts: expected some of TF01, TF02, got TF09"),
-        ({"instruction": "${oc.env:HOME}"}, "'${oc.env:HOME}': expected what"),  # words are no references
-        ({"style": "dots", "parts": "TF01"}, "parts: expected a list"),
     ],
 )
 @on_page
@@ -237,13 +231,10 @@ async def test_a_preview_that_is_cancelled_as_it_ends_is_not_shown(browser, held
     before = await picture(browser)
     await browser.send(**look(style="glass", preview=True))
     await asyncio.to_thread(reached.wait, 30)
-    await browser.send(type="cancel")
-    assert (await browser.next("trial"))["parts"] == []
+    assert await cancelled(browser) == []
     go_on.set()
-    await browser.send(**look(parts=["TF01"], style="dots", preview=True))
-    assert (await browser.next("trial"))["parts"] == ["TF01"], "nothing of the first"
-    await browser.send(type="cancel")
-    assert (await browser.next("trial"))["parts"] == []
+    assert await tried(browser, parts=["TF01"], style="dots") == ["TF01"], "nothing of the first"
+    assert await cancelled(browser) == []
     assert (await picture(browser) == before).all()
 
 
@@ -261,8 +252,7 @@ async def test_of_previews_that_wait_the_newest_is_shown(browser, client, held):
     (own,) = client.server_side._pages
     (folder,) = {each.texture.parent for each in own._trial.values()}
     assert len([*folder.parent.iterdir()]) == 2, "those between were not made"
-    await browser.send(**look(style="dots", preview=True))
-    await browser.next("trial")
+    await tried(browser, style="dots")
     assert (await picture(browser) == newest).all()
 
 
@@ -270,8 +260,7 @@ async def test_of_previews_that_wait_the_newest_is_shown(browser, client, held):
 async def test_a_preview_is_on_the_parts_that_are_chosen_and_on_no_others(browser, client):
     (own,) = client.server_side._pages
     for parts in ([], ["TF02"], ["TF01"]):
-        await browser.send(**look(parts=parts, style="glass", preview=True))
-        assert (await browser.next("trial"))["parts"] == (parts or ["TF01", "TF02"])
+        assert await tried(browser, parts=parts, style="glass") == (parts or ["TF01", "TF02"])
         assert all(look.texture.is_file() for look in own._trial.values())
 
 
@@ -284,8 +273,7 @@ async def thumbnail(client, style="glass", **values):
 @on_page
 async def test_a_thumbnail_is_the_scene_with_a_picture_on_it(browser, client):
     """It is the preview, as the page shows it, in small."""
-    await browser.send(**look(style="glass", preview=True))
-    await browser.next("trial")
+    await tried(browser, style="glass")
     shown = Image.fromarray((await picture(browser)).astype(np.uint8))
     status, content = await thumbnail(client)
     small = Image.open(io.BytesIO(content))
@@ -307,8 +295,7 @@ async def test_thumbnails_and_the_preview_of_a_picture_are_learned_once(browser,
     )
     _, first = await thumbnail(client)
     _, turned = await thumbnail(client, camera=SHOT["camera"] | {"azimuth": 0})
-    await browser.send(**look(style="glass", preview=True))
-    await browser.next("trial")
+    await tried(browser, style="glass")
     shown = await picture(browser)
     assert (first != turned, len(learned)) == (True, 1)
     await browser.send(type="edit", part="TF01", key="visible", value=False)
@@ -324,22 +311,16 @@ async def test_thumbnails_and_the_preview_of_a_picture_are_learned_once(browser,
 async def test_a_thumbnail_that_cannot_be_is_a_sentence(client, browser):
     for values, message in (
         ({"style": "nothing"}, b"style: expected one of strokes"),
-        ({"camera": {}}, b"camera.target: expected a value, got none"),
         ({"camera": None}, b"camera: expected one to show a thumbnail from, got none"),
         ({"colour": 1}, b"colour: no such key"),
     ):
         status, text = await thumbnail(client, **values)
-        assert status == 400
-        assert text.startswith(message)
-    async with client.get(f"/{TOKEN}/thumbnail.jpg") as answer:
-        assert answer.status == 400
+        assert (status, text[: len(message)]) == (400, message)
 
 
 def test_pictures_of_a_folder(tmp_path):
-    with pytest.raises(ArgumentError, match="--styles: expected a folder"):
-        Styles(tmp_path, tmp_path / "none")
-    with pytest.raises(ArgumentError, match="got 0"):
-        Styles(tmp_path, tmp_path)
+    refused(lambda: Styles(tmp_path, tmp_path / "none"), "--styles: expected a folder")
+    refused(lambda: Styles(tmp_path, tmp_path), "got 0")
     Image.new("RGB", (64, 48), "red").save(tmp_path / "red.png")
     (tmp_path / "broken.JPG").write_bytes(b"no picture")
     (tmp_path / "notes.txt").write_text("not offered")
@@ -347,9 +328,7 @@ def test_pictures_of_a_folder(tmp_path):
     styles = Styles(tmp_path, tmp_path)
     assert styles.names[-3:] == ["broken.JPG", "large.png", "red.png"]
     assert styles.source("red.png") == str(tmp_path / "red.png")
-    with pytest.raises(ArgumentError, match=r"large\.png: expected a picture of at most 50 million pixels"):
-        styles.source("large.png")
+    refused(lambda: styles.source("large.png"), "large.png: expected a picture of at most 50 million pixels")
     for number in range(51):
         (tmp_path / f"{number}.png").touch()
-    with pytest.raises(ArgumentError, match="got 54"):
-        Styles(tmp_path, tmp_path)
+    refused(lambda: Styles(tmp_path, tmp_path), "got 54")

@@ -9,15 +9,10 @@ from hypothesis import strategies as st
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.viewer.messages import (
-    Cancel,
     Edit,
-    Fit,
-    Keep,
     Look,
     Mask,
     Pick,
-    Redo,
-    Remove,
     Save,
     Segment,
     Undo,
@@ -41,26 +36,29 @@ def test_messages_are_read():
     view = parse(json.dumps(VIEW))
     assert isinstance(view, View)
     assert (view.id, view.mode, view.moving, view.before) == (7, "normal", True, False)
-    assert parse(json.dumps(PICK)) == Pick(view, (3, 4))
-    edit = {"type": "edit", "part": "TF01", "key": "opacity", "value": 0.5, "step": 3}
-    assert parse(json.dumps(edit)) == Edit("TF01", "opacity", 0.5, 3)
-    assert parse('{"type": "undo"}') == Undo()
-    assert parse('{"type": "redo"}') == Redo()
-    assert parse('{"type": "save", "name": "a.yaml"}') == Save("a.yaml", False)
-    assert parse('{"type": "cancel"}') == Cancel()
-    assert parse('{"type": "fit", "function": "TF03"}') == Fit("TF03")
-    assert parse('{"type": "keep", "function": "TF03"}') == Keep("TF03")
-    assert parse('{"type": "remove", "part": "TF01/a"}') == Remove("TF01/a")
-    look = {"type": "look", "parts": ["TF01"], "style": "glass", "sphere": True, "camera": CAMERA}
-    assert parse(json.dumps(look)) == Look(("TF01",), "glass", sphere=True, camera=view.camera)
-    clicks = {"camera": CAMERA, "points": [[1, 2.5, True], [3, 4, False]]}
-    clicked = (view.camera, ((1, 2.5, True), (3, 4, False)))
-    mask, segment = {"type": "mask", "id": 4, "model": "TF01"}, {"type": "segment", "part": "TF01/a"}
-    assert parse(json.dumps(mask | clicks)) == Mask(*clicked, model="TF01", id=4)
-    assert parse(json.dumps(segment | clicks)) == Segment(*clicked, part="TF01/a")
-    drawn = mask | {"camera": CAMERA, "points": [], "outline": [[0, 0], [9, 0], [9, 9.5]]}
     corners = ((0, 0), (9, 0), (9, 9.5))
-    assert parse(json.dumps(drawn)) == Mask(view.camera, (), corners, "TF01", 4)
+    for message, expected in (
+        (PICK, Pick(view, (3, 4))),
+        ({"type": "undo"}, Undo()),
+        ({"type": "save", "name": "a.yaml"}, Save("a.yaml", False)),
+        (
+            {"type": "edit", "part": "TF01", "key": "opacity", "value": 0.5, "step": 3},
+            Edit("TF01", "opacity", 0.5, 3),
+        ),
+        (
+            {"type": "look", "parts": ["TF01"], "style": "glass", "sphere": True, "camera": CAMERA},
+            Look(("TF01",), "glass", sphere=True, camera=view.camera),
+        ),
+        (
+            {"type": "segment", "part": "TF01/a", "camera": CAMERA, "points": [[1, 2.5, True]]},
+            Segment(view.camera, ((1, 2.5, True),), part="TF01/a"),
+        ),
+        (
+            {**MASK, "id": 4, "points": [], "outline": [[*corner] for corner in corners]},
+            Mask(view.camera, (), corners, "TF01", 4),
+        ),
+    ):
+        assert parse(json.dumps(message)) == expected
 
 
 def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
@@ -80,26 +78,18 @@ def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
         (VIEW, {"type": ["view"]}, "type: expected one of view, pick, edit, undo,"),
         (VIEW, {"mode": "shade"}, "mode: expected one of shaded, "),
         (VIEW, {"id": -1}, "id: expected at least 0, got -1"),
-        (VIEW, {"moving": 2}, "moving: expected true or false, got 2"),
         (VIEW, {"colour" * 100: 1}, f"{('colour' * 10)}: no such key"),
         (VIEW, {"camera": None}, "camera: expected keys with values, got null"),
         (VIEW, {"camera": {**CAMERA, "polar": 91}}, "camera.polar: expected at most 90, got 91"),
-        (VIEW, {"camera": {**CAMERA, "width": 1e3}}, "camera.width: expected an integer, got 1000.0"),
-        (VIEW, {"camera": {**CAMERA, "target": [0, 0]}}, "camera.target: expected 3 values, got 2"),
-        (VIEW, {"camera": {**CAMERA, "distance": "x"}}, "camera.distance: expected a number, got 'x'"),
         (VIEW, {"camera": {**CAMERA, "azimuth": 1e400}}, "camera.azimuth: expected a finite number"),
         (VIEW, {"camera": {}}, "camera.target: expected a value, got none"),
-        (VIEW, {"only": None}, "only: expected text, got null"),
         (VIEW, {"type": "undo"}, "id: no such key"),
         (PICK, {"pixel": [3, 4096]}, "pixel: expected at most 4095, got 4096"),
-        (PICK, {"view": {**SHOWN, "mode": "x"}}, "view.mode: expected one of shaded, "),
         (EXPORT, {"stops": [CAMERA] * 21}, "stops: expected 0 to 20 values, got 21"),
         (EXPORT, {"fps": 0}, "fps: expected at least 1, got 0"),
-        (MASK, {"points": None}, "points: expected a list, got null"),
         (MASK, {"points": [[1, "a", True]]}, "points.0.1: expected a number, got 'a'"),
         (MASK, {**DRAWN, "outline": [[1, 2], [3, 4]]}, "outline: expected 3 to 500 values, got 2"),
         (MASK, {**DRAWN, "outline": [[float("nan"), 1]] * 3}, "outline: expected a finite number"),
-        (MASK, {**DRAWN, "outline": "box"}, "outline: expected a list, [box]"),
     ],
 )
 def test_what_is_wrong_is_named(whole, change, message):

@@ -7,7 +7,6 @@ import torch
 
 from tests.fields.surfels.test_composition import ball
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
@@ -22,6 +21,7 @@ def test_a_scene_and_a_model_are_saved_in_their_place(scene_file, tmp_path):
     assert list(opened.scene.models) == ["TF01", "TF02"]
     assert (opened.folder, opened.name, opened.file) == (tmp_path, "scene.yaml", scene_file)
     assert open_scene(scene_file, tmp_path / "mine").folder == tmp_path / "mine"
+    assert open_scene(tmp_path).scene == opened.scene, "a folder is the scene in it"
     opened = open_scene(write_model(tmp_path / "shell.safetensors", ball(1)))
     assert list(opened.scene.models) == ["shell"]
     assert (opened.folder, opened.name) == (tmp_path, "scene.yaml")
@@ -37,14 +37,6 @@ def test_a_job_keeps_its_scene_and_its_folder(scene_file, tmp_path, monkeypatch)
     model = write_model(tmp_path / "model.safetensors", ball(1))
     assert open_scene(model).folder == project
     assert open_scene(model, tmp_path).folder == tmp_path
-
-
-def test_a_folder_with_one_scene(scene_file, tmp_path):
-    assert open_scene(tmp_path.parent / tmp_path.name).scene == open_scene(scene_file).scene
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other" / "scene.yaml").write_text(scene_file.read_text())
-    with pytest.raises(ArgumentError, match=r"got 2 \(other/scene.yaml, scene.yaml\); name one of them"):
-        open_scene(tmp_path)
 
 
 def described(tmp_path, *models, **values):

@@ -6,6 +6,7 @@ import re
 import shlex
 import zlib
 from base64 import b64decode
+from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
@@ -17,15 +18,24 @@ from torch.nn.functional import normalize
 
 from tests.viewer.drawing import closeness, unpacked
 from tests.viewer.drawn_scenes import BEGIN, COUNT, scene_of_series
-from tests.viewer.in_browser import LINK, PLACE, WAIT, expect, served, shown, still
+from tests.viewer.in_browser import (
+    LINK,
+    PLACE,
+    WAIT,
+    expect,
+    opened_file,
+    served,
+    settle,
+    shown,
+    standalone,
+    still,
+)
 from tests.viewer.in_browser import opened as opened_viewer
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
-from texgs.viewer import standalone
-from texgs.viewer.description import describe
 from texgs.viewer.page_steps import UNITS, page_steps
 from texgs.viewer.standalone import pack, scene_page
 
@@ -63,7 +73,9 @@ def test_sums_are_the_surfels_of_the_step(scene, time):
 
 
 def test_steps_are_chosen_around_that_of_the_scene(scene):
-    assert list(page_steps(scene).packed) == [0, 1, 2, 3, 4]
+    packed = page_steps(scene).packed
+    assert list(packed) == [0, 1, 2, 3, 4]
+    assert page_steps(scene).packed == packed, "the same bytes"
     assert list(page_steps(scene, "2").packed) == [0, 2, 4]
     assert list(page_steps(scene.at(3), 2).packed) == [1, 3]
     assert page_steps(scene, "one").packed == page_steps(scene, 3).packed | {BEGIN: ""} == {BEGIN: ""}
@@ -90,36 +102,15 @@ def test_a_scene_without_a_series_has_none_of_it(scene):
     assert 'class="step"' not in html
 
 
-def test_the_same_scene_gives_the_same_page(scene):
-    assert scene_page(scene, "x").text == scene_page(scene, "x").text
-
-
 # ---- The page ---------------------------------------------------------------
 
 
 @pytest.fixture
-def opened(chromium, scene, tmp_path):
-    """Open the page of an export with some words; nothing may go wrong in it, and it may ask for nothing."""
-    wrong, asked, pages = [], [], []
-
-    def open_page(*words, link=LINK):
-        file = tmp_path / "page.html"
-        source = str(scene.series.file.with_name("scene.yaml"))
-        assert main(["export", source, "--to", str(file), *words]) == 0
-        page = chromium.new_page(viewport={"width": 800, "height": 500})
-        pages.append(page)
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto(file.as_uri() + link)
-        page.wait_for_selector("#picture:not([hidden])", timeout=WAIT)
-        return page
-
-    yield open_page
-    for page in pages:
-        page.close()
-    assert wrong == []
-    assert [url for url in asked if not url.startswith(("data:", "file:", "blob:"))] == []
+def opened(chromium, scene):
+    """Opens pages of exports with some words."""
+    source = scene.series.file.with_name("scene.yaml")
+    with ExitStack() as pages:
+        yield lambda *words, link=LINK: pages.enter_context(standalone(chromium, source, *words, link=link))
 
 
 def slider(page):
@@ -163,7 +154,7 @@ def test_what_is_on_screen_follows(opened, scene):
     for time in (0, 4):
         slider(page).fill(str(time))
         page.wait_for_timeout(300)
-        page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
+        settle(page)
         size = page.locator("#picture").evaluate("picture => [picture.height, picture.width]")
         rendered = expected(scene.at(time), np.empty(size))
         assert closeness(shown(page), rendered[:-50]) > CLOSE - 10
@@ -236,44 +227,15 @@ def test_the_volume_is_that_of_one_step(opened, scene):
     assert page.get_by_label("Show", exact=True).input_value() == "volume"
 
 
-def test_a_damaged_step_is_told_and_the_others_stay(opened, scene, tmp_path):
-    page = opened()
-    text = page_steps(scene).packed[4]
-    file = tmp_path / "page.html"
-    file.write_text(file.read_text().replace(text, text[: len(text) // 8 * 4]))
-    page.goto(file.as_uri())
-    page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
-    slider(page).fill("4")
-    told = page.get_by_text("The scene in this page cannot be unpacked")
-    expect(told).to_be_visible()
-    slider(page).fill("3")
-    picture = saved(page)
-    height, width = picture.shape[:2]
-    view = describe("x", scene, scene.open())["views"][0]
-    camera = orbit(view["azimuth"], view["polar"], view["distance"], 30, width, height, target=view["target"])
-    assert closeness(picture, frame(scene.at(3).open(), camera, scene.at(3))) > CLOSE
-
-
-def test_steps_are_of_pages_alone(scene, tmp_path, capsys):
-    source = str(scene.series.file.with_name("scene.yaml"))
-    assert main(["export", source, "--to", str(tmp_path / "x.ply"), "--steps", "one"]) == 2
-    assert "steps: expected kind html, got 3dgs; leave it out" in capsys.readouterr().err
-    assert main(["export", source, "--to", str(tmp_path / "x.html"), "--steps", "half"]) == 2
-    assert "steps: expected all, one or a number N for each N-th step, got 'half'" in capsys.readouterr().err
-
-
-def exported_by(viewer, which=None, each=None):
-    """The steps that a page has which a viewer exports, with some of the series in it."""
-    with viewer.expect_download(timeout=WAIT) as download:
-        viewer.get_by_role("button", name="Export").click()
-        dialog = viewer.get_by_role("dialog")
-        dialog.get_by_label("As").select_option("Web page")
-        if which:
-            dialog.get_by_role("combobox", name="Steps in time").select_option(which)
-        if each:
-            dialog.get_by_role("spinbutton", name="N", exact=True).fill(each)
-        dialog.get_by_role("button", name="Export").click()
-    return download.value.path().read_text().count('class="step"')
+def test_a_damaged_step_is_told_and_the_others_stay(chromium, scene, tmp_path):
+    text, file = page_steps(scene).packed[4], tmp_path / "page.html"
+    file.write_text(scene_page(scene, "x").text.replace(text, text[: len(text) // 8 * 4]))
+    with opened_file(chromium, file) as page:
+        slider(page).fill("4")
+        expect(page.get_by_text("The scene in this page cannot be unpacked")).to_be_visible()
+        slider(page).fill("3")
+        picture = saved(page)
+        assert closeness(picture, expected(scene.at(3), picture)) > CLOSE
 
 
 def test_the_viewer_asks_which_steps_a_page_holds(chromium, scene):
@@ -281,18 +243,19 @@ def test_the_viewer_asks_which_steps_a_page_holds(chromium, scene):
     with served(file) as (_, address), opened_viewer(chromium, address) as viewer:
         viewer.get_by_role("button", name="Export").click()
         dialog, asked = viewer.get_by_role("dialog"), viewer.get_by_role("combobox", name="Steps in time")
+        number = dialog.get_by_role("spinbutton", name="N", exact=True)
         expect(asked).to_be_hidden()  # a film first
         dialog.get_by_label("As").select_option("Web page")
-        expect(asked).to_be_visible()
-        expect(dialog.get_by_role("spinbutton", name="N", exact=True)).to_be_hidden()
-        dialog.get_by_role("button", name="Cancel").click()
-        assert exported_by(viewer) == COUNT
-        assert exported_by(viewer, "Each N-th", "2") == 3
-        assert exported_by(viewer, "The one that is shown") == 1
+        expect(number).to_be_hidden()
+        asked.select_option("Each N-th")
+        number.fill("2")
+        with viewer.expect_download(timeout=WAIT) as download:
+            dialog.get_by_role("button", name="Export").click()
+        assert download.value.path().read_text().count('class="step"') == 3
 
 
 def test_series_that_are_too_large_are_refused(scene, tmp_path, monkeypatch):
-    monkeypatch.setattr(standalone, "LARGEST", len(pack(scene.open())))
+    monkeypatch.setattr("texgs.viewer.standalone.LARGEST", len(pack(scene.open())))
     assert scene_page(scene, "x", steps="one").steps.total == COUNT
     with pytest.raises(ArgumentError, match=r"of them; export fewer models or steps$"):
         scene_page(scene, "x")

@@ -1,6 +1,5 @@
 """The volume that a page carries: what is left of it, and what a browser draws of it."""
 
-import io
 import json
 import zlib
 from dataclasses import replace
@@ -9,14 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from PIL import Image
 from safetensors.numpy import load
 from scipy.ndimage import map_coordinates
 
+from tests.refusals import refused
 from tests.viewer.drawing import closeness
 from tests.viewer.drawn_scenes import scene_of_volume, waves
-from texgs.cli.main import main
-from texgs.core.errors import ArgumentError
+from tests.viewer.in_browser import shown, standalone
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.viewer.downloads import exports_of, write_download
 from texgs.viewer.messages import Export, parse
@@ -69,11 +67,14 @@ def test_a_volume_that_fits_stays_as_it_is():
 
 
 @pytest.mark.parametrize(
-    ("value", "words"), [(7.0, "got 7 to 7"), (np.nan, "got nan to nan"), (np.inf, "got inf to inf")]
+    ("grid", "most", "named"),
+    [
+        *((Grid(np.full((3, 3, 3), x)), 10_000, f"got {x:g} to {x:g}") for x in (7.0, np.nan, np.inf)),
+        (waves(), 20, "expected room for at least 2 samples a side, got 20 bytes"),
+    ],
 )
-def test_volumes_that_were_not_prepared_are_refused(value, words):
-    with pytest.raises(ArgumentError, match=f"expected finite samples of two values at least, {words}"):
-        within(Grid(np.full((3, 3, 3), value)), 10_000)
+def test_volumes_that_no_page_can_hold_are_refused(grid, most, named):
+    refused(lambda: within(grid, most), named)
 
 
 def test_packed_codes_are_sums_along_all_axes():
@@ -82,11 +83,7 @@ def test_packed_codes_are_sums_along_all_axes():
     for axis in range(3):
         steps = np.cumsum(steps, axis=axis, dtype=np.uint8)
     assert np.array_equal(steps, volume.codes)
-
-
-def test_no_room_is_a_sentence():
-    with pytest.raises(ArgumentError, match="expected room for at least 2 samples a side, got 20 bytes"):
-        within(waves(), 20)
+    assert within(waves(), 10_000).packed == volume.packed, "the same bytes"
 
 
 # ---- The whole page ---------------------------------------------------------
@@ -101,43 +98,24 @@ def source(tmp_path_factory):
 
 def test_the_page_works_alone(chromium, source, capsys):
     """Its editor shows a new function, which can be undone and copied; nothing is loaded."""
-    file = source.with_name("scene.html")
-    assert main(["export", str(source), "--to", str(file), "--volume"]) == 0
-    assert "34 x 26 x 30 samples in steps of" in capsys.readouterr().err
-    page, wrong, asked = chromium.new_page(viewport={"width": 900, "height": 500}), [], []
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
-    page.on("request", lambda request: asked.append(request.url))
-    page.goto(file.as_uri())
-    page.wait_for_selector("#picture:not([hidden])")
-    page.select_option("#mode", "volume")
-    page.locator("#models input[type=checkbox]").first.uncheck()  # it hides the middle
-    before = settled(page)
-    page.get_by_role("button", name="New", exact=True).click()
-    after = settled(page)
-    assert closeness(before, after) < 40, "a new function is seen"
-    words = page.locator("#functions textarea").input_value()
-    assert list(json.loads(words.removeprefix("functions: "))) == ["TF03"]
-    undo = page.get_by_role("button", name="Undo")
-    assert "functions TF03" in undo.get_attribute("title")
-    undo.click()
-    assert np.array_equal(settled(page), before)
-    assert page.locator("#functions").is_hidden()
-    assert page.get_by_role("button", name="Make model").is_hidden(), "there is no server"
-    page.select_option("#mode", "difference")
-    assert page.locator("#gain-row").is_visible()
-    assert not np.array_equal(settled(page), before)
-    page.close()
-    assert wrong == []
-    assert [url for url in asked if not url.startswith("data:")] == [file.as_uri()]
-
-
-def settled(page):
-    """The picture on the screen once a whole frame is there."""
-    page.wait_for_timeout(400)
-    page.wait_for_selector("#picture[aria-busy=false]")
-    picture = Image.open(io.BytesIO(page.locator("#picture").screenshot())).convert("RGB")
-    return np.asarray(picture).astype(int)
+    with standalone(chromium, source, "--volume") as page:
+        assert "34 x 26 x 30 samples in steps of" in capsys.readouterr().err
+        page.select_option("#mode", "volume")
+        page.locator("#models input[type=checkbox]").first.uncheck()  # it hides the middle
+        before = shown(page)
+        page.get_by_role("button", name="New", exact=True).click()
+        assert closeness(before, shown(page)) < 40, "a new function is seen"
+        words = page.locator("#functions textarea").input_value()
+        assert list(json.loads(words.removeprefix("functions: "))) == ["TF03"]
+        undo = page.get_by_role("button", name="Undo")
+        assert "functions TF03" in undo.get_attribute("title")
+        undo.click()
+        assert np.array_equal(shown(page), before)
+        assert page.locator("#functions").is_hidden()
+        assert page.get_by_role("button", name="Make model").is_hidden(), "there is no server"
+        page.select_option("#mode", "difference")
+        assert page.locator("#gain-row").is_visible()
+        assert not np.array_equal(shown(page), before)
 
 
 def test_the_viewer_exports_it_too(source, tmp_path):
@@ -147,31 +125,3 @@ def test_the_viewer_exports_it_too(source, tmp_path):
     for kind in ("volume", "html"):
         written, _ = write_download(tmp_path, scene, Export(kind, VIEW), "page", "", None)
         assert ('id="volume"' in written.read_text()) is (kind == "volume")
-
-
-def test_the_same_scene_gives_the_same_bytes(source, tmp_path):
-    files = [tmp_path / name / "page.html" for name in ("a", "b")]
-    for file in files:
-        file.parent.mkdir()
-        assert main(["export", str(source), "--to", str(file), "--volume", "0.05"]) == 0
-    assert files[0].read_bytes() == files[1].read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--to", "x.html", "--volume", "nan"], "--volume: expected a finite number, got nan"),
-        (["--to", "x.html", "--volume", "1e-5"], "expected room for at least 2 samples a side, got 10 bytes"),
-    ],
-)
-def test_mistakes_are_sentences(source, tmp_path, monkeypatch, capsys, words, message):
-    monkeypatch.chdir(tmp_path)
-    assert main(["export", str(source), *words]) == 2
-    assert message in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_scene_without_its_volume_is_refused(source, tmp_path, capsys):
-    scene = write_scene(tmp_path / "bare.yaml", replace(read_scene(source), volume=None))
-    assert main(["export", str(scene), "--to", str(tmp_path / "x.html"), "--volume"]) == 2
-    assert "volume: expected the volume that the scene was made from, got none" in capsys.readouterr().err

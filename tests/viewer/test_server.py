@@ -9,10 +9,10 @@ from shutil import copy
 import numpy as np
 import pytest
 import torch
-from aiohttp import WSCloseCode, WSMsgType, WSServerHandshakeError
+from aiohttp import WSCloseCode, WSMsgType
 from PIL import Image
 
-from tests.viewer.pages import TOKEN, WAIT, on_page, origin, page, served
+from tests.viewer.pages import TOKEN, WAIT, on_page, page, served
 from tests.viewer.test_messages import CAMERA, SHOWN, VIEW
 from texgs.cli.main import main
 from texgs.core.cuts import NO_CUTS
@@ -26,6 +26,8 @@ from texgs.viewer.messages import parse
 from texgs.viewer.segments import isolated
 
 # ---- Who may talk to it -----------------------------------------------------
+
+SOCKET = {"Connection": "Upgrade", "Upgrade": "websocket"}
 
 
 @pytest.mark.parametrize(
@@ -42,6 +44,10 @@ from texgs.viewer.segments import isolated
         (f"/{TOKEN}/still.png", {"Origin": "null"}),
         (f"/{TOKEN}/still.png", {"Origin": "http://["}),
         (f"/{TOKEN}/../x", {}),
+        (f"/{TOKEN}/socket", SOCKET),  # browsers name the origin of a socket
+        (f"/{TOKEN}/socket", {**SOCKET, "Origin": "http://evil.example"}),
+        (f"/{TOKEN}/socket", {**SOCKET, "Host": "evil.example", "Origin": "http://evil.example"}),
+        ("/wrong/socket", SOCKET),
     ],
 )
 @on_page
@@ -51,22 +57,6 @@ async def test_strangers_get_403(client, path, headers):
         assert "open the address that texgs view printed" in await answer.text()
         assert answer.headers["X-Content-Type-Options"] == "nosniff"
         assert answer.headers["Content-Security-Policy"] == "default-src 'none'"
-
-
-@pytest.mark.parametrize(
-    ("path", "headers"),
-    [
-        (f"/{TOKEN}/socket", {"Origin": "http://evil.example"}),
-        (f"/{TOKEN}/socket", {}),
-        ("/wrong/socket", None),
-        (f"/{TOKEN}/socket", {"Host": "evil.example", "Origin": "http://evil.example"}),
-    ],
-)
-@on_page
-async def test_sockets_of_strangers_get_403(client, path, headers):
-    with pytest.raises(WSServerHandshakeError) as error:
-        await client.ws_connect(path, headers=origin(client) if headers is None else headers)
-    assert error.value.status == 403
 
 
 @pytest.mark.parametrize(
@@ -101,6 +91,12 @@ async def test_pages_are_served_with_a_strict_policy_and_nothing_else(client):
 # ---- Frames -----------------------------------------------------------------
 
 
+async def still(client, query):
+    """Status, bytes and headers of a picture that is asked for."""
+    async with client.get(f"/{TOKEN}/still.png", params={"view": query}) as answer:
+        return answer.status, await answer.read(), answer.headers
+
+
 @on_page
 async def test_frames_are_those_of_the_renderer(browser, client, scene_file, tmp_path):
     words = ["--width", "64", "--height", "48", "--target", "0", "0", "0", "--radius", "3", "--fov", "40"]
@@ -111,31 +107,21 @@ async def test_frames_are_those_of_the_renderer(browser, client, scene_file, tmp
     header, shown = await browser.next("frame")
     assert header["id"] == 7
     assert np.abs(shown - expected).mean() < 2  # of JPEG at quality 95
-    query = {"view": json.dumps({"camera": CAMERA, "mode": "normal"})}
-    async with client.get(f"/{TOKEN}/still.png", params=query) as answer:
-        assert await answer.read() == (tmp_path / "a.png").read_bytes()
+    _, png, _ = await still(client, json.dumps({"camera": CAMERA, "mode": "normal"}))
+    assert png == (tmp_path / "a.png").read_bytes()
 
 
 @on_page
-async def test_a_still_has_what_a_check_has_found_in_its_metadata(browser, client, scene_file):
+async def test_a_still_has_what_a_check_has_found_or_says_what_is_wrong(browser, client, scene_file):
     scene, file = client.server_side.edits.scene, scene_file.with_name(f"{scene_file.stem}-check.json")
-    query = {"view": json.dumps({"camera": CAMERA})}
-    try:
-        for models, told in ((checksum_of(scene), "At least 30 dB"), ("others", None)):
-            write_json(file, {"models": models, "sentence": "At least 30 dB"})
-            async with client.get(f"/{TOKEN}/still.png", params=query) as answer:
-                picture = Image.open(io.BytesIO(await answer.read()))
-            assert picture.info.get("Comment") == told
-    finally:
-        file.unlink()
-
-
-@on_page
-async def test_a_still_without_a_view_says_so(browser, client):
-    for query, message in (("", "JSON"), ("[]", "expected keys with values"), ("{}", "camera")):
-        async with client.get(f"/{TOKEN}/still.png", params={"view": query}) as answer:
-            assert answer.status == 400
-            assert message in await answer.text()
+    for models, told in ((checksum_of(scene), "At least 30 dB"), ("others", None)):
+        write_json(file, {"models": models, "sentence": "At least 30 dB"})
+        _, png, _ = await still(client, json.dumps({"camera": CAMERA}))
+        assert Image.open(io.BytesIO(png)).info.get("Comment") == told
+    for query, message in (("", b"JSON"), ("[]", b"expected keys with values"), ("{}", b"camera")):
+        status, text, _ = await still(client, query)
+        assert status == 400
+        assert message in text
 
 
 @on_page
@@ -185,6 +171,12 @@ async def test_an_error_of_a_frame_is_a_notice(browser, client, scene_file):
 # ---- Edits ------------------------------------------------------------------
 
 
+async def saved(browser, name, **values):
+    """The notice of what is saved."""
+    await browser.send(type="save", name=name, **values)
+    return await browser.next("notice")
+
+
 @on_page
 async def test_pages_share_edits_and_their_history(browser, client):
     async with page(client) as other:
@@ -210,15 +202,9 @@ async def test_pages_share_edits_and_their_history(browser, client):
 @on_page
 async def test_pages_cut_the_scene(browser, client):
     up = {"normal": [0, 2, 0], "offset": 0.5}
-    await browser.send(type="edit", part="", key="cuts", value={"planes": [up]}, step=1)
-    await browser.send(
-        type="edit",
-        part="",
-        key="cuts",
-        value={"planes": [up, up], "faces": "unlit"},
-        step=1,
-        title="two planes",
-    )
+    edit = {"type": "edit", "part": "", "key": "cuts", "step": 1}
+    await browser.send(**edit, value={"planes": [up]})
+    await browser.send(**edit, value={"planes": [up, up], "faces": "unlit"}, title="two planes")
     cuts = (await browser.past("two planes"))["scene"]["cuts"]
     assert cuts == {"planes": 2 * [{"normal": [0, 1, 0], "offset": 0.25}], "box": None, "faces": "unlit"}
     assert isolated(client.server_side.edits.scene, "TF01").cuts == NO_CUTS, "clicks select what is whole"
@@ -254,11 +240,8 @@ async def test_a_movement_goes_on_from_its_own_step_only(browser, client):
     ("edit", "message"),
     [
         ({"part": "TF03", "key": "opacity", "value": 1}, "a model of the scene (TF01, TF02), got TF03"),
-        ({"part": "TF01", "key": "palette", "value": {"a": 1}}, "expected three numbers from 0 to 1"),
         ({"part": "", "key": "light", "value": "up"}, "expected headlight, or azimuth and polar"),
         ({"part": "", "key": "cuts", "value": {"planes": 3}}, "cuts.planes: expected"),
-        ({"part": "", "key": "cuts", "value": [1]}, "cuts: expected"),
-        ({"part": "", "key": "cuts", "value": {"planes": [{"normal": [0, 0, 0]}]}}, "that are not all 0"),
     ],
 )
 @on_page
@@ -272,14 +255,11 @@ async def test_edits_that_cannot_be_made_are_notices(browser, edit, message):
 async def test_scenes_are_saved_in_their_folder_only(browser, scene_file):
     await browser.send(type="edit", part="TF02", key="visible", value=False)
     for name in ("../a.yaml", "/tmp/a.yaml", "a\\b.yaml", ".a.yaml", "", "a.txt", "a\0.yaml"):
-        await browser.send(type="save", name=name, replace=True)
-        assert "save as: expected a name" in (await browser.next("notice"))["text"]
-    await browser.send(type="save", name="new.yaml")
-    assert (await browser.next("notice"))["level"] == "info"
+        assert "save as: expected a name" in (await saved(browser, name, replace=True))["text"]
+    assert (await saved(browser, "new.yaml"))["level"] == "info"
     news = await browser.next("scene")
     assert (news["saved"], news["file"]) == (True, "new.yaml")
-    await browser.send(type="save", name="scene.yaml")
-    assert (await browser.next("notice"))["level"] == "info", "it is what was opened"
+    assert (await saved(browser, "scene.yaml"))["level"] == "info", "it is what was opened"
     for name in ("scene.yaml", "new.yaml"):
         assert not read_scene(scene_file.parent / name).models["TF02"].edit.visible
 
@@ -298,22 +278,19 @@ def earlier(scene_file, monkeypatch):
 
 @on_page
 async def test_quotes_in_names_of_scenes(browser, client):
-    await browser.send(type="save", name='a "b".yaml')
-    assert (await browser.next("notice"))["level"] == "info"
-    async with client.get(f"/{TOKEN}/still.png", params={"view": json.dumps({"camera": CAMERA})}) as answer:
-        assert (answer.status, answer.headers["Content-Disposition"]) == (200, "attachment")
+    assert (await saved(browser, 'a "b".yaml'))["level"] == "info"
+    status, _, headers = await still(client, json.dumps({"camera": CAMERA}))
+    assert (status, headers["Content-Disposition"]) == (200, "attachment")
 
 
 @on_page
 async def test_other_files_are_replaced_after_a_question_only(browser, scene_file, earlier):
     await browser.send(type="edit", part="TF02", key="visible", value=False)
     for name in ("edited.yaml", "scene.yaml"):
-        await browser.send(type="save", name=name)
-        notice = await browser.next("notice")
+        notice = await saved(browser, name)
         assert (notice["level"], notice["name"]) == ("question", name)
     assert read_scene(earlier).models["TF02"].edit.visible
-    await browser.send(type="save", name="edited.yaml", replace=True)
-    assert (await browser.next("notice"))["level"] == "info"
+    assert (await saved(browser, "edited.yaml", replace=True))["level"] == "info"
     assert not read_scene(earlier).models["TF02"].edit.visible
     assert read_scene(scene_file).models["TF02"].edit.visible
 
@@ -321,11 +298,9 @@ async def test_other_files_are_replaced_after_a_question_only(browser, scene_fil
 @on_page
 async def test_a_file_that_others_have_written_is_replaced_after_a_question_only(browser, scene_file):
     await browser.send(type="edit", part="TF02", key="visible", value=False)
-    await browser.send(type="save", name="scene.yaml")
-    assert (await browser.next("notice"))["level"] == "info"
+    assert (await saved(browser, "scene.yaml"))["level"] == "info"
     assert main(["edit", str(scene_file), "TF01.opacity=0.25", "--output", str(scene_file)]) == 0
-    await browser.send(type="save", name="scene.yaml")
-    assert (await browser.next("notice"))["level"] == "question"
+    assert (await saved(browser, "scene.yaml"))["level"] == "question"
     assert read_scene(scene_file).models["TF01"].edit.opacity == 0.25
 
 
@@ -333,8 +308,7 @@ async def test_a_file_that_others_have_written_is_replaced_after_a_question_only
 async def test_a_scene_whose_model_is_gone_is_not_saved(browser, scene_file):
     (model := scene_file.parent / "TF01.safetensors").rename(away := scene_file.parent / "away")
     for is_saved in (False, True):
-        await browser.send(type="save", name="new.yaml")
-        notice = await browser.next("notice")
+        notice = await saved(browser, "new.yaml")
         assert notice["level"] == ("info" if is_saved else "error")
         assert is_saved or notice["text"] == (
             f"{model}: no such file, which the scene needs; bring it back, then try again"

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image
 
-from tests.viewer.in_browser import WAIT, expect, opened, rendered, served
+from tests.viewer.in_browser import WAIT, expect, opened, rendered, served, standalone
 from texgs.cli.main import main
 from texgs.scene.scene_file import read_scene, write_scene
 
@@ -67,22 +67,18 @@ def test_the_standalone_page_saves_what_the_command_renders(chromium, scene_file
     colored = write_scene(
         tmp_path / "colored.yaml", replace(read_scene(scene_file), background=(0.1, 0.3, 0.4))
     )
-    file, output = tmp_path / "scene.html", tmp_path / "render.png"
-    assert main(["export", str(colored), "--to", str(file)]) == 0
-    page = chromium.new_page(viewport={"width": 800, "height": 500})
-    page.goto(file.as_uri())
-    page.wait_for_selector("#picture[aria-busy=false]", timeout=WAIT)
-    before = page.locator("#picture").screenshot()
-    view = page.locator("#options").inner_text().split("--width")[0].split()[2:]
-    page.get_by_role("button", name="Picture of another size").click()
-    fill_size(page)
-    page.get_by_label("Transparent background").check()
-    made = np.asarray(Image.open(io.BytesIO(saved_by(page, "Save picture")))) / 255
+    output = tmp_path / "render.png"
+    with standalone(chromium, colored, link="") as page:
+        before = page.locator("#picture").screenshot()
+        view = page.locator("#options").inner_text().split("--width")[0].split()[2:]
+        page.get_by_role("button", name="Picture of another size").click()
+        fill_size(page)
+        page.get_by_label("Transparent background").check()
+        made = np.asarray(Image.open(io.BytesIO(saved_by(page, "Save picture")))) / 255
+        assert page.locator("#picture").screenshot() == before
     assert main(["render", str(colored), *view, "--width", SIZE[0], "--height", SIZE[1], "--transparent",
                  "--output", str(output)]) == 0  # fmt: skip
     expected = np.asarray(Image.open(output)) / 255
     premultiplied = [each[..., :3] * each[..., 3:] for each in (made, expected)]
     assert np.abs(made[..., 3] - expected[..., 3]).max() < 0.02  # surfels of the page are rounded
     assert np.abs(premultiplied[0] - premultiplied[1]).max() < 0.02
-    assert page.locator("#picture").screenshot() == before
-    page.close()

@@ -14,7 +14,7 @@ from PIL import Image
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
 from tests.viewer.drawing import rendered
-from tests.viewer.in_browser import HIDE
+from tests.viewer.in_browser import HIDE, opened_file, settle
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.cuts import NO_CUTS, Cuts, Plane
@@ -30,7 +30,7 @@ from texgs.viewer import standalone
 
 HOSTILE = "</script><b>&'\""
 LEVELS = 3  # of 255, see test_agreement.py
-SIZE = {"width": 900, "height": 400}  # of the window; a part of it is the picture
+SIZE = (900, 400)  # of the window; a part of it is the picture
 
 
 @pytest.fixture(scope="module")
@@ -56,30 +56,8 @@ def file(scene, folder):
 
 @pytest.fixture
 def page(chromium, file):
-    """The page, opened as a file; nothing may go wrong in it, and it may ask for nothing."""
-    page = chromium.new_page(viewport=SIZE)
-    wrong, asked = [], []
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
-    page.on("request", lambda request: asked.append(request.url))
-    page.goto(file.as_uri())
-    page.wait_for_selector("#picture:not([hidden])")
-    settle(page)
-    yield page
-    assert wrong == []
-    assert [url for url in asked if not url.startswith("data:")] == [file.as_uri()]
-    page.close()
-
-
-@pytest.fixture(scope="module")
-def blank(chromium):
-    return chromium.new_page()
-
-
-def settle(page):
-    """Wait for the frame in full that follows a movement."""
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    page.wait_for_selector("#picture[aria-busy=false]")
+    with opened_file(chromium, file, link="", size=SIZE) as page:
+        yield page
 
 
 def shown(page):
@@ -222,31 +200,6 @@ def test_a_plane_cuts_the_page_and_words_make_the_same_cut(page, file, scene, fo
     assert differ(page, file) > 50, "it takes something away"
 
 
-@pytest.mark.parametrize(
-    ("part", "key", "value", "title"),
-    [
-        ("TF01", "opacity", 0.123456, "TF01 opacity 0.1235"),
-        ("TF01", "opacity", 1000, "TF01 opacity 1000"),
-        ("", "time", 12345, "time 12345"),
-        ("TF01", "palette", [1, 0.5, 0], "TF01 palette #ff8000"),
-        ("TF01", "palette", "#00ff00", "TF01 palette #00ff00"),
-        ("TF01/a", "visible", False, "TF01/a visible off"),
-        ("TF01", "palette", None, "TF01 palette reset"),
-        ("", "light", {"polar": 12.4}, "light polar 12°"),
-        ("", "cuts", {"planes": [{}], "box": None, "faces": "unlit"}, "cuts 1 plane, unlit"),
-        ("", "cuts", {"planes": [{}, {}], "box": None, "faces": "shaded"}, "cuts 2 planes"),
-        ("", "cuts", {"planes": [], "box": {"low": [0, 0, 0]}}, "cuts box"),
-        ("", "cuts", {"planes": [], "faces": "unlit"}, "cuts none"),
-        ("", "cuts", None, "cuts reset"),
-    ],
-)
-def test_steps_have_titles(blank, part, key, value, title):
-    blank.evaluate(
-        f"() => {{ {standalone.joined_modules('state.js')} globalThis.state = modules['state.js']; }}"
-    )
-    assert blank.evaluate("edit => state.titleOf(edit)", {"part": part, "key": key, "value": value}) == title
-
-
 def test_the_words_at_an_input_are_in_its_name(page):
     page.get_by_role("button", name="Add a plane").click()
     page.get_by_role("checkbox", name="Box").check()
@@ -305,20 +258,18 @@ def test_pointers_and_keys_turn_the_camera(page, file):
     page.locator("#picture").press("Home")
     settle(page)
     assert differ(page, file) <= LEVELS
+    page.get_by_label("From").select_option("From +y")
+    page.wait_for_url(re.compile("azimuth=-90&polar=90&"))
 
 
 def test_a_link_leads_back_to_the_view(page, chromium, file):
     page.locator("#picture").press("ArrowLeft")
     page.get_by_label("Show", exact=True).select_option("normal")
     page.wait_for_url(re.compile("mode=normal"))
-    other = chromium.new_page(viewport=SIZE)
-    other.goto(page.url)
-    other.wait_for_selector("#picture:not([hidden])")
-    settle(other)
-    page.locator("#picture").evaluate("each => each.blur()")
-    assert other.get_by_label("Show", exact=True).input_value() == "normal"
-    assert np.abs(shown(other).astype(int) - shown(page))[4:-4, 4:-4].max() <= 1
-    other.close()
+    with opened_file(chromium, file, page.url[page.url.index("#") :], size=SIZE) as other:
+        page.locator("#picture").evaluate("each => each.blur()")
+        assert other.get_by_label("Show", exact=True).input_value() == "normal"
+        assert np.abs(shown(other).astype(int) - shown(page))[4:-4, 4:-4].max() <= 1
 
 
 WRONG = [  # as links to pages that were edited by hand
@@ -340,11 +291,19 @@ WRONG = [  # as links to pages that were edited by hand
 
 def test_of_a_wrong_link_is_done_what_can_be_and_the_rest_named(page, file):
     good = {"part": "B", "key": "visible", "value": False}
-    words = {"azimuth": "<b>", "target": "1,2", "mode": "wipe", "edits": json.dumps([*WRONG, good])}
+    words = {
+        "azimuth": "<b>",
+        "polar": "1e300",
+        "target": "1,2",
+        "mode": "wipe",
+        "edits": json.dumps([*WRONG, good]),
+    }
     page.evaluate("words => { location.hash = new URLSearchParams(words); }", words)
     told = page.get_by_text("This page cannot use of the link")
     told.wait_for()
-    names = "mode, azimuth, target, models, light, background, cuts, functions, constructor, B opacity, "
+    names = (
+        "mode, azimuth, polar, target, models, light, background, cuts, functions, constructor, B opacity, "
+    )
     assert f"{names}B visible, B palette, B segments, C opacity, 3, an edit." in told.text_content()
     page.evaluate("() => { document.getElementById('notices').hidden = true; }")
     assert page.get_by_role("listitem").all_text_contents() == ["B visible off"]
@@ -402,56 +361,28 @@ def test_slow_frames_of_what_moves_are_coarse_until_it_rests(page, file):
     assert differ(page, file, turned=(20 * 5, 0)) <= LEVELS
 
 
-def test_without_webgl_there_is_a_picture_and_a_sentence(chromium, file):
+@pytest.mark.parametrize(("is_damaged", "told"), [(False, "has no WebGL2"), (True, "copy the page again")])
+def test_a_page_that_cannot_draw_keeps_its_picture_and_says_why(chromium, file, tmp_path, is_damaged, told):
+    (copy := tmp_path / "copy.html").write_text(file.read_text())
     page = chromium.new_page()
-    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
-    page.goto(file.as_uri())
-    page.wait_for_function("document.getElementById('notices').textContent.includes('has no WebGL2')")
+    if is_damaged:
+        text = surfels(file)
+        copy.write_text(file.read_text().replace(text, text[: len(text) // 8 * 4]))
+    else:
+        page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page.goto(copy.as_uri())
+    page.wait_for_function("told => document.getElementById('notices').textContent.includes(told)", arg=told)
     assert page.locator("#poster").is_visible()
     assert page.locator(":is(button, input, select):enabled").count() == 0
     page.close()
 
 
-def test_a_damaged_page_keeps_its_picture_and_says_so(chromium, file, tmp_path):
-    damaged = tmp_path / "damaged.html"
-    text = surfels(file)
-    damaged.write_text(file.read_text().replace(text, text[: len(text) // 8 * 4]))
-    page = chromium.new_page()
-    page.goto(damaged.as_uri())
-    page.wait_for_function("document.getElementById('notices').textContent.includes('copy the page again')")
-    assert page.locator("#poster").is_visible()
-    page.close()
-
-
-def test_pictures_are_saved_as_they_are_shown(page, file, tmp_path):
-    with page.expect_download() as saved:
-        page.get_by_role("button", name="Picture", exact=True).click()
-    saved.value.save_as(tmp_path / "saved.png")
-    assert saved.value.suggested_filename == "scene.png"
-    picture = np.asarray(Image.open(tmp_path / "saved.png").convert("RGB")).astype(int)
-    assert np.abs(picture - expected(file, picture.shape[1::-1])).max() <= LEVELS
-
-
-def test_the_command_of_the_view_makes_it_again(page, scene, tmp_path):
-    for key in ("ArrowLeft", "ArrowUp", "+"):
-        page.locator("#picture").press(key)
-    settle(page)
-    program, verb, *options = page.get_by_text("This view again").inner_text().partition(": ")[2].split()
-    assert (program, verb) == ("texgs", "render")
-    assert main([verb, str(scene), "--output", str(tmp_path / "again.png"), *options]) == 0
-    again = np.asarray(Image.open(tmp_path / "again.png")).astype(int)
-    assert np.abs(again - shown(page))[4:-4, 4:-4].mean() < 1, "surfels of the page are rounded"
-
-
-def test_one_model_of_a_scene_keeps_its_edits(scene, tmp_path):
+def test_one_model_of_a_scene_keeps_its_edits_and_a_file_is_a_scene(scene, tmp_path):
     assert main(["export", str(scene), "--to", str(tmp_path / "b.html"), "--model", HOSTILE]) == 0
     (model,) = described(tmp_path / "b.html")["models"]
     assert model["name"] == HOSTILE
     assert model["edit"]["opacity"] == 0.8
-
-
-def test_a_model_file_becomes_a_page(folder, scene, tmp_path):
-    assert main(["export", str(folder / "a.safetensors"), "--to", str(tmp_path / "a.html")]) == 0
+    assert main(["export", str(scene.with_name("a.safetensors")), "--to", str(tmp_path / "a.html")]) == 0
     assert "<title>a</title>" in (tmp_path / "a.html").read_text()
 
 
@@ -459,16 +390,5 @@ def test_a_scene_without_surfels_shows_its_background(chromium, tmp_path):
     file = write_model(tmp_path / "none.safetensors", sample(n=0))
     scene = write_scene(tmp_path / "none.yaml", Scene({"A": SceneModel(file)}, background=(0.2, 0.4, 0.6)))
     assert main(["export", str(scene), "--to", str(tmp_path / "none.html")]) == 0
-    page = chromium.new_page(viewport=SIZE)
-    page.goto((tmp_path / "none.html").as_uri())
-    page.wait_for_selector("#picture:not([hidden])")
-    settle(page)
-    assert (shown(page)[4:-4, 4:-4] == [51, 102, 153]).all()
-    page.close()
-
-
-def test_scenes_that_are_too_large_are_refused(scene, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(standalone, "LARGEST", 0)
-    assert main(["export", str(scene), "--to", str(tmp_path / "s.html")]) == 2
-    message = "expected surfels of at most 0 MiB, got 0 MiB for 230 of them; export fewer models"
-    assert message in capsys.readouterr().err
+    with opened_file(chromium, tmp_path / "none.html", link="", size=SIZE) as page:
+        assert (shown(page)[4:-4, 4:-4] == [51, 102, 153]).all()

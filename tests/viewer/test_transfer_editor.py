@@ -5,11 +5,8 @@ from dataclasses import replace
 from urllib.parse import quote
 
 import numpy as np
-import pytest
 
 from tests.config.kept import project
-from tests.fields.surfels.test_composition import ball
-from tests.scene.test_twin import HIGH, LOW, sphere_volume
 from tests.viewer.in_browser import (
     JPEG,
     WAIT,
@@ -23,20 +20,8 @@ from tests.viewer.in_browser import (
     shown,
     still,
 )
-from texgs.fields.surfels.model_file import write_model
-from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.viewer.standalone import web_file
-
-
-@pytest.fixture
-def sphere_file(tmp_path):
-    """Two balls that claim to be a sphere."""
-    files = {name: write_model(tmp_path / f"{name}.safetensors", ball(1)) for name in ("low", "high")}
-    models = {name: SceneModel(file) for name, file in files.items()}
-    return write_scene(
-        tmp_path / "scene.yaml", Scene(models, volume=sphere_volume(tmp_path, low=LOW, high=HIGH))
-    )
 
 
 def test_what_is_dragged_is_the_volume_that_texgs_renders(chromium, sphere_file):
@@ -173,7 +158,7 @@ def test_a_function_is_kept_in_its_data_set(chromium, tmp_path, monkeypatch):
     with served(scene) as (_, address), opened(chromium, address) as page:
         page.get_by_role("button", name="over *", exact=True).click()
         page.get_by_role("button", name="Keep in data set").click()
-        expect(page.get_by_text(re.compile("over on .* overlaps TF02 on"))).to_be_visible(timeout=WAIT)
+        expect(page.get_by_text(re.compile("over: .*do not overlap"))).to_be_visible(timeout=WAIT)
         page.get_by_role("button", name="TF03 *", exact=True).click()
         page.get_by_role("button", name="Keep in data set").click()
         expect(page.get_by_text("TF03 is a basic transfer function")).to_be_visible(timeout=WAIT)

@@ -141,7 +141,7 @@ class WorkflowRun:
         tracked.end_runs(self._tracked, "FINISHED", plan, made)
         report = f"{plan.results}/report.html"
         print("Done:", report if report in made else "what was asked for")
-        files = [file for file in plan.metrics_of("steps") or plan.done("compose") if file in made]
+        files = [file for file in plan.metrics_of("steps") or plan.metrics_of("compose") if file in made]
         if files:
             program = Path(sys.executable).with_name("texgs")
             scene = Path(files[0]).with_name("scene.yaml")

@@ -23,7 +23,7 @@ EDIT_GROUP = "edit"
 SEED_LISTS = {
     "fit.seed": "seeds",
     "edit.seed": "edit_seeds",
-}  # for each key the list in `sweep` with its values
+}  # lists in `sweep` with values of keys
 OF_NUMBERS, OF_KINDS = "views", "kinds_of_views"  # the paper's sweep over numbers, and views=ONE,OTHER
 ELSEWHERE = {  # keys whose values have a list of their own
     **{key: f"sweep.{listed}" for key, listed in SEED_LISTS.items()},
