@@ -58,9 +58,7 @@ def test_views_lights_and_edits_are_drawn_from_a_seed(scene):
     assert np.mean([edit.palette is not None for edit in edits]) == pytest.approx(0.5, abs=0.1)
     assert np.mean([edit.opacity != 1 for edit in edits]) == pytest.approx(0.5, abs=0.1)
     heights = [float(camera.position[1]) / LENS.radius for _, camera, _ in drawn]
-    assert np.abs(np.quantile(heights, [0.25, 0.5, 0.75]) - [-0.5, 0, 0.5]).max() < 0.15, (
-        "evenly on the sphere"
-    )
+    assert np.abs(np.quantile(heights, [0.25, 0.5, 0.75]) - [-0.5, 0, 0.5]).max() < 0.15, "evenly"
 
 
 def test_a_check_tells_what_its_views_have(scene, tmp_path):

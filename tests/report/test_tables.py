@@ -75,23 +75,12 @@ def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
     old.write_text('{"stage": "texture", "dataset": "engine", "numbers": {"surfels": 9}}')
     missing = tmp_path / "missing.json"
     missing.write_text('[{"what": "data set wood", "why": "no file", "places": ["phase"]}]')
-    words = [
-        "tables",
-        str(path),
-        str(path),
-        str(old),
-        "--missing",
-        str(missing),
-        "--output",
-        str(tmp_path / "tables"),
-    ]
-    assert main(words) == 0
+    words = ["--missing", str(missing), "--output", str(tmp_path / "tables")]
+    assert main(["tables", str(path), str(path), str(old), *words]) == 0
     expected = {f"{table.name}.{kind}" for table in TABLES for kind in ("csv", "md", "tex")}
     assert {file.name for file in (tmp_path / "tables").iterdir()} == expected | {"tables.tex"}
     said = capsys.readouterr()
-    assert said.out.count("| scan | quick | shading | 1 | 40.00 |") == 1, (
-        "a file that is named twice counts once"
-    )
+    assert said.out.count("| scan | quick | shading | 1 | 40.00 |") == 1, "a file counts once"
     assert "Left out: data set wood: no file." in said.out
     assert "Left out: 1 metrics file: of another version of texgs" in said.err
     assert "## Table 1. Data sets" not in said.out, "tables without rows are not printed"

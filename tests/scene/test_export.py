@@ -10,7 +10,6 @@ from texgs.core.geometry import quats_to_matrices
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texels import mean_texels, owners
 from texgs.scene.export import export_model
 from texgs.scene.export_keys import Export
@@ -64,13 +63,6 @@ def test_joined_surfels_look_like_the_edited_scene_without_light():
     rendered = surfels.render(CAMERA)
     assert_close(rendered.alpha, expected.alpha, atol=1e-5, rtol=0)
     assert_close(rendered.color, expected.color, atol=1e-5, rtol=0)
-
-
-def test_a_scene_goes_through_a_file_of_gaussians(tmp_path):
-    surfels = joined(Composition([plain(1), plain(2)]).parts, [PartEdit(), PartEdit(opacity=0.5)])
-    back = read_ply(write_ply(tmp_path / "scene.ply", surfels, "3dgs"))
-    for name, values in surfels.parameters.items():
-        assert torch.equal(back.parameters[name], values), name
 
 
 def test_nothing_visible_is_refused():

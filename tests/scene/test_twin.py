@@ -182,10 +182,7 @@ def test_basic_tfs_of_other_models_are_told_where_a_scene_is_opened(volume):
         ({"opacity_unit": 10**400}, "volume.opacity_unit: expected a number above 0"),
         ({"tfs": None}, "volume.tfs: expected a table of keys and values, got None"),
         ({"tfs": {"low": 3}}, "volume.tfs.low: transfer function: expected the keys opacity, color, got "),
-        (
-            {"tfs": {"low": {"opacity": [[0, 2]], "color": []}}},
-            "volume.tfs.low: opacity: expected at least 2",
-        ),
+        ({"tfs": {"low": {"opacity": [[0, 2]], "color": []}}}, "volume.tfs.low: opacity: "),
     ],
 )
 def test_a_mistake_is_named_with_its_place(tmp_path, volume, change, message):
@@ -246,9 +243,7 @@ def test_the_mode_volume_alone_shows_what_is_tried(volume, tmp_path):
     scene = replace(scene_of(volume), models={name: SceneModel(file) for name in ("low", "high")}, cuts=cut)
     tried, session = replace(scene, functions={"new": peak(volume)}), Session(scene)
     assert not np.array_equal(*(session.frame(CAMERA, "volume", each) for each in (scene, tried)))
-    assert np.array_equal(*(session.frame(CAMERA, "shaded", each) for each in (scene, tried))), (
-        "also its faces"
-    )
+    assert np.array_equal(*(session.frame(CAMERA, "shaded", each) for each in (scene, tried))), "and faces"
     assert torch.equal(*(session.beside(CAMERA, each)[1].color for each in (scene, tried)))
 
 
@@ -263,10 +258,7 @@ def test_a_scene_file_keeps_the_functions_that_are_tried(volume, tmp_path):
     ("functions", "message"),
     [
         ([], "functions: expected a table of keys and values, got \\[\\]"),
-        (
-            {"a": {"opacity": [[0, 1]]}},
-            "functions.a: transfer function: expected the keys opacity",
-        ),
+        ({"a": {"opacity": [[0, 1]]}}, "functions.a: .* the keys opacity"),
         ({"a": {"opacity": [[1, 0], [0, 1]], "color": [[0, 0, 0, 0]]}}, "functions.a: .*expected ascending"),
         ({"": PEAK.to_dict()}, "functions: expected a name of 1 to 100 printable letters"),
         ({f"n{i}": PEAK.to_dict() for i in range(33)}, "functions: expected at most 32, got 33"),
