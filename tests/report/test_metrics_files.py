@@ -73,10 +73,7 @@ def test_copies_of_tracked_runs_and_jobs_at_work_are_no_results(tmp_path, monkey
         ({"pictures": ["a.png"]}, "pictures"),
         ({"numbers": {"fit_seconds": 1.0, "primitives": "many"}}, "numbers.primitives"),
         ({"numbers": {"fit_seconds": 1.0, "primitives": 9, "sizes": 3}}, "numbers.sizes"),
-        (
-            {"result": "EditMeasures", "numbers": {"edit": "a", "method": "b", "style_gram": "x"}},
-            "numbers.style_gram",
-        ),
+        ({"result": "EditMeasures", "numbers": {"edit": "a", "method": "b", "clip": 1}}, "numbers.clip"),
     ],
 )
 def test_a_value_of_another_type_is_an_error_with_file_and_key(tmp_path, change, key):

@@ -136,24 +136,21 @@ def test_the_verb_reads_whole_results_of_a_folder_and_names_others(tmp_path, cap
     assert "mine/scan/TF01/fit: comes from mine/scan/TF01/views, which has been made anew since" in said.err
 
 
+def fit_in(folder, stage, dataset, tf="TF01"):
+    """The metrics file of a fit in a folder."""
+    folder.mkdir(parents=True)
+    return metrics(folder, stage, FitResult(60.0, 9, psnr=40.0), dataset, tf, name=METRICS)
+
+
 def test_results_of_two_folders_are_not_mixed(tmp_path):
-    paths = []
-    for root in ("one", "scan/two"):  # a project may be named like its data
-        shown = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")
-        paths.append(tmp_path / root / "scan" / "TF01" / METRICS)
-        paths[-1].parent.mkdir(parents=True)
-        shown.rename(paths[-1])
-    refused(lambda: require_apart(read_known(paths)[0]), "two/scan.*: .*one/scan")
+    roots = ("one", "scan/two")  # a project may be named like its data
+    paths = [fit_in(tmp_path / root / "scan" / "TF01", "shading", "scan") for root in roots]
+    refused(lambda: require_apart(read_known(paths)[0]), r"two/scan.*: .*one/scan")
 
 
 def test_a_data_set_may_have_the_name_of_a_stage(tmp_path):
-    paths = []
-    for tf in ("TF01", "TF02"):
-        shown = metrics(tmp_path, "texture", FitResult(60.0, 9, psnr=40.0), "texture", tf)
-        paths.append(tmp_path / "results" / "texture" / tf / "texture" / METRICS)
-        paths[-1].parent.mkdir(parents=True)
-        shown.rename(paths[-1])
-    require_apart(read_known(paths)[0])
+    folder, stage = tmp_path / "results" / "texture", "texture"
+    require_apart(read_known([fit_in(folder / tf / stage, stage, stage, tf) for tf in ("TF01", "TF02")])[0])
 
 
 def test_columns_of_the_paper_without_a_value_are_left_out(tmp_path):

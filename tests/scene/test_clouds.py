@@ -63,9 +63,8 @@ def test_edits_and_a_light_from_the_side_are_in_the_colors():
 
 def test_the_color_is_that_of_the_mean_texel_under_the_gaussian():
     model = ball(1)
-    p = dict(model.parameters) | raw_material(
-        1 - 1e-6, 1e-6, 1e-6, 20.0, "bounded"
-    )  # the same from everywhere
+    everywhere_alike = raw_material(1 - 1e-6, 1e-6, 1e-6, 20.0, "bounded")
+    p = dict(model.parameters) | everywhere_alike
     cloud = cloud_of("a", (Surfels(p, model.shading), []), [PartEdit()], HEADLIGHT)
     place, surfel = owners(p)
     weights = footprint(p["sizes"])

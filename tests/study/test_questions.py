@@ -85,11 +85,10 @@ def test_what_cannot_be_asked_is_told(tmp_path):
 
 
 def test_ranks_have_the_papers_names():
-    assert [rank_name(rank, 4) for rank in (1, 2, 3, 4)] == ["best", "second-best", "second-worst", "worst"]
-    assert [rank_name(rank, 2) for rank in (1, 2)] == ["best", "worst"]
-    assert [rank_name(rank, 3) for rank in (1, 2, 3)] == ["best", "second-best", "worst"]
-    six = [rank_name(rank, 6) for rank in range(1, 7)]
-    assert six == ["best", "second-best", "rank 3", "rank 4", "second-worst", "worst"]
+    ends = ("second-best", "second-worst")
+    for between in ((), ends[:1], ends, (ends[0], "rank 3", "rank 4", ends[1])):
+        count = len(between) + 2
+        assert [rank_name(rank, count) for rank in range(1, count + 1)] == ["best", *between, "worst"]
 
 
 def test_a_key_is_read_as_it_was_written(tmp_path):
