@@ -3,10 +3,10 @@
 import math
 
 import torch
-from torch.nn.functional import normalize
 
 from tests.fields.surfels.test_composition import ball
 from tests.scene.test_twin import HIGH, LOW, sphere_volume
+from texgs.core.geometry import facing
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
@@ -34,10 +34,9 @@ def balls_in_a_volume(folder, **options):
 def shell(normals, radius, size, opacity, middle=(0.0, 0.0, 0.0)):
     """Geometry of round surfels on a sphere, whose normals [N, 3] point out of it; raw opacity."""
     n = len(normals)
-    half = normalize(normals + torch.tensor([1e-4, 0.0, 1.0]), dim=1)  # half a turn around it takes z there
     return {
         "means": torch.as_tensor(middle, dtype=torch.float32) + radius * normals,
-        "quats": torch.cat([torch.zeros(n, 1), half], dim=1),
+        "quats": facing(normals),
         "scales": torch.full((n, 2), math.log(size)),
         "opacities": torch.full((n,), opacity),
     }

@@ -67,21 +67,18 @@ def test_variants_of_an_edit_have_the_scene_before_them(tmp_path):
 
 
 def test_what_cannot_be_asked_is_told(tmp_path):
-    def refused(key, edits=()):
-        refused(lambda: questions(tmp_path, edits), key)
-
     job(tmp_path / "core", "edit_segment", EditResult("core", "segment", "grabcut", 1.0))
-    refused("new look")
+    refused(lambda: questions(tmp_path), "new look")
     edit(tmp_path, "style")
     edit(tmp_path, "text", followed=WORDS)
-    refused("engine style, engine text")
-    refused("--edits: .* got arf", ["arf"])
+    refused(lambda: questions(tmp_path), "engine style, engine text")
+    refused(lambda: questions(tmp_path, ["arf"]), "--edits: .* got arf")
     edit(tmp_path, "arf")
-    refused("no scene of engine by quick")
+    refused(lambda: questions(tmp_path), "no scene of engine by quick")
     fit(tmp_path)
     for number in range(25):
         edit(tmp_path, f"style{number}")
-    refused("at most 26")
+    refused(lambda: questions(tmp_path), "at most 26")
 
 
 def test_ranks_have_the_papers_names():
