@@ -10,6 +10,7 @@ from hydra import compose as hydra_compose
 from hydra import initialize_config_dir
 from omegaconf import OmegaConf
 
+from tests.refusals import refused
 from texgs.config.compose import compose
 from texgs.config.composition import composition, merge, resolve
 from texgs.config.describe import describe, keys
@@ -46,10 +47,7 @@ def test_a_copied_file_does_not_take_the_place_of_its_original(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     (tmp_path / "conf" / "fit").mkdir(parents=True)
     (tmp_path / "conf" / "fit" / "mine.yaml").write_text("defaults: [quick]\ntexture: {sweeps: 1}\n")
-    with pytest.raises(
-        ConfigError, match=r"fit=mine: expected `name: mine` in its file, got quick; change it"
-    ):
-        compose(("fit=mine",))
+    refused(lambda: compose(("fit=mine",)), "fit=mine: .*, got quick", ConfigError)
     assert compose(("fit=mine", "fit.name=other")).fit.name == "other"
 
 
@@ -67,10 +65,7 @@ def test_a_copied_file_does_not_take_the_place_of_its_original(tmp_path, monkeyp
         ("views.renderer=gpuu", "views.renderer: expected one of cpu, gpu, vtk, got gpuu, did you mean gpu?"),
         ("dataset=turbulnce", "turbulnce, did you mean turbulence?"),
         ("views=hugge", "views: expected one of default, headlight, paper, relight, small, got hugge"),
-        (
-            "views.lights=[{kind: sun}]",
-            "views.lights.0.kind: expected one of headlight, directional, random, got sun",
-        ),
+        ("views.lights=[{kind: sun}]", "views.lights.0.kind: expected one of headlight"),
         ("a=b=c", "a=b=c: expected key=value"),
         ("dataset=[engine,sphere]", "dataset: expected one name, got a list; several go to datasets"),
         ("edit.text.instruction=dark, red!", "needs quotes inside those of the shell, such as 'edit.text"),

@@ -10,6 +10,8 @@ import pytest
 import yaml
 
 from tests.real_data import real_data
+from tests.refusals import refused
+from tests.report.written import lines
 from tests.shipped import DATASETS, ROOT, tracked
 from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
@@ -18,21 +20,7 @@ from texgs.volume.sources import open_source
 from texgs.workflow.checks import check_basic_tfs
 from texgs.workflow.locate import source_file, tf_names, views_folder
 
-# The paper's Tables 1 and 8: samples along x, y, z; width of views; basic scenes.
-PAPER = {
-    "five_jets": ((256, 256, 256), 800, 2),
-    "mantle": ((360, 201, 180), 800, 2),
-    "supernova": ((864, 864, 864), 800, 2),
-    "wood": ((1024, 1024, 1024), 800, 1),
-    "beetle": ((832, 832, 494), 512, 1),
-    "chameleon": ((1024, 1024, 1080), 512, 2),
-    "engine": ((256, 256, 128), 512, 2),
-    "ionization": ((600, 248, 248), 512, 2),
-    "combustion": ((480, 720, 120), 800, 5),
-    "rotstrat": ((2048, 2048, 2048), 800, 1),
-    "sphere": ((512, 512, 512), 800, 1),
-    "vortex": ((1024, 1024, 1024), 800, 1),
-}
+PAPER = {line["dataset"]: line for line in lines("datasets")}
 PROMPTS = {"beetle": 1, "ionization": 1, "chameleon": 2, "engine": 2}  # of its text-driven comparison
 # Downloads come from one commit of a repository: what is there never changes.
 PINNED = re.compile(r"https://raw\.githubusercontent\.com/[\w.-]+/[\w.-]+/[0-9a-f]{40}/[\w./-]+")
@@ -41,6 +29,11 @@ CHECKSUM = re.compile(r"[0-9a-f]{64}")
 
 def dataset(name):
     return compose((f"dataset={name}",)).dataset
+
+
+def dims_of(name):
+    """Samples along x, y and z by the paper."""
+    return tuple(int(PAPER[name][f"volume_{axis}"]) for axis in "xyz")
 
 
 def as_written(name):
@@ -90,19 +83,18 @@ def test_downloads_are_pinned(name):
 def test_a_file_that_is_neither_there_nor_downloaded_is_explained(name, tmp_path):
     config = compose((f"dataset={name}", f"data_folder={tmp_path}"))
     assert dataset(name).volume.sha256 is None
-    with pytest.raises(ConfigError, match=re.escape(dataset(name).volume.obtain)):
-        source_file(config)
+    refused(lambda: source_file(config), re.escape(dataset(name).volume.obtain), ConfigError)
     assert len(dataset(name).volume.obtain) > 40
 
 
 @pytest.mark.parametrize("name", PAPER)
 def test_has_the_numbers_of_the_paper(name):
-    config, (dims, width, n_scenes) = dataset(name), PAPER[name]
+    config, dims = dataset(name), dims_of(name)
     assert config.title == name.replace("_", " ")
-    assert config.image == width
+    assert config.image == PAPER[name]["image_px"]
     assert config.volume.reduce == 1
     if config.views_folder is None:
-        assert len(config.basic_tfs) == n_scenes
+        assert len(config.basic_tfs) == PAPER[name]["basic_scenes"]
     if config.volume.generator is not None:
         assert (config.volume.size,) * 3 == dims
     if config.volume.dims is not None:
@@ -127,7 +119,7 @@ def test_agrees_with_the_real_volume(name, manifest):
     assert list(source.dims) == known["dims_xyz"]
     assert config.volume.sha256 in (None, known["sha256"])
     if name in PAPER:
-        assert source.dims == PAPER[name][0]
+        assert source.dims == dims_of(name)
     for tf, points in config.basic_tfs.items():
         first, last = in_data_values(tf, points, "data", known["min"], known["max"]).support
         assert known["min"] <= first < last <= known["max"]

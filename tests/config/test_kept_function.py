@@ -10,13 +10,14 @@ import pytest
 import yaml
 
 from tests.config.kept import DATA_SET, TRIED, project
+from tests.refusals import refused
 from tests.viewer.pages import on_page
 from texgs.cli.main import main
 from texgs.config.compose import recompose
 from texgs.config.dataset_text import as_yaml
 from texgs.config.kept_function import keep
 from texgs.config.project import ROOT
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import TexgsError
 from texgs.edit.function_model import with_model
 from texgs.scene.scene_file import write_scene
 from texgs.volume.basic_tfs import basic_tfs_of
@@ -135,8 +136,7 @@ def test_a_second_function_moves_no_views_either_and_may_be_a_model(here):
     """A server that runs all day reads the file anew."""
     scene = project(here)
     keep(scene, "TF03")
-    with pytest.raises(ArgumentError, match="TF03 and touching"):
-        keep(scene, "touching")
+    refused(lambda: keep(scene, "touching"), "TF03 and touching")
     made = with_model(scene, "outer", scene.models["TF01"].file, scene.functions["outer"])
     assert "outer" not in made.functions
     said = keep(made, "outer")
@@ -167,8 +167,7 @@ def test_a_second_function_moves_no_views_either_and_may_be_a_model(here):
 )
 def test_what_cannot_be_kept_is_told_and_nothing_is_written(here, name, text, told):
     scene = project(here, text)
-    with pytest.raises(TexgsError, match=told):
-        keep(scene, name)
+    refused(lambda: keep(scene, name), told, TexgsError)
     assert file_of(here).read_bytes() == text.encode()
     assert [path.name for path in file_of(here).parent.iterdir()] == ["mine.yaml"]
 
@@ -187,18 +186,15 @@ def test_a_volume_of_another_data_set(here, facts, told):
     scene = project(here)
     metrics = scene.volume.file.with_name("metrics.json")
     metrics.unlink() if facts is None else metrics.write_text(json.dumps(facts))
-    with pytest.raises(TexgsError, match=told):
-        keep(scene, "TF03")
+    refused(lambda: keep(scene, "TF03"), told, TexgsError)
     assert file_of(here).read_text() == DATA_SET
 
 
 def test_a_file_that_is_read_only_stays_and_a_scene_needs_a_volume(here, monkeypatch):
     scene = project(here)
-    with pytest.raises(ArgumentError, match=r"functions: .*none"):
-        keep(replace(scene, volume=None), "TF03")
+    refused(lambda: keep(replace(scene, volume=None), "TF03"), r"functions: .*none")
     monkeypatch.setattr(os, "access", lambda path, mode: path.suffix != ".yaml")
-    with pytest.raises(TexgsError, match=r"mine\.yaml: "):
-        keep(scene, "TF03")
+    refused(lambda: keep(scene, "TF03"), r"mine\.yaml: ", TexgsError)
     assert file_of(here).read_text() == DATA_SET
 
 
@@ -211,8 +207,7 @@ def test_the_command_line(here, scene_file, capsys):
     assert capsys.readouterr().out.endswith("then: texgs run dataset=mine\n")
     assert "TF03" in yaml.safe_load(file_of(here).read_text())["basic_tfs"]
     for words in ([], ["--keep", "--output", "new.yaml"]):
-        with pytest.raises(SystemExit, match="2"):
-            main(["model", str(scene_file), "outer", *words])
+        refused(lambda words=words: main(["model", str(scene_file), "outer", *words]), "2", SystemExit)
 
 
 @on_page

@@ -41,8 +41,7 @@ def test_failed_write_leaves_the_old_file_and_no_other(tmp_path, error, raised, 
         file.write(b"half")
         raise error
 
-    with pytest.raises(raised, match=message):
-        io.write_atomic(path, fail)
+    refused(lambda: io.write_atomic(path, fail), message, raised)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 

@@ -38,9 +38,7 @@ def test_files_are_known_by_their_header_and_the_same_field_gives_the_same_bytes
     field = open_field(path)
     assert (field.kind, field.metadata) == (make().kind, make().metadata)
     assert write(tmp_path / "b", make()).read_bytes() == path.read_bytes()
-    assert write(tmp_path / "c", field).read_bytes() == path.read_bytes(), (
-        "every bit comes back, and nothing is rounded twice"
-    )
+    assert write(tmp_path / "c", field).read_bytes() == path.read_bytes(), "nothing is rounded twice"
     if format in LOSSLESS:
         assert path.stat().st_size == pytest.approx(field.sizes()["stored_total_mib"] * 2**20, abs=4000)
 

@@ -5,6 +5,7 @@ import torch
 
 from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import STAGES, sample
+from tests.report.written import lines
 from texgs.core.memory import MIB
 from texgs.fields.gaussians import Gaussians
 from texgs.fields.palette.model import PaletteField
@@ -18,13 +19,6 @@ from texgs.raster.voxel_grid import VoxelGrid
 SCENES = 1.75  # basic scenes of a data set, on average: seven of four data sets
 LATTICE = 512  # of Plenoxels
 N_TEXELS = 10_000_000  # per basic scene, found by a bisection of 0.1 %
-# Paper, appendix, model size breakdown: basic scenes, geometry, shading, texture in MiB, primitives.
-PAPER = {
-    "beetle": (1, 1.8, 0.7, 114.5, 47767),
-    "ionization": (2, 4.6, 1.8, 228.9, 119396),
-    "wood": (1, 5.3, 2.1, 114.5, 138087),
-    "mantle": (2, 6.9, 2.7, 228.9, 179688),
-}
 
 
 def megabytes(mib):
@@ -77,14 +71,14 @@ def test_the_full_configuration_of_a_palette_field():
     assert megabytes(field.sizes()["total_mib"]) == pytest.approx(168.67, abs=0.005)
 
 
-@pytest.mark.parametrize("dataset", PAPER)
-def test_the_breakdown_of_surfels(dataset):
-    n_scenes, geometry, shading, texture, n = PAPER[dataset]
-    by_group = surfels(n, n_scenes * N_TEXELS).sizes()
-    assert round(by_group["geometry_mib"], 1) == geometry
-    assert round(by_group["shading_mib"], 1) == shading
-    assert by_group["texture_mib"] == pytest.approx(texture, rel=1e-3)
-    assert by_group["total_mib"] == pytest.approx(geometry + shading + texture, rel=1e-3)
+@pytest.mark.parametrize("line", lines("model_size"), ids=lambda line: line["dataset"])
+def test_the_breakdown_of_surfels(line):
+    by_group = surfels(int(line["primitives"]), int(line["basic_scenes"]) * N_TEXELS).sizes()
+    assert round(by_group["geometry_mib"], 1) == line["geometry_mib"]
+    assert round(by_group["shading_mib"], 1) == line["shading_mib"]
+    assert by_group["texture_mib"] == pytest.approx(line["texture_mib"], rel=1e-3)
+    total = sum(line[f"{group}_mib"] for group in ("geometry", "shading", "texture"))
+    assert by_group["total_mib"] == pytest.approx(total, rel=1e-3)
 
 
 @pytest.mark.parametrize(("table", "count", "published"), [("image", 129_857, 223), ("text", 108_119, 221)])

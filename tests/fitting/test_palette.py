@@ -34,6 +34,7 @@ SETTINGS = PaletteKeys(
     rays=512,
 )
 STEPS = 180
+STOPS = (20, 70, 140, STEPS)  # within the grid's fit and each part of that of networks, and between them
 
 
 @pytest.fixture(scope="module")
@@ -42,12 +43,20 @@ def images():
 
 
 @pytest.fixture(scope="module")
-def fit(images):
+def checkpoints(tmp_path_factory):
+    """The folder of the checkpoints of the fit, by iteration."""
+    return tmp_path_factory.mktemp("checkpoints")
+
+
+@pytest.fixture(scope="module")
+def fit(images, checkpoints):
     """A fit with its progress, and the density networks before palette colours learned."""
     palette_fit = PaletteFit(images, SETTINGS)
     palette_fit.progress = []
     for done in palette_fit.run():
         palette_fit.progress.append(done)
+        if done in STOPS:
+            checkpoint.save(checkpoints / str(done), palette_fit)
         if done == STEPS - 40:
             palette_fit.before = {name: x.detach().clone() for name, x in palette_fit.parameters.items()}
     return palette_fit
@@ -75,15 +84,11 @@ def test_the_palette_has_the_hue_of_the_ball(images):
     torch.testing.assert_close(color / color[0], torch.tensor([1.0, 0.5, 0.25]), atol=0.02, rtol=0)
 
 
-@pytest.mark.parametrize("stop", [20, 70, 140, STEPS])
-def test_a_resumed_run_is_as_if_it_had_never_stopped(fit, images, tmp_path, stop):
-    """Within the grid's fit and each part of that of networks, and between them."""
-    stopped, resumed = PaletteFit(images, SETTINGS), PaletteFit(images, SETTINGS, seed=1)
-    for _ in zip(range(stop), stopped.run(), strict=False):
-        pass
-    checkpoint.save(tmp_path, stopped)
+@pytest.mark.parametrize("stop", STOPS)
+def test_a_resumed_run_is_as_if_it_had_never_stopped(fit, images, checkpoints, stop):
+    resumed = PaletteFit(images, SETTINGS, seed=1)
     resumed.colors = fit.colors
-    run_to_end(resumed, tmp_path, "resumed")
+    run_to_end(resumed, checkpoints / str(stop), "resumed")
     assert resumed.iteration == resumed.iterations == STEPS
     require_equal(resumed.parameters, fit.parameters)
     assert torch.equal(resumed.geometry.grid.rows, fit.geometry.grid.rows)

@@ -67,17 +67,17 @@ def test_what_is_outside_of_the_ball_stays_empty(fit):
 
 
 @pytest.mark.parametrize("optimizer", ["rmsprop", "adam"])
-@pytest.mark.parametrize("stop", [25, 40, 70])
-def test_a_resumed_run_is_as_if_it_had_never_stopped(images, optimizer, stop):
+def test_a_resumed_run_is_as_if_it_had_never_stopped(images, optimizer):
     settings = replace(SETTINGS, optimizer=optimizer, density=Decay(5.0, 1.0), occupy_every=15)
-    whole = VoxelFit(images, settings)
+    whole, states = VoxelFit(images, settings), {}
     for done in whole.run():
-        if done == stop:
-            state = {name: x.clone() for name, x in whole.state().items()}
-    resumed = VoxelFit(images, settings, seed=1)
-    resumed.restore(state)
-    assert list(resumed.run()) == list(range(stop + 1, 121))
-    assert torch.equal(resumed.grid.rows, whole.grid.rows)
+        if done in (25, 40, 70):
+            states[done] = {name: x.clone() for name, x in whole.state().items()}
+    for stop, state in states.items():
+        resumed = VoxelFit(images, settings, seed=1)
+        resumed.restore(state)
+        assert list(resumed.run()) == list(range(stop + 1, 121))
+        assert torch.equal(resumed.grid.rows, whole.grid.rows)
 
 
 @pytest.mark.parametrize("stages", [[GridStage(16, 3), GridStage(32, 0)], [GridStage(16, 3)]])

@@ -8,8 +8,9 @@ import torch
 
 from tests.edit.lift_scenes import two_balls
 from tests.fields.voxels.test_voxels import ball as voxel_ball
+from tests.refusals import refused
 from texgs.core.camera import Camera, intrinsics, look_at, orbit
-from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.errors import ShapeError
 from texgs.core.light import Light
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.voxels import VoxelScene
@@ -140,13 +141,15 @@ def test_voxels_are_compared_by_their_mean_depth():
     frames = list(frames_of(scene, views, Light("headlight"), depth="depth"))
     assert covered(frames, tolerance=0.02) > 0.5
     assert consistency(frames, tolerance=0.02) < 0.01
-    with pytest.raises(ArgumentError, match="median"):
-        list(frames_of(scene, views, Light("headlight")))
+    refused(lambda: list(frames_of(scene, views, Light("headlight"))), "median")
 
 
 def test_frames_that_cannot_be_compared():
     frames = [plane(camera(0.0)), plane(camera(0.02))]
     away = plane(camera(5.0, target=(5.0, 0.0, 0.0)))
     assert difference(frames[0], away) is None, "they see nothing that is the same"
-    with pytest.raises(ShapeError, match=r"depth: expected \[64, 64\], got \[64, 63\]"):
-        difference(frames[0], replace(frames[1], depth=frames[1].depth[:, 1:]))
+    refused(
+        lambda: difference(frames[0], replace(frames[1], depth=frames[1].depth[:, 1:])),
+        r"depth: .*\[64, 63\]",
+        ShapeError,
+    )

@@ -10,10 +10,11 @@ import torch
 
 import texgs.metrics.edits
 from tests.metrics.test_edit_metrics import scenes, subject  # noqa: F401
+from tests.refusals import refused
 from tests.report.written import metrics as write_metrics
 from tests.report.written import records, rows
 from tests.toys.brightness import METRIC
-from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.errors import ConfigError
 from texgs.core.specifications import specifications
 from texgs.metrics.metric import Measure, Metric, metrics, require_declared, values_of
 from texgs.report.edit_tables import looks, text_driven
@@ -58,16 +59,17 @@ def test_a_metric_of_one_file_is_measured_and_has_its_columns(tmp_path, scenes):
     [0.5, {"bleu": 1}, {"redness": torch.tensor(0.5)}, {"redness": math.nan}, {"redness": "quite red"}],
 )
 def test_what_a_metric_gives_is_what_it_declares(given):
-    with pytest.raises(ArgumentError, match="redness"):
-        require_declared(Metric("redness", (Measure("redness", "share of red", 2),), print), given)
+    refused(
+        lambda: require_declared(Metric("redness", (Measure("redness", "share of red", 2),), print), given),
+        "redness",
+    )
 
 
 def test_two_metrics_have_no_value_of_one_name(toy, monkeypatch):
     taken = Metric("redness", (Measure("brightness", "share of red", 2),), print)
     known = specifications("texgs.metrics.edits", "METRIC")
     monkeypatch.setattr("texgs.metrics.metric.specifications", lambda *names: {**known, "redness": taken})
-    with pytest.raises(ConfigError, match=r"brightness and redness: .* got brightness of both; rename one"):
-        metrics()
+    refused(metrics, r"brightness and redness: .* got brightness of both; rename one", ConfigError)
 
 
 def test_columns_and_names_are_stated_once():
@@ -85,5 +87,4 @@ def test_columns_and_names_are_stated_once():
     ],
 )
 def test_a_mistake_in_a_metric_is_named(made, key):
-    with pytest.raises(ConfigError, match=key):
-        made()
+    refused(made, key, ConfigError)

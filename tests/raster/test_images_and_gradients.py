@@ -106,14 +106,19 @@ def test_some_gradients_only(device, drawn, wanted):
     check_gradients(drawn(random_scene(11)), device, ("color", "normal"), wanted=wanted)
 
 
-@pytest.mark.parametrize("wanted", [("texels",), ("base", "gain"), ("gain", "texels", "opacities")])
-def test_some_gradients_of_textures_only(device, wanted):
-    check_gradients(textured(random_scene(12)), device, wanted=wanted)
+SOME_OF_TEXTURES = {  # by the number of features beside the texture
+    0: [("texels",), ("base", "gain"), ("gain", "texels", "opacities")],
+    2: [("features",), ("texels",), ("features", "texels"), ("base", "features")],
+}
 
 
-@pytest.mark.parametrize("wanted", [("features",), ("texels",), ("features", "texels"), ("base", "features")])
-def test_textures_and_features_on_frozen_geometry(device, wanted):
-    check_gradients(textured_with_features(random_scene(12), 2), device, wanted=wanted)
+@pytest.mark.parametrize(
+    ("channels", "wanted"), [(n, some) for n, cases in SOME_OF_TEXTURES.items() for some in cases]
+)
+def test_some_gradients_of_textures_only(device, channels, wanted):
+    scene = random_scene(12)
+    scene = textured_with_features(scene, channels) if channels else textured(scene)
+    check_gradients(scene, device, wanted=wanted)
 
 
 def test_two_uses_of_one_image_and_two_images_of_one_scene(device, drawn):

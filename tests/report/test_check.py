@@ -11,17 +11,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.fields.surfels.test_composition import ball
-from tests.scene.test_twin import HIGH, LOW, sphere_volume
+from tests.refusals import refused
+from tests.scene.balls import balls_in_a_volume
 from texgs.cli.main import main
 from texgs.core.cuts import Cuts, Plane
-from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
-from texgs.fields.surfels.model_file import write_model
 from texgs.metrics.quality import compare
 from texgs.report.check import LIT_SHARE, check, floor_of, found_sentence, random_shots
 from texgs.scene.cut_view import scene_and_volume
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene
 from texgs.scene.scene_file import write_scene
 from texgs.scene.twin import Twin
 
@@ -30,18 +28,14 @@ LENS = Lens(3.0, 30.0, 32, 32)
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("scene")
-    files = {name: write_model(folder / f"{name}.safetensors", ball(seed)) for seed, name in enumerate("ab")}
-    models = {name: SceneModel(file) for name, file in files.items()}
-    return Scene(models, volume=sphere_volume(folder, a=LOW, b=HIGH))
+    return balls_in_a_volume(tmp_path_factory.mktemp("scene"))
 
 
 def test_the_floor_is_an_order_statistic():
     values = list(range(64, 0, -1))
     assert floor_of(values) == 3
     assert floor_of(values[:19]) == min(values[:19])
-    with pytest.raises(ArgumentError, match="views: expected at least 19, got 18"):
-        floor_of(values[:18])
+    refused(lambda: floor_of(values[:18]), "views: expected at least 19, got 18")
 
 
 def test_new_values_reach_the_floor():
@@ -64,9 +58,7 @@ def test_views_lights_and_edits_are_drawn_from_a_seed(scene):
     assert np.mean([edit.palette is not None for edit in edits]) == pytest.approx(0.5, abs=0.1)
     assert np.mean([edit.opacity != 1 for edit in edits]) == pytest.approx(0.5, abs=0.1)
     heights = [float(camera.position[1]) / LENS.radius for _, camera, _ in drawn]
-    assert np.abs(np.quantile(heights, [0.25, 0.5, 0.75]) - [-0.5, 0, 0.5]).max() < 0.15, (
-        "evenly on the sphere"
-    )
+    assert np.abs(np.quantile(heights, [0.25, 0.5, 0.75]) - [-0.5, 0, 0.5]).max() < 0.15, "evenly"
 
 
 def test_a_check_tells_what_its_views_have(scene, tmp_path):
@@ -117,21 +109,17 @@ def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, cap
     assert set(found) == {told["sentence"]}
     assert main(["check", "cut.yaml", *words]) == 0
     assert "cut.yaml: its cuts are left out, as their faces show the volume" in capsys.readouterr().err
-    other = Scene({"a": scene.models["a"]})
+    other = Scene({"low": scene.models["low"]})
     assert found_sentence(Path("ball.yaml"), other) == "", "of other models"
     write_scene("other.yaml", other)
     assert main(["render", "other.yaml", "--caption"]) == 2
     assert "run texgs check other.yaml first" in capsys.readouterr().err
-    for file, more, message in (
-        ("ball.yaml", ["--views", "18"], "views: expected at least 19, got 18"),
-        ("old.yaml", [], "old.yaml: volume: expected the volume that the scene was made from, got none"),
+    for file, more, named in (
+        ("ball.yaml", ["--views", "18", "--output", "none.json"], "views: "),
+        ("old.yaml", ["--output", "none.json"], "old.yaml: volume: "),
+        ("ball.yaml", ["--output", "none.txt"], "none.txt"),
+        ("ball.yaml", ["--output", "ball.yaml/x.json"], "cannot write"),
     ):
-        assert main(["check", file, *more, "--output", "none.json"]) == 2
-        assert message in capsys.readouterr().err
-    for output, message in (
-        ("none.txt", "ends in .json, got none.txt"),
-        ("ball.yaml/x.json", "cannot write"),
-    ):
-        assert main(["check", "ball.yaml", "--output", output]) == 2
-        assert message in capsys.readouterr().err, "before any view"
+        assert main(["check", file, *more]) == 2
+        assert named in capsys.readouterr().err, "before any view"
     assert not list(tmp_path.glob("none*"))

@@ -1,8 +1,8 @@
 import pytest
 
 from tests.fields.surfels.test_composition import ball
+from tests.refusals import refused
 from tests.report.written import job, metrics, read
-from texgs.core.errors import ArgumentError
 from texgs.core.figures import CELL, DPI
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.results import EditMeasures, EditResult, FitResult
@@ -104,5 +104,4 @@ def test_a_variant_with_a_missing_phase_is_not_measured(tmp_path):
     assert column(table, "edit") == ["-", "style"]
     assert column(table, "PSNR") == [None, None]
     assert column(table, "minutes") == [None, 0.5]
-    with pytest.raises(ArgumentError, match="sweep none:"):
-        sweep(read(paths), "none")
+    refused(lambda: sweep(read(paths), "none"), "sweep none:")

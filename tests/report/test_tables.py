@@ -2,11 +2,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.refusals import refused
 from tests.report.written import lines, metrics, records
 from tests.study.studies import study
 from texgs.cli.main import main
 from texgs.core.cache import Checksums
-from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_json
 from texgs.core.names import METRICS
 from texgs.report.metrics_files import LeftOut, read_known, require_apart
@@ -75,23 +75,12 @@ def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
     old.write_text('{"stage": "texture", "dataset": "engine", "numbers": {"surfels": 9}}')
     missing = tmp_path / "missing.json"
     missing.write_text('[{"what": "data set wood", "why": "no file", "places": ["phase"]}]')
-    words = [
-        "tables",
-        str(path),
-        str(path),
-        str(old),
-        "--missing",
-        str(missing),
-        "--output",
-        str(tmp_path / "tables"),
-    ]
-    assert main(words) == 0
+    words = ["--missing", str(missing), "--output", str(tmp_path / "tables")]
+    assert main(["tables", str(path), str(path), str(old), *words]) == 0
     expected = {f"{table.name}.{kind}" for table in TABLES for kind in ("csv", "md", "tex")}
     assert {file.name for file in (tmp_path / "tables").iterdir()} == expected | {"tables.tex"}
     said = capsys.readouterr()
-    assert said.out.count("| scan | quick | shading | 1 | 40.00 |") == 1, (
-        "a file that is named twice counts once"
-    )
+    assert said.out.count("| scan | quick | shading | 1 | 40.00 |") == 1, "a file counts once"
     assert "Left out: data set wood: no file." in said.out
     assert "Left out: 1 metrics file: of another version of texgs" in said.err
     assert "## Table 1. Data sets" not in said.out, "tables without rows are not printed"
@@ -103,7 +92,7 @@ def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
 
 def test_tables_of_a_folder_go_there(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("texgs.workflow.graph.earlier", lambda *_: ([str(path)], {}))
+    monkeypatch.setattr("texgs.workflow.graph.earlier_results", lambda *_: ([str(path)], {}))
     path = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")
     (tmp_path / "other").mkdir()
     assert main(["tables", "other"]) == 0
@@ -147,25 +136,21 @@ def test_the_verb_reads_whole_results_of_a_folder_and_names_others(tmp_path, cap
     assert "mine/scan/TF01/fit: comes from mine/scan/TF01/views, which has been made anew since" in said.err
 
 
+def fit_in(folder, stage, dataset, tf="TF01"):
+    """The metrics file of a fit in a folder."""
+    folder.mkdir(parents=True)
+    return metrics(folder, stage, FitResult(60.0, 9, psnr=40.0), dataset, tf, name=METRICS)
+
+
 def test_results_of_two_folders_are_not_mixed(tmp_path):
-    paths = []
-    for root in ("one", "scan/two"):  # a project may be named like its data
-        shown = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")
-        paths.append(tmp_path / root / "scan" / "TF01" / METRICS)
-        paths[-1].parent.mkdir(parents=True)
-        shown.rename(paths[-1])
-    with pytest.raises(ArgumentError, match=r"two/scan.*: expected results of one folder, got .*one/scan"):
-        require_apart(read_known(paths)[0])
+    roots = ("one", "scan/two")  # a project may be named like its data
+    paths = [fit_in(tmp_path / root / "scan" / "TF01", "shading", "scan") for root in roots]
+    refused(lambda: require_apart(read_known(paths)[0]), r"two/scan.*: .*one/scan")
 
 
 def test_a_data_set_may_have_the_name_of_a_stage(tmp_path):
-    paths = []
-    for tf in ("TF01", "TF02"):
-        shown = metrics(tmp_path, "texture", FitResult(60.0, 9, psnr=40.0), "texture", tf)
-        paths.append(tmp_path / "results" / "texture" / tf / "texture" / METRICS)
-        paths[-1].parent.mkdir(parents=True)
-        shown.rename(paths[-1])
-    require_apart(read_known(paths)[0])
+    folder, stage = tmp_path / "results" / "texture", "texture"
+    require_apart(read_known([fit_in(folder / tf / stage, stage, stage, tf) for tf in ("TF01", "TF02")])[0])
 
 
 def test_columns_of_the_paper_without_a_value_are_left_out(tmp_path):

@@ -8,9 +8,9 @@ from pxr import Sdf, Usd, UsdGeom, UsdValidation
 
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.test_composition import CAMERA, ball
+from tests.refusals import refused
 from tests.scene.cloud_files import EXTENSION, READERS, drawn, glb, read_gltf, read_spz, read_usd
 from tests.scene.test_export import plain
-from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT
 from texgs.fields.gaussians import Baked
 from texgs.fields.part_edit import PartEdit
@@ -79,10 +79,9 @@ def test_spz_holds_places_near_the_origin(clouds, tmp_path):
         assert np.allclose(read.means, means, rtol=1e-6)
         assert read.antialiased, "surfels are"
     (tmp_path / "x.spz").unlink()
-    with pytest.raises(
-        ArgumentError, match=r"x\.spz: expected splats within 2\^22 of the origin, got 5e\+06"
-    ):
-        write_spz(tmp_path / "x.spz", [replace(clouds[0], means=means * 5 / 3)])
+    refused(
+        lambda: write_spz(tmp_path / "x.spz", [replace(clouds[0], means=means * 5 / 3)]), r"x\.spz: .*5e\+06"
+    )
     assert not list(tmp_path.iterdir())
 
 
@@ -144,8 +143,7 @@ def test_prims_have_what_the_schema_of_usd_defines(clouds, tmp_path):
 
 def test_usd_core_is_asked_for(clouds, tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pxr", None)
-    with pytest.raises(ArgumentError, match=r"x\.usda: expected usd-core 26\.3 .* pip install '\.\[usd\]'"):
-        write_usd(tmp_path / "x.usda", clouds)
+    refused(lambda: write_usd(tmp_path / "x.usda", clouds), r"x\.usda: .*usd-core 26\.3")
     assert not list(tmp_path.iterdir())
 
 

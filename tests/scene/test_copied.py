@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from tests.fields.surfels.test_composition import ball
+from tests.refusals import refused
 from tests.scene.balls import ball_models
-from texgs.core.errors import ArgumentError
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.copied import write_copy
 from texgs.scene.scene import Scene, SceneModel, SceneVolume
@@ -69,8 +69,7 @@ def test_a_copy_that_fails_leaves_no_half_file(tmp_path, monkeypatch):
 @pytest.mark.parametrize("place", ["scene.yaml", "scene.yaml/kept"])
 def test_a_file_in_the_place_of_the_folder(tmp_path, place):
     (tmp_path / "scene.yaml").write_text("")
-    with pytest.raises(ArgumentError, match="expected a folder, but it cannot be made"):
-        write_copy(tmp_path / place, Scene(ball_models(tmp_path, "TF01")))
+    refused(lambda: write_copy(tmp_path / place, Scene(ball_models(tmp_path, "TF01"))), "cannot be made")
 
 
 @pytest.mark.parametrize("gone", ["TF01.safetensors", "volume.nrrd"])
@@ -79,13 +78,11 @@ def test_a_scene_of_which_a_file_is_gone_leaves_no_half_copy(tmp_path, gone):
     volume.file.touch()
     scene = Scene(ball_models(tmp_path, "TF01"), volume=volume)
     (tmp_path / gone).unlink()
-    with pytest.raises(ArgumentError, match=f"{gone}: no such file, which the scene needs"):
-        write_copy(tmp_path / "kept", scene)
+    refused(lambda: write_copy(tmp_path / "kept", scene), f"{gone}: no such file, which the scene needs")
     assert not (tmp_path / "kept").exists()
 
 
 def test_a_result_of_the_workflow_is_no_place_for_a_copy(tmp_path):
     (tmp_path / "metrics.json").touch()
-    with pytest.raises(ArgumentError, match="expected a folder of your own, got a result of the workflow"):
-        write_copy(tmp_path, Scene(ball_models(tmp_path, "TF01")))
+    refused(lambda: write_copy(tmp_path, Scene(ball_models(tmp_path, "TF01"))), "a result of the workflow")
     assert not (tmp_path / "scene.yaml").exists()

@@ -8,8 +8,7 @@ import torch
 from scipy.ndimage import distance_transform_cdt
 
 from tests.fields.surfels.test_composition import ball
-from tests.scene.balls import ball_models
-from tests.scene.test_twin import HIGH, LOW, sphere_volume
+from tests.scene.balls import balls_in_a_volume
 from texgs.core.camera import orbit
 from texgs.core.cuts import Box, Cuts, Plane
 from texgs.fields.surfels.variants import write_texture
@@ -26,7 +25,6 @@ from texgs.scene.cut_view import (
     slab_thickness,
 )
 from texgs.scene.frame import frame
-from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin, range_of
 from texgs.volume.nrrd_file import open_grid
@@ -39,9 +37,7 @@ HALF = Cuts([TOWARDS])
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     """Two balls with a sphere as their volume, cut by a plane that faces the camera."""
-    folder = tmp_path_factory.mktemp("scene")
-    models = ball_models(folder, "low", "high")
-    return Scene(models, cuts=HALF, volume=sphere_volume(folder, low=LOW, high=HIGH))
+    return balls_in_a_volume(tmp_path_factory.mktemp("scene"), cuts=HALF)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from tests.fields.surfels.test_composition import CAMERA, SIDE, ball
-from texgs.core.errors import ArgumentError
+from tests.refusals import refused
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
@@ -86,5 +86,4 @@ def test_nothing_to_see_is_the_background(scene):
 
 
 def test_a_mode_that_is_none(scene):
-    with pytest.raises(ArgumentError, match="mode: expected one of shaded, volume, unshaded, normal"):
-        shot(scene, "colour")
+    refused(lambda: shot(scene, "colour"), "mode: expected one of shaded, volume, unshaded, normal")

@@ -5,13 +5,10 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.fields.surfels.test_composition import ball
-from tests.scene.test_twin import HIGH, LOW, sphere_volume
+from tests.scene.balls import balls_in_a_volume
 from texgs.core.camera import orbit
 from texgs.core.cuts import Cuts, Plane
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.model_file import write_model
-from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.session import Session
 
 CAMERA = orbit(20, 10, 4, 30, 64, 48)
@@ -21,11 +18,7 @@ HALF = Cuts([Plane([1.0, 0.0, 0.0], 0.05)])  # keeps x up to 0.05
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("scene")
-    models = {
-        name: SceneModel(write_model(folder / f"{name}.safetensors", ball(1))) for name in ("low", "high")
-    }
-    return Scene(models, volume=sphere_volume(folder, low=LOW, high=HIGH))
+    return balls_in_a_volume(tmp_path_factory.mktemp("scene"))
 
 
 @pytest.mark.parametrize("mode", ["shaded", "normal", "difference"])

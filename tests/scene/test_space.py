@@ -11,10 +11,11 @@ from pxr import Usd
 
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.test_composition import ball
+from tests.refusals import refused
+from tests.scene.balls import shell
 from tests.scene.cloud_files import READERS, glb
 from tests.volume.test_space import ORIENTED, TO_RAS, WRITERS, center_by_itk
 from texgs.cli.main import main
-from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
 from texgs.fields.gaussians import write_gaussians
 from texgs.fields.surfels.model import Surfels
@@ -22,7 +23,7 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.raster.reference.shading import harmonics
 from texgs.scene.changes import apply_all
 from texgs.scene.clouds import Cloud, place_cloud
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.session import Session
 from texgs.viewer.description import describe, drawn
@@ -37,20 +38,16 @@ COARSE = ("--kind", "mesh", "--views", "42", "--size", "160", "--voxel", "0.012"
 
 def sphere(middle, count=700):
     """Opaque surfels side by side on a sphere; their normals point out of it."""
-    normals = torch.nn.functional.normalize(
-        torch.randn(count, 3, generator=torch.Generator().manual_seed(1)), dim=1
-    )
-    half = torch.nn.functional.normalize(
-        normals + torch.tensor([1e-4, 0.0, 1.0]), dim=1
-    )  # a half turn around it
-    made = ball(1, count)
-    parameters = {
-        "means": torch.as_tensor(middle, dtype=torch.float32) + RADIUS * normals,
-        "quats": torch.cat([torch.zeros(count, 1), half], dim=1),
-        "scales": torch.full((count, 2), float(np.log(0.012))),
-        "opacities": torch.full((count,), 6.0),
-    }
-    return Surfels({**made.parameters, **parameters}, made.shading)
+    normals = torch.randn(count, 3, generator=torch.Generator().manual_seed(1))
+    normals, made = torch.nn.functional.normalize(normals, dim=1), ball(1, count)
+    return Surfels({**made.parameters, **shell(normals, RADIUS, 0.012, 6.0, middle)}, made.shading)
+
+
+def head_up(folder):
+    """A scene of a sphere in a scan: x of the world points to the left of the patient, z to the front."""
+    matrix = [[100.0, 0, 0, 0], [0, 0, -100, 0], [0, 100, 0, 20], [0, 0, 0, 1]]
+    model = SceneModel(write_model(folder / "m.safetensors", sphere([0, 0, 0])))
+    return Scene({"A": model}, space=Space("left-posterior-superior", "mm", matrix))
 
 
 @pytest.fixture(params=[("v.nii.gz", "oblique"), ("v.mha", "oblique and mirrored"), ("left.nrrd", "oblique")])
@@ -186,8 +183,7 @@ def test_a_gaussian_is_turned_with_its_colours(sign, count):
 
     np.testing.assert_allclose(seen(moved, ways @ torch.from_numpy(turn.T)), seen(cloud, ways), atol=1e-5)
     sheared = Space("3D-right-handed", "", [[1.0, 0.3, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-    with pytest.raises(ArgumentError, match="expected axes at right angles, got oblique ones; export to the"):
-        place_cloud(cloud, sheared)
+    refused(lambda: placed(cloud, sheared), "expected axes at right angles, got oblique ones; export to the")
 
 
 def test_what_knows_no_space_stays_in_the_world_and_says_so(placed_scene, tmp_path, capsys):
@@ -197,21 +193,13 @@ def test_what_knows_no_space_stays_in_the_world_and_says_so(placed_scene, tmp_pa
     assert "space" not in old.read_text()
     target = tmp_path / "p.ply"
     assert main(["export", str(old), "--to", str(target), "--kind", "points"]) == 0
-    assert (
-        f"{target}: in world units: the scene knows no space of a file; texgs com" in capsys.readouterr().err
-    )
+    assert f"{target}: in world units" in capsys.readouterr().err
     places = pyvista.read(target).points
     np.testing.assert_allclose(np.linalg.norm(places - world, axis=1), RADIUS, rtol=1e-4)
     assert main(["export", str(old), "--to", str(target), "--kind", "points", "--space", "file"]) == 2
-    assert (
-        "space: expected a scene that knows the space of its volume's file, got none"
-        in capsys.readouterr().err
-    )
+    assert "space: expected a scene that knows the space" in capsys.readouterr().err
     assert main(["export", str(file), "--to", str(target), "--space", "file"]) == 2
-    assert (
-        "space: expected kind points or mesh or vtp or usd or gltf or spz, got 3dgs"
-        in capsys.readouterr().err
-    )
+    assert "space: expected kind points or mesh" in capsys.readouterr().err
     model = scene.models["A"].file
     assert main(["export", str(model), "--to", str(target), "--kind", "points", "--space", "file"]) == 2
     assert main(["export", str(file), "--model", "A", "--to", str(target), "--kind", "points"]) == 0
@@ -246,8 +234,7 @@ def test_a_scene_keeps_its_space(placed_scene):
         broken = file.with_name("broken.yaml")
         broken.write_text(text.replace(old, new))
         assert broken.read_text() != text
-        with pytest.raises(ArgumentError, match=message):
-            read_scene(broken)
+        refused(lambda broken=broken: read_scene(broken), message)
 
 
 def cut_by(file, word):
@@ -277,8 +264,6 @@ def test_cuts_by_the_axes_of_the_file(placed_scene):
 
 def test_cuts_by_samples_towards_a_letter(placed_scene, tmp_path):
     file, world, _, grid = placed_scene
-    from texgs.scene.scene import SceneVolume
-
     scene = replace(read_scene(file), volume=SceneVolume(tmp_path / "volume.nrrd", {}))
     write_scene(file, scene)
     ahead = drawn(scene.space)["ends"]
@@ -301,45 +286,29 @@ def test_cuts_by_samples_towards_a_letter(placed_scene, tmp_path):
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("cut=S,3cm", "S,POSITION in mm or along an axis as in 64v, got 3cm"),
-        ("cut=S,nan", "S,POSITION in mm or along an axis as in 64v, got nan"),
-        (
-            "cut=I,300mm",
-            r"from -0.1\d* to 0.1\d* along -?0,-1,-?0, got 3.2; samples are counted as in 64v",
-        ),
+        *((f"cut=S,{place}", f"S,POSITION in mm .*, got {place}") for place in ("3cm", "nan")),
+        ("cut=I,300mm", r"from -0.1\d* to 0.1\d* along -?0,-1,-?0, got 3.2"),
     ],
 )
 def test_mistakes_in_cuts_are_named(tmp_path, word, message):
-    matrix = [[100.0, 0, 0, 0], [0, 0, -100, 0], [0, 100, 0, 20], [0, 0, 0, 1]]
-    space = Space("left-posterior-superior", "mm", matrix)
-    model = SceneModel(write_model(tmp_path / "m.safetensors", sphere([0, 0, 0])))
-    file = write_scene(tmp_path / "scene.yaml", Scene({"A": model}, space=space))
-    with pytest.raises(ArgumentError, match=message):
-        cut_by(file, word)
+    scene = head_up(tmp_path)
+    file = write_scene(tmp_path / "scene.yaml", scene)
+    refused(lambda: cut_by(file, word), message)
     assert cut_by(file, "cut=-I,-20mm").normal == pytest.approx([0, 1, 0])
     for other, known in (
-        (None, "a scene with the space of its volume's file, got S"),
-        (replace(space, name="3D-right-handed"), "an axis of 3D-right-handed, got S; x, y and z"),
+        (None, "the space of its volume's file, got S"),
+        (replace(scene.space, name="3D-right-handed"), "an axis of 3D-right-handed, got S"),
     ):
         write_scene(file, replace(read_scene(file), space=other))
-        with pytest.raises(ArgumentError, match=known):
-            cut_by(file, "cut=S,0")
+        refused(lambda: cut_by(file, "cut=S,0"), known)
 
 
 def test_a_page_knows_the_letters_of_the_axes(tmp_path):
-    """A scan with the head up: x of the world points to the left of the patient, and z to the front."""
-    matrix = [[100.0, 0, 0, 0], [0, 0, -100, 0], [0, 100, 0, 20], [0, 0, 0, 1]]
-    space = Space("left-posterior-superior", "mm", matrix)
-    model = SceneModel(write_model(tmp_path / "m.safetensors", sphere([0, 0, 0])))
-    scene = Scene({"A": model}, space=space)
+    scene = head_up(tmp_path)
     said = describe("scan", scene, scene.open())["space"]
     assert said["ends"] == [["L", "R"], ["S", "I"], ["A", "P"]]
-    assert (said["axes"], said["unit"], said["matrix"], said["scale"]) == (
-        "LPS",
-        "mm",
-        matrix,
-        pytest.approx(100),
-    )
-    scene = replace(scene, space=replace(space, name="scanner-xyz"))
+    assert (said["axes"], said["unit"], said["matrix"]) == ("LPS", "mm", scene.space.matrix)
+    assert said["scale"] == pytest.approx(100)
+    scene = replace(scene, space=replace(scene.space, name="scanner-xyz"))
     assert describe("scan", scene, scene.open())["space"]["ends"] == [["x", ""], ["z", ""], ["", "y"]]
     assert describe("scan", replace(scene, space=None), scene.open())["space"] is None

@@ -10,6 +10,7 @@ import torch
 import yaml
 
 from tests.fields.surfels.test_composition import ball
+from tests.refusals import refused
 from texgs.core.camera import orbit
 from texgs.core.cuts import Cuts, Plane
 from texgs.core.errors import ArgumentError
@@ -157,21 +158,17 @@ def test_scene_files_name_their_volume(tmp_path, volume, twin):
 
 def test_a_twin_without_what_it_needs(tmp_path, volume, twin):
     old = read_scene(write_scene(tmp_path / "old.yaml", scene_of(None)))
-    with pytest.raises(ArgumentError, match=r"volume: expected the volume that the .* by texgs compose"):
-        Twin(old)
+    refused(lambda: Twin(old), r"volume: expected the volume that the .* by texgs compose")
     moved = scene_of(replace(volume, file=tmp_path / "none.nrrd"))
-    with pytest.raises(ArgumentError, match=r"volume: .*none\.nrrd: no such file; texgs volume "):
-        Twin(moved)
+    refused(lambda: Twin(moved), r"volume: .*none\.nrrd: no such file; texgs volume ")
     strange = Scene({"other": SceneModel("x")})
-    with pytest.raises(ArgumentError, match=r"volume\.tfs: expected the basic TF of model other, got low, h"):
-        twin.render(CAMERA, strange, [()])
+    refused(lambda: twin.render(CAMERA, strange, [()]), r"volume\.tfs: .*other, got low, h")
 
 
 def test_basic_tfs_of_other_models_are_told_where_a_scene_is_opened(volume):
     """The border that opens a scene names its file; a frame that is rendered later does not."""
     low = volume.tfs["low"]
-    with pytest.raises(ArgumentError, match=r"^volume\.tfs: expected the basic TF of model high, got low;"):
-        Twin(scene_of(replace(volume, tfs={"low": low})))
+    refused(lambda: Twin(scene_of(replace(volume, tfs={"low": low}))), r"^volume\.tfs: .*high, got low;")
 
 
 @pytest.mark.parametrize(
@@ -185,10 +182,7 @@ def test_basic_tfs_of_other_models_are_told_where_a_scene_is_opened(volume):
         ({"opacity_unit": 10**400}, "volume.opacity_unit: expected a number above 0"),
         ({"tfs": None}, "volume.tfs: expected a table of keys and values, got None"),
         ({"tfs": {"low": 3}}, "volume.tfs.low: transfer function: expected the keys opacity, color, got "),
-        (
-            {"tfs": {"low": {"opacity": [[0, 2]], "color": []}}},
-            "volume.tfs.low: opacity: expected at least 2",
-        ),
+        ({"tfs": {"low": {"opacity": [[0, 2]], "color": []}}}, "volume.tfs.low: opacity: "),
     ],
 )
 def test_a_mistake_is_named_with_its_place(tmp_path, volume, change, message):
@@ -249,9 +243,7 @@ def test_the_mode_volume_alone_shows_what_is_tried(volume, tmp_path):
     scene = replace(scene_of(volume), models={name: SceneModel(file) for name in ("low", "high")}, cuts=cut)
     tried, session = replace(scene, functions={"new": peak(volume)}), Session(scene)
     assert not np.array_equal(*(session.frame(CAMERA, "volume", each) for each in (scene, tried)))
-    assert np.array_equal(*(session.frame(CAMERA, "shaded", each) for each in (scene, tried))), (
-        "also its faces"
-    )
+    assert np.array_equal(*(session.frame(CAMERA, "shaded", each) for each in (scene, tried))), "and faces"
     assert torch.equal(*(session.beside(CAMERA, each)[1].color for each in (scene, tried)))
 
 
@@ -266,10 +258,7 @@ def test_a_scene_file_keeps_the_functions_that_are_tried(volume, tmp_path):
     ("functions", "message"),
     [
         ([], "functions: expected a table of keys and values, got \\[\\]"),
-        (
-            {"a": {"opacity": [[0, 1]]}},
-            "functions.a: transfer function: expected the keys opacity",
-        ),
+        ({"a": {"opacity": [[0, 1]]}}, "functions.a: .* the keys opacity"),
         ({"a": {"opacity": [[1, 0], [0, 1]], "color": [[0, 0, 0, 0]]}}, "functions.a: .*expected ascending"),
         ({"": PEAK.to_dict()}, "functions: expected a name of 1 to 100 printable letters"),
         ({f"n{i}": PEAK.to_dict() for i in range(33)}, "functions: expected at most 32, got 33"),
@@ -277,8 +266,7 @@ def test_a_scene_file_keeps_the_functions_that_are_tried(volume, tmp_path):
 )
 def test_functions_that_are_none(volume, functions, message):
     session = Session(scene_of(volume))
-    with pytest.raises(ArgumentError, match=message):
-        session.set_of_scene("functions", functions)
+    refused(lambda: session.set_of_scene("functions", functions), message)
     assert session.scene.functions == {}
 
 

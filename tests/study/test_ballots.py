@@ -2,8 +2,8 @@
 
 import pytest
 
+from tests.refusals import refused
 from tests.study.studies import study
-from texgs.core.errors import ArgumentError
 from texgs.study.ballots import read_ballot, read_votes, votes_beside
 from texgs.study.questions import write_key
 
@@ -57,21 +57,18 @@ def test_the_ballots_beside_a_key_are_counted(tmp_path):
     ],
 )
 def test_an_incomplete_ballot_is_refused(tmp_path, lines, key):
-    with pytest.raises(ArgumentError, match=rf"ballot-aa\.csv: .*{key}"):
-        read_ballot(STUDY, ballot(tmp_path, lines))
+    refused(lambda: read_ballot(STUDY, ballot(tmp_path, lines)), rf"ballot-aa\.csv: .*{key}")
 
 
 def test_a_ballot_of_another_study_one_that_is_there_twice_and_other_files_are_refused(tmp_path):
     paths = [ballot(tmp_path, file="one.csv"), ballot(tmp_path, file="two.csv")]
     assert len(read_votes(STUDY, paths).ballots) == 1, "a download that was saved again"
     paths.append(ballot(tmp_path, ["1,A,1", "1,B,2", "1,C,3", *LINES[3:]], file="x.csv"))
-    with pytest.raises(ArgumentError, match=r"x\.csv: .*two\.csv"):
-        read_votes(STUDY, paths)
+    refused(lambda: read_votes(STUDY, paths), r"x\.csv: .*two\.csv")
     ballot(tmp_path, study="ffff", file="other.csv")
     both = paths[0].read_text() + ballot(tmp_path, name="bb").read_text().partition("\n")[2]
     (tmp_path / "both.csv").write_text(both)
     (tmp_path / "picture.csv").write_bytes(b"\x89PNG\r\n\xff\xfe")
     (tmp_path / "long.csv").write_text("study\n" * 300_000)
     for name in ("other", "both", "picture", "long", "none"):
-        with pytest.raises(ArgumentError, match=rf"{name}\.csv: "):
-            read_ballot(STUDY, tmp_path / f"{name}.csv")
+        refused(lambda name=name: read_ballot(STUDY, tmp_path / f"{name}.csv"), rf"{name}\.csv: ")

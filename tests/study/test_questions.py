@@ -1,10 +1,8 @@
 """What is compared in which question, and the key."""
 
-import pytest
-
+from tests.refusals import refused
 from tests.report.written import read
 from tests.study.studies import WORDS, edit, fit, job, study
-from texgs.core.errors import ArgumentError
 from texgs.report.metrics_files import below
 from texgs.report.results import EditResult
 from texgs.study.questions import questions_of, rank_name, read_key, write_key
@@ -69,30 +67,25 @@ def test_variants_of_an_edit_have_the_scene_before_them(tmp_path):
 
 
 def test_what_cannot_be_asked_is_told(tmp_path):
-    def refused(key, edits=()):
-        with pytest.raises(ArgumentError, match=key):
-            questions(tmp_path, edits)
-
     job(tmp_path / "core", "edit_segment", EditResult("core", "segment", "grabcut", 1.0))
-    refused("new look")
+    refused(lambda: questions(tmp_path), "new look")
     edit(tmp_path, "style")
     edit(tmp_path, "text", followed=WORDS)
-    refused("engine style, engine text")
-    refused("--edits: .* got arf", ["arf"])
+    refused(lambda: questions(tmp_path), "engine style, engine text")
+    refused(lambda: questions(tmp_path, ["arf"]), "--edits: .* got arf")
     edit(tmp_path, "arf")
-    refused("no scene of engine by quick")
+    refused(lambda: questions(tmp_path), "no scene of engine by quick")
     fit(tmp_path)
     for number in range(25):
         edit(tmp_path, f"style{number}")
-    refused("at most 26")
+    refused(lambda: questions(tmp_path), "at most 26")
 
 
 def test_ranks_have_the_papers_names():
-    assert [rank_name(rank, 4) for rank in (1, 2, 3, 4)] == ["best", "second-best", "second-worst", "worst"]
-    assert [rank_name(rank, 2) for rank in (1, 2)] == ["best", "worst"]
-    assert [rank_name(rank, 3) for rank in (1, 2, 3)] == ["best", "second-best", "worst"]
-    six = [rank_name(rank, 6) for rank in range(1, 7)]
-    assert six == ["best", "second-best", "rank 3", "rank 4", "second-worst", "worst"]
+    ends = ("second-best", "second-worst")
+    for between in ((), ends[:1], ends, (ends[0], "rank 3", "rank 4", ends[1])):
+        count = len(between) + 2
+        assert [rank_name(rank, count) for rank in range(1, count + 1)] == ["best", *between, "worst"]
 
 
 def test_a_key_is_read_as_it_was_written(tmp_path):
@@ -102,5 +95,4 @@ def test_a_key_is_read_as_it_was_written(tmp_path):
     files = [write_key(tmp_path / f"{index}.json", each) for index, each in enumerate(changed)]
     path.write_text('{"study": 3}')
     for file in (*files, path, tmp_path / "none.json"):
-        with pytest.raises(ArgumentError, match=file.name):
-            read_key(file)
+        refused(lambda file=file: read_key(file), file.name)
