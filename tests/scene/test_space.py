@@ -183,7 +183,9 @@ def test_a_gaussian_is_turned_with_its_colours(sign, count):
 
     np.testing.assert_allclose(seen(moved, ways @ torch.from_numpy(turn.T)), seen(cloud, ways), atol=1e-5)
     sheared = Space("3D-right-handed", "", [[1.0, 0.3, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-    refused(lambda: placed(cloud, sheared), "expected axes at right angles, got oblique ones; export to the")
+    refused(
+        lambda: place_cloud(cloud, sheared), "expected axes at right angles, got oblique ones; export to the"
+    )
 
 
 def test_what_knows_no_space_stays_in_the_world_and_says_so(placed_scene, tmp_path, capsys):
