@@ -97,7 +97,7 @@ def test_a_job_that_was_stopped_goes_on_in_the_middle_of_the_series(rings, tmp_p
     monkeypatch.setattr(series.Follower, "step", stopped)
     for name, value in {"VIEW_SIZE": 32, "ROUNDS": 1}.items():
         monkeypatch.setattr(series, name, value)
-    words = ["steps", *RINGS, "views.shading.diffuse=0.65"]
+    words = ["steps", "--replace", *RINGS, "views.shading.diffuse=0.65"]
     assert main(words) == 130
     assert main(words) == 0
     assert titles == ["TF01, step 2", "TF01, step 0", "TF02, step 2", "TF02, step 2", "TF02, step 0"]
