@@ -1,8 +1,8 @@
 """The one light of a view or of a scene."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from torch import Tensor
@@ -10,14 +10,22 @@ from torch import Tensor
 from texgs.core.camera import Camera, orbit_direction
 from texgs.core.errors import ArgumentError
 
+MAX_REACH = 2.0  # world units: through all of a volume, whose longest side is 1
+
 
 @dataclass(frozen=True)
 class Light:
-    """White light from one direction: from the camera, or fixed in the world."""
+    """White light from one direction: from the camera, or fixed in the world.
+
+    Shadows take away diffuse light and highlights of a directional light, occlusion takes away ambient light.
+    """
 
     kind: Literal["headlight", "directional"]
     azimuth: float = 0.0  # degrees, of a directional light; see orbit_direction
     polar: float = 0.0  # degrees above the horizon
+    shadows: float = 0.0  # share of the light that matter in its way takes away: 0 nothing, 1 all it can
+    occlusion: float = 0.0  # the same of ambient light, which comes from all around
+    reach: float = 0.25  # how far matter is that hides ambient light, world units
 
     def __post_init__(self) -> None:
         if self.kind not in ("headlight", "directional"):
@@ -26,6 +34,21 @@ class Light:
             raise ArgumentError(f"light: expected an azimuth in degrees, got {self.azimuth:g}")
         if not abs(self.polar) <= 90:
             raise ArgumentError(f"light: expected a polar angle from -90 to 90 degrees, got {self.polar:g}")
+        for name in ("shadows", "occlusion"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ArgumentError(f"{name}: expected a share from 0 to 1, got {getattr(self, name):g}")
+        if not 0 < self.reach <= MAX_REACH:
+            raise ArgumentError(f"reach: expected above 0 to {MAX_REACH:g} world units, got {self.reach:g}")
+
+    @property
+    def casts_shadows(self) -> bool:
+        """Return whether matter hides any light; a headlight shines along the rays of the eye."""
+        return self.occlusion > 0 or (self.shadows > 0 and self.kind == "directional")
+
+    @property
+    def unhidden(self) -> Self:
+        """Return the same light without shadows and occlusion."""
+        return replace(self, shadows=0.0, occlusion=0.0)
 
     def direction(self, camera: Camera) -> Tensor:
         """Return the unit vector [3], float64, from the origin to the light or headlight."""

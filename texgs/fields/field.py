@@ -74,6 +74,7 @@ class Asked(NamedTuple):
     background: Tensor | None
     outputs: Collection[str]
     depth_range: Tensor | None
+    exposure: Tensor | None
 
 
 class Composed(ABC):
@@ -101,6 +102,7 @@ class Composed(ABC):
         background: Tensor | None = None,
         outputs: Collection[str] = (),
         depth_range: Tensor | None = None,
+        exposure: Tensor | None = None,
     ) -> Render:
         """Render one view of all visible fields.
 
@@ -113,11 +115,12 @@ class Composed(ABC):
             background: [3]; white by default, for a factor black.
             outputs: besides colour and alpha.
             depth_range: [2, H, W] camera z from which on, and before which, a pixel shows something.
+            exposure: [N, 2] factors on the light of the lamp, and on ambient light, of each primitive.
 
         Raises:
             ArgumentError: if there are not as many edits as parts, or fields of this kind cannot show one.
         """
-        return self._draw(camera, light, edits, look, Asked(background, outputs, depth_range))
+        return self._draw(camera, light, edits, look, Asked(background, outputs, depth_range, exposure))
 
     @abstractmethod
     def _draw(
@@ -189,6 +192,11 @@ class UnlitScene(Composed, Generic[F]):
         if look != "shaded":
             raise ArgumentError(
                 f"look: expected shaded, got {look}; {self.kind} have light in their colours, fit surfels"
+            )
+        if asked.exposure is not None:
+            raise ArgumentError(
+                f"light: expected surfels for shadows and occlusion, got {self.kind}, which have light in "
+                "their colours; fit surfels, or take both back by shadows=0 occlusion=0"
             )
         factors = opacity_factors(edits, len(self.counts), self.kind)
         return self._blend(factors, camera, asked)

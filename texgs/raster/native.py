@@ -1,9 +1,9 @@
 """The native libraries: find, open and describe them to ctypes; turn errors of calls into exceptions.
 
 `libtexgs` works on CPU tensors, `libtexgs_cuda` on CUDA tensors; both export the functions of `csrc/texgs.h`,
-`texgs_losses.h`, `texgs_fit.h`, `texgs_grid.h` and `texgs_volume.h`, the first also those of `texgs_fusion.h`
-and `texgs_neural.h`. They know raw pointers only, so that one build serves every version of torch and Python.
-A module declares the structures and functions that it calls.
+`texgs_losses.h`, `texgs_fit.h`, `texgs_grid.h`, `texgs_volume.h` and `texgs_light.h`, the first also those of
+`texgs_fusion.h` and `texgs_neural.h`. They know raw pointers only, so that one build serves every version of
+torch and Python. A module declares the structures and functions that it calls.
 """
 
 import ctypes
@@ -24,7 +24,7 @@ from texgs.core import memory
 from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError
 from texgs.core.native_sources import SUFFIX, built_from, library_sources
 
-ABI_VERSION = 7
+ABI_VERSION = 8
 FOLDER = Path(__file__).parent / "_native"
 CSRC = Path(__file__).parent / "csrc"
 INSTALL_ADVICE = "install texgs again (pip install .)"

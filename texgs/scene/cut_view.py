@@ -12,6 +12,7 @@ from texgs.core.camera import Camera
 from texgs.fields.field import Composed, Look
 from texgs.raster import Render
 from texgs.raster.api import CutRange
+from texgs.scene.exposure import exposure_of
 from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin, range_of
 from texgs.volume.images import smaller
@@ -22,6 +23,7 @@ RIM = 0.01  # width of the slab's rim around a face, in shorter sides of the pic
 HIDDEN_ALPHA = 0.998  # alpha of a slab that hides models, half a level of 255 from opaque
 STEP = 0.5  # voxels between the samples of a slab
 COARSE_PIXELS = 4  # step of the search for faces, pixels
+LIT = ("shaded", "discs")  # looks that show light
 Crop = tuple[slice, slice]  # rows and columns of a picture
 
 
@@ -53,12 +55,14 @@ def cut_view(
     """
     cut = range_of(scene.cuts, camera) if scene.cuts else None
     if cut is None or twin is None or look != "shaded" or outputs:
+        exposure = exposure_of(composed, scene, twin) if look in LIT else None
         return composed.render(
             *(camera, scene.light, scene.edits),
             look=look,
             background=background,
             outputs=outputs,
             depth_range=None if cut is None else cut.depth_range,
+            exposure=exposure,
         )
     if scene.is_as_volume:
         return twin.render(camera, scene, composed.palettes, cut)
@@ -80,6 +84,7 @@ def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut:
         *(camera, scene.light, scene.edits),
         background=camera.viewmat.new_tensor(scene.background),
         depth_range=beyond,
+        exposure=exposure_of(composed, scene, twin),
     )
     return blend_over(seen, models, part)
 

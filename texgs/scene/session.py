@@ -38,7 +38,7 @@ from texgs.scene.scene_file import (
 )
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.shot import Mode
-from texgs.scene.twin import Twin, needs_twin
+from texgs.scene.twin import Twin, last_of, needs_twin
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -354,16 +354,6 @@ class Session:
         """Add a scene to the history, and clear undone steps."""
         self._past = [*self._past[-HISTORY_STEPS:], (scene, "")]
         self._future.clear()
-
-
-def last_of(kept: deque[tuple[object, T]], state: object, make: Callable[[], T]) -> T:
-    """Return the cached result of a state, or compute it and replace the oldest one."""
-    for each, value in tuple(kept):  # another thread may change it
-        if each == state:
-            return value
-    value = make()
-    kept.append((state, value))
-    return value
 
 
 def files_of(scene: Scene) -> list[Path | None]:

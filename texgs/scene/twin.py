@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
 
-from texgs.core.camera import Camera
+from texgs.core.camera import Camera, orbit_direction
 from texgs.core.cuts import Cuts
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.fields.part_edit import PartEdit
@@ -21,9 +22,14 @@ from texgs.raster.api import CutRange, cut_range
 from texgs.raster.shading import MATERIAL
 from texgs.scene.scene import Scene, volume_of
 from texgs.volume.caster import Cast, Caster
+from texgs.volume.light_cells import LightCells
+from texgs.volume.matter import Matter
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
 from texgs.volume.transfer import TransferFunction
+
+T = TypeVar("T")
+KEPT_LIGHTS = 2  # of the scene, and of the functions that it tries
 
 
 class Twin:
@@ -42,6 +48,8 @@ class Twin:
         self._volume, self._device, self._by_cell = volume_of(scene), torch.device(device), True
         with errors_at("volume"):
             self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
+        self._matter = deque[tuple[object, Matter]](maxlen=KEPT_LIGHTS)  # of all copies
+        self._cells = deque[tuple[object, LightCells]](maxlen=KEPT_LIGHTS)
         for name in scene.models:
             self._tf(name)
 
@@ -98,16 +106,10 @@ class Twin:
         and tint of light hold for the whole volume: those of the first visible model. A tint costs a cast for
         each different channel.
         """
-        shown, edits, functions = {}, list[PartEdit](), functions or {}
-        for (name, model), palette in zip(scene.models.items(), palettes, strict=True):
-            if model.edit.visible and model.edit.opacity > 0:
-                tf = functions.get(name) or self._tf(name)
-                shown[name] = edit_function(tf, model.edit, palette)
-                edits.append(model.edit)
-        shown |= {name: tf for name, tf in functions.items() if name not in scene.models}
+        shown = self._shown(scene, palettes, functions or {})
         if not shown:
             return Cast(torch.zeros(camera.height, camera.width, 4, device=self._device))
-        edit = edits[0] if edits else PartEdit()
+        edit = next((model.edit for model in scene.models.values() if is_seen(model.edit)), PartEdit())
         look = self._volume.appearance
         look = replace(look, **{key: getattr(look, key) * getattr(edit, key) for key in MATERIAL})
         cut = range_of(scene.cuts, camera) if cut is None and scene.cuts else cut
@@ -120,12 +122,47 @@ class Twin:
                 faces=cut,
                 lit_faces=scene.cuts.faces == "shaded",
                 by_cell=self._by_cell,
+                cells=self._lit(scene, shown) if scene.light.casts_shadows else None,
             )
         first = casts[edit.tint[0]]
         for channel, share in enumerate(edit.tint[1:], start=1):
             if share != edit.tint[0]:
                 first.rgba[..., channel] = casts[share].rgba[..., channel]
         return first
+
+    def light_cells(self, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> LightCells:
+        """Return which shares of a scene's light reach places in its volume; kept while both are the same."""
+        return self._lit(scene, self._shown(scene, palettes, {}))
+
+    def matter(self, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> Matter:
+        """Return what hides light in a scene's volume: its functions with their edits, where no cut is."""
+        return self._hiding(scene, self._shown(scene, palettes, {}))
+
+    def _lit(self, scene: Scene, shown: Mapping[str, TransferFunction]) -> LightCells:
+        light, matter = scene.light, self._hiding(scene, shown)
+        is_shaded = light.kind == "directional" and light.shadows > 0
+        direction = orbit_direction(light.azimuth, light.polar) if is_shaded else None
+        reach = light.reach if light.occlusion else None
+        state = matter, (light.azimuth, light.polar) if is_shaded else None, reach
+        return last_of(self._cells, state, lambda: matter.lit(direction, reach))
+
+    def _hiding(self, scene: Scene, shown: Mapping[str, TransferFunction]) -> Matter:
+        tfs, unit = overlays(shown), self.opacity_unit
+        state = tfs, unit, scene.cuts
+        return last_of(self._matter, state, lambda: Matter(self._caster, tfs, unit, scene.cuts))
+
+    def _shown(
+        self,
+        scene: Scene,
+        palettes: Sequence[tuple[float, ...]],
+        functions: Mapping[str, TransferFunction],
+    ) -> dict[str, TransferFunction]:
+        """Return the functions that a scene shows, with the edits of its models; or others in their place."""
+        shown = {}
+        for (name, model), palette in zip(scene.models.items(), palettes, strict=True):
+            if is_seen(model.edit):
+                shown[name] = edit_function(functions.get(name) or self._tf(name), model.edit, palette)
+        return shown | {name: tf for name, tf in functions.items() if name not in scene.models}
 
     def _tf(self, name: str) -> TransferFunction:
         """Return the basic TF of a model."""
@@ -135,14 +172,29 @@ class Twin:
         return self._volume.tfs[name]
 
 
+def is_seen(edit: PartEdit) -> bool:
+    """Return whether an edit leaves anything of a model."""
+    return edit.visible and edit.opacity > 0
+
+
+def last_of(kept: deque[tuple[object, T]], state: object, make: Callable[[], T]) -> T:
+    """Return the cached result of a state, or compute it and replace the oldest one."""
+    for each, value in tuple(kept):  # another thread may change it
+        if each == state:
+            return value
+    value = make()
+    kept.append((state, value))
+    return value
+
+
 def twin_of(scene: Scene, device: torch.device | str = "cpu") -> Twin | None:
-    """Return the twin that shaded frames need for faces of cuts, or None without cuts."""
+    """Return the twin that shaded frames need for faces of cuts and for shadows, or None without both."""
     return Twin(scene, device) if needs_twin(scene, "shaded") else None
 
 
 def needs_twin(scene: Scene, mode: str) -> bool:
     """Return whether frames of a mode show the scene's volume."""
-    return mode == "volume" or (bool(scene.cuts) and scene.volume is not None)
+    return mode == "volume" or scene.light.casts_shadows or (bool(scene.cuts) and scene.volume is not None)
 
 
 def range_of(cuts: Cuts, camera: Camera) -> CutRange:

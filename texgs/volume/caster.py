@@ -32,6 +32,7 @@ from texgs.raster import native
 from texgs.raster.api import CutRange
 from texgs.raster.arguments import pinhole, require
 from texgs.volume.grid import Grid
+from texgs.volume.light_cells import LightCells
 from texgs.volume.render import Appearance, directions
 from texgs.volume.transfer import TransferFunction, left_limit, right_limit
 
@@ -49,7 +50,7 @@ NativeView = native.struct(
     "texgs_cast_view",
     "p viewmat K, i width height, f step opacity_unit, 3f to_viewer to_light, "
     "f ambient diffuse specular shininess, p rgba depth median normal, "
-    "p depth_range face planes, i n_planes unlit_faces",
+    "p depth_range face planes, i n_planes unlit_faces, p light, 3i light_size, f shadows occlusion outset",
 )
 native.declare("texgs_volume_bricks", NativeVolume, "p", result=c_int64, stream=False)
 native.declare("texgs_volume_extremes", NativeVolume, "pp")
@@ -78,9 +79,9 @@ class Caster:
 
     def __init__(self, grid: Grid, appearance: Appearance, device: torch.device | str = "cpu") -> None:
         self._appearance, self._grid = appearance, grid
-        self._half = [float(side) for side in grid.aabb[1]]
-        self._diagonal = 2 * hypot(*self._half)
-        self._voxel = min(2 * side / (size - 1) for side, size in zip(self._half, grid.dims, strict=True))
+        self.half = [float(side) for side in grid.aabb[1]]  # half the sides of its box, world units
+        self._diagonal = 2 * hypot(*self.half)
+        self._voxel = min(2 * side / (size - 1) for side, size in zip(self.half, grid.dims, strict=True))
         # With the number of the GPU, whichever is the current one later.
         self.device = torch.empty(0, device=device).device
         self._channels = dict[int, tuple[native.Struct, Tensor]]()  # that were shown, of all copies
@@ -109,6 +110,7 @@ class Caster:
         faces: CutRange | None = None,
         lit_faces: bool = True,
         by_cell: bool = True,
+        cells: LightCells | None = None,
     ) -> Cast:
         """Cast a view, with what else is wanted of OUTPUTS, in one pass; without gradients and skew.
 
@@ -121,6 +123,8 @@ class Caster:
 
         By cell, rays pass by all cells in which nothing shows, which are found once a function. Otherwise
         they know bricks only: faster for a function that is shown in one small picture.
+
+        Cells say how much of the light reaches samples, as far as the light casts shadows.
         """
         height, width = camera.height, camera.width
         require_memory(
@@ -143,6 +147,7 @@ class Caster:
             **seen,
             **self._cut(camera, depth_range, faces),
             unlit_faces=not lit_faces,
+            **({} if cells is None else lit_by(cells, light)),
         )
         native.call("texgs_cast", *prepared, view, device=self.device)
         return Cast(**seen)
@@ -206,6 +211,13 @@ class Caster:
             native.call("texgs_volume_cells", volume, distance, transfer, cells, device=self.device)
         return volume, transfer, distance, cells
 
+    def functions(self, tfs: Sequence[TransferFunction]) -> tuple[Any, ...]:
+        """Return channels, functions, their number, and distances of bricks for the library."""
+        tfs = [*tfs]
+        prepared = next((each for each in [*self._prepared] if each[0][0] == tfs), None)
+        _, arguments, _kept = prepared or self._prepare(tfs, False)
+        return arguments[:-1]
+
     def channel(self, number: int) -> tuple[native.Struct, Tensor]:
         """Return a channel for the library, and the extremes of its bricks [bricks, 2]."""
         if number not in self._channels:
@@ -215,7 +227,7 @@ class Caster:
             if kind not in TYPES:
                 raise ArgumentError(f"volume: expected samples of {', '.join(TYPES)} or bool, got {kind}")
             samples = bytes_of(values).to(self.device)
-            volume = NativeVolume(samples, TYPES.index(kind), grid.dims, tuple(self._half))
+            volume = NativeVolume(samples, TYPES.index(kind), grid.dims, tuple(self.half))
             count_bricks = native.function(native.library(self.device.type), "texgs_volume_bricks")
             bricks = count_bricks(volume, (c_int32 * 3)())
             require_memory(17 * bricks, "a volume's bricks", "crop it, or reduce it by dataset.volume.reduce")
@@ -224,6 +236,13 @@ class Caster:
             native.call("texgs_volume_extremes", volume, extremes, missing, device=self.device)
             self._channels[number] = volume, extremes
         return self._channels[number]
+
+
+def lit_by(cells: LightCells, light: Light) -> dict[str, Any]:
+    """Return what a view needs of the light that reaches its samples, by the names of the library."""
+    shadows = light.shadows if light.kind == "directional" else 0.0
+    strengths = {"shadows": shadows, "occlusion": light.occlusion, "outset": cells.outset}
+    return {"light": cells.light, "light_size": cells.size, **strengths}
 
 
 def bytes_of(values: NDArray[Any]) -> Tensor:

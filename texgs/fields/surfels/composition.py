@@ -2,16 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import accumulate
 from math import log, sqrt
-from typing import get_args
+from typing import Self, get_args
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.geometry import quats_to_matrices
 from texgs.core.light import Light
 from texgs.fields.field import Asked, Composed, Look
 from texgs.fields.part_edit import PartEdit
@@ -36,6 +37,12 @@ class Edited:
     material: tuple[Tensor, Tensor, Tensor, Tensor]  # k_a, k_d, k_s and beta, [N] or [1]
     opacities: Tensor  # [N]
     tint: Tensor | None  # [N, 3] or [3] colour of highlights; None: white
+
+    def exposed(self, exposure: Tensor) -> Self:
+        """Return the same where matter hides a part of the light; see `Composed.render`."""
+        lamp, ambient = exposure.unbind(dim=1)
+        a, d, s, b = self.material
+        return replace(self, material=(a * ambient, d * lamp, s * lamp, b))
 
 
 class EditableModel:
@@ -124,7 +131,7 @@ class Composition(Composed):
         self.device = self.means.device
         self.texels, self.sizes, self.offsets = join_textures(models)
         self.has_normals = any("normals" in model.parameters for model in models)
-        self._latest: tuple[list[PartEdit] | None, list[Edited], Tensor] | None = None
+        self._latest: tuple[list[PartEdit] | None, Tensor | None, list[Edited], Tensor] | None = None
 
     def __len__(self) -> int:
         return len(self.means)
@@ -140,7 +147,7 @@ class Composition(Composed):
     ) -> Render:
         if look not in get_args(Look):
             raise ArgumentError(f"look: expected one of {', '.join(get_args(Look))}, got {look}")
-        edited, opacities = self._edited(edits)
+        edited, opacities = self._edited(edits, asked.exposure)
         looks = [part.shade(own, camera, light, look) for part, own in zip(self.parts, edited, strict=True)]
         base, gain = (torch.cat(x) for x in zip(*looks, strict=True))
         background = asked.background
@@ -163,15 +170,27 @@ class Composition(Composed):
         normals = torch.cat([seen_normals(part.model.parameters, camera) for part in self.parts])
         return replace(render, normal=draw(features=normals).color)
 
-    def _edited(self, edits: Sequence[PartEdit] | None) -> tuple[list[Edited], Tensor]:
+    @cached_property
+    def normals(self) -> Tensor:
+        """The unit normals [N, 3] that light sees, each on one side of its surfel."""
+        turns = [part.model.parameters.get("normals", part.model.parameters["quats"]) for part in self.parts]
+        return quats_to_matrices(torch.cat(turns))[..., 2].contiguous()
+
+    def _edited(
+        self, edits: Sequence[PartEdit] | None, exposure: Tensor | None
+    ) -> tuple[list[Edited], Tensor]:
         """Return all models with their edits, and opacities [N]; kept while only the camera moves."""
         own = None if edits is None else list(edits)
         latest = self._latest  # another thread may replace it
-        if latest is None or latest[0] != own:
+        if latest is None or latest[0] != own or latest[1] is not exposure:
             pairs = zip(self.parts, by_part(self.parts, own), strict=True)
             edited = [part.apply(each) for part, each in pairs]
-            self._latest = latest = (own, edited, torch.cat([each.opacities for each in edited]))
-        return latest[1:]
+            opacities = torch.cat([each.opacities for each in edited])
+            if exposure is not None:
+                counts = [len(part.model) for part in self.parts]
+                edited = [each.exposed(own) for each, own in zip(edited, exposure.split(counts), strict=True)]
+            self._latest = latest = (own, exposure, edited, opacities)
+        return latest[2:]
 
 
 def by_part(parts: Sequence[EditableModel], edits: Sequence[PartEdit] | None) -> list[Sequence[PartEdit]]:

@@ -3,7 +3,7 @@
 #pragma once
 #include "both.h"
 #include "status.h"
-#include "texgs_volume.h"
+#include "texgs_light.h"
 
 namespace texgs {
 
@@ -41,6 +41,9 @@ inline void check_cast(const texgs_cast_view& view) {
     require(view.step > 0.0f && view.opacity_unit > 0.0f, "view: expected a step and an opacity unit above 0");
     require(!view.face || (view.depth_range && (view.planes || !view.n_planes)),
             "view: expected depth ranges and planes with faces");
+    for (int a = 0; view.light && a < 3; ++a)
+        require(view.light_size[a] >= 2 && view.light_size[a] <= TEXGS_LIGHT_SIDE,
+                "light: expected 2 to 256 cells along an axis");
 }
 
 inline int64_t count_bricks(const texgs_volume& volume, int32_t size[3]) {

@@ -217,31 +217,69 @@ TEXGS_MATHS Vec3<F> turned(Vec3<F> n, F side) {  // towards where side is above 
     return sign * n;
 }
 
+// What is left of light from the lamp and of ambient light where other matter is in their way.
+template <class F>
+struct Exposure {
+    F lamp = 1.0f, ambient = 1.0f;
+};
+
 // Blinn-Phong: c (k_a + k_d max(n.l, 0)) + k_s max(n.h, 0)^beta in [0, 1]. A normal of 0 is ambient.
 template <class F>
-TEXGS_MATHS Vec3<F> lit(Vec3<F> color, Vec3<F> normal, const Lamp& lamp) {
+TEXGS_MATHS Vec3<F> lit(Vec3<F> color, Vec3<F> normal, const Lamp& lamp, Exposure<F> exposure) {
     const F zero = 0.0f, one = 1.0f;
     const Vec3<F> n = turned(normal, along(normal, lamp.viewer));
     const F n_l = max(along(n, lamp.light), zero), n_h = max(along(n, lamp.half), zero);
     const F power = exp2(max(F(lamp.shininess) * log2(max(n_h, F(1e-30f))), F(-126.0f)));
-    const F specular = F(lamp.specular) * select(zero < n_l, power, zero);
-    const F diffuse = fma(F(lamp.diffuse), n_l, F(lamp.ambient));
+    const F specular = F(lamp.specular) * exposure.lamp * select(zero < n_l, power, zero);
+    const F diffuse = fma(F(lamp.diffuse) * exposure.lamp, n_l, F(lamp.ambient) * exposure.ambient);
     return {min(max(fma(color.x, diffuse, specular), zero), one), min(max(fma(color.y, diffuse, specular), zero), one),
             min(max(fma(color.z, diffuse, specular), zero), one)};
 }
 
 // The same of samples k of a ray, as far as their steps do not belong to a face; there its normal counts.
 template <class F>
-TEXGS_MATHS Vec3<F> lit(const CastRay& ray, F k, Vec3<F> color, Vec3<F>& normal, const Lamp& lamp) {
-    const Vec3<F> inner = lit(color, normal, lamp);
+TEXGS_MATHS Vec3<F> lit(const CastRay& ray, F k, Vec3<F> color, Vec3<F>& normal, const Lamp& lamp,
+                        Exposure<F> exposure) {
+    const Vec3<F> inner = lit(color, normal, lamp, exposure);
     if (!ray.face) return inner;
     const F part = min(max(F(ray.face_end) - k, F(0.0f)), F(1.0f));
     const Vec3<F> plane{F(ray.face[0]), F(ray.face[1]), F(ray.face[2])};
-    const Vec3<F> outer = lamp.unlit_faces ? color : lit(color, plane, lamp);
+    const Vec3<F> outer = lamp.unlit_faces ? color : lit(color, plane, lamp, exposure);
     const auto is_face = F(0.5f) < part;
     normal = {select(is_face, plane.x, normal.x), select(is_face, plane.y, normal.y),
               select(is_face, plane.z, normal.z)};
     return {mix(inner.x, outer.x, part), mix(inner.y, outer.y, part), mix(inner.z, outer.z, part)};
+}
+
+// From places in a volume to those of the light that reaches them: centre = place * scale - 0.5 + outset * direction.
+struct LightCells {
+    float scale[3], outset[3];
+};
+TEXGS_MATHS LightCells light_cells_of(const Lattice& lattice, const texgs_volume& volume, const texgs_cast_view& view) {
+    LightCells c{};
+    for (int a = 0; view.light && a < 3; ++a) {
+        const float size = static_cast<float>(view.light_size[a]);
+        c.scale[a] = size / lattice.last[a];
+        c.outset[a] = view.outset * size / (2.0f * volume.half[a]);
+    }
+    return c;
+}
+
+// Which way from a sample to look for light: along the normal on the viewer's side, or that of its face.
+template <class F>
+TEXGS_MATHS Vec3<F> outward(const CastRay& ray, F k, Vec3<F> normal, const Lamp& lamp) {
+    const Vec3<F> n = turned(normal, along(normal, lamp.viewer));
+    if (!ray.face) return n;
+    const auto is_face = F(0.5f) < F(ray.face_end) - k;
+    return {select(is_face, F(ray.face[0]), n.x), select(is_face, F(ray.face[1]), n.y),
+            select(is_face, F(ray.face[2]), n.z)};
+}
+
+// What strengths of shadows and of occlusion make of shares of light, in 255ths.
+template <class F>
+TEXGS_MATHS Exposure<F> exposure_of(const texgs_cast_view& view, F lamp, F sky) {
+    return {fma(lamp, F(view.shadows / 255.0f), F(1.0f - view.shadows)),
+            fma(sky, F(view.occlusion / 255.0f), F(1.0f - view.occlusion))};
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "../volume_maths.h"
 #include "cell_samples.h"
 #include "intervals.h"
+#include "light_shares.h"
 #include "volume_kernels.h"
 
 namespace texgs::TEXGS_ISA {
@@ -53,7 +54,11 @@ struct Sums {
 template <class T>
 class Caster {
 public:
-    Caster(const CastJob& job) : job_(job), lattice_(lattice_of(job.volume)), lamp_(lamp_of(job.view)) {
+    Caster(const CastJob& job)
+        : job_(job),
+          lattice_(lattice_of(job.volume)),
+          lamp_(lamp_of(job.view)),
+          light_cells_(light_cells_of(lattice_, job.volume, job.view)) {
         for (int a = 0; a < 3; ++a) box_.lower[a] = job.lower[a], box_.upper[a] = job.upper[a];
         for (int c = 0; c < job.n; ++c) {
             const CastTable& t = job.channels[c].table;
@@ -190,7 +195,8 @@ private:
             Vec3<vf> n = unit(Vec3<vf>{slope[0] * vf(s[0]), slope[1] * vf(s[1]), slope[2] * vf(s[2])});
             const Intervals intervals(t, load(seen.value + i * kLanes));
             const Vec3<vf> color{intervals.mixed(t.color[0]), intervals.mixed(t.color[1]), intervals.mixed(t.color[2])};
-            const Vec3<vf> shown = lit(ray, load(seen.k + i * kLanes), color, n, lamp_);
+            const vf k = load(seen.k + i * kLanes);
+            const Vec3<vf> shown = lit(ray, k, color, n, lamp_, exposed(ray, k, n));
             const Vec3<vf> against = turned(n, vf(0.0f) - along(n, ray.direction));
             const vf looks[3] = {shown.x, shown.y, shown.z}, normals[3] = {against.x, against.y, against.z};
             const vm is_used = to_float(iota()) < vf(static_cast<float>(seen.n - i * kLanes));
@@ -200,6 +206,21 @@ private:
             }
         }
         seen.drop();
+    }
+
+    // What reaches samples k of the light.
+    TEXGS_INLINE Exposure<vf> exposed(const CastRay& ray, vf k, Vec3<vf> normal) const {
+        const texgs_cast_view& view = job_.view;
+        if (!view.light) return {};
+        const Vec3<vf> out = outward(ray, k, normal, lamp_);
+        const vf outs[3] = {out.x, out.y, out.z};
+        vf place[3];
+        for (int a = 0; a < 3; ++a) {
+            const vf at = fma(k + vf(0.5f), ray.step[a], ray.entry[a]);
+            place[a] = fma(at, light_cells_.scale[a], fma(outs[a], light_cells_.outset[a], vf(-0.5f)));
+        }
+        const Shares shares = shares_at(view.light, view.light_size, place);
+        return exposure_of(view, shares.lamp, shares.sky);
     }
 
     // Loads the blocks around the first samples, and where these are in their cells.
@@ -227,6 +248,7 @@ private:
     const CastJob& job_;
     const Lattice lattice_;
     const Lamp lamp_;
+    const LightCells light_cells_;
     Extent box_;
     Blocks blocks_[kVectors];
     Queue seen_[TEXGS_CHANNELS];  // samples of each channel that show something; empty between rays

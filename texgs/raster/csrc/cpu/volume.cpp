@@ -3,13 +3,12 @@
 #include "../volume_bricks.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
-#include <limits>
 #include <vector>
 
 #include "dispatch.h"
 #include "parallel.h"
+#include "point_table.h"
 #include "volume_kernels.h"
 
 namespace texgs {
@@ -25,30 +24,6 @@ const VolumeKernels& volume_kernels() {
 #endif
     return portable::kVolumeKernels;
 }
-
-// Points as arrays, see CastTable.
-struct Table {
-    std::vector<float> numbers;
-    CastTable view;
-
-    explicit Table(const texgs_transfer& transfer) {
-        const int n = transfer.n;
-        int length = kTablePoints;
-        while (length < n) length *= 2;
-        numbers.resize(6 * size_t(length), 0.0f);
-        float* column[6];
-        for (int c = 0; c < 6; ++c) column[c] = numbers.data() + c * length;
-        std::fill_n(column[0], length, std::numeric_limits<float>::infinity());
-        for (int i = 0; i < n; ++i) {
-            const float* p = transfer.points + 5 * i;
-            column[0][i] = p[0], column[2][i] = p[1];
-            const float per_width = i + 1 < n && p[5] > p[0] ? 1.0f / (p[5] - p[0]) : 0.0f;
-            column[1][i] = std::isfinite(per_width) ? per_width : 0.0f;  // too narrow to mix: a step
-            for (int c = 0; c < 3; ++c) column[3 + c][i] = p[2 + c];
-        }
-        view = {n, length, column[0], column[1], column[2], {column[3], column[4], column[5]}};
-    }
-};
 
 // Bricks in which something shows, as a box of bricks; empty where there is none.
 struct Shown {
@@ -125,7 +100,7 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, i
         count_bricks(*volume, size);
         const Shown shown(distance, size);
         if (!shown.any()) return;
-        const std::vector<Table> tables(transfer, transfer + n);
+        const std::vector<PointTable> tables(transfer, transfer + n);
         CastJob job{*volume, *view, n, {}, distance, cells, {}, {}};
         for (int c = 0; c < n; ++c) job.channels[c] = {volume[c].values, tables[c].view};
         for (int a = 0; a < 3; ++a) {
@@ -149,7 +124,7 @@ int32_t texgs_volume_lookup(const texgs_volume* volume, const texgs_transfer* tr
     return guarded([&] {
         check_volume(*volume);
         check_transfer(*transfer);
-        const Table table(*transfer);
+        const PointTable table(*transfer);
         const LookupJob job{*volume, table.view, points, *to};
         parallel_for(n, 256, [&](int64_t begin, int64_t end, int) { volume_kernels().lookup(job, begin, end); });
     });

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// The mean extinction of cells: of places in rows that go through all cells of a row.
+#include "simd.h"
+
+#include "../volume_maths.h"
+#include "cell_samples.h"
+#include "intervals.h"
+#include "light_kernels.h"
+
+namespace texgs::TEXGS_ISA {
+namespace {
+
+constexpr int kMostPlaces = 8 * TEXGS_LIGHT_SIDE;
+
+// Places of a row of the finer lattice: place i is at (i + 0.5) * spacing along x, in samples.
+template <class T>
+class Row {
+public:
+    Row(const ExtinctionJob& job, int places) : job_(job), lattice_(lattice_of(job.volume)), places_(places) {
+        per_edge_ = shortest_edge(job.cells) / job.opacity_unit;
+        spacing_ = lattice_.last[0] / static_cast<float>(places);
+    }
+
+    // Adds the extinctions of its places at (y, z), in samples, to sums.
+    void add(float y, float z, float* sums) {
+        const float at[2] = {y, z};
+        vf cell[3], inside[3];
+        for (int a = 1; a < 3; ++a) {
+            const vf place = at[a - 1], low = min(floor(place), vf(lattice_.last[a] - 1.0f));
+            cell[a] = low, inside[a] = place - low;
+        }
+        const int64_t bricks = brick_row(y, z);
+        for (int i = 0; i < places_; i += kLanes) {
+            const vf number = to_float(splat(i) + iota());
+            const vf place = min((number + vf(0.5f)) * vf(spacing_), vf(lattice_.last[0]));
+            cell[0] = min(floor(place), vf(lattice_.last[0] - 1.0f)), inside[0] = place - cell[0];
+            const vm shown = (number < vf(static_cast<float>(places_))) & is_shown(bricks, cell[0]);
+            if (!any(shown)) continue;
+            const vm counts = shown & is_left(place, y, z);
+            if (any(counts)) store(sums + i, load(sums + i) + zero_unless(counts, extinctions(cell, inside)));
+        }
+    }
+
+private:
+    int64_t brick_row(float y, float z) const {
+        const auto brick = [&](float at, int axis) {
+            const int b = static_cast<int>(at) / TEXGS_BRICK;
+            return b < lattice_.bricks[axis] ? b : lattice_.bricks[axis] - 1;
+        };
+        return (int64_t(brick(z, 2)) * lattice_.bricks[1] + brick(y, 1)) * lattice_.bricks[0];
+    }
+
+    vm is_shown(int64_t bricks, vf x) const {
+        return to_float(gather_bytes(job_.distance + bricks, truncate(x) >> 2) & splat(255)) < vf(0.5f);
+    }
+
+    // Whether no cut takes places away.
+    vm is_left(vf x, float y, float z) const {
+        const auto world = [&](vf at, int a) {
+            return (at - vf(static_cast<float>(lattice_.middle[a]))) *
+                   vf(static_cast<float>(1.0 / lattice_.per_unit[a]));
+        };
+        const vf w[3] = {world(x, 0), world(y, 1), world(z, 2)};
+        vm left = vf(0.0f) < vf(1.0f);
+        for (int k = 0; k < job_.n_planes; ++k) {
+            const float* n = job_.planes + 4 * k;
+            left = left & (fma(w[0], n[0], fma(w[1], n[1], w[2] * vf(n[2]))) <= vf(n[3]));
+        }
+        return left;
+    }
+
+    vf extinctions(const vf (&cell)[3], const vf (&inside)[3]) {
+        static constexpr float kAhead[3] = {1.0f, 1.0f, 1.0f};
+        vf all = 0.0f;
+        for (int c = 0; c < job_.n; ++c) {
+            const CastTable& t = job_.channels[c].table;
+            blocks_.fetch(static_cast<const T*>(job_.channels[c].values), job_.volume.size, cell, kAhead,
+                          Rows::of_cell);
+            const vf v = values_in(blocks_, inside), opacity = Intervals(t, v).mixed(t.opacity);
+            const vm visible = (vf(t.value[0]) <= v) & (v <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
+            all -= zero_unless(visible, log2_through(opacity, vf(per_edge_)));
+        }
+        return all;
+    }
+
+    const ExtinctionJob& job_;
+    const Lattice lattice_;
+    const int places_;
+    float per_edge_, spacing_;
+    Blocks blocks_;
+};
+
+template <class T>
+void extinction_of(const ExtinctionJob& job, int y, int z) {
+    int places[3];
+    for (int a = 0; a < 3; ++a) places[a] = places_per_cell(job.volume, job.cells, a);
+    const int32_t* const size = job.cells.size;
+    Row<T> row(job, places[0] * size[0]);
+    float sums[kMostPlaces + kLanes] = {};
+    for (int k = 0; k < places[2]; ++k)
+        for (int j = 0; j < places[1]; ++j) {
+            const auto at = [&](int cell, int place, int a) {
+                const float last = static_cast<float>(job.volume.size[a] - 1);
+                return (static_cast<float>(cell * places[a] + place) + 0.5f) * last /
+                       static_cast<float>(places[a] * size[a]);
+            };
+            row.add(at(y, j, 1), at(z, k, 2), sums);
+        }
+    float* const to = job.extinction + (int64_t(z) * size[1] + y) * size[0];
+    const float share = 1.0f / static_cast<float>(places[0] * places[1] * places[2]);
+    for (int x = 0; x < size[0]; ++x) {
+        float sum = 0.0f;
+        for (int i = 0; i < places[0]; ++i) sum += sums[x * places[0] + i];
+        to[x] = share * sum;
+    }
+}
+
+}  // namespace
+
+void extinction_row(const ExtinctionJob& job, int y, int z) {
+    using Extinction = void (*)(const ExtinctionJob&, int, int);
+    static constexpr Extinction kExtinction[] = {
+        extinction_of<uint8_t>,  extinction_of<int8_t>,  extinction_of<uint16_t>, extinction_of<int16_t>,
+        extinction_of<uint32_t>, extinction_of<int32_t>, extinction_of<uint64_t>, extinction_of<int64_t>,
+        extinction_of<float>,    extinction_of<double>,
+    };
+    kExtinction[job.volume.type](job, y, z);
+}
+
+}  // namespace texgs::TEXGS_ISA
