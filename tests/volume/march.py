@@ -17,9 +17,8 @@ from texgs.volume.grid import Grid
 from texgs.volume.render import Appearance, directions
 from texgs.volume.transfer import TransferFunction
 
-
-# Factors [m, 2] of the lamp's and of ambient light at points [m, 3] of the world, whose normals [m, 3] of length 1
-# or 0 are on the viewer's side.
+# Factors [m, 2] of lamp and ambient light at points [m, 3] of the world, whose normals [m, 3] are unit
+# vectors on the side of the viewer, or 0.
 Exposure = Callable[[Tensor, Tensor], Tensor]
 
 
@@ -105,7 +104,7 @@ def march(
 def shares_of(
     cut: CutRange | None, near: Tensor, stretch: Tensor, count: int, unit: float
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Return which shares [n, k] of the steps of samples a cut leaves, which are of a face, and its normal [n, 3].
+    """Return shares [n, k] of samples' steps that a cut leaves, those of a face, and its normal [n, 3].
 
     Rays start at camera z `near` [n], steps are `stretch` [n] of it; an opacity unit is so many steps.
     """
@@ -154,4 +153,6 @@ def shade(
     n_l = (normal @ to_light)[:, None].clamp_min(0)
     n_h = (normal @ normalize(to_light + to_viewer, dim=0))[:, None].clamp_min(0)
     specular = lamp * torch.where(n_l > 0, n_h**look.shininess, 0)
-    return (color * (look.ambient * ambient + look.diffuse * lamp * n_l) + look.specular * specular).clamp(0, 1)
+    return (color * (look.ambient * ambient + look.diffuse * lamp * n_l) + look.specular * specular).clamp(
+        0, 1
+    )

@@ -21,7 +21,8 @@ typedef struct {
 } texgs_cells;
 
 /* The mean extinction of each cell, extinction [z, y, x]: the logarithm to base 2, negated, of the light that its
- * shortest edge lets through, over places in it that are no farther apart than samples are, up to eight along an axis.
+ * shortest edge lets through, over places in it that are no farther apart than samples are, up to eight along an axis;
+ * at most 16 at each of them.
  * Places with n.x > offset for one of planes [n_planes, 4] of n and offset show nothing; nor do bricks with a distance
  * above 0. */
 TEXGS_API int32_t texgs_extinction(const texgs_volume*, const texgs_transfer*, int32_t n, const uint8_t* distance,
