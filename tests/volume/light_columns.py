@@ -14,8 +14,8 @@ def shares_of(
 ) -> np.ndarray:
     """Share [z, y, x] of a distant light, from extinctions of the shortest edge of a cell.
 
-    Columns lie in the light's direction and meet slice after slice of cells; what is between centres is
-    linear. Only matter within `reach` world units hides a place, in whole slices.
+    Columns lie in the light's direction and meet slice after slice of cells. Extinctions are linear between
+    centres, and so is what columns let through between them. Only matter within `reach` world units hides a place, in whole slices.
     """
     edges = 2 * np.array(half) / extinction.shape[::-1]
     along = -np.array(to_light, float) / edges
@@ -35,7 +35,7 @@ def shares_of(
         met.append(length / edges.min() * linear(plane, columns + shift))
         last = met[i - window] if i >= window else 0 * met[i]
         depth = sum(met[max(0, i - window + 1) : i]) + 0.5 * (met[i] + last)
-        shares[i] = 2 ** -linear(depth, centres - shift + slices)
+        shares[i] = linear(2**-depth, centres - shift + slices)
     return np.moveaxis(shares[::-1] if along[w] < 0 else shares, 0, w).T
 
 

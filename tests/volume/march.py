@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +12,17 @@ from torch.nn.functional import normalize
 
 from texgs.core.camera import Camera
 from texgs.core.light import Light
+from texgs.raster.api import CutRange
 from texgs.volume.grid import Grid
 from texgs.volume.render import Appearance, directions
 from texgs.volume.transfer import TransferFunction
+
+# Factors [m, 2] of lamp and ambient light at points [m, 3] of the world, whose normals [m, 3] are unit
+# vectors on the side of the viewer, or 0.
+Exposure = Callable[[Tensor, Tensor], Tensor]
+
+
+LEAST_WEIGHT = 1e-6  # of a sample that is shaded
 
 
 class March(NamedTuple):
@@ -31,11 +40,15 @@ def march(
     camera: Camera,
     look: Appearance,
     light: Light,
+    exposure: Exposure | None = None,  # of samples to light; None: nothing hides any
+    cut: CutRange | None = None,
 ) -> March:
     """March the rays of a camera through a volume, front to back.
 
     A sample has opacity 1 - (1 - a)^(step / opacity unit) and the colour of `shade`. Of several channels it
     has the product of what is let through, and colours and normals by their shares of the logarithm of that.
+    A cut leaves what of the steps of samples lies in its range. Over an opacity unit behind a face they are
+    shaded by its normal, and where that is most of their step, light comes along it.
     """
     tfs = [tf] if isinstance(tf, TransferFunction) else tf
     channels = [Tensor(grid.channel(each.channel).values) for each in tfs]
@@ -52,17 +65,19 @@ def march(
     points = origin + z[..., None] * direction[:, None]  # [n, k, 3]
     seen = [each(sample(values, points)) for each, values in zip(tfs, channels, strict=True)]
     rgba = torch.from_numpy(np.stack(seen)).float()  # [C, n, k, 4]
-    own = 1 - (1 - rgba[..., 3]) ** (step / look.opacity_unit)
+    left, of_face, plane = shares_of(cut, near, stretch, count, look.opacity_unit / step)
+    own = 1 - (1 - rgba[..., 3]) ** (left * (step / look.opacity_unit))
     own = torch.where(z < far[:, None], own, 0)
     alpha = 1 - (1 - own).prod(dim=0) if len(tfs) > 1 else own[0]
     extinction = -torch.log1p(-own.double().clamp_max(1 - 1e-9))
     shares = (extinction / extinction.sum(dim=0).clamp_min(1e-30)).float() if len(tfs) > 1 else own / own
     through = torch.cumprod(1 - alpha, dim=1)
     weights = (torch.cat([torch.ones(len(z), 1), through[:, :-1]], dim=1) * alpha)[..., None]  # [n, k, 1]
-    ray, k = alpha.nonzero().T
+    ray, k = (weights[..., 0] > LEAST_WEIGHT).nonzero().T
     around = points[ray, k][:, None] + torch.stack([torch.diag(2 / cells), -torch.diag(2 / cells)])[:, None]
     to_viewer, to_light = (torch.from_numpy(vector).float() for vector in directions(camera, light))
     color, facing = torch.zeros(*z.shape, 3), torch.zeros(*z.shape, 3)
+    part, plane = of_face[ray, k, None], plane[ray]
     for values, (red_green_blue, share) in zip(
         channels, zip(rgba[..., :3], shares, strict=True), strict=True
     ):
@@ -70,9 +85,13 @@ def march(
         normal = normalize(
             (ahead - behind) * (cells / half), dim=-1, eps=1e-30
         )  # central differences, [m, 3]
-        color[ray, k] += share[ray, k, None] * shade(
-            red_green_blue[ray, k], normal, to_viewer, to_light, look
+        out = torch.where(part > 0.5, plane, torch.where(normal @ to_viewer[:, None] < 0, -normal, normal))
+        factors = exposure(points[ray, k] * half, out) if exposure else torch.ones(len(ray), 2)
+        inner, outer = (
+            shade(red_green_blue[ray, k], n, to_viewer, to_light, look, factors) for n in (normal, plane)
         )
+        color[ray, k] += share[ray, k, None] * torch.lerp(inner, outer, part)
+        normal = torch.where(part > 0.5, plane, normal)
         away = (normal * rays[ray]).sum(dim=1, keepdim=True) > 0
         facing[ray, k] += share[ray, k, None] * torch.where(away, -normal, normal)
     weight = weights.sum(dim=1)  # [n, 1]
@@ -80,6 +99,23 @@ def march(
     depth, normal = (torch.where(weight > 0, x / weight.clamp_min(1e-12), 0) for x in sums[1:])
     planes = (sums[0], weight[:, 0], depth[:, 0], normal)
     return March(*(plane.reshape(camera.height, camera.width, *plane.shape[1:]) for plane in planes))
+
+
+def shares_of(
+    cut: CutRange | None, near: Tensor, stretch: Tensor, count: int, unit: float
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return shares [n, k] of samples' steps that a cut leaves, those of a face, and its normal [n, 3].
+
+    Rays start at camera z `near` [n], steps are `stretch` [n] of it; an opacity unit is so many steps.
+    """
+    if cut is None:
+        return torch.ones(len(near), count), torch.zeros(len(near), count), torch.zeros(len(near), 3)
+    k = torch.arange(count)
+    begin, end = (cut.depth_range.reshape(2, -1, 1) - near[:, None]) / stretch[:, None]
+    face = cut.face.reshape(-1, 1)
+    of_face = torch.where(face >= 0, (begin + unit - k).clamp(0, 1), 0)
+    left = torch.minimum(k + 1, end) - torch.maximum(k, begin)
+    return left.clamp(0, 1), of_face, cut.normals[face[:, 0].clamp_min(0)]
 
 
 def sample(values: Tensor, points: Tensor) -> Tensor:
@@ -98,14 +134,25 @@ def sample(values: Tensor, points: Tensor) -> Tensor:
     return corners[0]
 
 
-def shade(color: Tensor, normal: Tensor, to_viewer: Tensor, to_light: Tensor, look: Appearance) -> Tensor:
-    """Return Blinn-Phong with white light: c (k_a + k_d max(n.l, 0)) + k_s max(n.h, 0)^beta, in [0, 1].
+def shade(
+    color: Tensor,
+    normal: Tensor,
+    to_viewer: Tensor,
+    to_light: Tensor,
+    look: Appearance,
+    factors: Tensor | None = None,
+) -> Tensor:
+    """Return Blinn-Phong with white light: c (k_a A + L k_d max(n.l, 0)) + L k_s max(n.h, 0)^beta, in [0, 1].
 
     n is turned towards the viewer; the last term is there only where n.l > 0. A zero normal is ambient.
-    Colours and normals are [n, 3], the directions to the distant viewer and to the light [3].
+    Colours and normals are [n, 3], the directions to the distant viewer and to the light [3], factors L and A
+    [n, 2], or 1.
     """
+    lamp, ambient = torch.ones(2, len(color), 1) if factors is None else factors.T[..., None]
     normal = torch.where(normal @ to_viewer[:, None] < 0, -normal, normal)
     n_l = (normal @ to_light)[:, None].clamp_min(0)
     n_h = (normal @ normalize(to_light + to_viewer, dim=0))[:, None].clamp_min(0)
-    specular = torch.where(n_l > 0, n_h**look.shininess, 0)
-    return (color * (look.ambient + look.diffuse * n_l) + look.specular * specular).clamp(0, 1)
+    specular = lamp * torch.where(n_l > 0, n_h**look.shininess, 0)
+    return (color * (look.ambient * ambient + look.diffuse * lamp * n_l) + look.specular * specular).clamp(
+        0, 1
+    )

@@ -11,7 +11,7 @@ from torch import Tensor
 from texgs.raster import native
 from texgs.raster.arguments import require
 
-OUTSET = 1.5  # cells along its normal from which light comes to a place: matter must not darken itself
+OUTSET = 2.5  # cells along its normal from which light comes to a place: matter must not darken itself
 NativeCells = native.struct("texgs_cells", "3i size, 3f half")
 native.declare("texgs_light_lookup", NativeCells, "p n pp")
 

@@ -9,6 +9,9 @@
 
 namespace texgs {
 
+// Of a place, in a cell's edges: 2^-16 of the light is none. Cells that opaque matter only touches stay bright.
+constexpr float kMostExtinction = 16.0f;
+
 // Columns of light through slices of cells. Slice 0 is the nearest to the light. Along the axis w from it the
 // direction has its largest part, in cells; u and v are the others. At slice i the column (U, V) is at the place
 // (U + shift(u, i), V + shift(v, i)) of centres.

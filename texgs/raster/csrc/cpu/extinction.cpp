@@ -85,7 +85,7 @@ private:
             const vm visible = (vf(t.value[0]) <= v) & (v <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
             all -= zero_unless(visible, log2_through(opacity, vf(per_edge_)));
         }
-        return all;
+        return min(all, kMostExtinction);
     }
 
     const ExtinctionJob& job_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Light through slices of cells: columns run in its direction, and each slice is read and written where they meet it.
-// What is between centres is linear, by the same shares all over a slice.
+// What is between centres is linear, by the same shares all over a slice: extinctions where columns meet a slice, and
+// the light in columns where centres are, so that opaque matter darkens what is beside it by its part of this.
 #include "simd.h"
 
 #include "../volume_maths.h"
@@ -32,15 +33,22 @@ void add_row(const SweepJob& job, int slice, int V, float part, float* sums, flo
     }
 }
 
-// Adds the shares of a row v of centres to their sums, from depths of two rows of columns.
-void add_shares(const SweepJob& job, int slice, int v, const float* depths, const float* next_row, float fv) {
+// Turns a row of depths into shares of light, where columns are next to centres.
+void to_shares(const Columns& c, int slice, float* depths) {
+    const int begin = Shift(-shift_of(c, 0, slice)).steps;
+    for (int U = begin; U <= begin + c.n_u; U += kLanes)
+        store(depths + U, exp2(vf(0.0f) - max(load(depths + U), 0.0f)));
+}
+
+// Adds the shares of a row v of centres to their sums, from those of two rows of columns.
+void add_shares(const SweepJob& job, int slice, int v, const float* row, const float* next_row, float fv) {
     const Columns& c = job.columns;
     const Shift u(-shift_of(c, 0, slice));
     float* to = job.sums + (int64_t(place_of(c, slice)) * c.n_v + v) * c.n_u;
     for (int i = 0; i < c.n_u; i += kLanes) {
         const int n = c.n_u - i < kLanes ? c.n_u - i : kLanes;
-        const vf depth = bilinear(depths + u.steps + i, next_row + u.steps + i, u.rest, fv);
-        store_part(to + i, load_part(to + i, n) + exp2(vf(0.0f) - max(depth, 0.0f)), n);
+        const vf share = bilinear(row + u.steps + i, next_row + u.steps + i, u.rest, fv);
+        store_part(to + i, load_part(to + i, n) + share, n);
     }
 }
 
@@ -57,6 +65,10 @@ void sweep(const SweepJob& job, int first, int end, float* scratch) {
                 add_row(job, slice - job.reach, first + r, -job.per_slice, sums + r * width, depths + r * width);
         }
         const Shift v(-shift_of(c, 1, slice));
+        for (int r = 0; r < rows; ++r) {
+            const int row = first + r - v.steps;
+            if (row >= 0 && row <= c.n_v) to_shares(c, slice, depths + r * width);
+        }
         for (int r = 0; r < rows - 1; ++r) {
             const int row = first + r - v.steps;
             if (row >= 0 && row < c.n_v)

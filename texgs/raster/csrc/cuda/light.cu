@@ -59,7 +59,7 @@ __device__ float extinction_at(const texgs_volume& volume, const Lattice& lattic
     float all = 0.0f;
     for (int c = 0; c < channels.n; ++c)
         all -= log2_through_at(channels.transfer[c], spot.value(channels.samples<T>(c, volume)), places.lengths);
-    return all;
+    return fminf(all, kMostExtinction);
 }
 
 template <class T>
@@ -104,7 +104,7 @@ struct Beam {
         u = strides[columns.u], v = strides[columns.v], w = strides[columns.w];
     }
     int64_t count_columns() const { return int64_t(columns.wide) * columns.high; }
-    int64_t count_depths() const { return columns.slices * count_columns(); }
+    int64_t count_places() const { return columns.slices * count_columns(); }
 
     // What column (U, V) meets in a slice: what is between centres is linear, and 0 beyond them.
     __device__ float met(int U, int V, int slice) const {
@@ -120,8 +120,8 @@ struct Beam {
     }
 };
 
-// depths [slice, V, U]: what hides the middle of each column in each slice.
-__global__ __launch_bounds__(kThreads) void depths_kernel(const Beam beam, int64_t count, float* depths) {
+// through [slice, V, U]: what reaches the middle of each column in each slice.
+__global__ __launch_bounds__(kThreads) void through_kernel(const Beam beam, int64_t count, float* through) {
     const int64_t i = thread_index();
     if (i >= count) return;
     const int U = static_cast<int>(i % beam.columns.wide), V = static_cast<int>(i / beam.columns.wide);
@@ -129,13 +129,13 @@ __global__ __launch_bounds__(kThreads) void depths_kernel(const Beam beam, int64
     for (int slice = 0; slice < beam.columns.slices; ++slice) {
         const float more = beam.met(U, V, slice);
         const float less = slice >= beam.reach ? beam.met(U, V, slice - beam.reach) : 0.0f;
-        depths[slice * count + i] = fma(more - less, 0.5f, sum);
+        through[slice * count + i] = exp2(-fmaxf(fma(more - less, 0.5f, sum), 0.0f));
         sum += more - less;
     }
 }
 
 // Adds the share that reaches each cell to sums [z, y, x].
-__global__ __launch_bounds__(kThreads) void shares_kernel(const Beam beam, const float* depths, int64_t cells,
+__global__ __launch_bounds__(kThreads) void shares_kernel(const Beam beam, const float* through, int64_t cells,
                                                           float* sums) {
     const int64_t i = thread_index();
     if (i >= cells) return;
@@ -143,9 +143,8 @@ __global__ __launch_bounds__(kThreads) void shares_kernel(const Beam beam, const
     const int u = static_cast<int>(i / beam.u % c.n_u), v = static_cast<int>(i / beam.v % c.n_v),
               slice = place_of(c, static_cast<int>(i / beam.w % c.slices));
     const Shift shift_u(-shift_of(c, 0, slice)), shift_v(-shift_of(c, 1, slice));
-    const float* const p = depths + (int64_t(slice) * c.high + v + shift_v.steps) * c.wide + u + shift_u.steps;
-    const float depth = mix(mix(p[0], p[1], shift_u.rest), mix(p[c.wide], p[c.wide + 1], shift_u.rest), shift_v.rest);
-    sums[i] += exp2(-fmaxf(depth, 0.0f));
+    const float* const p = through + (int64_t(slice) * c.high + v + shift_v.steps) * c.wide + u + shift_u.steps;
+    sums[i] += mix(mix(p[0], p[1], shift_u.rest), mix(p[c.wide], p[c.wide + 1], shift_u.rest), shift_v.rest);
 }
 
 // Writes the scaled sums of cells to every other byte of light, two of a word by each thread.
@@ -161,14 +160,14 @@ void write_shares(Workspace& workspace, const texgs_cells& cells, const std::vec
                   uint8_t* light, cudaStream_t stream) {
     const int64_t count = count_cells(cells), blocks = blocks_for(count, kThreads);
     int64_t most = 0;
-    for (const Beam& beam : beams) most = std::max(most, beam.count_depths());
-    float* const depths = workspace.planes.ensure<float>(most);
+    for (const Beam& beam : beams) most = std::max(most, beam.count_places());
+    float* const through = workspace.planes.ensure<float>(most);
     float* const sums = workspace.sums.ensure<float>(count);
     check(cudaMemsetAsync(sums, 0, sizeof(float) * static_cast<size_t>(count), stream), "clearing sums");
     for (const Beam& beam : beams) {
         const int64_t columns = beam.count_columns();
-        launch(depths_kernel, blocks_for(columns, kThreads), kThreads, stream, beam, columns, depths);
-        launch(shares_kernel, blocks, kThreads, stream, beam, depths, count, sums);
+        launch(through_kernel, blocks_for(columns, kThreads), kThreads, stream, beam, columns, through);
+        launch(shares_kernel, blocks, kThreads, stream, beam, through, count, sums);
     }
     launch(bytes_kernel, blocks_for(count, 2 * kThreads), kThreads, stream, sums, scale, count, light);
 }
