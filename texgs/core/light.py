@@ -10,6 +10,7 @@ from torch import Tensor
 from texgs.core.camera import Camera, orbit_direction
 from texgs.core.errors import ArgumentError
 
+HIDING = ("shadows", "occlusion", "reach")  # how matter hides light
 MAX_REACH = 2.0  # world units: through all of a volume, whose longest side is 1
 
 
