@@ -177,6 +177,9 @@ def test_shadows_need_a_volume_and_models_that_can_be_relit(session, tmp_path, k
     refused(lambda: session.set_of_scene("light", {key: 0.5}), "light: expected the volume")
     assert session.scene is before
     session.set_of_scene(key, 0)
+    other = Session(replace(before, light=Light("headlight", shadows=0.7, occlusion=0.5)))
+    apply_all(other, ["shadows=0", "occlusion=0", "light=30,40"])  # as the sentence says
+    assert other.scene.light == Light("directional", 30.0, 40.0)
     baked = {"low": SceneModel(write_voxels(tmp_path / "grid.safetensors", voxels()))}
     session = Session(Scene(baked, volume=sphere_volume(tmp_path, low=LOW)))
     refused(lambda: session.set_of_scene(key, 0.5), "expected surfels for shadows and occlusion, got voxels")

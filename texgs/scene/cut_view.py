@@ -166,9 +166,9 @@ def scene_and_fitted(
     twin: Twin | None,
     outputs: Collection[str],
 ) -> tuple[Render, Render]:
-    """Render a view of a scene, and the same view of its fitted models; cuts have no faces in either.
+    """Render a view of a scene, and the same view of its fitted models, with some outputs.
 
-    The twin, with the outputs, is for shadows alone.
+    Cuts have no faces in either: the twin is for shadows alone.
     """
     camera = camera.to(composed.device)
     background = camera.viewmat.new_tensor(scene.background)

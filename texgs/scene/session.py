@@ -153,7 +153,8 @@ class Session:
     @locked
     def set_light(self, light: Light = HEADLIGHT) -> None:
         """Change the light of the scene, with its shadows."""
-        if light.shadows or light.occlusion:
+        before = self.scene.light
+        if light.shadows > before.shadows or light.occlusion > before.occlusion:
             require_shadows(self.scene)
         self._push(replace(self.scene, light=light))
 
@@ -180,7 +181,7 @@ class Session:
         match key:
             case "light":
                 self.set_light(light_of(value, self.scene.light))
-            case "shadows" | "occlusion" | "reach":
+            case _ if key in HIDING:
                 self.set_light(light_of({**asdict(self.scene.light), key: value}))
             case "cuts":
                 self.set_cuts(cuts_of(value))
