@@ -19,7 +19,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.scene_file import light_of, plain_light, read_scene, write_scene
+from texgs.scene.scene_file import LIGHT_KEYS, light_of, plain_light, read_scene, write_scene
 
 
 @pytest.fixture
@@ -78,6 +78,23 @@ NUMBERS = st.floats(0, 1)
 )
 def test_every_light_is_read_as_it_was_written(light):
     assert light_of(yaml.safe_load(yaml.safe_dump(plain_light(light)))) == light
+
+
+SCALARS = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9)
+ANYTHING = st.recursive(SCALARS, lambda x: st.lists(x, max_size=3) | st.dictionaries(st.text(max_size=9), x))
+
+
+@given(
+    st.dictionaries(st.sampled_from([*LIGHT_KEYS, "colour"]), ANYTHING | st.just("headlight") | NUMBERS)
+    | ANYTHING
+)
+def test_anything_is_a_light_or_refused_in_a_sentence(value):
+    try:
+        said = f"light: {plain_light(light_of(value))}"
+    except ArgumentError as error:
+        said = str(error)
+    assert said.startswith("light")
+    assert said.isprintable()
 
 
 @pytest.mark.parametrize(
