@@ -132,7 +132,7 @@ def directions(lights):
 
 @pytest.mark.parametrize("azimuth", [float("nan"), float("inf")])
 def test_an_azimuth_that_is_no_angle_is_refused(azimuth):
-    refused(lambda: Light("directional", azimuth), f"light: .*{azimuth}")
+    refused(lambda: Light("directional", azimuth), f"azimuth: .*{azimuth}")
 
 
 @pytest.mark.parametrize("seed", [(0,), (0, 2), (7, 1)])

@@ -7,7 +7,8 @@ import torch
 
 from tests.scene.balls import balls_in_a_volume
 from texgs.core.camera import orbit
-from texgs.core.cuts import Cuts, Plane
+from texgs.core.cuts import NO_CUTS, Cuts, Plane
+from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.session import Session
 
@@ -28,6 +29,15 @@ def test_a_point_of_models_is_seen_at_its_pixel_at_their_mean_depth(scene, mode)
     torch.testing.assert_close(place, torch.tensor([30.5, 20.5]), atol=1e-3, rtol=0)
     depth = scene.open().render(CAMERA, scene.light, scene.edits, outputs=("depth",)).depth
     assert float(z) == pytest.approx(float(depth[20, 30]), abs=1e-4)
+
+
+@pytest.mark.parametrize("mode", ["shaded", "normal", "volume"])
+@pytest.mark.parametrize("cuts", [NO_CUTS, HALF])
+def test_shadows_move_no_point(scene, mode, cuts):
+    cut = replace(scene, cuts=cuts)
+    shadowed = replace(cut, light=Light("directional", 30.0, 40.0, 1.0, 1.0))
+    places = [Session(each).point_at(CAMERA, mode, each, MIDDLE) for each in (cut, shadowed)]
+    assert places[0] == places[1]
 
 
 @pytest.mark.parametrize("mode", ["shaded", "volume"])

@@ -149,3 +149,19 @@ def test_an_edit_of_a_scene_of_a_series_comes_from_all_of_its_steps(tmp_path):
     )
     files = {path.name for path in files_of_scene(scene).values()}
     assert files == {"ball.safetensors", "series.json", *(series.model("ball", step).name for step in (0, 1))}
+
+
+@pytest.mark.parametrize(
+    ("light", "names"),
+    [
+        ("headlight", {"ball.safetensors"}),
+        ("{azimuth: 3, polar: 4}", {"ball.safetensors"}),
+        ("{azimuth: 3, polar: 4, shadows: 0.5}", {"ball.safetensors", "volume.nrrd"}),
+    ],
+)
+def test_an_edit_of_a_scene_with_shadows_comes_from_its_volume_too(tmp_path, light, names):
+    for name in ("ball.safetensors", "volume.nrrd"):
+        (tmp_path / name).touch()
+    text = f"models: {{ball: {{file: ball.safetensors}}}}\nlight: {light}\nvolume: {{file: volume.nrrd}}\n"
+    (scene := tmp_path / "scene.yaml").write_text(text)
+    assert {path.name for path in files_of_scene(scene).values()} == names

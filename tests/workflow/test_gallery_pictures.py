@@ -79,6 +79,15 @@ def test_a_picture_is_a_frame_of_the_changed_scene(renderer):
 
 
 @pytest.mark.parametrize("show", ["scene", "volume"])
+def test_a_picture_may_have_shadows(renderer, show):
+    side, words = [-30.0, 40.0], ["shadows=1", "occlusion=0.5"]
+    plain, shadowed = (renderer.render(cell(show, light=side, changes=each)).pixels for each in ([], words))
+    assert shadowed.mean() < plain.mean()
+    lit = [*words, f"light={side[0]},{side[1]}"]
+    np.testing.assert_array_equal(renderer.render(cell(show, changes=lit)).pixels, shadowed)
+
+
+@pytest.mark.parametrize("show", ["scene", "volume"])
 def test_a_box_is_cut_out_of_a_larger_view(renderer, show):
     box = renderer.render(cell(show, box=[0.25, 0.5, 0.25])).pixels
     assert box.shape == (SIZE, SIZE, 3)

@@ -9,7 +9,6 @@ import numpy as np
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.light import Light
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.metrics.quality import compare, mean
@@ -103,7 +102,8 @@ class SideBySide:
         can = kind_of(next(iter(scene.models.values())).file).can
         outputs = ("depth", "normal") if "normals" in can else ("depth",)
         now, before = (self._session.composition_of(each) for each in (scene, scene.as_fitted))
-        return scene_and_fitted(now, before, camera, scene, outputs)
+        twin = self._session.twin_of(scene) if scene.light.casts_shadows else None
+        return scene_and_fitted(now, before, camera, scene, twin, outputs)
 
 
 def caption(entry: ViewComparison) -> str:
@@ -130,13 +130,13 @@ def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str
         changes.append(("+ k_a x 0.7, k_d x 1.2, k_s x 2", dict.fromkeys(names, magnitude)))
     for title, change in changes:
         scene = steps[title] = with_edits(scene, change)
-    return {**steps, "+ light from the left": replace(scene, light=Light("directional", *LEFT_LIGHT))}
+    return {**steps, "+ light from the left": replace(scene, light=scene.light.turned(*LEFT_LIGHT))}
 
 
 def light_sweep(scene: Scene) -> dict[str, Scene]:
     """Return the scene under a light that moves from below the object to above it, by title."""
     return {
-        f"light at (-90°, {polar:g}°)": replace(scene, light=Light("directional", -90.0, polar))
+        f"light at (-90°, {polar:g}°)": replace(scene, light=scene.light.turned(-90.0, polar))
         for polar in SWEEP_ANGLES
     }
 

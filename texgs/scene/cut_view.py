@@ -159,10 +159,18 @@ def scene_and_volume(composed: Composed, camera: Camera, scene: Scene, twin: Twi
 
 
 def scene_and_fitted(
-    composed: Composed, fitted: Composed, camera: Camera, scene: Scene, outputs: Collection[str]
+    composed: Composed,
+    fitted: Composed,
+    camera: Camera,
+    scene: Scene,
+    twin: Twin | None,
+    outputs: Collection[str],
 ) -> tuple[Render, Render]:
-    """Render a view of a scene, and the same view of its fitted models; cuts have no faces in either."""
+    """Render a view of a scene, and the same view of its fitted models, with some outputs.
+
+    Cuts have no faces in either: the twin is for shadows alone.
+    """
     camera = camera.to(composed.device)
     background = camera.viewmat.new_tensor(scene.background)
-    view = partial(cut_view, camera=camera, twin=None, background=background, outputs=outputs)
+    view = partial(cut_view, camera=camera, twin=twin, background=background, outputs=outputs)
     return view(composed, scene=scene), view(fitted, scene=scene.as_fitted)

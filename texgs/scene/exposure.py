@@ -11,7 +11,8 @@ from torch import Tensor
 from texgs.core.camera import orbit_direction
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.fields.field import Composed
+from texgs.fields.field import Composed, baked_light
+from texgs.fields.files import kind_of
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin, last_of
@@ -22,6 +23,11 @@ REACH = 2.0  # cells to both sides of a surfel, within which matter belongs to i
 STEP = 0.5  # cells
 MEAN_SLANT = 1.5  # length of a ray by depth below a surface: the mean cosine of surfaces that are seen is 2/3
 CLEAR = 1e-4  # share of light; matter that takes away less leaves a surfel where it is
+
+NO_VOLUME = (
+    "light: expected the volume of the scene for shadows and occlusion, got none; make the scene again by "
+    "texgs compose, or take both back by shadows=0 occlusion=0"
+)
 
 
 def exposure_of(composed: Composed, scene: Scene, twin: Twin | None) -> Tensor | None:
@@ -36,10 +42,7 @@ def exposure_of(composed: Composed, scene: Scene, twin: Twin | None) -> Tensor |
     if not light.casts_shadows:
         return None
     if twin is None:
-        raise ArgumentError(
-            "light: expected the volume of the scene for shadows and occlusion, got none; make the scene "
-            "again by texgs compose, or take both back by shadows=0 occlusion=0"
-        )
+        raise ArgumentError(NO_VOLUME)
     if not isinstance(composed, Composition):
         return torch.ones(len(composed), 2, device=composed.device)  # is refused
     cells, matter = twin.light_cells(scene, composed.palettes), twin.matter(scene, composed.palettes)
@@ -50,6 +53,15 @@ def exposure_of(composed: Composed, scene: Scene, twin: Twin | None) -> Tensor |
         return 1 - shares.new_tensor([light.shadows, light.occlusion]) * (1 - shares)
 
     return last_of(twin.exposures, (composed, cells, light), make)
+
+
+def require_shadows(scene: Scene) -> None:
+    """Require what shadows and occlusion need: models that can be relit, and a volume."""
+    kind = kind_of(next(iter(scene.models.values())).file)
+    if "relight" not in kind.can:
+        raise baked_light(kind.name)
+    if scene.volume is None:
+        raise ArgumentError(NO_VOLUME)
 
 
 def shares_of(composed: Composition, light: Light, cells: LightCells, places: Tensor) -> Tensor:

@@ -141,7 +141,7 @@ def _light(where: str, frame: Mapping[str, Any]) -> Light:
         raise ArgumentError(f"{where}: light: expected the kind headlight or directional, got {light!r}")
     if light["kind"] == "headlight":
         return HEADLIGHT
-    with errors_at(where):
+    with errors_at(f"{where}: light"):
         return Light("directional", _number(where, light, "azimuth"), _number(where, light, "polar"))
 
 

@@ -153,11 +153,12 @@ def files_of_scene(scene: Path) -> dict[str, Path]:
         named: list[object] = [parse_yaml(scene.read_text(encoding="utf-8"))]
     except (OSError, ValueError, YAMLError, ArgumentError):
         return {}  # the job tells what is wrong with it
-    files: dict[str, Path] = {}
+    files, light = dict[str, Path](), named[0].get("light") if isinstance(named[0], dict) else None
+    has_shadows = isinstance(light, dict) and not light.keys().isdisjoint(("shadows", "occlusion"))
     while named:
         table = named.pop()
         for key, value in table.items() if isinstance(table, dict) else ():
-            if key == "volume":  # no edit reads it
+            if key == "volume" and not has_shadows:  # pictures of an edit need it for them alone
                 continue
             if key == "series" and (path := scene.parent / str(value)).is_file():
                 files |= {f"of_series.{number}": each for number, each in enumerate([path, *steps_of(path)])}
