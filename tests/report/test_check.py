@@ -9,6 +9,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
 from tests.refusals import refused
@@ -16,6 +17,7 @@ from tests.scene.balls import balls_in_a_volume
 from texgs.cli.main import main
 from texgs.core.cuts import Cuts, Plane
 from texgs.core.lens import Lens
+from texgs.core.light import Light
 from texgs.metrics.quality import compare
 from texgs.report.check import LIT_SHARE, check, floor_of, found_sentence, random_shots
 from texgs.scene.cut_view import scene_and_volume
@@ -85,6 +87,29 @@ def test_a_cut_changes_nothing_about_a_check(scene, tmp_path):
     twin, composition = Twin(scene), scene.open()
     one, other = (check(x, composition, twin, LENS, 19, 7, tmp_path / "c.json") for x in (scene, cut))
     assert one == other
+
+
+def test_shadows_of_a_scene_are_checked_and_told(scene, tmp_path):
+    """Views, edits and directions are the same as without; what was found holds for these shadows alone."""
+    light = Light("directional", 10, 20, shadows=0.7, occlusion=0.4, reach=0.2)
+    dark = replace(scene, light=light)
+    for plain, shown in zip(random_shots(scene, LENS, 40, 5), random_shots(dark, LENS, 40, 5), strict=True):
+        assert plain[0] == shown[0]
+        assert plain[2].models == shown[2].models
+        lights = plain[2].light, shown[2].light
+        assert lights[0].kind == lights[1].kind
+        assert (lights[1].shadows, lights[1].occlusion, lights[1].reach) == (0.7, 0.4, 0.2)
+        assert torch.equal(*(each.direction(shown[1]) for each in lights))
+    twin, composition = Twin(scene), scene.open()
+    result = check(dark, composition, twin, LENS, 19, 7, tmp_path / "ball-check.json")
+    views = [compare(*scene_and_volume(composition, *x[1:], twin)) for x in random_shots(dark, LENS, 19, 7)]
+    assert result.psnr["mean"] == pytest.approx(np.mean([each["psnr"] for each in views]))
+    assert result.sentence.endswith("edits at random, shadows 0.7, occlusion 0.4, reach 0.2).")
+    path = tmp_path / "ball.yaml"
+    assert found_sentence(path, dark) == result.sentence
+    turned = replace(dark, light=light.at(90, 10))
+    assert found_sentence(path, turned) == result.sentence, "whatever the direction"
+    assert found_sentence(path, scene) == found_sentence(path, replace(scene, light=light.unhidden)) == ""
 
 
 def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, capsys):

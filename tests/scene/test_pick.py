@@ -8,6 +8,7 @@ import torch
 from tests.scene.balls import balls_in_a_volume
 from texgs.core.camera import orbit
 from texgs.core.cuts import Cuts, Plane
+from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.session import Session
 
@@ -35,6 +36,14 @@ def test_there_is_no_point_on_the_background(scene, mode):
     assert Session(scene).point_at(CAMERA, mode, scene, (0, 0)) is None
     hidden = {name: replace(model, edit=PartEdit(visible=False)) for name, model in scene.models.items()}
     assert Session(scene).point_at(CAMERA, mode, replace(scene, models=hidden), MIDDLE) is None
+
+
+@pytest.mark.parametrize("mode", ["shaded", "normal", "volume", "texture"])
+def test_shadows_move_no_point(scene, mode):
+    dark = replace(scene, light=Light("directional", 60, 40, shadows=0.8, occlusion=0.5))
+    assert Session(dark).point_at(CAMERA, mode, dark, MIDDLE) == Session(scene).point_at(
+        CAMERA, mode, scene, MIDDLE
+    )
 
 
 def test_a_point_of_the_volume_is_on_the_side_of_the_camera(scene):

@@ -50,6 +50,10 @@ class Light:
         """Return the same light without shadows and occlusion."""
         return replace(self, shadows=0.0, occlusion=0.0)
 
+    def at(self, azimuth: float, polar: float) -> Self:
+        """Return a directional light from another side, which casts the same shadows."""
+        return replace(self, kind="directional", azimuth=azimuth, polar=polar)
+
     def direction(self, camera: Camera) -> Tensor:
         """Return the unit vector [3], float64, from the origin to the light or headlight."""
         if self.kind == "directional":

@@ -9,7 +9,6 @@ import torch
 
 from texgs.core.figures import new_figure, words, write_figure, write_grid
 from texgs.core.lens import Lens
-from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.fields.kinds import Kind
 from texgs.scene.film import Film, frames_of
@@ -18,7 +17,7 @@ from texgs.volume.cameras import FRONT, orbit_path
 
 POLAR = 20.0  # degrees
 VIEW_COUNT = 3  # around the object
-SIDE_LIGHT = Light("directional", -30.0, 40.0)  # a light that no edit has seen
+SIDE_LIGHT = (-30.0, 40.0)  # azimuth and polar angle of a light that no edit has seen, degrees
 SIZE = 512  # pixels of a picture
 TURNTABLE_FRAMES = 36  # frames of the turntable
 
@@ -32,7 +31,7 @@ def write_before_and_after(
     if "relight" in kind.can:
         cameras, lights, titles = (
             [*cameras, cameras[0]],
-            [*lights, SIDE_LIGHT],
+            [*lights, before.light.at(*SIDE_LIGHT)],
             [*titles, "light from the side"],
         )
     scenes = {"before": before, "after": after}

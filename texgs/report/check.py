@@ -16,7 +16,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.figures import write_grid
 from texgs.core.io import read_json, write_json
 from texgs.core.lens import Lens
-from texgs.core.light import HEADLIGHT, Light
+from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
@@ -58,7 +58,7 @@ def check(
     sentence = (
         f"At least {part:.1f} dB on the object from direct volume rendering in 95 of 100 such views, of the "
         f"whole picture {whole:.1f} dB, and {there:.1f} % of what it shows is there (views from anywhere, "
-        "lights and edits at random)."
+        f"lights and edits at random{hiding_words(scene.light)})."
     )
     seen = count, seed, lens.width, lens.height
     result = CheckResult(
@@ -85,16 +85,23 @@ def found_sentence(path: Path, scene: Scene) -> str:
 
 
 def checksum_of(scene: Scene) -> str:
-    """Return a checksum of the models with their looks, independent of other edits."""
-    files = [(name, file) for name, model in scene.models.items() for file in model.files if file]
-    return combined_checksum((name, sha256(file)) for name, file in files)
+    """Return a checksum of the models with their looks, and of shadows; independent of other edits."""
+    files = [(name, sha256(file)) for name, model in scene.models.items() for file in model.files if file]
+    hidden = hiding_words(scene.light)
+    return combined_checksum([*files, (hidden, "")] if hidden else files)
+
+
+def hiding_words(light: Light) -> str:
+    """Describe what hides light after a comma, or return ""."""
+    hidden = light.shadows, light.occlusion
+    return ", shadows {:g}, occlusion {:g}, reach {:g}".format(*hidden, light.reach) if any(hidden) else ""
 
 
 def random_shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str, Camera, Scene]]:
     """Yield independent views with a title, from anywhere on a sphere, with lights and edits at random.
 
-    They are not cut: a cut scene may show its volume itself. Opacities and palettes that are not edited are
-    those of the scene. A seed gives the same again.
+    They are not cut: a cut scene may show its volume itself. Shadows and occlusion, and opacities and
+    palettes that are not edited, are those of the scene. A seed gives the same again.
     """
     random = Random(seed)
 
@@ -103,7 +110,8 @@ def random_shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tu
 
     for _ in range(count):
         azimuth, polar = anywhere()
-        light = Light("directional", *anywhere()) if random.random() < LIT_SHARE else HEADLIGHT
+        is_lit = random.random() < LIT_SHARE
+        light = scene.light.at(*anywhere()) if is_lit else replace(scene.light, kind="headlight")
         models = {}
         for name, model in scene.models.items():
             edit, can = model.edit, kind_of(model.file).can
@@ -112,7 +120,7 @@ def random_shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tu
             if random.random() < EDITED_SHARE and "palette" in can:
                 edit = replace(edit, palette=(random.random(), random.random(), random.random()))
             models[name] = replace(model, edit=edit)
-        lit = light.kind if light == HEADLIGHT else f"light {light.azimuth:.0f}°, {light.polar:.0f}°"
+        lit = f"light {light.azimuth:.0f}°, {light.polar:.0f}°" if is_lit else light.kind
         title = f"camera {azimuth:.0f}°, {polar:.0f}°\n{lit}"
         yield title, orbit(azimuth, polar, *lens), replace(scene, models=models, light=light, cuts=NO_CUTS)
 

@@ -9,7 +9,6 @@ import torch
 
 from texgs.config.gallery import GalleryCell, Grid
 from texgs.core.camera import Camera, orbit
-from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.metrics.quality import psnr
 from texgs.report.fit_figure import ERROR, signed_error
@@ -51,7 +50,7 @@ class GalleryRenderer:
         try:
             apply_all(session, cell.changes)
             if cell.light:
-                session.set_light(Light("directional", *cell.light))
+                session.set_light(session.scene.light.at(*cell.light))
             camera = self._camera(cell)
             scene = None if cell.show == "volume" else session.frame(camera).astype("float32") / 255
             volume = None if cell.show == "scene" else self._volume_frame(session, camera)

@@ -72,7 +72,6 @@ class Film(Shot):
             ArgumentError: if a cut or time is to move, and the scene has none.
         """
         from texgs.core.camera import orbit
-        from texgs.core.light import Light
         from texgs.volume.cameras import orbit_path, spiral
 
         lens, count = lens or self.lens(scene.framed(composition)), self.count
@@ -93,7 +92,7 @@ class Film(Shot):
             low, high = sweep_range(scene, composition or scene.open())
             return ((camera, move_planes(scene, high + share * (low - high))) for share in shares)
         # from below the object to above, on the camera's side
-        lights = (Light("directional", self.azimuth, -90 + 180 * share) for share in shares)
+        lights = (scene.light.at(self.azimuth, -90 + 180 * share) for share in shares)
         return ((camera, replace(scene, light=light)) for light in lights)
 
     def write(
