@@ -107,7 +107,8 @@ def scene(folder: Path, channel: int = 0) -> Path:
     volume = SceneVolume(folder / "volume.nrrd", {"TF01": RISE, "TF02": replace(FALL, channel=channel)})
     frame = Frame([0.1, 0.0, -0.2], 0.5)
     models = {"TF01": entry, "TF02": SceneModel(file)}
-    whole = Scene(models, volume=volume, frame=frame, functions={"TF02": RISE, "TF03": FALL})
+    light, functions = Light("directional", 30, 20, 0.7, 0.5, 0.3), {"TF02": RISE, "TF03": FALL}
+    whole = Scene(models, light, volume=volume, frame=frame, functions=functions)
     return write_scene(folder / "scene.yaml", whole)
 
 

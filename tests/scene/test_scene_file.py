@@ -4,6 +4,8 @@ from dataclasses import replace
 import pytest
 import torch
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 from safetensors.torch import load_file, save_file
 
 from tests.fields.surfels.samples import sample
@@ -17,7 +19,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.scene_file import light_of, plain_light, read_scene, write_scene
 
 
 @pytest.fixture
@@ -61,6 +63,53 @@ def test_what_is_saved_is_opened(folder):
     assert values["models"]["TF02"] == edited, "nothing else is edited"
 
 
+NUMBERS = st.floats(0, 1)
+
+
+@given(
+    light=st.builds(
+        Light,
+        *(st.just("directional"), st.floats(-1e6, 1e6), st.floats(-90, 90)),
+        shadows=NUMBERS,
+        occlusion=NUMBERS,
+        reach=st.floats(1e-3, 2),
+    )
+    | st.builds(Light, st.just("headlight"), shadows=NUMBERS, occlusion=NUMBERS)
+)
+def test_every_light_is_read_as_it_was_written(light):
+    assert light_of(yaml.safe_load(yaml.safe_dump(plain_light(light)))) == light
+
+
+@pytest.mark.parametrize(
+    ("light", "line"),
+    [
+        (Light("headlight"), "light: headlight"),
+        (Light("directional", 30.0, -10.0), "light: {azimuth: 30.0, polar: -10.0}"),
+        (Light("headlight", occlusion=0.5), "light: {kind: headlight, occlusion: 0.5}"),
+        (
+            Light("directional", 3.0, 4.0, 0.7, 0.5, 0.3),
+            "light: {kind: directional, azimuth: 3.0, polar: 4.0, shadows: 0.7, occlusion: 0.5, reach: 0.3}",
+        ),
+    ],
+)
+def test_lights_without_shadows_are_written_as_before_there_were_any(folder, light, line):
+    path = write_scene(folder / "scene.yaml", replace(scene_in(folder), light=light))
+    written = path.read_text().partition("background:")[0].splitlines()[1:]
+    assert " ".join(each.strip() for each in written) == line
+    assert read_scene(path).light == light
+
+
+@pytest.mark.parametrize(
+    "value", [[30, -10], {"azimuth": 30, "polar": -10}, {"polar": -10, "kind": "directional", "azimuth": 30}]
+)
+def test_a_direction_keeps_the_shadows_that_it_does_not_name(value):
+    before = Light("headlight", shadows=0.7, occlusion=0.5, reach=0.3)
+    assert light_of(value) == Light("directional", 30.0, -10.0)
+    assert light_of(value, before) == replace(before, kind="directional", azimuth=30.0, polar=-10.0)
+    assert light_of("headlight", light_of(value, before)) == before
+    assert light_of({"kind": "headlight", "shadows": 0}, before) == replace(before, shadows=0.0)
+
+
 def test_a_folder_may_move(folder):
     write_scene(folder / "scenes" / "scene.yaml", scene_in(folder))
     folder.rename(folder.with_name("elsewhere"))
@@ -81,9 +130,16 @@ def test_a_variant_replaces_texels(folder):
     [
         ({"texgs-scene": 2}, "texgs-scene: expected 1, got 2"),
         ({"lights": "headlight"}, "the scene: no such key 'lights', did you mean light?"),
-        ({"light": {"azimut": 3}}, "light: expected headlight, or azimuth and polar in degrees"),
-        ({"light": {"polar": "up"}}, "light: expected headlight"),
-        ({"light": {"azimuth": 10**400, "polar": 0}}, "light: expected headlight"),
+        ({"light": "sun"}, "light: expected headlight, or azimuth and polar in degrees, got 'sun'"),
+        ({"light": {"azimut": 3}}, "light: no such key 'azimut', did you mean azimuth"),
+        ({"light": {"polar": "up"}}, "light.polar: expected a number, got 'up'"),
+        ({"light": {"polar": 91}}, "light.polar: expected -90 to 90 degrees, got 91"),
+        ({"light": {"azimuth": 10**400, "polar": 0}}, "light.azimuth: expected a number"),
+        ({"light": {"kind": ["sun"]}}, r"light.kind: expected headlight or directional, got \['sun'\]"),
+        ({"light": {"shadows": 1.5}}, "light.shadows: expected a share from 0 to 1, got 1.5"),
+        ({"light": {"kind": "headlight", "occlusion": -0.1}}, "light.occlusion: expected a share from 0 to"),
+        ({"light": {"shadows": True}}, "light.shadows: expected a number, got True"),
+        ({"light": {"reach": 0}}, "light.reach: expected above 0 to 2 world units, got 0"),
         ({"background": [0, 0]}, "background: expected three numbers from 0 to 1"),
         ({"background": [[[0]]] * 9}, "background: expected three numbers"),
         ({"cuts": []}, "cuts: expected keys with values, got a list"),

@@ -7,13 +7,16 @@ import pytest
 import torch
 
 from tests.fields.surfels.test_composition import CAMERA, ball
+from tests.fields.voxels.test_voxels import ball as voxels
 from tests.refusals import refused
+from tests.scene.balls import balls_in_a_volume
 from tests.scene.test_twin import LOW, sphere_volume
 from texgs.core.cuts import Box, Cuts, Plane
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
+from texgs.fields.voxels import write_voxels
 from texgs.scene.changes import apply_all
 from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene, SceneModel
@@ -127,6 +130,8 @@ def test_a_new_segment_looks_as_its_model_does_and_an_earlier_scene_as_it_was(se
         (lambda s: s.set("left", "opacity", -1), "models.left.opacity: "),
         (lambda s: s.set_background("red"), "background: "),
         (lambda s: s.set_of_scene("light", "up"), "light: "),
+        (lambda s: s.set_of_scene("shadows", "dark"), "light.shadows: expected a number, got 'dark'"),
+        (lambda s: s.set_of_scene("reach", 3), "light.reach: expected above 0 to 2"),
         (lambda s: s.set_of_scene("cuts", {"plane": []}), "cuts.plane: "),
         (lambda s: s.set_of_scene("models", 1), "'models'"),
         (lambda s: s.set_file("left", "texture", s.scene.models["left"].file), "models.left: "),
@@ -139,6 +144,42 @@ def test_a_change_that_cannot_be_made_leaves_the_scene(session, change, message)
     refused(lambda: change(session), message)
     assert session.scene is before
     assert not session.undo()
+
+
+def test_shadows_are_edits_that_stay_while_the_light_moves(tmp_path):
+    session = Session(balls_in_a_volume(tmp_path))
+    before, first = session.scene, session.frame(CAMERA)
+    apply_all(session, ["shadows=0.7", "light=30,40", "occlusion=0.5", "reach=0.3"])
+    shadowed = Light("directional", 30.0, 40.0, 0.7, 0.5, 0.3)
+    assert session.scene.light == shadowed
+    darker = session.frame(CAMERA)
+    session.set_of_scene("light", [60, 10])
+    assert session.scene.light == replace(shadowed, azimuth=60.0, polar=10.0)
+    session.change("", "light", None)
+    assert session.scene.light == Light("headlight", shadows=0.7, occlusion=0.5, reach=0.3)
+    session.undo()
+    session.undo()
+    apply_all(session, ["shadows=", "occlusion=", "reach="])
+    assert session.scene.light == Light("directional", 30.0, 40.0)
+    lighter = session.frame(CAMERA)
+    assert darker.mean() < lighter.mean()
+    assert (darker <= lighter).all()
+    session.undo()
+    session.undo()
+    assert session.scene == before
+    assert np.array_equal(session.frame(CAMERA), first)
+
+
+@pytest.mark.parametrize("key", ["shadows", "occlusion"])
+def test_shadows_need_a_volume_and_models_that_can_be_relit(session, tmp_path, key):
+    before = session.scene
+    refused(lambda: session.set_of_scene(key, 0.5), "light: expected the volume of the scene for shadows")
+    refused(lambda: session.set_of_scene("light", {key: 0.5}), "light: expected the volume")
+    assert session.scene is before
+    session.set_of_scene(key, 0)
+    baked = {"low": SceneModel(write_voxels(tmp_path / "grid.safetensors", voxels()))}
+    session = Session(Scene(baked, volume=sphere_volume(tmp_path, low=LOW)))
+    refused(lambda: session.set_of_scene(key, 0.5), "expected surfels for shadows and occlusion, got voxels")
 
 
 def test_a_file_that_was_written_again_is_read_again(session, tmp_path):
@@ -270,7 +311,7 @@ def test_planes_have_the_numbers_of_before_all_words(session, words, left):
         ("cut.1=0,1,1,9", "along 0,0.707,0.707, got 6.36"),
         ("cut.box=4,4,4,5,5,5", "along -1,0,0, got -4"),
         ("cuts=x,0", "'cuts', did you mean cut?"),
-        ("sun=3", "'sun'; expected light, background, cut, time$"),
+        ("sun=3", "'sun'; expected light, shadows, .*reach, background, cut, time$"),
         ("cut.box=1,2,3", "X0,Y0,Z0,X1,Y1,Z1, .* got 1,2,3"),
         ("cut.faces=dark", "faces: .* dark"),
     ],

@@ -1,15 +1,19 @@
 """What a viewer is started with, and what pages are told of it."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
 
 from tests.fields.surfels.test_composition import ball
+from tests.fields.voxels.test_voxels import ball as voxels
 from texgs.core.camera import orbit
 from texgs.core.light import Light
 from texgs.fields.surfels.model_file import write_model
+from texgs.fields.voxels import write_voxels
 from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene
 from texgs.scene.segment_file import write_segment
 from texgs.scene.session import Session
 from texgs.viewer.description import describe
@@ -63,6 +67,18 @@ def test_a_description_has_all_parts_and_what_they_can_show(tmp_path):
     assert told["light"] == {"azimuth": 10, "polar": 20}
     assert told["modes"][0] == "shaded"
     assert "normal" in told["modes"]
+
+
+def test_a_description_has_shadows_and_whether_the_scene_can_have_them(sphere_file, tmp_path):
+    scene = read_scene(sphere_file)
+    shadowed = replace(scene, light=Light("headlight", shadows=0.7, occlusion=0.5, reach=0.3))
+    told = describe("name", shadowed, scene.open())
+    assert told["light"] is None
+    assert [told[key] for key in ("shadows", "occlusion", "reach")] == [0.7, 0.5, 0.3]
+    assert told["can_shadow"]
+    assert not describe("name", replace(scene, volume=None), scene.open())["can_shadow"]
+    baked = Scene({"a": SceneModel(write_voxels(tmp_path / "a.safetensors", voxels()))}, volume=scene.volume)
+    assert not describe("name", baked, baked.open())["can_shadow"], "light is in their colours"
 
 
 def test_the_first_view_shows_the_whole_scene(tmp_path):

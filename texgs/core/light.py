@@ -10,6 +10,7 @@ from torch import Tensor
 from texgs.core.camera import Camera, orbit_direction
 from texgs.core.errors import ArgumentError
 
+HIDING = ("shadows", "occlusion", "reach")  # values of a light that say how matter hides it
 MAX_REACH = 2.0  # world units: through all of a volume, whose longest side is 1
 
 
@@ -29,11 +30,11 @@ class Light:
 
     def __post_init__(self) -> None:
         if self.kind not in ("headlight", "directional"):
-            raise ArgumentError(f"light: expected headlight or directional, got {self.kind!r}")
+            raise ArgumentError(f"kind: expected headlight or directional, got {self.kind!r}")
         if not isfinite(self.azimuth):
-            raise ArgumentError(f"light: expected an azimuth in degrees, got {self.azimuth:g}")
+            raise ArgumentError(f"azimuth: expected degrees, got {self.azimuth:g}")
         if not abs(self.polar) <= 90:
-            raise ArgumentError(f"light: expected a polar angle from -90 to 90 degrees, got {self.polar:g}")
+            raise ArgumentError(f"polar: expected -90 to 90 degrees, got {self.polar:g}")
         for name in ("shadows", "occlusion"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ArgumentError(f"{name}: expected a share from 0 to 1, got {getattr(self, name):g}")

@@ -194,16 +194,21 @@ class UnlitScene(Composed, Generic[F]):
                 f"look: expected shaded, got {look}; {self.kind} have light in their colours, fit surfels"
             )
         if asked.exposure is not None:
-            raise ArgumentError(
-                f"light: expected surfels for shadows and occlusion, got {self.kind}, which have light in "
-                "their colours; fit surfels, or take both back by shadows=0 occlusion=0"
-            )
+            raise baked_light(self.kind)
         factors = opacity_factors(edits, len(self.counts), self.kind)
         return self._blend(factors, camera, asked)
 
     @abstractmethod
     def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
         """Render all fields, each with a factor on its opacity."""
+
+
+def baked_light(kind: str) -> ArgumentError:
+    """Return the error for shadows on fields that cannot be relit."""
+    return ArgumentError(
+        f"light: expected surfels for shadows and occlusion, got {kind}, which have light in their colours; "
+        "fit surfels, or take both back by shadows=0 occlusion=0"
+    )
 
 
 def require_depth(outputs: Collection[str], kind: str) -> None:

@@ -16,6 +16,7 @@ import yaml
 
 from texgs.core.cuts import AXES, NO_CUTS, Box, Cuts, Plane, along
 from texgs.core.errors import ArgumentError, errors_at
+from texgs.core.light import HIDING
 from texgs.core.names import is_number
 from texgs.core.plain_yaml import parse_yaml
 from texgs.scene.bounds import models_of, span_of
@@ -75,7 +76,7 @@ def _apply(session: Session, word: str) -> None:
         models = ", ".join(session.scene.models)
         raise ArgumentError(f"expected a model of the scene ({models}), got {part}")
     else:
-        require_keys({name: text}, ("light", "background", "cut", "time"), "the scene")
+        require_keys({name: text}, ("light", *HIDING, "background", "cut", "time"), "the scene")
         session.set_of_scene(name, _plain(text) if text else SCENE_KEYS[name])
 
 

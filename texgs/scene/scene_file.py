@@ -13,7 +13,7 @@ from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading, write_bytes
 from texgs.core.keys import typed_argument
 from texgs.core.lens import Frame
-from texgs.core.light import HEADLIGHT, Light
+from texgs.core.light import HEADLIGHT, HIDING, Light
 from texgs.core.names import SCENE, SCENES, close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
 from texgs.fields.files import formats
@@ -32,6 +32,7 @@ KEYS = ("texgs-scene", *SCENE_KEYS, "models", "volume", "space", "functions", "s
 EDIT_KEYS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDIT_KEYS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
+LIGHT_KEYS = tuple(each.name for each in fields(Light))
 APPEARANCE_KEYS = tuple(each.name for each in fields(Appearance))
 VOLUME_KEYS = ("file", *APPEARANCE_KEYS, "tfs")
 
@@ -109,12 +110,10 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
     for name, entry in scene.models.items():
         segments = {key: _plain(segment, relative) for key, segment in entry.segments.items()}
         models[name] = _plain(entry, relative) | ({"segments": segments} if segments else {})
-    light: Any = "headlight"
-    if scene.light.kind == "directional":
-        light = {"azimuth": scene.light.azimuth, "polar": scene.light.polar}
     cuts = {"cuts": plain_cuts(scene.cuts)} if scene.cuts != NO_CUTS else {}
     frame = {"frame": asdict(scene.frame)} if scene.frame else {}
-    of_scene = {"light": light, "background": list(scene.background), **cuts, **frame}
+    light = {"light": plain_light(scene.light)}
+    of_scene = {**light, "background": list(scene.background), **cuts, **frame}
     values = {"texgs-scene": VERSION, **of_scene, "models": models}
     if scene.volume is not None:
         look = asdict(scene.volume.appearance)
@@ -190,17 +189,35 @@ def plain_functions(functions: Mapping[str, TransferFunction]) -> dict[str, Any]
     return {name: tf.to_dict() for name, tf in functions.items()}
 
 
-def light_of(value: Any) -> Light:
-    """Return a light from one, "headlight", or azimuth and polar angle in degrees, with or without names."""
+def light_of(value: Any, before: Light = HEADLIGHT) -> Light:
+    """Return a light from one, "headlight", azimuth and polar angle in degrees, or its values by name.
+
+    Shadows, occlusion and reach that are not named are those of the light before.
+    """
     if isinstance(value, Light):
         return value
     if isinstance(value, str) and value == "headlight":
-        return HEADLIGHT
+        value = {"kind": value}
     if isinstance(value, list | tuple) and len(value) == 2:
         value = dict(zip(("azimuth", "polar"), value, strict=True))
-    if isinstance(value, dict) and set(value) <= {"azimuth", "polar"} and all(map(is_number, value.values())):
-        return Light("directional", **{key: float(angle) for key, angle in value.items()})
-    raise ArgumentError(f"light: expected headlight, or azimuth and polar in degrees, got {value!r}")
+    if not isinstance(value, dict):
+        raise ArgumentError(f"light: expected headlight, or azimuth and polar in degrees, got {value!r}")
+    require_keys(value, LIGHT_KEYS, "light")
+    kind = value.get("kind", "directional")
+    numbers = {key: number for key, number in value.items() if key != "kind"}
+    for key, number in numbers.items():
+        if not is_number(number):
+            raise ArgumentError(f"light.{key}: expected a number, got {number!r}")
+    kept = {key: getattr(before, key) for key in HIDING}
+    with errors_at("light", "."):
+        return Light(kind, **kept | {key: float(number) for key, number in numbers.items()})
+
+
+def plain_light(light: Light) -> Any:
+    """Return a light as plain values; what is as in `HEADLIGHT` is left out."""
+    angles = {"azimuth": light.azimuth, "polar": light.polar} if light.kind == "directional" else {}
+    hiding = {key: getattr(light, key) for key in HIDING if getattr(light, key) != getattr(HEADLIGHT, key)}
+    return {"kind": light.kind, **angles, **hiding} if hiding else angles or "headlight"
 
 
 def cuts_of(value: Any) -> Cuts:

@@ -4,7 +4,7 @@ import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import wraps
 from pathlib import Path
 from threading import RLock
@@ -17,13 +17,14 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.cuts import Cuts
 from texgs.core.errors import ArgumentError, errors_at
-from texgs.core.light import HEADLIGHT, Light
+from texgs.core.light import HEADLIGHT, HIDING, Light
 from texgs.core.names import require_name
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.raster import Render
 from texgs.scene.cut_view import scene_and_volume
+from texgs.scene.exposure import require_shadows
 from texgs.scene.frame import frame, point_at
 from texgs.scene.parts import NewLook, entry_of, key_path, replace_entry, require_new, split, with_looks
 from texgs.scene.scene import WHITE, Scene, SceneSegment
@@ -44,6 +45,7 @@ T = TypeVar("T")
 P = ParamSpec("P")
 SCENE_KEYS: dict[str, Any] = {
     "light": "headlight",
+    **{key: getattr(HEADLIGHT, key) for key in HIDING},
     "background": WHITE,
     "cuts": {},
     "functions": {},
@@ -150,7 +152,9 @@ class Session:
 
     @locked
     def set_light(self, light: Light = HEADLIGHT) -> None:
-        """Change the light of the scene."""
+        """Change the light of the scene, with its shadows."""
+        if light.shadows or light.occlusion:
+            require_shadows(self.scene)
         self._push(replace(self.scene, light=light))
 
     @locked
@@ -175,7 +179,9 @@ class Session:
         require_keys({key: value}, SCENE_KEYS, "the scene")
         match key:
             case "light":
-                self.set_light(light_of(value))
+                self.set_light(light_of(value, self.scene.light))
+            case "shadows" | "occlusion" | "reach":
+                self.set_light(light_of({**asdict(self.scene.light), key: value}))
             case "cuts":
                 self.set_cuts(cuts_of(value))
             case "functions":

@@ -8,6 +8,7 @@ import numpy as np
 
 from texgs.core.errors import TexgsError
 from texgs.core.lens import Frame, Lens
+from texgs.core.light import HIDING
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import NEEDS, PartEdit
@@ -88,6 +89,8 @@ def describe(
         "name": name,
         "background": list(scene.background),
         "light": {"azimuth": light.azimuth, "polar": light.polar} if light.kind == "directional" else None,
+        **{key: getattr(light, key) for key in HIDING},
+        "can_shadow": "relight" in kind.can and scene.volume is not None,
         "cuts": asdict(scene.cuts),
         "models": models,
         "functions": plain_functions(scene.functions),

@@ -1,4 +1,4 @@
-// The light: at the camera, or from a direction that is dragged on a ball or set by its angles.
+// The light: at the camera, or from a direction that is dragged on a ball or set by its angles; and its shadows.
 
 import { angles, direction, dot } from "./camera.js";
 import { element, gesture, slider, tick } from "./inputs.js";
@@ -8,6 +8,7 @@ const BALL = 0.46; // its radius, part of the size
 
 export class LightControl {
   #state; #camera; #canvas; #headlight; #azimuth; #polar;
+  #shares; // sliders of what matter takes away of light, by their keys
   #hint = element("p", { className: "hint" });
 
   /**
@@ -28,9 +29,16 @@ export class LightControl {
     this.#azimuth = angle("azimuth", "Azimuth", 180);
     this.#polar = angle("polar", "Polar", 90);
     for (const { row } of [this.#azimuth, this.#polar]) row.querySelector(".reset").remove();
+    const share = (key, name, what) => [key, slider(
+      name, what, { max: 1, most: 1, unedited: 0 }, (value, step) => state.edit("", key, value, step),
+    )];
+    this.#shares = state.scene.can_shadow ? [
+      share("shadows", "Shadows", "shadows"), share("occlusion", "Occlusion", "occlusion of ambient light"),
+    ] : [];
     const about = element("div", {}, this.#headlight.row,
       this.#hint);
-    root.append(element("div", { className: "light" }, this.#canvas, about), this.#azimuth.row, this.#polar.row);
+    root.append(element("div", { className: "light" }, this.#canvas, about), this.#azimuth.row, this.#polar.row,
+      ...this.#shares.map(([, { row }]) => row));
     root.hidden = !state.scene.models.some((model) => model.can.includes("diffuse")); // nothing shows the light
     this.#listen();
     state.addEventListener("change", () => this.show());
@@ -39,12 +47,13 @@ export class LightControl {
 
   /** Show the light as it is, seen from where the camera is. */
   show() {
-    const { light } = this.#state.scene, { azimuth, polar } = this.#angles();
+    const { scene } = this.#state, { light } = scene, { azimuth, polar } = this.#angles();
     this.#headlight.show(light === null);
     this.#hint.textContent = light ? "Drag on the ball to turn the light."
-      : "It moves with the camera. Drag on the ball to fix the light.";
+      : `It moves with the camera${scene.can_shadow ? " and casts no shadows" : ""}. Drag on the ball to fix the light.`;
     this.#azimuth.show(azimuth);
     this.#polar.show(polar);
+    for (const [key, input] of this.#shares) input.show(scene[key]);
     this.#draw();
   }
 

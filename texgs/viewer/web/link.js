@@ -3,7 +3,7 @@
 import { timesOf } from "./state.js";
 
 const MOST = 1e6; // of a coordinate
-const MOST_FACTOR = 1000, MOST_PLANES = 6;
+const MOST_FACTOR = 1000, MOST_PLANES = 6, MOST_REACH = 2;
 
 /** A number between two others; nothing else. */
 const isNumber = (x, low = -MOST, high = MOST) => typeof x === "number" && x >= low && x <= high;
@@ -16,12 +16,14 @@ const arePoints = (x, columns, least) => Array.isArray(x) && x.length >= least &
   Array.isArray(row) && row.length === columns && Number.isFinite(row[0]) && !(row[0] < x[i - 1]?.[0])
   && row.slice(1).every((each) => isNumber(each, 0, 1)));
 const isFunction = (x) => arePoints(x?.opacity, 2, 2) && arePoints(x?.color, 4, 1);
+const isShare = (x, scene) => scene.can_shadow && isNumber(x, 0, 1);
 const OF_PART = {
   visible: (x) => typeof x === "boolean", palette: isColor, opacity: isFactor,
   ambient: isFactor, diffuse: isFactor, specular: isFactor, shininess: isFactor, tint: isColor,
 };
 const OF_SCENE = {
   light: (x) => isNumber(x?.azimuth) && isNumber(x?.polar),
+  shadows: isShare, occlusion: isShare, reach: (x, scene) => scene.can_shadow && isNumber(x, 1 / MOST, MOST_REACH),
   background: isColor,
   cuts: (x) => Array.isArray(x?.planes) && x.planes.length <= MOST_PLANES && x.planes.every(isPlane)
     && (x.box === null || isBox(x.box)) && ["shaded", "unlit"].includes(x.faces),
