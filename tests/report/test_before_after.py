@@ -3,21 +3,16 @@
 from dataclasses import replace
 
 import av
-import numpy as np
 import pytest
 import torch
 
 from tests.fields.surfels.test_composition import ball
-from tests.scene.balls import balls_in_a_volume
 from texgs.core.lens import Lens
-from texgs.core.light import Light
 from texgs.fields.kinds import kinds
 from texgs.fields.surfels.model_file import write_model
 from texgs.report import before_after
 from texgs.report.before_after import write_before_and_after
 from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.session import Session
-from texgs.volume.cameras import orbit_path
 
 SURFELS = kinds()["surfels"]
 
@@ -42,15 +37,3 @@ def test_only_what_can_be_relit_is_shown_under_another_light(kind, columns, tmp_
         assert len(list(film.decode(stream))) == 3
     assert "ball, after: " in (log := capsys.readouterr().err)
     assert "ball, turntable: 3 of 3 frames" in log
-
-
-def test_the_light_from_the_side_casts_the_shadows_of_the_scene(tmp_path, monkeypatch):
-    dark = Light("directional", 10.0, 20.0, shadows=0.8, occlusion=0.5)
-    scene = balls_in_a_volume(tmp_path, light=dark)
-    monkeypatch.setattr(before_after, "TURNTABLE_FRAMES", 2)
-    grids = []
-    monkeypatch.setattr(before_after, "write_grid", lambda path, rows, titles: grids.append(rows))
-    write_before_and_after(scene, scene, SURFELS, Lens(), tmp_path, torch.device("cpu"), "balls")
-    camera = orbit_path(3, before_after.POLAR, Lens().square(before_after.SIZE))[0]
-    lit = replace(scene, light=dark.at(*before_after.SIDE_LIGHT))
-    np.testing.assert_array_equal(grids[0]["after"][3], Session(lit).frame(camera))

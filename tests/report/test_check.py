@@ -9,7 +9,6 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-import torch
 from PIL import Image
 
 from tests.refusals import refused
@@ -89,29 +88,6 @@ def test_a_cut_changes_nothing_about_a_check(scene, tmp_path):
     assert one == other
 
 
-def test_shadows_of_a_scene_are_checked_and_told(scene, tmp_path):
-    """Views, edits and directions are the same as without; what was found holds for these shadows alone."""
-    light = Light("directional", 10, 20, shadows=0.7, occlusion=0.4, reach=0.2)
-    dark = replace(scene, light=light)
-    for plain, shown in zip(random_shots(scene, LENS, 40, 5), random_shots(dark, LENS, 40, 5), strict=True):
-        assert plain[0] == shown[0]
-        assert plain[2].models == shown[2].models
-        lights = plain[2].light, shown[2].light
-        assert lights[0].kind == lights[1].kind
-        assert (lights[1].shadows, lights[1].occlusion, lights[1].reach) == (0.7, 0.4, 0.2)
-        assert torch.equal(*(each.direction(shown[1]) for each in lights))
-    twin, composition = Twin(scene), scene.open()
-    result = check(dark, composition, twin, LENS, 19, 7, tmp_path / "ball-check.json")
-    views = [compare(*scene_and_volume(composition, *x[1:], twin)) for x in random_shots(dark, LENS, 19, 7)]
-    assert result.psnr["mean"] == pytest.approx(np.mean([each["psnr"] for each in views]))
-    assert result.sentence.endswith("edits at random, shadows 0.7, occlusion 0.4, reach 0.2).")
-    path = tmp_path / "ball.yaml"
-    assert found_sentence(path, dark) == result.sentence
-    turned = replace(dark, light=light.at(90, 10))
-    assert found_sentence(path, turned) == result.sentence, "whatever the direction"
-    assert found_sentence(path, scene) == found_sentence(path, replace(scene, light=light.unhidden)) == ""
-
-
 def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     write_scene("ball.yaml", scene)
@@ -148,3 +124,17 @@ def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, cap
         assert main(["check", file, *more]) == 2
         assert named in capsys.readouterr().err, "before any view"
     assert not list(tmp_path.glob("none*"))
+
+
+def test_what_a_check_has_found_holds_for_its_shadows(scene, tmp_path):
+    """Whatever the direction of the light, which a check draws at random."""
+    light = Light("directional", 10, 20, shadows=0.7, occlusion=0.4, reach=0.2)
+    dark, twin, composition = replace(scene, light=light), Twin(scene), scene.open()
+    result = check(dark, composition, twin, LENS, 19, 7, tmp_path / "ball-check.json")
+    views = [compare(*scene_and_volume(composition, *x[1:], twin)) for x in random_shots(dark, LENS, 19, 7)]
+    assert result.psnr["mean"] == pytest.approx(np.mean([each["psnr"] for each in views]))
+    path = tmp_path / "ball.yaml"
+    for same in (light, light.turned(90, 10), replace(light, kind="headlight")):
+        assert found_sentence(path, replace(scene, light=same)) == result.sentence
+    for other in (light.unhidden, replace(light, shadows=0.6), replace(light, reach=0.3)):
+        assert found_sentence(path, replace(scene, light=other)) == ""

@@ -11,14 +11,15 @@ from tests.scene.balls import balls_in_a_volume
 from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.core.light import Light
+from texgs.fields.kinds import kinds
 from texgs.fields.part_edit import PartEdit
 from texgs.metrics.quality import compare
-from texgs.report import compared
-from texgs.report.compared import SideBySide, chain, compare_views, light_sweep, write_light_figure
+from texgs.report import before_after, compared
+from texgs.report.compared import SideBySide, compare_views, write_light_figure
 from texgs.scene.cut_view import cut_view, scene_and_fitted, scene_and_volume
-from texgs.scene.film import Film
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
+from texgs.volume.cameras import orbit_path
 
 CAMERA = orbit(20, 10, 4, 30, 48, 48)
 DARK = Light("directional", -60, 30, shadows=0.8, occlusion=0.6)
@@ -78,17 +79,6 @@ def test_frames_beside_the_volume_are_those_with_shadows(scene):
     assert f"whole picture: {scores['psnr']:.2f} dB" in dark.sentences[0]
 
 
-def test_other_lights_of_a_scene_cast_its_shadows(scene):
-    """Of the figures of edits and of relighting, and of a film; without shadows their lights are as ever."""
-    film = [shown for _, shown in Film(what="light", frames=3).shots(scene, lens=Lens())]
-    moved = [*chain(scene, [(), ()], ()).values()][-1], *light_sweep(scene).values(), *film
-    assert {(each.light.shadows, each.light.occlusion) for each in moved} == {(0.8, 0.6)}
-    assert moved[0].light.unhidden == Light("directional", *compared.LEFT_LIGHT)
-    assert light_sweep(replace(scene, light=Light("headlight")))["light at (-90°, 30°)"].light == Light(
-        "directional", -90.0, 30.0
-    )
-
-
 def test_the_figure_of_light_and_shadow(scene, tmp_path, monkeypatch):
     """Its pictures are those of scene and volume under four lights, and its numbers those on the object."""
     grids, twin, composed = [], Twin(scene), scene.open()
@@ -109,3 +99,14 @@ def test_the_figure_of_light_and_shadow(scene, tmp_path, monkeypatch):
     path = write_light_figure(tmp_path / "shadows.png", scene, composed, twin, Lens(width=32, height=32))
     with Image.open(path) as picture:
         assert picture.width > picture.height > 100
+
+
+def test_the_light_from_the_side_of_an_edit_casts_the_shadows_of_its_scene(scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(before_after, "TURNTABLE_FRAMES", 2)
+    grids = []
+    monkeypatch.setattr(before_after, "write_grid", lambda path, rows, titles: grids.append(rows))
+    surfels = kinds()["surfels"]
+    before_after.write_before_and_after(scene, scene, surfels, Lens(), tmp_path, torch.device("cpu"), "balls")
+    camera = orbit_path(3, before_after.POLAR, Lens().square(before_after.SIZE))[0]
+    turned = replace(scene, light=DARK.turned(*before_after.SIDE_LIGHT))
+    np.testing.assert_array_equal(grids[0]["after"][3], Session(turned).frame(camera))

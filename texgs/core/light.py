@@ -51,8 +51,8 @@ class Light:
         """Return the same light without shadows and occlusion."""
         return replace(self, shadows=0.0, occlusion=0.0)
 
-    def at(self, azimuth: float, polar: float) -> Self:
-        """Return a directional light from another side, which casts the same shadows."""
+    def turned(self, azimuth: float, polar: float) -> Self:
+        """Return the light from a direction, see `orbit_direction`, with the same shadows and occlusion."""
         return replace(self, kind="directional", azimuth=azimuth, polar=polar)
 
     def direction(self, camera: Camera) -> Tensor:

@@ -31,7 +31,7 @@ def write_before_and_after(
     if "relight" in kind.can:
         cameras, lights, titles = (
             [*cameras, cameras[0]],
-            [*lights, before.light.at(*SIDE_LIGHT)],
+            [*lights, before.light.turned(*SIDE_LIGHT)],
             [*titles, "light from the side"],
         )
     scenes = {"before": before, "after": after}

@@ -16,7 +16,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.figures import write_grid
 from texgs.core.io import read_json, write_json
 from texgs.core.lens import Lens
-from texgs.core.light import Light
+from texgs.core.light import HIDING
 from texgs.core.progress import progress
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
@@ -54,11 +54,12 @@ def check(
     shown = [pictures(*scene_and_volume(composition, *drawn[index][1:], twin)) for index in worst]
     titles = [f"{drawn[index][0]}\n{psnr[index]:.1f} dB" for index in worst]
     write_grid(file.with_suffix(".png"), {name: [each[name] for each in shown] for name in shown[0]}, titles)
+    lights = "lights" if scene.light == scene.light.unhidden else "lights with shadows"
     part, whole, there = (floor(10 * floor_of(x)) / 10 for x in (on_object, psnr, [100 * x for x in share]))
     sentence = (
         f"At least {part:.1f} dB on the object from direct volume rendering in 95 of 100 such views, of the "
         f"whole picture {whole:.1f} dB, and {there:.1f} % of what it shows is there (views from anywhere, "
-        f"lights and edits at random{hiding_words(scene.light)})."
+        f"{lights} and edits at random)."
     )
     seen = count, seed, lens.width, lens.height
     result = CheckResult(
@@ -87,14 +88,9 @@ def found_sentence(path: Path, scene: Scene) -> str:
 def checksum_of(scene: Scene) -> str:
     """Return a checksum of the models with their looks, and of shadows; independent of other edits."""
     files = [(name, sha256(file)) for name, model in scene.models.items() for file in model.files if file]
-    hidden = hiding_words(scene.light)
-    return combined_checksum([*files, (hidden, "")] if hidden else files)
-
-
-def hiding_words(light: Light) -> str:
-    """Describe what hides light after a comma, or return ""."""
-    hidden = light.shadows, light.occlusion
-    return ", shadows {:g}, occlusion {:g}, reach {:g}".format(*hidden, light.reach) if any(hidden) else ""
+    if scene.light != scene.light.unhidden:
+        files += [(key, str(getattr(scene.light, key))) for key in HIDING]
+    return combined_checksum(files)
 
 
 def random_shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str, Camera, Scene]]:
@@ -110,8 +106,9 @@ def random_shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tu
 
     for _ in range(count):
         azimuth, polar = anywhere()
-        is_lit = random.random() < LIT_SHARE
-        light = scene.light.at(*anywhere()) if is_lit else replace(scene.light, kind="headlight")
+        light = replace(scene.light, kind="headlight")
+        if random.random() < LIT_SHARE:
+            light = light.turned(*anywhere())
         models = {}
         for name, model in scene.models.items():
             edit, can = model.edit, kind_of(model.file).can
@@ -120,7 +117,7 @@ def random_shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tu
             if random.random() < EDITED_SHARE and "palette" in can:
                 edit = replace(edit, palette=(random.random(), random.random(), random.random()))
             models[name] = replace(model, edit=edit)
-        lit = f"light {light.azimuth:.0f}°, {light.polar:.0f}°" if is_lit else light.kind
+        lit = light.kind if light.kind == "headlight" else f"light {light.azimuth:.0f}°, {light.polar:.0f}°"
         title = f"camera {azimuth:.0f}°, {polar:.0f}°\n{lit}"
         yield title, orbit(azimuth, polar, *lens), replace(scene, models=models, light=light, cuts=NO_CUTS)
 

@@ -138,13 +138,13 @@ def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str
         changes.append(("+ k_a x 0.7, k_d x 1.2, k_s x 2", dict.fromkeys(names, magnitude)))
     for title, change in changes:
         scene = steps[title] = with_edits(scene, change)
-    return {**steps, "+ light from the left": replace(scene, light=scene.light.at(*LEFT_LIGHT))}
+    return {**steps, "+ light from the left": replace(scene, light=scene.light.turned(*LEFT_LIGHT))}
 
 
 def light_sweep(scene: Scene) -> dict[str, Scene]:
     """Return the scene under a light that moves from below the object to above it, by title."""
     return {
-        f"light at (-90°, {polar:g}°)": replace(scene, light=scene.light.at(-90.0, polar))
+        f"light at (-90°, {polar:g}°)": replace(scene, light=scene.light.turned(-90.0, polar))
         for polar in SWEEP_ANGLES
     }
 
@@ -157,7 +157,7 @@ def write_light_figure(path: Path, scene: Scene, composition: Composed, twin: Tw
     camera = orbit(SHADOWED_SIDE, POLAR, *lens)
     rows, titles = {"scene": list[np.ndarray](), "volume": list[np.ndarray]()}, []
     for azimuth, polar in SHADOWING_LIGHTS:
-        light = replace(scene.light.at(azimuth, polar), shadows=SHADOWS, occlusion=OCCLUSION)
+        light = replace(scene.light.turned(azimuth, polar), shadows=SHADOWS, occlusion=OCCLUSION)
         scenes = (replace(scene, light=each) for each in (light, light.unhidden))
         pair, plain = (scene_and_volume(composition, camera, each, twin) for each in scenes)
         shown = pictures(*pair)

@@ -50,7 +50,7 @@ class GalleryRenderer:
         try:
             apply_all(session, cell.changes)
             if cell.light:
-                session.set_light(session.scene.light.at(*cell.light))
+                session.set_of_scene("light", cell.light)
             camera = self._camera(cell)
             scene = None if cell.show == "volume" else session.frame(camera).astype("float32") / 255
             volume = None if cell.show == "scene" else self._volume_frame(session, camera)

@@ -92,7 +92,7 @@ class Film(Shot):
             low, high = sweep_range(scene, composition or scene.open())
             return ((camera, move_planes(scene, high + share * (low - high))) for share in shares)
         # from below the object to above, on the camera's side
-        lights = (scene.light.at(self.azimuth, -90 + 180 * share) for share in shares)
+        lights = (scene.light.turned(self.azimuth, -90 + 180 * share) for share in shares)
         return ((camera, replace(scene, light=light)) for light in lights)
 
     def write(

@@ -1,6 +1,5 @@
 """Frames of a scene for display: colours, normals, depth, material; and the point at a pixel."""
 
-from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -117,10 +116,8 @@ def point_at(
     """
     column, row = pixel
     alone = camera.crop(column, row, column + 1, row + 1).to(composed.device)
-    is_of_models = mode != "volume" and not (scene.cuts and mode not in HOLLOW_MODES)
-    if twin is None or is_of_models:
-        unhidden = replace(scene, light=scene.light.unhidden)  # depth is the same in the dark
-        seen = cut_view(composed, alone, unhidden, None, outputs=("depth",))
+    if twin is None or mode in HOLLOW_MODES:
+        seen = cut_view(composed, alone, scene, None, outputs=("depth",))
     else:
         functions = scene.functions if mode == "volume" else None
         seen = twin.render(alone, scene, composed.palettes, functions=functions, outputs=("depth", "median"))
