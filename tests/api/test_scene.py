@@ -12,7 +12,7 @@ from PIL import Image
 
 import texgs
 from tests.refusals import refused
-from tests.scene.balls import ball_models, write_balls
+from tests.scene.balls import ball_models, balls_in_a_volume, write_balls
 from texgs.cli.main import main
 from texgs.core.errors import DeviceError
 from texgs.core.image import read_rgba
@@ -68,11 +68,30 @@ def test_light_background_and_cuts(scene):
     assert scene.light == Light("directional", 30.0, 40.0)
     assert scene.background == (0.0, 0.0, 0.0)
     assert pixels(scene)[0, 0].tolist() == [0, 0, 0]
+    scene.reach = 0.3
     scene.light = "headlight"
-    assert scene.light == Light("headlight")
+    assert scene.light == Light("headlight", reach=0.3)
+    scene.reach = None
+    assert scene.reach == 0.25
     assert scene.edit("cut=x,0", "TF02.opacity=2") is scene
     assert len(scene.session.scene.cuts.planes) == 1
     assert scene["TF02"].opacity == 2
+
+
+def test_shadows_are_values_of_the_scene(tmp_path):
+    scene = texgs.open(write_scene(tmp_path / "scene.yaml", balls_in_a_volume(tmp_path)))
+    scene.light = (30, 40)
+    plain = pixels(scene)
+    scene.shadows, scene.occlusion = np.float32(0.75), 0.5
+    assert (scene.shadows, scene.occlusion) == (0.75, 0.5)
+    assert pixels(scene).sum() < plain.sum()
+    scene.light = (60, 40)
+    assert scene.light == Light("directional", 60.0, 40.0, 0.75, 0.5)
+    scene.light = Light("directional", 30.0, 40.0)
+    assert (pixels(scene) == plain).all(), "a whole light has shadows of its own"
+    assert scene.undo()
+    scene.shadows = scene.occlusion = None
+    assert scene.light == Light("directional", 60.0, 40.0)
 
 
 @pytest.mark.parametrize(
@@ -82,6 +101,8 @@ def test_light_background_and_cuts(scene):
         (lambda scene: scene.edit(["light=30,40"]), "words: "),
         (lambda scene: scene.edit("TF01.specular=0.5", "TF01.opacity=-3"), r"TF01\.opacity=-3: "),
         (lambda scene: setattr(scene, "light", (3, 4, 5)), "light: "),
+        (lambda scene: setattr(scene, "shadows", -1), "light.shadows: expected a share from 0 to 1, got -1"),
+        (lambda scene: setattr(scene, "occlusion", 1), "light: expected the volume of the scene"),
         (lambda scene: scene.segment("spot", [1, 2, 3], model="TF01"), "point: "),
         (
             lambda scene: scene.segment("spot", (24, 24), size=48),

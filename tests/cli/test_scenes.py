@@ -16,10 +16,11 @@ from tests.edit.scenes import task
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
-from tests.scene.balls import write_balls
+from tests.scene.balls import balls_in_a_volume, write_balls
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.core.lens import Frame
+from texgs.core.light import Light
 from texgs.fields.gaussians import write_gaussians
 from texgs.fields.surfels.compact import read_compact, write_compact
 from texgs.fields.surfels.model_file import write_model
@@ -165,9 +166,23 @@ def test_edits_show_and_are_data(scene, tmp_path):
     assert yaml.safe_load(scene.with_name("back.yaml").read_text()) == yaml.safe_load(scene.read_text())
 
 
+def test_shadows_are_edits_that_can_be_taken_back(tmp_path):
+    (tmp_path / "here").mkdir()
+    scene = write_scene(tmp_path / "here" / "scene.yaml", balls_in_a_volume(tmp_path))
+    assert edit(scene, "shadows=0.7", "occlusion=0.5", "light=30,-10", "reach=0.3", output="dark.yaml") == 0
+    dark = scene.with_name("dark.yaml")
+    assert read_scene(dark).light == Light("directional", 30.0, -10.0, 0.7, 0.5, 0.3)
+    assert edit(dark, "shadows=", "occlusion=", "reach=", "light=") == 0
+    assert scene.with_name("new.yaml").read_text() == scene.read_text()
+    for words in (["--compare"], ["--compare", "fitted"], ["--path", "light", "--frames", "2"]):
+        assert render(dark, tmp_path / "dark.gif", *words) == 0
+
+
 @pytest.mark.parametrize(
     ("word", "message"),
     [
+        ("shadows=2", "shadows=2: light.shadows: expected a share from 0 to 1, got 2"),
+        ("shadows=0.5", "shadows=0.5: light: expected the volume of the scene for shadows and occlusion"),
         ("TF03.opacity=1", "expected a model of the scene (TF01, TF02), got TF03"),
         ("TF01/shell.opacity=1", "expected a segment of TF01 (it has none), got shell"),
         ("TF01/=none", "expected a file that is there"),

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.fields.surfels.test_composition import CAMERA
 from tests.refusals import refused
 from tests.scene.balls import balls_in_a_volume
 from texgs.cli.main import main
@@ -60,6 +61,29 @@ def test_views_lights_and_edits_are_drawn_from_a_seed(scene):
     assert np.mean([edit.opacity != 1 for edit in edits]) == pytest.approx(0.5, abs=0.1)
     heights = [float(camera.position[1]) / LENS.radius for _, camera, _ in drawn]
     assert np.abs(np.quantile(heights, [0.25, 0.5, 0.75]) - [-0.5, 0, 0.5]).max() < 0.15, "evenly"
+
+
+def test_lights_that_are_drawn_have_the_shadows_of_the_scene(scene):
+    plain = [changed for *_, changed in random_shots(scene, LENS, 20, 5)]
+    shadowed = replace(scene, light=Light("directional", 1.0, 2.0, 0.7, 0.5, 0.3))
+    drawn = [changed for *_, changed in random_shots(shadowed, LENS, 20, 5)]
+    assert {replace(each.light, kind="headlight", azimuth=0, polar=0) for each in drawn} == {
+        Light("headlight", shadows=0.7, occlusion=0.5, reach=0.3)
+    }
+    assert [(one.light.kind, one.edits) for one in drawn] == [(one.light.kind, one.edits) for one in plain]
+    lit = [(one.light, other.light) for one, other in zip(drawn, plain, strict=True)]
+    assert all(one.direction(CAMERA).equal(other.direction(CAMERA)) for one, other in lit)
+
+
+def test_a_check_with_shadows_says_so(scene, tmp_path):
+    shadowed = replace(scene, light=Light("headlight", shadows=1.0))
+    twin, composed = Twin(scene), scene.open()
+    plain, other = (
+        check(each, composed, twin, LENS, 19, 7, tmp_path / "worst.json") for each in (scene, shadowed)
+    )
+    assert "(views from anywhere, lights and edits at random)" in plain.sentence
+    assert "(views from anywhere, lights with shadows and edits at random)" in other.sentence
+    assert other.psnr != plain.psnr
 
 
 def test_a_check_tells_what_its_views_have(scene, tmp_path):

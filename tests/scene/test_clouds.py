@@ -1,5 +1,7 @@
 """Clouds for other programs: what is visible of a scene, one colour a surfel, and the light on it."""
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 from torch.testing import assert_close
@@ -8,10 +10,11 @@ from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import CAMERA, SIDE, ball
 from tests.refusals import refused
+from tests.scene.balls import balls_in_a_volume
 from tests.scene.cloud_files import drawn
 from tests.scene.test_export import plain
 from texgs.core.geometry import quats_to_matrices
-from texgs.core.light import HEADLIGHT
+from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.gaussians import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
@@ -22,8 +25,10 @@ from texgs.fields.surfels.texels import footprint, owners
 from texgs.metrics.quality import psnr
 from texgs.raster.shading import spherical_harmonics
 from texgs.scene.clouds import cloud_of, clouds_of
+from texgs.scene.exposure import exposure_of
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.segment_file import write_segment
+from texgs.scene.twin import Twin
 
 WHITE = [1.0, 1.0, 1.0]
 MATT = raw_material(0.3, 0.6, 1e-6, 20.0, "bounded")
@@ -59,6 +64,23 @@ def test_edits_and_a_light_from_the_side_are_in_the_colors():
     unlit = Composition(models).render(CAMERA, edits=edits, look="unshaded")
     shown = drawn(clouds, CAMERA, WHITE)
     assert psnr(shown, expected.color) > 32 > 25 > psnr(unlit.color, expected.color)
+
+
+def test_shadows_are_in_the_colors_as_frames_have_them(tmp_path):
+    dark = Light("directional", SIDE.azimuth, SIDE.polar, 1.0, 1.0)
+    scene = balls_in_a_volume(tmp_path, light=dark)
+    lit, dim = ((clouds_of(replace(scene, light=light))) for light in (SIDE, dark))
+    shares = exposure_of(scene.open(), scene, Twin(scene))
+    assert float(shares.min()) < 0.9
+    for one, other, (lamp, ambient) in zip(lit, dim, shares.T.split(150, dim=1), strict=True):
+        alike = np.asarray((lamp > 0.99) & (ambient > 0.99))
+        assert np.abs(one.sh - other.sh)[alike].max() < 0.02
+        assert (other.sh[:, 0] <= one.sh[:, 0] + 1e-5).all()
+    expected = scene.open().render(CAMERA, dark, exposure=shares).color
+    bright = drawn(lit, CAMERA, WHITE)
+    assert psnr(drawn(dim, CAMERA, WHITE), expected) > psnr(bright, expected) + 1
+    baked = Scene({"C": SceneModel(write_gaussians(tmp_path / "c.safetensors", gaussians(30)))}, dark)
+    refused(lambda: clouds_of(baked), "expected surfels for shadows and occlusion, got gaussians")
 
 
 def test_the_color_is_that_of_the_mean_texel_under_the_gaussian():

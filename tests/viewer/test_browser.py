@@ -10,6 +10,7 @@ from PIL import Image
 from tests.edit.lift_scenes import two_balls
 from tests.viewer.in_browser import (
     JPEG,
+    LINK,
     PLACE,
     WAIT,
     drag,
@@ -71,6 +72,7 @@ def test_a_movement_is_one_step(chromium, scene_file):
         drag(page, slider, (0.5, 0.5), (0.05, 0.5))
         expect(page.get_by_role("listitem")).to_have_text([f"TF01 opacity {float(slider.input_value()):g}"])
         assert float(slider.input_value()) < 0.3
+        expect(page.get_by_role("slider", name="Shadows"), "there is no volume").to_have_count(0)
         drag(page, page.locator(".ball"), (0.5, 0.5), (0.9, 0.5))
         expect(page.get_by_role("listitem")).to_have_text(
             [re.compile("TF01 opacity"), re.compile("light azimuth .*°, polar .*°")]
@@ -88,6 +90,35 @@ def test_a_movement_is_one_step(chromium, scene_file):
         assert first - last == pytest.approx(0.01)
         save_as(page, "moved.yaml")
         assert still(page) == rendered(scene_file.parent / "moved.yaml", page)
+
+
+def test_sliders_under_the_light_are_of_shadows_and_occlusion(chromium, sphere_file):
+    with served(sphere_file) as (_, address), opened(chromium, address) as page:
+        first, shadows = still(page), page.get_by_role("slider", name="Shadows", exact=True)
+        expect(page.get_by_text("casts no shadows")).to_be_visible()
+        page.get_by_role("spinbutton", name="Occlusion of ambient light, as a number").fill("0.5")
+        page.get_by_role("checkbox", name="Headlight").uncheck()
+        drag(page, shadows, (0.5, 0.5), (0.7, 0.5))
+        drag(page, page.locator(".ball"), (0.5, 0.5), (0.9, 0.5))
+        share = float(shadows.input_value())
+        assert 0.5 < share < 1
+        steps = page.get_by_role("listitem")
+        light = re.compile("light azimuth .*°, polar .*°")
+        expect(steps).to_have_text(["occlusion 0.5", light, f"shadows {share:g}", light])
+        expect(page).to_have_url(re.compile("shadows"), timeout=WAIT)
+        save_as(page, "dark.yaml")
+        dark, shadowed = sphere_file.with_name("dark.yaml"), still(page)
+        saved = read_scene(dark).light
+        assert (saved.kind, saved.shadows, saved.occlusion) == ("directional", share, 0.5)
+        assert shadowed == rendered(dark, page) != first
+        page.goto(f'{address}#edits=[{{"part":"","key":"shadows","value":2}}]')
+        expect(page.get_by_text("This page cannot use of the link: shadows.")).to_be_visible()
+        page.goto(address + LINK)
+        page.get_by_role("button", name="Reset shadows").click()
+        expect(shadows).to_have_value("0")
+        page.get_by_role("button", name="Undo").click()
+        expect(shadows).to_have_value(f"{share:g}")
+        assert still(page) == shadowed
 
 
 def test_planes_cut_move_and_tilt(chromium, scene_file):

@@ -200,6 +200,16 @@ async def test_pages_share_edits_and_their_history(browser, client):
 
 
 @on_page
+async def test_reach_is_an_edit_of_the_scene_that_stays_with_its_light(browser):
+    await browser.send(type="edit", part="", key="reach", value=0.5)
+    await browser.send(type="edit", part="", key="light", value={"azimuth": 30, "polar": 40})
+    news = await browser.past("reach 0.5", "light {'azimuth': 30, 'polar': 40}")
+    assert news["scene"]["reach"] == 0.5
+    await browser.send(type="edit", part="", key="reach")
+    assert (await browser.next("scene"))["scene"]["reach"] == 0.25
+
+
+@on_page
 async def test_pages_cut_the_scene(browser, client):
     up = {"normal": [0, 2, 0], "offset": 0.5}
     edit = {"type": "edit", "part": "", "key": "cuts", "step": 1}
@@ -241,6 +251,11 @@ async def test_a_movement_goes_on_from_its_own_step_only(browser, client):
     [
         ({"part": "TF03", "key": "opacity", "value": 1}, "a model of the scene (TF01, TF02), got TF03"),
         ({"part": "", "key": "light", "value": "up"}, "expected headlight, or azimuth and polar"),
+        ({"part": "", "key": "shadows", "value": "dark"}, "light.shadows: expected a number, got 'dark'"),
+        (
+            {"part": "", "key": "occlusion", "value": 0.5},
+            "light: expected the volume of the scene for shadows",
+        ),
         ({"part": "", "key": "cuts", "value": {"planes": 3}}, "cuts.planes: expected"),
     ],
 )

@@ -41,7 +41,16 @@ class Editing:
     __slots__ = ("__weakref__", "_count", "_kept", "_scratch", "_viewer", "session")  # a slip is an error
 
     _part = ""  # none: values are of the whole scene
-    light = Value[Light]('Light: set "headlight", or azimuth and polar angle in degrees.')
+    light = Value[Light](
+        'Light: set "headlight", or azimuth and polar angle in degrees; shadows and occlusion stay.'
+    )
+    shadows = Value[float](
+        "Share of a directional light that matter in its way takes away: set 0, none, to 1.", of="light"
+    )
+    occlusion = Value[float](
+        "Share of ambient light that matter around takes away: set 0, none, to 1.", of="light"
+    )
+    reach = Value[float]("How far matter is that hides ambient light: set world units up to 2.", of="light")
     background = Value["tuple[float, float, float]"](
         'Colour behind the scene: set red, green, blue from 0 to 1, or "#rrggbb".'
     )

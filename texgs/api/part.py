@@ -20,10 +20,15 @@ class Edited(Protocol):
 
 
 class Value(Generic[T]):
-    """A value of an edit. Setting it is a step of the history; None takes the edit back."""
+    """A value of an edit. Setting it is a step of the history; None takes the edit back.
 
-    def __init__(self, words: str = "") -> None:
-        self.__doc__ = words
+    Args:
+        words: what it is.
+        of: the value of a scene that has it, such as "light"; default the scene or the part itself.
+    """
+
+    def __init__(self, words: str = "", of: str = "") -> None:
+        self.__doc__, self._of = words, of
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._key = name
@@ -32,7 +37,8 @@ class Value(Generic[T]):
         if of is None:
             return cast(T, self)
         scene = of.session.scene
-        return cast(T, getattr(entry_of(scene, of._part).edit if of._part else scene, self._key))
+        owned: Any = entry_of(scene, of._part).edit if of._part else scene
+        return cast(T, getattr(getattr(owned, self._of) if self._of else owned, self._key))
 
     def __set__(self, of: Edited, value: Any) -> None:
         words = (of._part, self._key, "as fitted" if value is None else str(value))

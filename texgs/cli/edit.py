@@ -19,8 +19,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="MODEL.KEY=VALUE with visible, palette (r,g,b from 0 to 1, or #rrggbb), opacity, ambient, "
         "diffuse, specular, shininess (factors), tint (a colour, of highlights), texture (a file) or file "
-        "(another model); light=headlight or light=AZIMUTH,POLAR; background=#rrggbb; time=STEP of a "
-        "series; cut=AXIS,POSITION (x, -x, y, ...; world units, or samples as in 64v; or R, A, S, L, P, "
+        "(another model); light=headlight or light=AZIMUTH,POLAR; shadows=SHARE and occlusion=SHARE, "
+        "of the light and of ambient light that matter takes away (0 to 1), and reach=DISTANCE of what hides "
+        "ambient light (world units); background=#rrggbb; time=STEP of a series; cut=AXIS,POSITION (x, -x, "
+        "y, ...; world units, or samples as in 64v; or R, A, S, L, P, "
         "I, X, Y, Z, of the volume's file, in its unit, as in S,-12mm) or "
         "cut=NX,NY,NZ,OFFSET adds a plane, cut.1=... replaces it, cut= takes all back; "
         "cut.box=X0,Y0,Z0,X1,Y1,Z1; cut.faces=shaded or unlit; MODEL.KEY= takes an edit back; "

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.lens import Lens
 from texgs.core.light import Light
@@ -22,7 +23,9 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import FAR_DISTANCE
 from texgs.fields.surfels.texels import with_single_texels
 from texgs.raster.reference.shading import harmonics
+from texgs.scene.exposure import exposure_of, require_shadows
 from texgs.scene.scene import Scene
+from texgs.scene.twin import twin_of
 from texgs.volume.cameras import icosphere_of
 from texgs.volume.space import Space
 
@@ -49,12 +52,18 @@ def clouds_of(scene: Scene) -> list[Cloud]:
     """Return the visible splats of each model of surfels or 3D Gaussians, as edited and lit, but not cut.
 
     Raises:
-        ArgumentError: if a model cannot be opened, or nothing is visible.
+        ArgumentError: if a model cannot be opened, nothing is visible, or there can be no shadows.
     """
-    clouds = []
+    clouds, start, exposure, whole = [], 0, None, replace(scene, cuts=NO_CUTS)
+    if scene.light.casts_shadows:
+        require_shadows(scene)
+        exposure = exposure_of(scene.open(), whole, twin_of(whole))
     for name, entry in scene.models.items():
         with errors_at(f"models.{name}"):
-            clouds.append(cloud_of(name, entry.open(), entry.edits, scene.light))
+            opened = entry.open()
+            own = None if exposure is None else exposure[start : start + len(opened[0])]
+            clouds.append(cloud_of(name, opened, entry.edits, scene.light, own))
+            start += len(opened[0])
     visible = [cloud for cloud in clouds if len(cloud.means)]
     if not visible:
         raise ArgumentError("models: expected at least one visible splat, got none; show a model")
@@ -86,14 +95,21 @@ def place_cloud(cloud: Cloud, space: Space) -> Cloud:
 
 @torch.no_grad()
 def cloud_of(
-    name: str, opened: tuple[Field, Sequence[Tensor]], edits: Sequence[PartEdit], light: Light
+    name: str,
+    opened: tuple[Field, Sequence[Tensor]],
+    edits: Sequence[PartEdit],
+    light: Light,
+    exposure: Tensor | None = None,
 ) -> Cloud:
-    """Return the visible cloud of a model from `SceneModel.open`; edits are as in `EditableModel`."""
+    """Return the visible cloud of a model from `SceneModel.open`.
+
+    Edits are as in `EditableModel`, the exposure as in `Composed.render`.
+    """
     model, masks = cast("Surfels | Gaussians", opened[0]), opened[1]
     means, quats, scales, opacities = geometry(model.parameters)
     is_flat = isinstance(model, Surfels)
     if isinstance(model, Surfels) and model.stage != "surfels":
-        opacities, sh = light_harmonics(model, masks, edits, light)
+        opacities, sh = light_harmonics(model, masks, edits, light, exposure)
     else:
         (factor,) = opacity_factors(edits, 1, model.kind)
         opacities, sh = (opacities * factor).clamp_max(1), model.parameters["sh"]
@@ -105,7 +121,11 @@ def cloud_of(
 
 
 def light_harmonics(
-    model: Surfels, masks: Sequence[Tensor], edits: Sequence[PartEdit], light: Light
+    model: Surfels,
+    masks: Sequence[Tensor],
+    edits: Sequence[PartEdit],
+    light: Light,
+    exposure: Tensor | None,
 ) -> tuple[Tensor, Tensor]:
     """Return opacities [N] and harmonics [N, K, 3] of edited surfels with one colour each, under a light.
 
@@ -115,7 +135,7 @@ def light_harmonics(
     model = with_single_texels(model) if model.stage == "texture" else model
     texels = model.parameters.get("texels", torch.zeros_like(model.parameters["colors"]))
     part = EditableModel(model, masks)
-    edited = part.apply(edits)
+    edited = part.apply(edits) if exposure is None else part.apply(edits).exposed(exposure)
     cameras = icosphere_of(DIRECTIONS, Lens(radius=FAR_DISTANCE))
     views = normalize(torch.stack([-camera.position for camera in cameras]).double(), dim=1)  # [M, 3]
     count = COEFFICIENTS[light.kind]
