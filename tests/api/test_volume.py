@@ -1,6 +1,7 @@
 """Volumes from arrays of other libraries: the same samples at the same places, and pictures of them."""
 
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,9 @@ from tests.volume.zarr_files import axes_of, write_image
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import Light
+from texgs.scene.scene import Scene, SceneModel, SceneVolume
+from texgs.scene.scene_file import light_of
+from texgs.scene.twin import Twin
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.nrrd_file import open_grid
@@ -180,6 +184,22 @@ def test_a_picture_is_what_the_caster_sees_over_the_background():
     rgba = caster.cast(tf, orbit(10, 15, *lens), Light("directional", 50, 20)).rgba.double().numpy()
     expected = rgba[..., :3] + (1 - rgba[..., 3:]) * background
     assert np.abs(np.asarray(picture) - 255 * expected.clip(0, 1)).max() <= 0.5001
+
+
+def test_a_picture_may_have_shadows():
+    """Those of a twin with the same functions."""
+    volume, light = texgs.Volume(field(20, 21, 22)), {"azimuth": 50, "polar": 20, "shadows": 1, "reach": 0.5}
+    functions = {"a": RED, "b": BLUE}
+    plain, dark, darker = (
+        np.asarray(volume.render(functions, 10, 15, 40, light=light | {"shadows": x, "occlusion": y})) / 255
+        for x, y in ((0, 0), (1, 0), (1, 1))
+    )
+    assert plain.mean() > dark.mean() + 1e-3 > darker.mean() + 2e-3
+    entries = {name: SceneModel(Path("x")) for name in functions}
+    scene = Scene(entries, light_of(light), volume=SceneVolume(volume.file, functions))
+    lens = frame_of(volume.grid, [RED, BLUE]).lens(width=40, height=40)
+    expected = Twin(scene).render(orbit(10, 15, *lens), scene, [(0.0, 0.0, 0.0)] * 2).color.numpy()
+    assert np.abs(dark - expected.clip(0, 1)).max() <= 0.5001 / 255
 
 
 def test_suggested_functions_plot_themselves():

@@ -26,6 +26,7 @@ from texgs.scene.scene_file import light_of
 from texgs.scene.shot import Shot
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
+from texgs.volume.matter import Matter
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
 from texgs.volume.prepare import prepare
@@ -151,7 +152,7 @@ class Volume:
         width: int = 800,
         height: int | None = None,
         *,
-        light: Light | str | tuple[float, float] = "headlight",
+        light: Light | str | tuple[float, float] | dict[str, float] = "headlight",
         background: str | Sequence[float] = WHITE,
         step: float = Appearance().step,
     ) -> Image:
@@ -164,14 +165,19 @@ class Volume:
             polar: of the camera above the horizon, degrees.
             width: pixels.
             height: pixels; default the width.
-            light: "headlight", or azimuth and polar angle in degrees.
+            light: "headlight", azimuth and polar angle in degrees, or keys of a scene file's light such as
+                `{"polar": 40, "shadows": 0.7}`.
             background: red, green, blue from 0 to 1, or "#rrggbb".
             step: distance of samples along rays, voxels.
         """
         tfs = named(self.suggest() if functions is None else functions)
-        caster = Caster(self.grid, replace(Appearance(), step=step))
+        look, shown, lit = replace(Appearance(), step=step), overlays(tfs), light_of(as_python(light))
+        caster, cells = Caster(self.grid, look), None
         view = Shot(width, height, azimuth=azimuth, polar=polar).camera(frame_of(self.grid, tfs.values()))
-        rgba = caster.cast(overlays(tfs), view, light_of(as_python(light))).rgba
+        if lit.casts_shadows:
+            matter, reach = Matter(caster, shown, look.opacity_unit), lit.reach if lit.occlusion else None
+            cells = matter.lit(lit.direction(view) if lit.kind == "directional" else None, reach)
+        rgba = caster.cast(shown, view, lit, cells=cells).rgba
         behind = rgba.new_tensor(color("background", as_python(background)))
         return picture_of(quantize(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))
 
