@@ -10,6 +10,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,9 +22,11 @@ from benchmarks.browser import viewer as view
 from benchmarks.results import RESULTS, ROOT, add
 from texgs.core.camera import orbit
 from texgs.core.figures import Cell, Row, as_picture, content, grid_rows, lay_out
+from texgs.core.light import Light
+from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
-from texgs.scene.twin import twin_of
+from texgs.scene.twin import Twin, twin_of
 from tools import workflow_picture
 
 DOCS, RUNS = ROOT / "docs", ROOT / "build" / "pictures"
@@ -54,6 +57,8 @@ LOOKS = {  # title: scene file below the scenes of the demo
     "one lobe in crimson": "edits/crimson/scene.yaml",
 }
 
+SHADOWED = Light("directional", -60.0, 60.0, shadows=0.8, occlusion=0.6)  # as docs/scenes.md has it
+
 
 def shown(scene_file: Path, size: int, azimuth: float = 30, polar: float = 20) -> np.ndarray:
     """Return a scene [size, size, 3], uint8, under its own light."""
@@ -78,6 +83,19 @@ def looks(run: Path) -> Image.Image:
     sides = {"front": (30, 20), "from above": (150, 50)}
     rows = {side: [shown(scene, 512, *angles) for scene in scenes] for side, angles in sides.items()}
     return as_picture(lay_out(grid_rows(rows, titles)))
+
+
+def shadows(run: Path) -> Image.Image:
+    """Draw a scene and its volume side by side, without shadows and occlusion, and with both."""
+    scene = read_scene(run / "orbital/scene/demo" / LOOKS["as fitted"])
+    camera = orbit(30, 20, *scene.framed().lens().square(512))
+    composed, twin, pictures = scene.open(), Twin(scene), list[np.ndarray]()
+    for light in (SHADOWED.unhidden, SHADOWED):
+        pair = scene_and_volume(composed, camera, replace(scene, light=light), twin)
+        pictures += [each.color.clamp(0, 1).numpy() for each in pair]
+    box, titles = content(pictures), ("scene", "volume", "scene, shadows", "volume, shadows")
+    cells = [Cell(title, each[box]) for title, each in zip(titles, pictures, strict=True)]
+    return as_picture(lay_out([Row("", cells)]))
 
 
 def views(run: Path) -> Image.Image:
@@ -139,6 +157,7 @@ FIT = "volume views surfels shading texture"
 PICTURES = {
     "workflow": Picture(workflow_picture.draw, "demo", f"{FIT} compose pse image text segment edit_metrics"),
     "hero": Picture(hero, "demo", f"{FIT} compose pse image text"),
+    "shadows": Picture(shadows, "demo", f"{FIT} compose texgs.scene.cut_view"),
     "views": Picture(views, "demo", "volume views sheet"),
     "edits": Picture(copy("orbital/scene/demo/pse/pse.png"), "demo", f"{FIT} pse"),
     "looks": Picture(looks, "demo", f"{FIT} compose image text segment"),

@@ -114,13 +114,14 @@ def test_edits_are_compared_with_the_volume(results):
     assert all(step["object_psnr"] < step["psnr"] - 3 for step in metrics["pse"])
     assert all(step["psnr"] > 12 for step in (*metrics["pse"], *metrics["relight"]))
     assert metrics["pse"][0]["psnr"] > 16
-    for name in ("pse.png", "relight.png"):
+    for name in ("pse.png", "relight.png", "shadows.png"):
         assert (results / "pse" / name).stat().st_size > 5000
     check, told = metrics["check"], json.loads((results / "pse" / "metrics.json").read_text())
     assert check["psnr"]["worst"] <= check["psnr"]["floor"] <= check["psnr"]["mean"]
     composed = results / "compose" / "scene.yaml"
     assert found_sentence(composed, read_scene(composed)) == check["sentence"]
     assert "in 95 of 100 such views" in told["pictures"]["check.png"]
+    assert told["pictures"]["shadows.png"].startswith("Light and shadow: ")
     last = read_scene(results / "pse" / "pse-4.yaml")
     edit = last.models["TF01"].edit
     assert (edit.opacity, edit.ambient, last.light.azimuth) == (0.4, 0.7, -150.0), (

@@ -148,3 +148,17 @@ def test_the_verb_writes_numbers_and_a_picture(scene, tmp_path, monkeypatch, cap
         assert main(["check", file, *more]) == 2
         assert named in capsys.readouterr().err, "before any view"
     assert not list(tmp_path.glob("none*"))
+
+
+def test_what_a_check_has_found_holds_for_its_shadows(scene, tmp_path):
+    """Whatever the direction of the light, which a check draws at random."""
+    light = Light("directional", 10, 20, shadows=0.7, occlusion=0.4, reach=0.2)
+    dark, twin, composition = replace(scene, light=light), Twin(scene), scene.open()
+    result = check(dark, composition, twin, LENS, 19, 7, tmp_path / "ball-check.json")
+    views = [compare(*scene_and_volume(composition, *x[1:], twin)) for x in random_shots(dark, LENS, 19, 7)]
+    assert result.psnr["mean"] == pytest.approx(np.mean([each["psnr"] for each in views]))
+    path = tmp_path / "ball.yaml"
+    for same in (light, light.turned(90, 10), replace(light, kind="headlight")):
+        assert found_sentence(path, replace(scene, light=same)) == result.sentence
+    for other in (light.unhidden, replace(light, shadows=0.6), replace(light, reach=0.3)):
+        assert found_sentence(path, replace(scene, light=other)) == ""

@@ -4,7 +4,7 @@ import asyncio
 import io
 import json
 import threading
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from tests.refusals import refused
 from tests.viewer.pages import TOKEN, on_page, origin, page
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
+from texgs.core.light import Light
 from texgs.edit.new_look import learn_look
 from texgs.edit.readable import MATERIALS
 from texgs.fields.part_edit import PartEdit
@@ -284,6 +285,15 @@ async def test_a_thumbnail_is_the_scene_with_a_picture_on_it(browser, client):
         np.asarray(Image.open(io.BytesIO(other))).astype(int) - np.asarray(small).astype(int)
     ).mean()
     assert off < 0.5 * others
+
+
+def test_a_thumbnail_leaves_shadows_out(scene_file, tmp_path):
+    """Its scene needs no volume; the look itself is the same."""
+    scene, asked = read_scene(scene_file), Look(style="glass", camera=FRONT)
+    dark = replace(scene, light=Light("directional", 30, 40, shadows=0.8, occlusion=0.5))
+    lit = replace(scene, light=dark.light.unhidden)
+    looks = Looks(Styles(tmp_path), tmp_path / "looks")
+    assert looks.thumbnail(dark, asked) == looks.thumbnail(lit, asked)
 
 
 @on_page

@@ -72,6 +72,6 @@ def require_checked(scene: Path, words: str) -> None:
     """Require that `texgs check` has found something of a scene."""
     if not words:
         raise ArgumentError(
-            f"--caption: expected {scene.stem}-check.json here or beside the scene, of its models as they "
-            f"are; run texgs check {scene} first"
+            f"--caption: expected {scene.stem}-check.json here or beside the scene, of its models and "
+            f"shadows as they are; run texgs check {scene} first"
         )

@@ -16,6 +16,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.figures import write_grid
 from texgs.core.io import read_json, write_json
 from texgs.core.lens import Lens
+from texgs.core.light import HIDING
 from texgs.core.progress import progress
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
@@ -85,16 +86,18 @@ def found_sentence(path: Path, scene: Scene) -> str:
 
 
 def checksum_of(scene: Scene) -> str:
-    """Return a checksum of the models with their looks, independent of other edits."""
-    files = [(name, file) for name, model in scene.models.items() for file in model.files if file]
-    return combined_checksum((name, sha256(file)) for name, file in files)
+    """Return a checksum of the models with their looks, and of shadows; independent of other edits."""
+    files = [(name, sha256(file)) for name, model in scene.models.items() for file in model.files if file]
+    if scene.light != scene.light.unhidden:
+        files += [(key, str(getattr(scene.light, key))) for key in HIDING]
+    return combined_checksum(files)
 
 
 def random_shots(scene: Scene, lens: Lens, count: int, seed: int) -> Iterator[tuple[str, Camera, Scene]]:
     """Yield independent views with a title, from anywhere on a sphere, with lights and edits at random.
 
-    They are not cut: a cut scene may show its volume itself. Opacities and palettes that are not edited are
-    those of the scene. A seed gives the same again.
+    They are not cut: a cut scene may show its volume itself. Shadows and occlusion, and opacities and
+    palettes that are not edited, are those of the scene. A seed gives the same again.
     """
     random = Random(seed)
 

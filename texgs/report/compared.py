@@ -3,15 +3,18 @@
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from texgs.core.camera import Camera
+from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
+from texgs.core.figures import write_grid
+from texgs.core.lens import Lens
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
-from texgs.metrics.quality import compare, mean
+from texgs.metrics.quality import MAX_PSNR, compare, mean
 from texgs.raster import Render
 from texgs.report.beside_volume import change_words, changes_of, pictures, score_words, side_by_side
 from texgs.report.results import COMPARED_VIEWS, ViewComparison
@@ -26,6 +29,10 @@ POLAR = 20.0  # polar angle of compared views, degrees
 LEFT_LIGHT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
 # Polar angles of the light in the paper's figure, degrees.
 SWEEP_ANGLES = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)
+SHADOWED_SIDE = -60.0  # azimuth of a view that shows shadows, degrees: it sees two sides
+# Azimuths and polar angles of lights on the left, on the right, above and behind in that view, degrees.
+SHADOWING_LIGHTS = ((-130.0, 30.0), (10.0, 30.0), (-60.0, 75.0), (70.0, 40.0))
+SHADOWS, OCCLUSION = 0.8, 0.6  # shares: shadows are plain, and what lies in them can be seen
 
 
 def mean_scores(pairs: Iterable[tuple[Render, Render]]) -> dict[str, float]:
@@ -90,10 +97,12 @@ class SideBySide:
     @property
     def sentences(self) -> list[str]:
         """Return the means of PSNR and SSIM so far, and the changes by edits."""
-        return [
-            ", ".join(score_words(mean(self._scores))),
-            *([change_words(self._changes)] * self._is_fitted),
-        ]
+        scores = ", ".join(score_words(mean(self._scores)))
+        if not self._is_fitted:
+            return [scores]
+        light = self._session.scene.light
+        left_out = ["both without shadows and occlusion"] * (light != light.unhidden)
+        return [scores, change_words(self._changes), *left_out]
 
     def _pair(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
         """Render a view of a scene, and its counterpart."""
@@ -102,8 +111,7 @@ class SideBySide:
         can = kind_of(next(iter(scene.models.values())).file).can
         outputs = ("depth", "normal") if "normals" in can else ("depth",)
         now, before = (self._session.composition_of(each) for each in (scene, scene.as_fitted))
-        twin = self._session.twin_of(scene) if scene.light.casts_shadows else None
-        return scene_and_fitted(now, before, camera, scene, twin, outputs)
+        return scene_and_fitted(now, before, camera, scene, outputs)
 
 
 def caption(entry: ViewComparison) -> str:
@@ -139,6 +147,25 @@ def light_sweep(scene: Scene) -> dict[str, Scene]:
         f"light at (-90°, {polar:g}°)": replace(scene, light=scene.light.turned(-90.0, polar))
         for polar in SWEEP_ANGLES
     }
+
+
+def write_light_figure(path: Path, scene: Scene, composition: Composed, twin: Twin, lens: Lens) -> Path:
+    """Write a PNG of a scene, and of its volume below, under four lights with shadows and occlusion.
+
+    Above each is the PSNR on the object, and that of the same pictures without both.
+    """
+    camera = orbit(SHADOWED_SIDE, POLAR, *lens)
+    rows, titles = {"scene": list[np.ndarray](), "volume": list[np.ndarray]()}, []
+    for azimuth, polar in SHADOWING_LIGHTS:
+        light = replace(scene.light.turned(azimuth, polar), shadows=SHADOWS, occlusion=OCCLUSION)
+        scenes = (replace(scene, light=each) for each in (light, light.unhidden))
+        pair, plain = (scene_and_volume(composition, camera, each, twin) for each in scenes)
+        shown = pictures(*pair)
+        for name, row in rows.items():
+            row.append(shown[name])
+        hidden, lit = (compare(*each).get("object_psnr", MAX_PSNR) for each in (pair, plain))
+        titles.append(f"({azimuth:g}°, {polar:g}°): {hidden:.1f} dB\nwithout shadows: {lit:.1f} dB")
+    return write_grid(path, rows, titles)
 
 
 def with_edits(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:

@@ -1,6 +1,7 @@
 """Views of a cut scene: faces of its volume, and the remaining parts of its models."""
 
 from collections.abc import Collection
+from dataclasses import replace
 from functools import partial
 from math import ceil
 
@@ -159,18 +160,14 @@ def scene_and_volume(composed: Composed, camera: Camera, scene: Scene, twin: Twi
 
 
 def scene_and_fitted(
-    composed: Composed,
-    fitted: Composed,
-    camera: Camera,
-    scene: Scene,
-    twin: Twin | None,
-    outputs: Collection[str],
+    composed: Composed, fitted: Composed, camera: Camera, scene: Scene, outputs: Collection[str]
 ) -> tuple[Render, Render]:
-    """Render a view of a scene, and the same view of its fitted models, with some outputs.
+    """Render a view of a scene, and the same view of its fitted models.
 
-    Cuts have no faces in either: the twin is for shadows alone.
+    In neither have cuts faces, nor does matter hide light: differences are those of the models.
     """
+    scene = replace(scene, light=scene.light.unhidden)
     camera = camera.to(composed.device)
     background = camera.viewmat.new_tensor(scene.background)
-    view = partial(cut_view, camera=camera, twin=twin, background=background, outputs=outputs)
+    view = partial(cut_view, camera=camera, twin=None, background=background, outputs=outputs)
     return view(composed, scene=scene), view(fitted, scene=scene.as_fitted)

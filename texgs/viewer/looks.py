@@ -98,6 +98,7 @@ class Looks:
         tried = self.tried(scene, replace(asked, camera=None))
         shown, file = with_looks(scene, tried.looks), io.BytesIO()
         camera = asked.camera.camera(THUMBNAIL_ROWS / asked.camera.height)
+        shown = replace(shown, light=shown.light.unhidden)  # its volume would have to be read first
         Image.fromarray(frame(shown.open(self._device), camera, shown)).save(file, "JPEG", quality=90)
         return file.getvalue()
 
