@@ -92,7 +92,8 @@ class JoinedGaussians(UnlitScene[Gaussians]):
         self.whole = join_models(models)
 
     def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
-        return self.whole.render(camera, opacity=self._per_gaussian(factors), **asked._asdict())
+        of_view = {key: value for key, value in asked._asdict().items() if key != "exposure"}
+        return self.whole.render(camera, opacity=self._per_gaussian(factors), **of_view)
 
     def with_edits(self, edits: Sequence[PartEdit]) -> Gaussians:
         """Return the visible Gaussians as one model, with edited opacities."""
