@@ -7,6 +7,7 @@ from tests.cuda_emulation import emulated
 from tests.raster.operations import OPERATIONS, of_operation
 from tests.raster.scenes import gaussians, random_scene, textured
 from tests.raster.test_determinism import everything, voxels
+from tests.volume import test_light_devices as light
 
 pytestmark = pytest.mark.emulated
 
@@ -28,6 +29,7 @@ COMPUTED = {
     "gaussians": lambda: everything(gaussians(random_scene(3, n=150))),
     "textured surfels": lambda: everything(textured(random_scene(2, n=150))),
     "operations": operations,
+    "light": lambda: light.everything("float32"),
     "voxels": lambda: dict(enumerate(voxels(2, size=(16, 12, 16), n_rays=400))),
 }
 

@@ -15,7 +15,7 @@ TESTS = Path(__file__).parents[1]
 KERNELS = ("operations", "losses", "shading", "voxels", "voxel_grid", "convolution")
 FILES = [
     *(TESTS / "raster" / f"test_{name}.py" for name in (*KERNELS, "images_and_gradients")),
-    *(TESTS / "volume" / f"test_{name}.py" for name in ("caster", "cuts", "lookup")),
+    *(TESTS / "volume" / f"test_{name}.py" for name in ("caster", "cuts", "lookup", "light_devices")),
 ]
 # Without what computes the same on all of them; of random scenes, whose float64 definition takes long, those
 # with all images, with numbers of channels that fill no vector, and with all that a texture can have.

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from texgs.core.camera import Camera, orbit_direction
 from texgs.core.cuts import Cuts
@@ -29,7 +30,6 @@ from texgs.volume.overlay import overlays
 from texgs.volume.transfer import TransferFunction
 
 T = TypeVar("T")
-KEPT_LIGHTS = 2  # of the scene, and of the functions that it tries
 
 
 class Twin:
@@ -48,8 +48,10 @@ class Twin:
         self._volume, self._device, self._by_cell = volume_of(scene), torch.device(device), True
         with errors_at("volume"):
             self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
-        self._matter = deque[tuple[object, Matter]](maxlen=KEPT_LIGHTS)  # of all copies
-        self._cells = deque[tuple[object, LightCells]](maxlen=KEPT_LIGHTS)
+        self._matter = deque[tuple[object, Matter]](maxlen=1)  # the latest, of all copies
+        self._cells = deque[tuple[object, LightCells]](maxlen=1)
+        self.places = deque[tuple[object, Tensor]](maxlen=1)  # see `texgs.scene.exposure`
+        self.exposures = deque[tuple[object, Tensor]](maxlen=1)
         for name in scene.models:
             self._tf(name)
 

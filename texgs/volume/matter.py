@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import grid_sample
 
 from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.raster import native
@@ -69,6 +70,17 @@ class Matter:
         if to_light is not None:
             self._call("texgs_transmittance", to_light.float().cpu().contiguous(), light)
         return LightCells(light, self.half)
+
+    @property
+    def edge(self) -> float:
+        """Return the shortest edge of a cell, which extinctions are of; world units."""
+        return min(2 * half / n for half, n in zip(self.half, self._cells.size, strict=True))
+
+    def at(self, points: Tensor) -> Tensor:
+        """Return the extinction [N] at points [N, 3] of the world, those of the box beyond it."""
+        places = (points / points.new_tensor(self.half)).reshape(1, 1, 1, -1, 3)
+        values = self.extinction[None, None]
+        return grid_sample(values, places, padding_mode="border", align_corners=False).reshape(-1)
 
     def _everywhere(self) -> Tensor:
         """Return shares of 1 [Z, Y, X, 2]."""

@@ -52,12 +52,19 @@ inline int places_per_cell(const texgs_volume& volume, const texgs_cells& cells,
     return places < 2 ? 2 : places > 8 ? 8 : places;
 }
 
+// The distance of places along an axis, in samples: place i is at (i + 0.5) times it.
+inline float spacing_of(const texgs_volume& volume, const texgs_cells& cells, int axis) {
+    const int places = places_per_cell(volume, cells, axis) * cells.size[axis];
+    return static_cast<float>(volume.size[axis] - 1) / static_cast<float>(places);
+}
+
 // How far columns are at a slice from where they count, along U or V, in cells.
 TEXGS_MATHS double shift_of(const Columns& c, int axis, int slice) { return c.slope[axis] * slice - c.base[axis]; }
 // The place of a slice along w.
 TEXGS_MATHS int place_of(const Columns& c, int slice) { return c.is_from_end ? c.slices - 1 - slice : slice; }
 
-inline double ceiling(double a) { return ::ceil(a - 1e-9); }
+// How many more columns it takes to reach `far` cells beyond the others, also where rounding makes that a little more.
+inline double columns_beyond(double far) { return far > 0.0 ? ::ceil(far + 1e-9) : 0.0; }
 
 inline Columns columns_of(const texgs_cells& cells, const float (&to_light)[3]) {
     double along[3], length = 0.0;  // in cells
@@ -78,8 +85,8 @@ inline Columns columns_of(const texgs_cells& cells, const float (&to_light)[3]) 
     for (int i = 0; i < 2; ++i) {
         c.slope[i] = -along[i ? c.v : c.u] / ::fabs(along[c.w]);
         const double far = c.slope[i] * (c.slices - 1);
-        c.base[i] = far > 0.0 ? ceiling(far) : 0.0;
-        count[i] = (i ? c.n_v : c.n_u) + static_cast<int>(c.base[i] + (far < 0.0 ? ceiling(-far) : 0.0)) + 1;
+        c.base[i] = columns_beyond(far);
+        count[i] = (i ? c.n_v : c.n_u) + static_cast<int>(c.base[i] + columns_beyond(-far)) + 1;
     }
     c.wide = count[0], c.high = count[1];
     return c;

@@ -22,9 +22,8 @@ typedef struct {
 
 /* The mean extinction of each cell, extinction [z, y, x]: the logarithm to base 2, negated, of the light that its
  * shortest edge lets through, over places in it that are no farther apart than samples are, up to eight along an axis;
- * at most 16 at each of them.
- * Places with n.x > offset for one of planes [n_planes, 4] of n and offset show nothing; nor do bricks with a distance
- * above 0. */
+ * at each of them at most 16. Places with n.x > offset for one of planes [n_planes, 4] of n and offset, at most
+ * TEXGS_MAX_PLANES, show nothing; nor do bricks with a distance above 0. */
 TEXGS_API int32_t texgs_extinction(const texgs_volume*, const texgs_transfer*, int32_t n, const uint8_t* distance,
                                    float opacity_unit, const float* planes, int32_t n_planes, const texgs_cells*,
                                    float* extinction, void* stream);

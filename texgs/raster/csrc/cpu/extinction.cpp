@@ -12,18 +12,18 @@ namespace {
 
 constexpr int kMostPlaces = 8 * TEXGS_LIGHT_SIDE;
 
-// Places of a row of the finer lattice: place i is at (i + 0.5) * spacing along x, in samples.
+// Places of a row of the finer lattice.
 template <class T>
 class Row {
 public:
     Row(const ExtinctionJob& job, int places) : job_(job), lattice_(lattice_of(job.volume)), places_(places) {
         per_edge_ = shortest_edge(job.cells) / job.opacity_unit;
-        spacing_ = lattice_.last[0] / static_cast<float>(places);
+        for (int a = 0; a < 3; ++a) spacing_[a] = spacing_of(job.volume, job.cells, a);
     }
 
-    // Adds the extinctions of its places at (y, z), in samples, to sums.
-    void add(float y, float z, float* sums) {
-        const float at[2] = {y, z};
+    // Adds the extinctions of its places at the j-th along y and the k-th along z to sums.
+    void add(int j, int k, float* sums) {
+        const float y = place_at(j, 1), z = place_at(k, 2), at[2] = {y, z};
         vf cell[3], inside[3];
         for (int a = 1; a < 3; ++a) {
             const vf place = at[a - 1], low = min(floor(place), vf(lattice_.last[a] - 1.0f));
@@ -32,7 +32,7 @@ public:
         const int64_t bricks = brick_row(y, z);
         for (int i = 0; i < places_; i += kLanes) {
             const vf number = to_float(splat(i) + iota());
-            const vf place = min((number + vf(0.5f)) * vf(spacing_), vf(lattice_.last[0]));
+            const vf place = min((number + vf(0.5f)) * vf(spacing_[0]), vf(lattice_.last[0]));
             cell[0] = min(floor(place), vf(lattice_.last[0] - 1.0f)), inside[0] = place - cell[0];
             const vm shown = (number < vf(static_cast<float>(places_))) & is_shown(bricks, cell[0]);
             if (!any(shown)) continue;
@@ -42,6 +42,11 @@ public:
     }
 
 private:
+    float place_at(int number, int axis) const {
+        const float place = (static_cast<float>(number) + 0.5f) * spacing_[axis];
+        return place < lattice_.last[axis] ? place : lattice_.last[axis];
+    }
+
     int64_t brick_row(float y, float z) const {
         const auto brick = [&](float at, int axis) {
             const int b = static_cast<int>(at) / TEXGS_BRICK;
@@ -86,7 +91,7 @@ private:
     const ExtinctionJob& job_;
     const Lattice lattice_;
     const int places_;
-    float per_edge_, spacing_;
+    float per_edge_, spacing_[3];
     Blocks blocks_;
 };
 
@@ -98,14 +103,7 @@ void extinction_of(const ExtinctionJob& job, int y, int z) {
     Row<T> row(job, places[0] * size[0]);
     float sums[kMostPlaces + kLanes] = {};
     for (int k = 0; k < places[2]; ++k)
-        for (int j = 0; j < places[1]; ++j) {
-            const auto at = [&](int cell, int place, int a) {
-                const float last = static_cast<float>(job.volume.size[a] - 1);
-                return (static_cast<float>(cell * places[a] + place) + 0.5f) * last /
-                       static_cast<float>(places[a] * size[a]);
-            };
-            row.add(at(y, j, 1), at(z, k, 2), sums);
-        }
+        for (int j = 0; j < places[1]; ++j) row.add(y * places[1] + j, z * places[2] + k, sums);
     float* const to = job.extinction + (int64_t(z) * size[1] + y) * size[0];
     const float share = 1.0f / static_cast<float>(places[0] * places[1] * places[2]);
     for (int x = 0; x < size[0]; ++x) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "../cuts.h"
 #include "../volume_bricks.h"
 #include "dispatch.h"
 #include "light_kernels.h"
@@ -83,6 +84,7 @@ int32_t texgs_extinction(const texgs_volume* volume, const texgs_transfer* trans
         check_channels(volume, transfer, n);
         for (int c = 0; c < n; ++c) check_transfer(transfer[c]);
         check_cells(*cells);
+        check_planes(n_planes);
         require(opacity_unit > 0.0f, "light: expected an opacity unit above 0");
         const std::vector<PointTable> tables(transfer, transfer + n);
         CastChannel channels[TEXGS_CHANNELS];

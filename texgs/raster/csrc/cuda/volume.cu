@@ -2,10 +2,8 @@
 // Volumes on GPUs: what is known of their bricks, a thread each, and rays through them, a thread each.
 #include "../volume_bricks.h"
 #include "chebyshev.cuh"
-#include "maths.cuh"
+#include "light.cuh"
 #include "workspace.cuh"
-
-#include "../volume_maths.h"
 
 using namespace texgs;
 using namespace texgs::cuda;
@@ -13,10 +11,7 @@ using namespace texgs::cuda;
 namespace texgs::cuda {
 namespace {
 
-constexpr int kThreads = 128;
 constexpr int kTileX = 16, kTileY = 8;  // pixels of a block
-
-__device__ inline int64_t thread_index() { return int64_t(blockIdx.x) * kThreads + threadIdx.x; }
 
 // -- Bricks ------------------------------------------------------------------------------------------------------
 
@@ -96,86 +91,25 @@ __global__ __launch_bounds__(kThreads) void cells_kernel(const texgs_volume volu
 
 // -- Rays --------------------------------------------------------------------------------------------------------
 
-template <class T>
-struct Samples {
-    const T* values;
-    int size[3];
-
-    __device__ float at(int x, int y, int z) const {
-        const int i[3] = {clamped(x, 0), clamped(y, 1), clamped(z, 2)};
-        return static_cast<float>(values[(int64_t(i[2]) * size[1] + i[1]) * size[0] + i[0]]);
-    }
-    __device__ int clamped(int i, int axis) const { return i < 0 ? 0 : i < size[axis] ? i : size[axis] - 1; }
-};
-
-// A cell and the place in it.
-struct Spot {
-    int cell[3];
-    float inside[3];
-
-    __device__ Spot(const Lattice& lattice, const float (&at)[3]) {
-        for (int a = 0; a < 3; ++a) {
-            const float place = fminf(fmaxf(at[a], 0.0f), lattice.last[a]);
-            cell[a] = static_cast<int>(fminf(floorf(place), lattice.last[a] - 1.0f));
-            inside[a] = place - static_cast<float>(cell[a]);
-        }
-    }
-    // Whether the cell is one of those chosen of a brick.
-    __device__ bool is_among(const uint32_t* cells, const int (&brick)[3]) const {
-        const int x = cell[0] - TEXGS_BRICK * brick[0], y = cell[1] - TEXGS_BRICK * brick[1],
-                  z = cell[2] - TEXGS_BRICK * brick[2];
-        return cells[z / 2] >> (16 * (z % 2) + 4 * y + x) & 1;
-    }
-    template <class T>
-    __device__ float value(const Samples<T>& s) const {
-        float v[8];
-        for (int i = 0; i < 8; ++i) v[i] = s.at(cell[0] + (i & 1), cell[1] + (i >> 1 & 1), cell[2] + (i >> 2));
-        return trilinear(v, inside);
-    }
-    template <class T>
-    __device__ float difference(const Samples<T>& s, int axis) const {
-        const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
-        float v[8];
-        for (int i = 0; i < 8; ++i) {
-            const int x = cell[0] + (i & 1), y = cell[1] + (i >> 1 & 1), z = cell[2] + (i >> 2);
-            v[i] = s.at(x + dx, y + dy, z + dz) - s.at(x - dx, y - dy, z - dz);
-        }
-        return trilinear(v, inside);
-    }
-};
-
-// The interval of a transfer function that a value is in, and how far.
-struct Interval {
-    const float *from, *to;
-    float place;
-
-    __device__ Interval(const texgs_transfer& t, float value) {
-        int first = 0;
-        for (int end = t.n - 1; end - first > 1;) {
-            const int middle = (first + end) / 2;
-            if (t.points[5 * middle] <= value)
-                first = middle;
-            else
-                end = middle;
-        }
-        from = t.points + 5 * first, to = from + 5;
-        place = to[0] > from[0] ? (value - from[0]) / (to[0] - from[0]) : 0.0f;
-    }
-    __device__ float column(int c) const { return mix(from[c], to[c], place); }
-};
-
-// Volumes of one lattice that a cast shows together, each with its transfer function.
-struct Channels {
-    const void* values[TEXGS_CHANNELS];
-    texgs_transfer transfer[TEXGS_CHANNELS];
-    int n;
-};
+// What reaches sample k of the light.
+__device__ inline Exposure<float> exposed(const texgs_cast_view& view, const LightCells& cells, const CastRay& ray,
+                                          float k, Vec3<float> normal, const Lamp& lamp) {
+    if (!view.light) return {};
+    const Vec3<float> out = outward(ray, k, normal, lamp);
+    const float outs[3] = {out.x, out.y, out.z};
+    float place[3];
+    for (int a = 0; a < 3; ++a)
+        place[a] = fma(fma(k + 0.5f, ray.step[a], ray.entry[a]), cells.scale[a], fma(outs[a], cells.outset[a], -0.5f));
+    const Shares shares = shares_at(view.light, view.light_size, place);
+    return exposure_of(view, shares.lamp, shares.sky);
+}
 
 // kMost: 1, which needs no memory for values of channels, or TEXGS_CHANNELS.
 template <class T, int kMost>
 __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volume, const Channels channels,
                                                         const uint8_t* distance, const uint32_t* cells,
-                                                        const texgs_cast_view view, int tiles) {
+                                                        const texgs_cast_view view, const LightCells light_cells,
+                                                        int tiles) {
     const int x = static_cast<int>(blockIdx.x) % tiles * kTileX + static_cast<int>(threadIdx.x) % kTileX;
     const int y = static_cast<int>(blockIdx.x) / tiles * kTileY + static_cast<int>(threadIdx.x) / kTileX;
     if (x >= view.width || y >= view.height) return;
@@ -183,9 +117,6 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
     const Lamp lamp = lamp_of(view);
     const CastRay ray = cast_ray(lattice, view, x, y);
     const int n = kMost == 1 ? 1 : channels.n;
-    const auto samples_of = [&](int c) {
-        return Samples<T>{static_cast<const T*>(channels.values[c]), {volume.size[0], volume.size[1], volume.size[2]}};
-    };
     float light = 1.0f, depth = 0.0f, median = 0.0f, color[3] = {}, normal[3] = {};
     for (int k = ray.first; k < ray.samples && light >= kOpaque;) {
         float place[3];
@@ -201,7 +132,7 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
             k = leap(ray, k, place, brick, far);
             continue;
         }
-        const Spot spot(lattice, place);
+        const Spot spot(lattice.last, place);
         if (cells && !spot.is_among(cells + 2 * at_brick, brick)) {
             ++k;
             continue;
@@ -210,11 +141,8 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
         const float lengths = view.step / view.opacity_unit * share(ray, at);
         float value[kMost], through[kMost], all = 0.0f;
         for (int c = 0; c < n; ++c) {
-            const texgs_transfer& transfer = channels.transfer[c];
-            value[c] = spot.value(samples_of(c)), through[c] = 0.0f;
-            if (!(value[c] >= transfer.points[0] && value[c] <= transfer.points[5 * (transfer.n - 1)])) continue;
-            const float opacity = Interval(transfer, value[c]).column(1);
-            if (opacity > 0.0f) through[c] = log2_through(opacity, lengths);
+            value[c] = spot.value(channels.samples<T>(c, volume));
+            through[c] = log2_through_at(channels.transfer[c], value[c], lengths);
             all += through[c];
         }
         ++k;
@@ -226,7 +154,7 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
         for (int c = 0; c < n; ++c) {
             if (through[c] == 0.0f) continue;
             const texgs_transfer& transfer = channels.transfer[c];
-            const Samples<T> samples = samples_of(c);
+            const Samples<T> samples = channels.samples<T>(c, volume);
             const float part = weight * (through[c] / all);
             const float scale = 1.0f / (transfer.points[5 * (transfer.n - 1)] - transfer.points[0]);
             Vec3<float> slope{spot.difference(samples, 0), spot.difference(samples, 1), spot.difference(samples, 2)};
@@ -236,7 +164,8 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
             Vec3<float> n_c = unit(slope);
             const Interval interval(transfer, value[c]);
             const Vec3<float> own{interval.column(2), interval.column(3), interval.column(4)};
-            const Vec3<float> shown = lit(ray, at, own, n_c, lamp);
+            const Exposure<float> exposure = exposed(view, light_cells, ray, at, n_c, lamp);
+            const Vec3<float> shown = lit(ray, at, own, n_c, lamp, exposure);
             const Vec3<float> against = turned(n_c, -along(n_c, ray.direction));
             color[0] = fma(part, shown.x, color[0]), normal[0] = fma(part, against.x, normal[0]);
             color[1] = fma(part, shown.y, color[1]), normal[1] = fma(part, against.y, normal[1]);
@@ -265,7 +194,7 @@ __global__ __launch_bounds__(kThreads) void lookup_kernel(const texgs_volume vol
     float at[3];
     for (int a = 0; a < 3; ++a)
         at[a] = fma(points[3 * i + a], static_cast<float>(lattice.per_unit[a]), static_cast<float>(lattice.middle[a]));
-    const Spot spot(lattice, at);
+    const Spot spot(lattice.last, at);
     const float value = spot.value(samples), low = transfer.points[0], high = transfer.points[5 * (transfer.n - 1)];
     if (to.values) to.values[i] = value;
     if (to.colors) {
@@ -284,33 +213,6 @@ __global__ __launch_bounds__(kThreads) void lookup_kernel(const texgs_volume vol
     float quat[4];
     turn_z_to(normal, quat);
     for (int k = 0; k < 4; ++k) to.quats[4 * i + k] = quat[k];
-}
-
-// Calls body(sample) with a sample of the volume's type.
-template <class Body>
-void with_type(const texgs_volume& volume, const Body& body) {
-    switch (volume.type) {
-        case TEXGS_U8:
-            return body(uint8_t());
-        case TEXGS_I8:
-            return body(int8_t());
-        case TEXGS_U16:
-            return body(uint16_t());
-        case TEXGS_I16:
-            return body(int16_t());
-        case TEXGS_U32:
-            return body(uint32_t());
-        case TEXGS_I32:
-            return body(int32_t());
-        case TEXGS_U64:
-            return body(uint64_t());
-        case TEXGS_I64:
-            return body(int64_t());
-        case TEXGS_F32:
-            return body(float());
-        default:
-            return body(double());
-    }
 }
 
 }  // namespace
@@ -364,14 +266,14 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, i
     return on_device_of(view->rgba, on, [&](cudaStream_t stream) {
         check_channels(volume, transfer, n);
         check_cast(*view);
-        Channels channels{};
-        channels.n = n;
-        for (int c = 0; c < n; ++c) channels.values[c] = volume[c].values, channels.transfer[c] = transfer[c];
+        const Channels channels(volume, transfer, n);
+        const LightCells light_cells = light_cells_of(lattice_of(*volume), *volume, *view);
         const int tiles = (view->width + kTileX - 1) / kTileX, rows = (view->height + kTileY - 1) / kTileY;
         with_type(*volume, [&](auto sample) {
             const auto kernel =
                 n == 1 ? cast_kernel<decltype(sample), 1> : cast_kernel<decltype(sample), TEXGS_CHANNELS>;
-            launch(kernel, int64_t(tiles) * rows, kThreads, stream, *volume, channels, distance, cells, *view, tiles);
+            launch(kernel, int64_t(tiles) * rows, kThreads, stream, *volume, channels, distance, cells, *view,
+                   light_cells, tiles);
         });
     });
 }
