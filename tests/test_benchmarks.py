@@ -9,11 +9,16 @@ from pathlib import Path
 import pytest
 import torch
 
+from benchmarks import light, light_speed
 from benchmarks.command import call
 from benchmarks.report import Measurement, Section
 from benchmarks.settings import SECTIONS
 from benchmarks.speeds import Sample, factor, scaled
 from benchmarks.timing import Case, measure
+from tests.viewer.drawn_scenes import scene_of_volume, waves
+from tests.volume.scenes import SHELLS, ball
+from texgs.volume.framing import frame_of
+from texgs.volume.render import Appearance
 from texgs.workflow.forecast import Speed
 
 ROOT = Path(__file__).parents[1]
@@ -101,3 +106,26 @@ def test_words_of_a_command_line_are_the_arguments(monkeypatch, capsys):
     with pytest.raises(SystemExit, match="2"):
         called("a.json")
     assert "missing a required argument: 'name'" in capsys.readouterr().err
+
+
+def test_accuracy_of_light_grows_with_cells_and_directions(monkeypatch):
+    for name, value in {"CELLS": (24, 6), "DIRECTIONS": (4, 32), "MOST": 256, "REACHES": (0.2,)}.items():
+        monkeypatch.setattr(light, name, value)
+    grid = ball(16)
+    table = light.measured(light.Looked(grid, [SHELLS], Appearance(), frame_of(grid, [SHELLS])), 12)
+    assert (
+        list(table.measure) == ["cells", "no shadows"] * 2 + ["no occlusion"] + ["directions, reach 0.2"] * 2
+    )
+    fine, coarse = table[table.measure == "cells"].PSNR
+    assert fine > coarse
+    few, many = table[table.choice.isin((4, 32))]["mean error"]
+    assert few > many > 0
+
+
+def test_speed_of_light_is_told_for_each_step_and_frame(tmp_path):
+    section = light_speed.measured(scene_of_volume(tmp_path, waves()), 16, 1)
+    assert {m.name for m in section.measurements if m.unit == "ms"} == {
+        *("extinction", "grid of a light", "new light, grid and surfels", "openness", "volume", "scene")
+    }
+    assert {m.name for m in section.measurements if m.unit == "ratio"} == {"volume / plain", "scene / plain"}
+    assert all(m.min > 0 for m in section.measurements)

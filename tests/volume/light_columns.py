@@ -15,8 +15,8 @@ def shares_of(
     """Share [z, y, x] of a distant light, from extinctions of the shortest edge of a cell.
 
     Columns lie in the light's direction and meet slice after slice of cells. Extinctions are linear between
-    centres, and so is what columns let through between them. Only matter within `reach`
-    world units hides a place, in whole slices.
+    centres, and so is what columns let through between them. Only matter within `reach` world units hides a
+    place, in whole slices.
     """
     edges = 2 * np.array(half) / extinction.shape[::-1]
     along = -np.array(to_light, float) / edges

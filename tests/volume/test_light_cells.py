@@ -1,6 +1,4 @@
-"""Light that goes through cells: closed forms, the sum along each column, symmetries, and lookups."""
-
-from math import floor
+"""Light that goes through cells: closed forms, laws, and the definition for any cells and directions."""
 
 import numpy as np
 import pytest
@@ -10,6 +8,7 @@ from hypothesis import strategies as st
 from torch.nn.functional import normalize
 
 from tests.refusals import refused
+from tests.volume.light_columns import shares_of
 from texgs.raster import native
 from texgs.volume.light_cells import OUTSET, LightCells, NativeCells
 from texgs.volume.matter import even_directions
@@ -55,50 +54,6 @@ def edge_of(size, half):
     return min(2 * h / n for n, h in zip(size, half, strict=True))
 
 
-def follow(extinction, half, to_light):
-    """Shares [Z, Y, X], float64, of light along columns, cell by cell, in plain numpy.
-
-    Columns are whole cells apart along u and v in the slice that light meets first, and go its way. A column
-    has met all slices before and half of its own, each where it is, linear between centres and 0 beyond. Of a
-    cell it is the mean of the four columns around it by how near they are.
-    """
-    matter, size = extinction.double().numpy(), extinction.shape[::-1]
-    along = np.array(to_light) * np.array(size) / (2 * np.array(half))  # cells
-    w = int(np.abs(along).argmax())
-    u, v = [a for a in range(3) if a != w]
-    matter = np.pad(np.transpose(matter, (2 - w, 2 - v, 2 - u)), ((0, 0), (1, 2), (1, 2)))
-    n_w, n_v, n_u = (size[a] for a in (w, v, u))
-    matter = matter[::-1] if along[w] > 0 else matter
-    slope = {a: -along[a] / abs(along[w]) for a in (u, v)}
-    length = np.linalg.norm(to_light) / abs(along[w]) / edge_of(size, half)
-
-    def between(table, at_v, at_u):  # of a slice, at one place
-        j, i = floor(at_v), floor(at_u)
-        if not (-1 <= j < n_v and -1 <= i < n_u):
-            return 0.0
-        (a, b), (c, d) = table[j + 1 : j + 3, i + 1 : i + 3]
-        fv, fu = at_v - j, at_u - i
-        return (1 - fv) * ((1 - fu) * a + fu * b) + fv * ((1 - fu) * c + fu * d)
-
-    def share(s, column_v, column_u):
-        met = [between(matter[i], column_v + slope[v] * i, column_u + slope[u] * i) for i in range(s + 1)]
-        return 2 ** -(length * (sum(met) - met[-1] / 2))
-
-    result = np.empty((n_w, n_v, n_u))
-    for s, j, i in np.ndindex(result.shape):
-        at_v, at_u = j - slope[v] * s, i - slope[u] * s
-        fv, fu = at_v - floor(at_v), at_u - floor(at_u)
-        near = {(0, 0): (1 - fv) * (1 - fu), (0, 1): (1 - fv) * fu, (1, 0): fv * (1 - fu), (1, 1): fv * fu}
-        result[s, j, i] = sum(
-            weight * share(s, floor(at_v) + dv, floor(at_u) + du)
-            for (dv, du), weight in near.items()
-            if weight
-        )
-    result = result[::-1] if along[w] > 0 else result
-    places = [2 - w, 2 - v, 2 - u]
-    return torch.from_numpy(np.transpose(result, np.argsort(places)).copy())
-
-
 @examples
 @given(
     size=st.tuples(*3 * [st.integers(2, 6)]),
@@ -111,7 +66,7 @@ def test_light_is_what_each_column_lets_through(device, size, sides, to_light, s
     rng = np.random.default_rng(seed)
     values = rng.choice([0.0, 0.1, 0.6, 2.0, 16.0], size[::-1]) * rng.random(size[::-1])
     matter = torch.from_numpy(values).float()
-    expected = follow(matter, sides, [float(np.float32(x)) for x in to_light])
+    expected = torch.from_numpy(shares_of(matter.double().numpy(), sides, np.float32(to_light)).copy())
     assert float((lamp(matter, sides, to_light, device) - expected).abs().max()) < 1.01 * LEVEL
 
 
@@ -271,25 +226,6 @@ def test_openness_without_an_end_is_the_mean_of_lamps(seed, device):
     lamps = [lamp(matter, half, each.tolist(), device) for each in directions]
     expected = (2 * torch.stack(lamps).mean(dim=0)).clamp_max(1)
     assert float((sky(matter, half, 2.0, directions, device) - expected).abs().max()) < 3 * LEVEL
-
-
-@examples
-@given(seed=st.integers(0, 1000), size=st.tuples(*3 * [st.integers(2, 7)]))
-def test_lookups_are_trilinear_and_beyond_the_centres_as_there(seed, size, device):
-    rng, half = np.random.default_rng(seed), (0.5, 0.31, 0.4)
-    light = rng.integers(0, 256, (*size[::-1], 2)).astype(np.uint8)
-    points = rng.uniform(-1.5, 1.5, (50, 3)) * half
-    places = np.clip((points / half + 1) * np.array(size) / 2 - 0.5, 0, np.array(size) - 1)
-    low = np.minimum(places.astype(int), np.array(size) - 2)
-    inside, expected = places - low, np.zeros((50, 2))
-    for corner in np.ndindex(2, 2, 2):
-        weight = np.where(corner, inside, 1 - inside).prod(axis=1)
-        x, y, z = (low + corner).T
-        expected += weight[:, None] * light[z, y, x] / 255
-    cells = LightCells(torch.from_numpy(light).to(device), half)
-    found = cells.at(torch.from_numpy(points).float().to(device))
-    np.testing.assert_allclose(found.cpu(), expected, atol=2e-5)
-    assert cells.at(torch.zeros(0, 3, device=device)).shape == (0, 2)
 
 
 def test_the_outset_is_so_many_of_the_shortest_edges():

@@ -152,17 +152,6 @@ def test_any_function_of_any_volume(tf, seed, longest):
     require_close(matter, brute_force(grid, [tf], matter.extinction.shape[::-1]))
 
 
-def test_bits_are_the_same_with_any_number_of_threads():
-    found, before = [], torch.get_num_threads()
-    for count in (1, 2, 5):
-        torch.set_num_threads(count)
-        matter = matter_of(ball(30), [SHELLS], 24)
-        found.append((matter.extinction, matter.lit(torch.tensor([1.0, 0.4, -0.3]), 0.2).light))
-    torch.set_num_threads(before)
-    for each in found[1:]:
-        assert all(torch.equal(x, y) for x, y in zip(each, found[0], strict=True))
-
-
 def test_what_is_not_asked_for_is_all_there():
     matter = matter_of(ball(24), [SHELLS], 16)
     whole = torch.full((16, 16, 16), 255, dtype=torch.uint8)

@@ -6,7 +6,7 @@
 
 namespace texgs {
 
-constexpr int kBand = 8;     // rows of columns that one worker follows at a time
+constexpr int kBand = 16;    // rows of columns that one worker follows at a time
 constexpr int kMargin = 16;  // numbers behind a row that whole vectors may reach: the most lanes there are
 
 struct ExtinctionJob {
