@@ -49,8 +49,14 @@ def exposure_of(composed: Composed, scene: Scene, twin: Twin | None) -> Tensor |
     places = last_of(twin.places, (composed, matter), lambda: places_of(composed, matter))
 
     def make() -> Tensor:
-        shares = shares_of(composed, light, cells, places)
-        return 1 - shares.new_tensor([light.shadows, light.occlusion]) * (1 - shares)
+        exposure = composed.means.new_ones(len(composed), 2)
+        if light.shadows and light.kind == "directional":
+            exposure[:, 0] -= light.shadows * (1 - lamp_shares(composed, light, cells, places))
+        if light.occlusion:
+            state = composed, matter, light.reach
+            sky = last_of(twin.sky, state, lambda: sky_shares(composed, cells, places))
+            exposure[:, 1] -= light.occlusion * (1 - sky)
+        return exposure
 
     return last_of(twin.exposures, (composed, cells, light), make)
 
@@ -64,29 +70,29 @@ def require_shadows(scene: Scene) -> None:
         raise ArgumentError(NO_VOLUME)
 
 
-def shares_of(composed: Composition, light: Light, cells: LightCells, places: Tensor) -> Tensor:
-    """Return which shares [N, 2] of the lamp's and of ambient light reach surfels.
+def lamp_shares(composed: Composition, light: Light, cells: LightCells, places: Tensor) -> Tensor:
+    """Return which share [N] of a directional light reaches surfels, on the side that faces it."""
+    direction = orbit_direction(light.azimuth, light.polar).to(composed.normals)
+    is_ahead = composed.normals @ direction > 0
+    along = torch.where(is_ahead, places[0], places[1])
+    return outside(composed, cells, along, torch.where(is_ahead, 1.0, -1.0))[:, 0]
 
-    The lamp shines on the side of a surfel that faces it. Ambient light is that of the lighter side, which
-    for opaque matter is the side that is seen.
 
-    Args:
-        composed: the surfels.
-        light: of any kind; a headlight reaches all that is seen.
-        cells: which shares reach them.
-        places: of the surfels' matter, see `places_of`.
+def sky_shares(composed: Composition, cells: LightCells, places: Tensor) -> Tensor:
+    """Return which share [N] of ambient light reaches surfels, on the side where that is more.
+
+    For opaque matter it is the side that is seen.
     """
-    normals, outset = composed.normals, cells.outset
-    sides = []
-    for towards, along in ((1, places[0]), (-1, places[1])):
-        points = (composed.means + towards * (each + outset)[:, None] * normals for each in along)
-        sides.append(torch.stack([cells.at(each) for each in points]).mean(dim=0))
-    ahead, behind = sides
-    shares = torch.maximum(ahead, behind)
-    if light.kind == "directional":
-        direction = orbit_direction(light.azimuth, light.polar).to(normals)
-        shares[:, 0] = torch.where(normals @ direction > 0, ahead[:, 0], behind[:, 0])
-    return shares
+    ahead, behind = (outside(composed, cells, *each)[:, 1] for each in zip(places, (1.0, -1.0), strict=True))
+    return torch.maximum(ahead, behind)
+
+
+def outside(composed: Composition, cells: LightCells, along: Tensor, side: Tensor | float) -> Tensor:
+    """Return the shares [N, 2] outside of surfels: means over two places [2, N] on one side, 1 or -1."""
+    steps = side * (along + cells.outset)
+    points = (torch.addcmul(composed.means, step[:, None], composed.normals) for step in steps)
+    before, after = (cells.at(each) for each in points)
+    return 0.5 * (before + after)
 
 
 def places_of(composed: Composition, matter: Matter) -> Tensor:

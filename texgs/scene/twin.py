@@ -51,6 +51,7 @@ class Twin:
         self._matter = deque[tuple[object, Matter]](maxlen=1)  # the latest, of all copies
         self._cells = deque[tuple[object, LightCells]](maxlen=1)
         self.places = deque[tuple[object, Tensor]](maxlen=1)  # see `texgs.scene.exposure`
+        self.sky = deque[tuple[object, Tensor]](maxlen=1)
         self.exposures = deque[tuple[object, Tensor]](maxlen=1)
         for name in scene.models:
             self._tf(name)
