@@ -4,11 +4,15 @@
 benchmarks/results/index.csv. A film is as fast as what it shows was on this machine, pictures of it included;
 that of the model is faster by `FASTER`.
 
-`python -m tools.films SERIES EDITED` makes that of docs/scenes.md: two scenes of `rings` side by side, as
-fitted and with a style, through all steps while the camera turns.
+`python -m tools.films SERIES EDITED` makes that of a series in docs/scenes.md: two scenes of `rings` side by
+side, as fitted and with a style, through all steps while the camera turns.
+
+`python -m tools.films light SCENE SCENE` makes that of light there: scenes side by side, with shadows and
+occlusion, under a light that rises.
 """
 
 import subprocess
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,9 +26,10 @@ from benchmarks.browser import SOFTWARE, browser_path, viewer
 from benchmarks.command import call
 from benchmarks.results import add
 from texgs.scene.film import Film as SceneFilm
+from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene
 from texgs.scene.session import Session
-from tools.pictures import DOCS, PROGRAM
+from tools.pictures import DOCS, PROGRAM, SHADOWED
 
 WINDOW, SIZE = {"width": 1120, "height": 700}, (720, 450)  # of the browser, and of a film, pixels
 FASTER = 8
@@ -65,12 +70,22 @@ def animate(path: Path, frames: list[Image.Image], durations: list[int]) -> None
 
 def through_time(path: Path, *files: str) -> None:
     """Write a film of scenes of one series side by side: all steps, around which the camera turns."""
+    scenes = [read_scene(file) for file in files]
+    count = EACH * len(scenes[0].timeline.steps)
+    side_by_side(path, scenes, SceneFilm(what="orbit-time", frames=count, azimuth=-60.0))
+
+
+def under_light(path: Path, *files: str) -> None:
+    """Write a film of scenes side by side, with shadows, under a light that rises."""
+    scenes = [replace(scene, light=SHADOWED) for scene in map(read_scene, files)]
+    side_by_side(path, scenes, SceneFilm(what="light", azimuth=-60.0))
+
+
+def side_by_side(path: Path, scenes: list[Scene], film: SceneFilm) -> None:
+    """Write what a film shows of scenes."""
     columns = []
-    for file in files:
-        scene = read_scene(file)
-        session, steps = Session(scene), len(scene.timeline.steps)
-        lens, count = scene.framed().lens().square(SIZE[1] * 4 // 5), EACH * steps
-        film = SceneFilm(what="orbit-time", frames=count, azimuth=-60.0)
+    for scene in scenes:
+        session, lens = Session(scene), scene.framed().lens().square(SIZE[1] * 4 // 5)
         shots = film.shots(scene, session.composition, lens)
         columns.append([session.frame(camera, scene=shown) for camera, shown in shots])
     frames = [Image.fromarray(np.concatenate(pair, axis=1)) for pair in zip(*columns, strict=True)]
@@ -143,11 +158,16 @@ def alone(page: Any) -> Film:
 
 
 def main(source: str, *edited: str) -> None:
-    """Make all films of a scene, or that of a series."""
+    """Make all films of a scene, or that of a series or of light."""
+    if edited and source == "light":
+        path = DOCS / "light.webp"
+        under_light(path, *edited)
+        add(path, "python -m tools.films light SCENE SCENE", "compose texgs.scene.film texgs.scene.exposure")
+        return
     if edited:
         path = DOCS / "series.webp"
         through_time(path, source, *edited)
-        add(path, "python -m tools.films SERIES EDITED", "steps image texgs.scene.paths")
+        add(path, "python -m tools.films SERIES EDITED", "steps image texgs.scene.film")
         return
     from playwright.sync_api import expect, sync_playwright
 

@@ -56,21 +56,27 @@ LOOKS = {  # title: scene file below the scenes of the demo
     "painted": "edits/painted/scene.yaml",
     "one lobe in crimson": "edits/crimson/scene.yaml",
 }
-
 SHADOWED = Light("directional", -60.0, 60.0, shadows=0.8, occlusion=0.6)  # as docs/scenes.md has it
 
 
-def shown(scene_file: Path, size: int, azimuth: float = 30, polar: float = 20) -> np.ndarray:
-    """Return a scene [size, size, 3], uint8, under its own light."""
+def shown(
+    scene_file: Path, size: int, azimuth: float = 30, polar: float = 20, light: Light | None = None
+) -> np.ndarray:
+    """Return a scene [size, size, 3], uint8, under its own light, or under another one."""
     scene = read_scene(scene_file)
+    if light is not None:
+        is_fixed = scene.light.kind == "directional"
+        scene = replace(
+            scene, light=light.turned(scene.light.azimuth, scene.light.polar) if is_fixed else light
+        )
     camera = orbit(azimuth, polar, *scene.framed().lens().square(size))
     return frame(scene.open(), camera, scene, twin=twin_of(scene))
 
 
 def hero(run: Path) -> Image.Image:
-    """Draw six looks of one scene, a label below each."""
+    """Draw six looks of one scene with shadows, a label below each."""
     scenes = run / "orbital/scene/demo"
-    pictures = {title: shown(scenes / LOOKS[title], 640) for title in list(LOOKS)[:6]}
+    pictures = {title: shown(scenes / LOOKS[title], 640, light=SHADOWED) for title in list(LOOKS)[:6]}
     box = content(list(pictures.values()))
     cells = [Cell("", each[box], title) for title, each in pictures.items()]
     return as_picture(lay_out([Row("", cells[:3]), Row("", cells[3:])]))
@@ -128,7 +134,7 @@ def viewer(run: Path) -> Image.Image:
     from playwright.sync_api import expect, sync_playwright
 
     scene, edited = run / "engine/scene/quick/compose/scene.yaml", run / "edited.yaml"
-    changes = ("TF02.palette=#2a9d8f", "light=-120,35")
+    changes = ("TF02.palette=#2a9d8f", "light=-120,35", "shadows=0.8", "occlusion=0.6")
     subprocess.run([PROGRAM, "edit", scene, *changes, "--output", edited], check=True)
     with view(edited) as address, sync_playwright() as player:
         browser = player.chromium.launch(executable_path=browser_path())
@@ -156,8 +162,8 @@ GALLERY = "vortex/gallery/*/gallery.png"
 FIT = "volume views surfels shading texture"
 PICTURES = {
     "workflow": Picture(workflow_picture.draw, "demo", f"{FIT} compose pse image text segment edit_metrics"),
-    "hero": Picture(hero, "demo", f"{FIT} compose pse image text"),
-    "shadows": Picture(shadows, "demo", f"{FIT} compose texgs.scene.cut_view"),
+    "hero": Picture(hero, "demo", f"{FIT} compose pse image text texgs.scene.exposure"),
+    "shadows": Picture(shadows, "demo", f"{FIT} compose texgs.scene.exposure"),
     "views": Picture(views, "demo", "volume views sheet"),
     "edits": Picture(copy("orbital/scene/demo/pse/pse.png"), "demo", f"{FIT} pse"),
     "looks": Picture(looks, "demo", f"{FIT} compose image text segment"),
