@@ -15,7 +15,7 @@ from texgs.fields.field import Composed, baked_light
 from texgs.fields.files import kind_of
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.scene import Scene
-from texgs.scene.twin import Twin, last_of
+from texgs.scene.twin import Twin, is_seen, last_of
 from texgs.volume.light_cells import LightCells
 from texgs.volume.matter import Matter
 
@@ -33,13 +33,13 @@ NO_VOLUME = (
 def exposure_of(composed: Composed, scene: Scene, twin: Twin | None) -> Tensor | None:
     """Return factors [N, 2] on the lamp's and on ambient light of each primitive, or None without shadows.
 
-    They are kept while only the camera moves.
+    They are kept while only the camera moves. What no model shows of the volume hides nothing.
 
     Raises:
         ArgumentError: if there is no volume, or these primitives cannot be relit.
     """
     light = scene.light
-    if not light.casts_shadows:
+    if not light.casts_shadows or not any(is_seen(model.edit) for model in scene.models.values()):
         return None
     if twin is None:
         raise ArgumentError(NO_VOLUME)
