@@ -83,6 +83,7 @@ def decibels(one, other):
     return psnr(one.numpy(), other.numpy()), psnr(one[is_seen].numpy(), other[is_seen].numpy())
 
 
+@pytest.mark.large
 @pytest.mark.parametrize(("scene", "whole", "of_object"), [
     ("an opaque ball before a wall", 42, 40),
     ("a translucent shell", 65, 60),
@@ -98,6 +99,7 @@ def test_shadows_are_those_of_rays_to_the_light(scene, whole, of_object, device)
     assert found[1] > of_object
 
 
+@pytest.mark.large
 @pytest.mark.parametrize("longest", [64, 32])
 def test_fewer_cells_show_softer_shadows(longest, device):
     solid, shell = (
@@ -108,6 +110,7 @@ def test_fewer_cells_show_softer_shadows(longest, device):
     assert min(shell) > {64: 55, 32: 46}[longest]
 
 
+@pytest.mark.large
 @pytest.mark.parametrize("light", [
     Light("headlight", occlusion=1.0, reach=0.2),
     Light("directional", -120, 45, shadows=0.7, occlusion=0.5, reach=0.15),
