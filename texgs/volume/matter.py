@@ -19,7 +19,7 @@ from texgs.volume.light_cells import LightCells, NativeCells
 from texgs.volume.transfer import TransferFunction
 
 LONGEST_SIDE = 128  # cells
-SKY_DIRECTIONS = 32
+SKY_DIRECTIONS = 64
 native.declare("texgs_extinction", NativeVolume, NativeTransfer, "ip f pi", NativeCells, "p")
 native.declare("texgs_transmittance", NativeCells, "ppp")
 native.declare("texgs_openness", NativeCells, "p i p f p")
