@@ -78,7 +78,7 @@ def through_time(path: Path, *files: str) -> None:
 def under_light(path: Path, *files: str) -> None:
     """Write a film of scenes side by side, with shadows, under a light that rises."""
     scenes = [replace(scene, light=SHADOWED) for scene in map(read_scene, files)]
-    side_by_side(path, scenes, SceneFilm(what="light", azimuth=-60.0))
+    side_by_side(path, scenes, SceneFilm(what="light", azimuth=120.0))
 
 
 def side_by_side(path: Path, scenes: list[Scene], film: SceneFilm) -> None:
