@@ -23,7 +23,7 @@ from tests.viewer.drawn_scenes import (
     waves,
 )
 from texgs.core.camera import orbit
-from texgs.core.cuts import Box, Cuts, Plane
+from texgs.core.cuts import NO_CUTS, Box, Cuts, Plane
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
@@ -145,6 +145,11 @@ def cases(names, cameras, modes, changes, limit):
 TRIED = {"functions": (("high", WIDE), ("new", HIGH))}
 LIGHTS = [{"light": light} for light in (HEADLIGHT, SIDE, BELOW)]
 FACES = [{"cuts": replace(cuts, faces=faces), "light": SIDE} for cuts in (CUTS, BOX) for faces in FACE_LIGHTS]
+SHADOWS = [
+    {"light": replace(light, shadows=0.9, occlusion=occlusion), "cuts": cuts}
+    for light, occlusion in ((SIDE, 0.0), (SIDE, 0.7), (HEADLIGHT, 0.7))
+    for cuts in (NO_CUTS, CUTS)
+]
 TIMES = [{"time": time} for time in (4, 0, 1, BEGIN)]
 CASES = [  # the limit is the least PSNR in dB, or how many levels, or both where something is cut
     *cases(["parts"], CAMERAS, ["shaded"], LIGHTS, LEVELS),
@@ -164,6 +169,9 @@ CASES = [  # the limit is the least PSNR in dB, or how many levels, or both wher
     *cases(VOLUMES, [CAMERA], ["volume"], [{"edits": [edit]} for edit in OF_VOLUMES], LEAST),
     *cases(VOLUMES, [CAMERA], ["volume", "shaded"], [TRIED], LEAST),
     *cases(VOLUMES, [CAMERA], ["volume", "shaded"], FACES, LEAST - 3),
+    # Cells of light in a page are not smaller than those between its samples.
+    *cases(["sphere", "waves"], [CAMERA], ["volume", "shaded"], SHADOWS, LEAST - 3),
+    *cases(["flat"], [CAMERA], ["volume", "shaded"], SHADOWS, LEAST - 7),
     # A volume has one material: models with others are seen below faces.
     *cases(
         *(VOLUMES, [CAMERA], ["shaded"]),

@@ -31,5 +31,5 @@ def export(path: Path, scene: Scene, keys: Export, checked: str = "", name: str 
         require_export(kind_of(entry.file), "html")
     volume = None if keys.volume is None else page_volume(shown, keys.volume)
     page = write_page(path, shown, name or path.stem, checked, volume, keys.steps)
-    told = {"Volume": volume, "Series": page.steps}
+    told = {"Volume": volume, "Series": page.steps, "Light": page.light}
     return [f"{title} in the page: {what}" for title, what in told.items() if what is not None]

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from PIL import Image
 from torch import Tensor
 
@@ -21,11 +22,14 @@ from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import write_bytes
 from texgs.fields.surfels.compact import TEXEL_STEP, compact_tensors
 from texgs.fields.surfels.composition import Composition
-from texgs.scene.frame import frame
+from texgs.scene.cut_view import cut_view
+from texgs.scene.exposure import require_shadows
+from texgs.scene.frame import quantize
 from texgs.scene.scene import Scene
-from texgs.scene.twin import Twin
+from texgs.scene.twin import Twin, is_seen
 from texgs.viewer.description import describe, presets
 from texgs.viewer.origins import Origins
+from texgs.viewer.page_light import PageLight, page_light
 from texgs.viewer.page_steps import PageSteps, page_steps
 from texgs.viewer.page_volume import PageVolume
 
@@ -45,6 +49,7 @@ class ScenePage:
     surfels: int
     poster: bytes  # a JPEG of the first view
     steps: PageSteps | None  # of the scene's series
+    light: PageLight | None  # of its surfels, where it has no volume
 
 
 def write_page(
@@ -79,7 +84,12 @@ def scene_page(
     composed = scene.open()
     if not isinstance(composed, Composition):
         raise ArgumentError("expected a scene of surfels, got another kind; fit surfels for this")
-    surfels, moved = pack(composed), page_steps(scene, steps)
+    is_hiding = max(scene.light.shadows, scene.light.occlusion) > 0 and has_matter(scene, composed)
+    if is_hiding:
+        require_shadows(scene)
+    twin = Twin(scene) if volume is not None or is_hiding else None  # refuses one that is not of the models
+    light = page_light(scene, composed, twin) if twin is not None and volume is None else None
+    surfels, moved = pack(composed, light), page_steps(scene, steps)
     if (size := len(surfels) + (moved.size if moved else 0)) > LARGEST:
         raise ArgumentError(
             f"expected surfels of at most {LARGEST >> 20} MiB, got {size >> 20} MiB for "
@@ -88,14 +98,19 @@ def scene_page(
     description = describe(name, scene, composed)
     if moved is not None:
         description["held"] = list(moved.packed)
-    twin = None
+    description["can_shadow"] = volume is not None or light is not None
     if volume is not None:
         description |= {"volume": volume.describe(scene), "presets": presets()}
         description["transfer"] = Origins(scene).transfer
-        twin = Twin(scene)  # refuses a volume that cannot be shown as the models
-    picture = poster(scene, composed, description["views"][0], description["fov_y"], twin)
-    html = page_of(description, surfels, picture, checked, volume, moved)
-    return ScenePage(html, len(composed), picture, moved)
+    view = description["views"][0] | {"fov_y": description["fov_y"]}
+    picture = poster(scene, composed, view, twin, has_faces=volume is not None)
+    html = page_of(description, surfels, picture, checked, volume, moved, light)
+    return ScenePage(html, len(composed), picture, moved, light)
+
+
+def has_matter(scene: Scene, composed: Composition) -> bool:
+    """Return whether anything that is seen may hide light."""
+    return len(composed) > 0 and any(is_seen(model.edit) for model in scene.models.values())
 
 
 def page_of(
@@ -105,6 +120,7 @@ def page_of(
     checked: str,
     volume: PageVolume | None,
     steps: PageSteps | None,
+    light: PageLight | None,
 ) -> str:
     """Return the page of a description, see `describe`, packed surfels, and a JPEG that is shown first.
 
@@ -131,6 +147,7 @@ def page_of(
             volume=Markup(b64encode(volume.packed).decode()) if volume else "",
             volume_words=f"The page has the volume in {volume}." if volume else "",
             steps=steps,
+            light=light,
             time=description["time"],
             poster=b64encode(picture).decode(),
         )
@@ -138,12 +155,16 @@ def page_of(
 
 
 def poster(
-    scene: Scene, composed: Composition, view: dict[str, Any], fov_y: float, twin: Twin | None
+    scene: Scene, composed: Composition, view: dict[str, Any], twin: Twin | None, *, has_faces: bool
 ) -> bytes:
-    """Return a view of a scene, see `describe`, as JPEG; cuts have faces where there is a twin."""
-    place = (view["azimuth"], view["polar"], view["distance"], fov_y, POSTER_SIDE, POSTER_SIDE)
+    """Return a view of a scene, see `describe`, as JPEG; a twin hides light, and cuts may have its faces."""
+    place = (view["azimuth"], view["polar"], view["distance"], view["fov_y"], POSTER_SIDE, POSTER_SIDE)
     camera = orbit(*place, target=view["target"])
-    pixels = frame(composed, camera, scene, twin=twin)
+    # Cuts are hollow where more than colours is asked for.
+    more = ("depth",) if twin is not None and not has_faces else ()
+    background = torch.tensor(scene.background)
+    seen = cut_view(composed, camera, scene, twin, background=background, outputs=more)
+    pixels = quantize(seen.color)
     file = BytesIO()
     Image.fromarray(pixels).save(file, "JPEG", quality=POSTER_QUALITY, optimize=True)
     return file.getvalue()
@@ -154,14 +175,16 @@ def digest(text: str) -> str:
     return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
 
 
-def pack(composition: Composition) -> str:
-    """Return the tensors of all models as text, named NUMBER.PARAMETER, and `labels` [N] of segments.
+def pack(composition: Composition, light: PageLight | None = None) -> str:
+    """Return the tensors of all models as text, named NUMBER.PARAMETER.
 
-    The same scene gives the same text. Browsers unpack zlib by themselves, but not xz.
+    Among them are `labels` [N] of segments, and `exposure` [10, N] of light, see `PageLight.packed`. The same
+    scene gives the same text. Browsers unpack zlib by themselves, but not xz.
     """
     from safetensors.numpy import save
 
     tensors: dict[str, np.ndarray] = {}
+    first = 0
     for number, part in enumerate(composition.parts):
         model = part.model.to("cpu")
         if "texels" in model.parameters:
@@ -169,9 +192,14 @@ def pack(composition: Composition) -> str:
         own = compact_tensors(model)
         if part.labels is not None:
             own["labels"] = part.labels.cpu().numpy().astype(np.uint8 if part.segments < 256 else np.int32)
+        if light is not None:
+            own["exposure"] = light.packed(first, len(model))
+        first += len(model)
         tensors |= {f"{number}.{name}": values for name, values in own.items()}
     optics = [asdict(part.model.shading) for part in composition.parts]
     facts = {"models": optics, "low_pass": composition.options.low_pass, "step": TEXEL_STEP}
+    if light is not None:
+        facts["exposure"] = light.scales
     # One entry: safetensors writes several in any order.
     return b64encode(zlib.compress(save(tensors, {"optics": json.dumps(facts)}), 9)).decode()
 

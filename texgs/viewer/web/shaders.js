@@ -31,6 +31,8 @@ uniform sampler2DArray surfels;
 uniform usampler2D lookups;
 uniform usampler2D order;        // of the surfels, which have four vertices each
 uniform sampler2D parts;
+uniform sampler2D shares;        // of the light of the lamp and from all around that reach surfels
+uniform vec2 strengths;          // of shadows and of occlusion
 uniform mat3 rotation;           // world to camera
 uniform vec3 translation;
 uniform vec2 focal, size;        // pixels
@@ -162,6 +164,9 @@ void main() {
   vec4 flags = texelFetch(parts, ivec2(2, lookup.w), 0);
   vec3 tint = texelFetch(parts, ivec2(3, lookup.w), 0).rgb;
   vec3 n = axes(normalize(texelFetch(surfels, ivec3(at, NORMALS), 0))).n;
+  if (look == LOOK_SHADED || look == LOOK_DISCS) {
+    material.xyz *= (1.0 - strengths * (1.0 - texelFetch(shares, at, 0).xy)).yxx;
+  }
   vec4 shaded = colour_of(color, material, tint, place.xyz, n, flags);
   base = vec4(shaded.xyz, log2(opacity));
   gain = shaded.w * texel_step;

@@ -39,6 +39,7 @@ export class SurfelPass {
       texels: makeTexture(gl, ofTexels, [WIDTH, texels.length / (3 * WIDTH)], texels),
       order: makeTexture(gl, [gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT], [WIDTH, height], null),
       parts: makeTexture(gl, floats, [COLUMNS, rows], null),
+      shares: makeTexture(gl, [gl.RG8, gl.RG, gl.UNSIGNED_BYTE], [WIDTH, height], null),
     };
     this._makeCorners(count);
   }
@@ -47,13 +48,14 @@ export class SurfelPass {
    * Blends far to near.
    *
    * @param {object} view viewmat [12], focal and size [2].
-   * @param {object} look `mode` (a number), `light`, a direction [3] or null for a headlight, and `planes` that cut.
+   * @param {object} look `mode` (a number), `light`, a direction [3] or null for a headlight, `planes` that cut, and
+   *   `exposure` of the surfels, see `SurfelLight`.
    * @param {Float32Array} table of parts.
    * @param {Uint32Array} order of the surfels, in a buffer of whole rows of the texture.
    * @param {object|null} slab that hides them behind faces: its `reach` in world units, and a texture of `weights`.
    * @returns {object} the picture, a texture whose first row is on top: premultiplied colour and alpha.
    */
-  blend(view, { mode, light, planes }, table, order, slab = null) {
+  blend(view, { mode, light, planes, exposure }, table, order, slab = null) {
     const gl = this._gl;
     const { program, uniforms } = this._shaders;
     this.target.begin(view.size);
@@ -61,6 +63,7 @@ export class SurfelPass {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.useProgram(program);
     this._upload(table, order);
+    this._expose(exposure.shares);
     const textures = { ...this._textures, weights: slab?.weights ?? this._textures.parts };
     Object.entries(textures).forEach(([name, texture], unit) => bind(gl, unit, texture, uniforms[name]));
     setView(gl, uniforms, view);
@@ -68,6 +71,7 @@ export class SurfelPass {
     gl.uniform1i(uniforms.headlight, light ? 0 : 1);
     gl.uniform3fv(uniforms.light, light ?? [0, 0, 1]);
     gl.uniform1i(uniforms.look, mode);
+    gl.uniform2fv(uniforms.strengths, exposure.strengths);
     gl.uniform1f(uniforms.reach, slab?.reach ?? 0);
     gl.uniform1f(uniforms.low_pass, this._optics.low_pass);
     gl.uniform1f(uniforms.near, NEAR);
@@ -111,6 +115,15 @@ export class SurfelPass {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, COLUMNS, parts, gl.RGBA, gl.FLOAT, table);
     gl.bindTexture(gl.TEXTURE_2D, this._textures.order.texture);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, whole);
+  }
+
+  /** Takes shares of light, where they are others than before. */
+  _expose(shares) {
+    const gl = this._gl;
+    if (!shares || shares === this._shares) return;
+    this._shares = shares;
+    gl.bindTexture(gl.TEXTURE_2D, this._textures.shares.texture);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, shares.length / (2 * WIDTH), gl.RG, gl.UNSIGNED_BYTE, shares);
   }
 
   /** Two triangles for each surfel. Instances would be fewer numbers, but software draws them one by one. */

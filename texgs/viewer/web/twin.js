@@ -43,7 +43,7 @@ export class Twin {
   pictures(view, scene, look, { mode, moving }, models) {
     const step = moving ? MOVING : STILL, shown = mode === "volume" ? scene : { ...scene, functions: {} }; // no others have models
     const cast = (target, slab) => {
-      this.#volume.cast(target, view, shown, look, { step, ...slab });
+      this.#volume.cast(target, view, shown, look, { step, isMoving: moving, ...slab });
       return target.picture;
     };
     const seen = () => {
@@ -56,6 +56,11 @@ export class Twin {
     if (mode === "volume") return alone(cast(this.target));
     if (mode === "shaded") return alone(seen());
     return { first: seen(), second: cast(this.target), pair: mode };
+  }
+
+  /** What of a scene's light reaches cells of its volume, see `VolumeLight`. */
+  cells(scene, look, isMoving) {
+    return this.#volume.cells({ ...scene, functions: {} }, look, isMoving);
   }
 
   /** Draw depths of the volume into the target. */

@@ -1,6 +1,7 @@
 // Casts rays through the volume of a page into a picture: all that is on the graphics card for it.
 
 import { Bricks } from "./bricks.js";
+import { VolumeLight, strengthsOf } from "./exposure.js";
 import { SIZE, functionTable, integralsOf, materialOf } from "./function_table.js";
 import { makeProgram, makeTexture } from "./program.js";
 import { PRESENT_VERTEX } from "./shaders.js";
@@ -8,7 +9,8 @@ import { bind, setView } from "./surfel_pass.js";
 import { VOLUME_FRAGMENT } from "./volume_shaders.js";
 
 export class VolumePass {
-  #gl; #facts; #shaders; #bricks; #textures;
+  #gl; #facts; #shaders; #bricks; #textures; #light;
+  #lit = { lamp: null, sky: null }; // cells that the textures hold
   #shown = ""; // what the table and the distances show
 
   /**
@@ -21,12 +23,15 @@ export class VolumePass {
     this.#gl = gl;
     this.#facts = facts;
     this.#bricks = new Bricks(codes, sizes);
+    this.#light = new VolumeLight({ codes, sizes }, facts);
     this.#shaders = makeProgram(gl, PRESENT_VERTEX, VOLUME_FRAGMENT);
     this.#textures = {
       samples: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], sizes, codes, { filter: gl.LINEAR, isSolid: true }),
       bricks: makeTexture(gl, [gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE], this.#bricks.size, null, { isSolid: true }),
       table: makeTexture(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT], [SIZE, 2], null),
       weights: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], [1, 1], new Uint8Array([255])),
+      lamp: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], [1, 1, 1], null, { filter: gl.LINEAR, isSolid: true }),
+      sky: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], [1, 1, 1], null, { filter: gl.LINEAR, isSolid: true }),
     };
     this.voxel = Math.min(...sizes.map((size, axis) => 2 * facts.half[axis] / (size - 1))); // world units
     this.unit = facts.appearance.opacity_unit;
@@ -41,13 +46,17 @@ export class VolumePass {
    * @param {object} look `light`, a direction [3] or null for a headlight, and `planes` that cut.
    * @param {object} how `step`, in voxels; and to show only what is behind faces, its `reach` in world units, and
    *   what part of that each pixel shows, a texture of `weights`; by default all;
-   *   `isOver`: over what is in the target; `isDepth`: depths in place of colours.
+   *   `isOver`: over what is in the target; `isDepth`: depths in place of colours; `isMoving`: see `VolumeLight`.
    */
-  cast(target, view, scene, { light, planes }, { step, reach = 0, weights = this.#textures.weights, isOver = false, isDepth = false }) {
+  cast(target, view, scene, look, { step, reach = 0, weights = this.#textures.weights, isOver = false, isDepth = false, isMoving = false }) {
     const gl = this.#gl, { program, uniforms } = this.#shaders, viewer = view.viewmat.slice(8, 11).map((x) => -x);
+    const { light, planes } = look;
     this.#show(scene);
+    this.#shine(scene, look, isMoving);
     target.begin(view.size, isOver);
     gl.useProgram(program);
+    gl.uniform2fv(uniforms.strengths, strengthsOf(scene, light));
+    gl.uniform2f(uniforms.outsets, this.#lit.lamp.outset, this.#lit.sky.outset);
     Object.entries({ ...this.#textures, weights }).forEach(([name, each], unit) => bind(gl, unit, each, uniforms[name]));
     setView(gl, uniforms, view);
     gl.uniform3fv(uniforms.box, this.#facts.half);
@@ -67,6 +76,22 @@ export class VolumePass {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.BLEND);
     target.end();
+  }
+
+  /** What of a scene's light reaches cells, see `VolumeLight`. */
+  cells(scene, look, isMoving) {
+    return this.#light.cells(scene, look, isMoving);
+  }
+
+  /** Take what of a scene's light reaches cells, where that is something else than before. */
+  #shine(scene, look, isMoving) {
+    const gl = this.#gl, cells = this.cells(scene, look, isMoving);
+    for (const name of ["lamp", "sky"]) {
+      if (cells[name] === this.#lit[name]) continue;
+      gl.bindTexture(gl.TEXTURE_3D, this.#textures[name].texture);
+      gl.texImage3D(gl.TEXTURE_3D, 0, gl.R8, ...cells[name].size, 0, gl.RED, gl.UNSIGNED_BYTE, cells[name].values);
+    }
+    this.#lit = cells;
   }
 
   /** Take what a scene shows, where that is something else than before. */

@@ -18,6 +18,8 @@ uniform sampler3D samples;       // codes
 uniform usampler3D bricks;       // distances, with one more brick on each side
 uniform sampler2D table;         // by values: colours and extinctions; below, their integrals
 uniform sampler2D weights;       // of faces
+uniform sampler3D lamp, sky;     // shares of light that reach cells
+uniform vec2 strengths, outsets; // of shadows and of occlusion, and how far along normals to look for light, world units
 uniform mat3 rotation;           // world to camera
 uniform vec3 translation;
 uniform vec2 focal, size;        // pixels
@@ -36,12 +38,20 @@ out vec4 fragment;                 // premultiplied
 float least(vec3 a) { return min(a.x, min(a.y, a.z)); }
 float most(vec3 a) { return max(a.x, max(a.y, a.z)); }
 
-// Blinn-Phong, on the side of the viewer.
-vec3 lit(vec3 color, vec3 normal) {
+// What reaches a point of the world of the lamp and of ambient light: 1 without matter in their way.
+vec2 exposed(vec3 point, vec3 n) {
+  if (strengths == vec2(0.0)) return vec2(1.0);
+  float of_lamp = texture(lamp, 0.5 + 0.5 * (point + outsets.x * n) / box).r;
+  return 1.0 - strengths * (1.0 - vec2(of_lamp, texture(sky, 0.5 + 0.5 * (point + outsets.y * n) / box).r));
+}
+
+// Blinn-Phong, on the side of the viewer, at a point of the world.
+vec3 lit(vec3 color, vec3 normal, vec3 point) {
   vec3 n = dot(normal, viewer) < 0.0 ? -normal : normal, between = viewer + light;
+  vec2 share = exposed(point, n);
   float n_l = max(dot(n, light), 0.0), n_h = dot(between, between) > 0.0 ? max(dot(n, normalize(between)), 0.0) : 0.0;
-  float highlight = n_l > 0.0 ? material.z * pow(max(n_h, 1e-30), material.w) : 0.0;
-  return clamp(color * (material.x + material.y * n_l) + highlight * tint, 0.0, 1.0);
+  float highlight = n_l > 0.0 ? share.x * material.z * pow(max(n_h, 1e-30), material.w) : 0.0;
+  return clamp(color * (share.y * material.x + share.x * material.y * n_l) + highlight * tint, 0.0, 1.0);
 }
 
 // The normal at a place of the texture, 0 where nothing changes.
@@ -108,8 +118,9 @@ void main() {
     if (look.a > 0.0) {
       float part = min(k + 1.0, ends) - max(k, begins), alpha = 1.0 - exp2(-look.a * part * interval / unit);
       float of_face = face < 0 ? 0.0 : clamp((face_end - near) / interval - k, 0.0, 1.0);
-      vec3 color = of_face < 1.0 ? lit(look.rgb, normal_at((place + 0.5) * texel, texel)) : vec3(0.0);
-      if (of_face > 0.0) color = mix(color, are_faces_lit ? lit(look.rgb, planes[face].xyz) : look.rgb, of_face);
+      vec3 point = box * (2.0 * place / last - 1.0);
+      vec3 color = of_face < 1.0 ? lit(look.rgb, normal_at((place + 0.5) * texel, texel), point) : vec3(0.0);
+      if (of_face > 0.0) color = mix(color, are_faces_lit ? lit(look.rgb, planes[face].xyz, point) : look.rgb, of_face);
       if (is_depth) color = vec3((near + (k + 0.5) * interval) / length(camera));
       sum += clear * alpha * color;
       clear *= 1.0 - alpha;

@@ -1,6 +1,7 @@
 // Draws a scene of surfels by WebGL2: sorted, blended far to near into floats, then shown.
 
 import { direction } from "./camera.js";
+import { Harmonics, SurfelLight } from "./exposure.js";
 import { COLUMNS, firstRows, partTable } from "./parts.js";
 import { makeProgram } from "./program.js";
 import { samplesOf } from "./samples.js";
@@ -64,6 +65,8 @@ export class WebglRenderer {
     this._steps = new Steps(tensors, steps, scene.held ?? []);
     this._time = scene.time; // where the surfels are
     this._turn = Promise.resolve(); // of who needs them at a step
+    const { models, exposure } = this._optics;
+    this._harmonics = exposure ? new Harmonics(tensors, models.length, exposure) : null;
     this._order = new DepthOrder(this._surfels.lookups.length / 4);
     this._samples = volume ? samplesOf((await unpack(volume)).tensors) : null;
     if (volume) this.modes = MODES.toSpliced(1, 0, ...OF_TWIN);
@@ -120,7 +123,7 @@ export class WebglRenderer {
     const look = lookOf(shown), isCut = look.planes.length > 0 && (mode === "shaded" || OF_TWIN.includes(mode));
     const isVolume = this._hasTwin(shown) && (mode === "volume" || isCut);
     if (isVolume) this._twin.drawDepths(viewOf(view), mode === "volume" ? shown : { ...shown, functions: {} }, look);
-    else this._blend(viewOf(view), shown, look, "depth");
+    else this._blend(viewOf(view), shown, look, { mode: "depth" });
     const depth = (isVolume ? this._twin : this._pass).target.depthAt(x, y);
     return depth && camera.unproject(pixel, depth, view.width, view.height);
   }
@@ -248,17 +251,23 @@ export class WebglRenderer {
     return this._twin && scene.time === this._original.time;
   }
 
+  /** The scene without shadows at steps other than that of which its light is known. */
+  _lit(scene) {
+    return scene.time === this._original.time ? scene : { ...scene, can_shadow: false };
+  }
+
   /** The picture of a mode, or two and how they are shown. */
   _pictures(view, scene, mode, moving) {
-    const look = lookOf(scene), draw = (slab) => this._blend(view, scene, look, mode, slab);
+    const look = lookOf(scene), draw = (slab) => this._blend(view, scene, look, { mode, moving, slab });
     if (!this._hasTwin(scene) || (mode !== "shaded" && !OF_TWIN.includes(mode))) return alone(draw());
     return this._twin.pictures(view, scene, look, { mode, moving }, { draw, target: this._pass.target });
   }
 
   /** Blends the surfels; on the canvas nothing changes. */
-  _blend(view, scene, look, mode, slab) {
+  _blend(view, scene, look, { mode, moving = false, slab }) {
+    const exposure = this._light.of(this._lit(scene), look, moving);
     const table = partTable(scene.models, this._optics.models), of = OF_TWIN.includes(mode) ? "shaded" : mode;
-    return this._pass.blend(view, { ...look, mode: MODES.indexOf(of) }, table, this._sort(view, table), slab);
+    return this._pass.blend(view, { ...look, exposure, mode: MODES.indexOf(of) }, table, this._sort(view, table), slab);
   }
 
   /** Surfels beyond the near plane whose part is visible, far to near, by depths rounded as the rasterizer's. */
@@ -283,6 +292,7 @@ export class WebglRenderer {
     const rows = partTable(this._original.models, this._optics.models).length / (4 * COLUMNS);
     this._pass = new SurfelPass(this._gl, this._surfels, this._optics, rows);
     this._twin = this._samples && new Twin(this._gl, this._samples, this._original.volume);
+    this._light = new SurfelLight(this._surfels, this._harmonics, this._twin);
     this._present = makeProgram(this._gl, PRESENT_VERTEX, PRESENT_FRAGMENT);
   }
 }
