@@ -62,7 +62,7 @@ def main(output: str, *datasets: str) -> None:
     tables = {name: measured(looked(name)) for name in datasets}
     table = pd.concat(tables, names=["data set"]).reset_index(level=0)
     print(table.round(2).to_string(index=False))
-    table.to_csv(output, index=False, lineterminator="\n")
+    table.round(3).to_csv(output, index=False, lineterminator="\n")
 
 
 def looked(dataset: str) -> Looked:

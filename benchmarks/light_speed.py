@@ -55,7 +55,10 @@ def measured(scene: Scene, size: int, rounds: int) -> Section:
     composed, twin = scene.open(), Twin(scene)
     camera = orbit(-60.0, 25.0, *scene.framed(composed).lens(width=size, height=size))
     cases = [
-        *(Case(name, {"step": "once"}, {name: run}) for name, run in steps(scene, composed, twin).items()),
+        *(
+            Case(name, {"step": "once"}, {name: run})
+            for name, run in steps(scene, composed, twin, camera).items()
+        ),
         *frames(scene, composed, twin, camera, size),
     ]
     section = Section(measure(cases, rounds, torch.device("cpu"), "light"))
@@ -64,7 +67,7 @@ def measured(scene: Scene, size: int, rounds: int) -> Section:
     return section
 
 
-def steps(scene: Scene, composed: Composed, twin: Twin) -> dict[str, Callable[[], object]]:
+def steps(scene: Scene, composed: Composed, twin: Twin, camera: Camera) -> dict[str, Callable[[], object]]:
     """Return what is done when functions, a light or the reach change; each run has another one."""
     volume, numbers = volume_of(scene), count()
     caster = Caster(open_grid(volume.file), volume.appearance)
@@ -74,14 +77,14 @@ def steps(scene: Scene, composed: Composed, twin: Twin) -> dict[str, Callable[[]
     def grid_of_a_light() -> None:
         matter.lit(orbit_direction(7.0 * next(numbers), 40.0), None)
 
-    def new_light() -> None:
-        light = replace(LIGHTS["shadows"], azimuth=7.0 * next(numbers))
-        exposure_of(composed, replace(scene, light=light), twin)
+    def turned() -> Scene:
+        return replace(scene, light=replace(LIGHTS["shadows and occlusion"], azimuth=7.0 * next(numbers)))
 
     return {
         "extinction": partial(Matter, caster, tfs, unit),
         "grid of a light": grid_of_a_light,
-        "new light, grid and surfels": new_light,
+        "new light, grid and surfels": lambda: exposure_of(composed, turned(), twin),
+        "frame under a new light": lambda: cut_view(composed, camera, turned(), twin),
         "openness": lambda: matter.lit(None, 0.25 + 1e-6 * next(numbers)),
     }
 

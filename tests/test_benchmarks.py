@@ -125,7 +125,15 @@ def test_accuracy_of_light_grows_with_cells_and_directions(monkeypatch):
 def test_speed_of_light_is_told_for_each_step_and_frame(tmp_path):
     section = light_speed.measured(scene_of_volume(tmp_path, waves()), 16, 1)
     assert {m.name for m in section.measurements if m.unit == "ms"} == {
-        *("extinction", "grid of a light", "new light, grid and surfels", "openness", "volume", "scene")
+        *(
+            "extinction",
+            "grid of a light",
+            "new light, grid and surfels",
+            "frame under a new light",
+            "openness",
+            "volume",
+            "scene",
+        )
     }
     assert {m.name for m in section.measurements if m.unit == "ratio"} == {"volume / plain", "scene / plain"}
     assert all(m.min > 0 for m in section.measurements)
