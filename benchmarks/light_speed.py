@@ -80,9 +80,18 @@ def steps(scene: Scene, composed: Composed, twin: Twin, camera: Camera) -> dict[
     def turned() -> Scene:
         return replace(scene, light=replace(LIGHTS["shadows and occlusion"], azimuth=7.0 * next(numbers)))
 
+    def changed() -> None:
+        edited, factor = turned(), 1 - 1e-4 * next(numbers)
+        models = {
+            name: replace(each, edit=replace(each.edit, opacity=factor))
+            for name, each in scene.models.items()
+        }
+        exposure_of(composed, replace(edited, models=models), twin)
+
     return {
         "extinction": partial(Matter, caster, tfs, unit),
         "grid of a light": grid_of_a_light,
+        "changed opacity, all of it": changed,
         "new light, grid and surfels": lambda: exposure_of(composed, turned(), twin),
         "frame under a new light": lambda: cut_view(composed, camera, turned(), twin),
         "openness": lambda: matter.lit(None, 0.25 + 1e-6 * next(numbers)),

@@ -94,7 +94,7 @@ def test_extinctions_are_means_over_places(kind, cuts, device):
     grid = waves(kind)
     for channel in (grid.values, *grid.others):
         np.nan_to_num(channel, copy=False)
-    extinction = matter_of(grid, device, cuts).extinction.cpu()
+    extinction = matter_of(grid, device, cuts).extinction[1:-1, 1:-1, 1:-1].cpu()
     half, dims, size = np.array(grid.aabb[1]), np.array(grid.dims), np.array(extinction.shape)[::-1]
     per_cell = np.ceil((dims - 1) / size).clip(2, 8).astype(int)
     shares = [(np.arange(n) + 0.5) / n for n in per_cell * size]  # of the box
@@ -233,5 +233,6 @@ def test_sizes_beyond_the_limits_are_refused(size, device):
 
 def test_more_planes_than_cuts_have_are_refused(device):
     caster, extinction = Caster(ball(8), LOOK, device), torch.zeros(2, 2, 2, device=device)
-    given = *caster.functions([SHELLS]), 0.1, torch.zeros(13, 4), 13, NativeCells((2, 2, 2), HALF), extinction
+    shown, cells = caster.functions([SHELLS])[0], NativeCells((2, 2, 2), HALF)
+    given = *shown, 0.1, torch.zeros(13, 4), 13, cells, extinction
     refused(lambda: native.call("texgs_extinction", *given, device=device), "planes: expected 12 at most")

@@ -42,7 +42,8 @@ class Editing:
 
     _part = ""  # none: values are of the whole scene
     light = Value[Light](
-        'Light: set "headlight", or azimuth and polar angle in degrees; shadows and occlusion stay.'
+        'Light: set "headlight", or azimuth and polar angle in degrees; shadows and occlusion stay, '
+        "unless it is a Light."
     )
     shadows = Value[float](
         "Share of a directional light that matter in its way takes away: set 0, none, to 1.", of="light"

@@ -152,7 +152,7 @@ class Volume:
         width: int = 800,
         height: int | None = None,
         *,
-        light: Light | str | tuple[float, float] | dict[str, float] = "headlight",
+        light: Light | str | tuple[float, float] | dict[str, Any] = "headlight",
         background: str | Sequence[float] = WHITE,
         step: float = Appearance().step,
     ) -> Image:
@@ -175,8 +175,7 @@ class Volume:
         caster, cells = Caster(self.grid, look), None
         view = Shot(width, height, azimuth=azimuth, polar=polar).camera(frame_of(self.grid, tfs.values()))
         if lit.casts_shadows:
-            matter, reach = Matter(caster, shown, look.opacity_unit), lit.reach if lit.occlusion else None
-            cells = matter.lit(lit.direction(view) if lit.kind == "directional" else None, reach)
+            cells = Matter(caster, shown, look.opacity_unit).under(lit)
         rgba = caster.cast(shown, view, lit, cells=cells).rgba
         behind = rgba.new_tensor(color("background", as_python(background)))
         return picture_of(quantize(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))

@@ -15,7 +15,7 @@ from texgs.raster import Render
 from texgs.raster.api import CutRange
 from texgs.scene.exposure import exposure_of
 from texgs.scene.scene import Scene
-from texgs.scene.twin import Twin, range_of
+from texgs.scene.twin import LIT, Twin, range_of
 from texgs.volume.images import smaller
 
 SLAB_UNITS = 36.0  # thickness of the slab behind a face, opacity units; it hides most of the rest
@@ -24,7 +24,6 @@ RIM = 0.01  # width of the slab's rim around a face, in shorter sides of the pic
 HIDDEN_ALPHA = 0.998  # alpha of a slab that hides models, half a level of 255 from opaque
 STEP = 0.5  # voxels between the samples of a slab
 COARSE_PIXELS = 4  # step of the search for faces, pixels
-LIT = ("shaded", "discs")  # looks that show light
 Crop = tuple[slice, slice]  # rows and columns of a picture
 
 

@@ -192,7 +192,8 @@ def plain_functions(functions: Mapping[str, TransferFunction]) -> dict[str, Any]
 def light_of(value: Any, before: Light = HEADLIGHT) -> Light:
     """Return a light from one, "headlight", azimuth and polar angle in degrees, or its values by name.
 
-    Shadows, occlusion and reach that are not named are those of the light before.
+    Shadows, occlusion and reach that are not named are those of the light before; where neither the kind nor
+    an angle is named, so are these.
     """
     if isinstance(value, Light):
         return value
@@ -203,14 +204,18 @@ def light_of(value: Any, before: Light = HEADLIGHT) -> Light:
     if not isinstance(value, dict):
         raise ArgumentError(f"light: expected headlight, or azimuth and polar in degrees, got {value!r}")
     require_keys(value, LIGHT_KEYS, "light")
-    kind = value.get("kind", "directional")
     numbers = {key: number for key, number in value.items() if key != "kind"}
     for key, number in numbers.items():
         if not is_number(number):
             raise ArgumentError(f"light.{key}: expected a number, got {number!r}")
-    kept = {key: getattr(before, key) for key in HIDING}
+    has_angles = bool({"azimuth", "polar"} & numbers.keys())
+    kind = value.get("kind", "directional" if has_angles else before.kind)
+    if has_angles and kind == "headlight":
+        raise ArgumentError("light: expected a headlight without angles, got some; or leave its kind out")
+    kept = HIDING if has_angles or "kind" in value else (*HIDING, "azimuth", "polar")
     with errors_at("light", "."):
-        return Light(kind, **kept | {key: float(number) for key, number in numbers.items()})
+        values = {key: getattr(before, key) for key in kept} | {key: float(x) for key, x in numbers.items()}
+        return Light(kind, **values)
 
 
 def plain_light(light: Light) -> Any:

@@ -4,7 +4,7 @@ import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from threading import RLock
@@ -182,7 +182,7 @@ class Session:
             case "light":
                 self.set_light(light_of(value, self.scene.light))
             case _ if key in HIDING:
-                self.set_light(light_of({**asdict(self.scene.light), key: value}))
+                self.set_light(light_of({key: value}, self.scene.light))
             case "cuts":
                 self.set_cuts(cuts_of(value))
             case "functions":

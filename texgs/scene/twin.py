@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from texgs.core.camera import Camera, orbit_direction
+from texgs.core.camera import Camera
 from texgs.core.cuts import Cuts
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.fields.part_edit import PartEdit
@@ -30,6 +30,7 @@ from texgs.volume.overlay import overlays
 from texgs.volume.transfer import TransferFunction
 
 T = TypeVar("T")
+LIT = ("shaded", "discs")  # modes that show light
 
 
 class Twin:
@@ -143,11 +144,9 @@ class Twin:
 
     def _lit(self, scene: Scene, shown: Mapping[str, TransferFunction]) -> LightCells:
         light, matter = scene.light, self._hiding(scene, shown)
-        is_shaded = light.kind == "directional" and light.shadows > 0
-        direction = orbit_direction(light.azimuth, light.polar) if is_shaded else None
         reach = light.reach if light.occlusion else None
-        state = matter, (light.azimuth, light.polar) if is_shaded else None, reach
-        return last_of(self._cells, state, lambda: matter.lit(direction, reach))
+        state = matter, light.kind, light.azimuth, light.polar, light.shadows > 0, reach
+        return last_of(self._cells, state, lambda: matter.under(light))
 
     def _hiding(self, scene: Scene, shown: Mapping[str, TransferFunction]) -> Matter:
         tfs, unit = overlays(shown), self.opacity_unit
@@ -196,8 +195,9 @@ def twin_of(scene: Scene, device: torch.device | str = "cpu") -> Twin | None:
 
 
 def needs_twin(scene: Scene, mode: str) -> bool:
-    """Return whether frames of a mode show the scene's volume."""
-    return mode == "volume" or scene.light.casts_shadows or (bool(scene.cuts) and scene.volume is not None)
+    """Return whether frames of a mode need the scene's volume: they show it, or shadows."""
+    shows_shadows = mode in LIT and scene.light.casts_shadows
+    return mode == "volume" or (scene.volume is not None and (bool(scene.cuts) or shows_shadows))
 
 
 def range_of(cuts: Cuts, camera: Camera) -> CutRange:

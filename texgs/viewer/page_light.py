@@ -42,7 +42,7 @@ class PageLight:
 
 
 def page_light(scene: Scene, composed: Composition, twin: Twin) -> PageLight:
-    """Return what a page needs for shadows of a scene as it is, of which at least one surfel is seen."""
+    """Return what a page needs for shadows of a scene as it is; it shows at least one model."""
     matter, lamps = twin.matter(scene, composed.palettes), even_directions(LAMPS)
     places = places_of(composed, matter)
     rows = composed.means.new_zeros(10, len(composed))

@@ -50,7 +50,8 @@ NativeView = native.struct(
     "texgs_cast_view",
     "p viewmat K, i width height, f step opacity_unit, 3f to_viewer to_light, "
     "f ambient diffuse specular shininess, p rgba depth median normal, "
-    "p depth_range face planes, i n_planes unlit_faces, p light, 3i light_size, f shadows occlusion outset",
+    "p depth_range face planes, i n_planes unlit_faces, "
+    "p light, 3i light_size, 3f light_half, f shadows occlusion outset",
 )
 native.declare("texgs_volume_bricks", NativeVolume, "p", result=c_int64, stream=False)
 native.declare("texgs_volume_extremes", NativeVolume, "pp")
@@ -211,12 +212,12 @@ class Caster:
             native.call("texgs_volume_cells", volume, distance, transfer, cells, device=self.device)
         return volume, transfer, distance, cells
 
-    def functions(self, tfs: Sequence[TransferFunction]) -> tuple[Any, ...]:
-        """Return channels, functions, their number, and distances of bricks for the library."""
+    def functions(self, tfs: Sequence[TransferFunction]) -> tuple[tuple[Any, ...], Any]:
+        """Return channels, functions, their number and distances of bricks; and what has to be kept."""
         tfs = [*tfs]
         prepared = next((each for each in [*self._prepared] if each[0][0] == tfs), None)
-        _, arguments, _kept = prepared or self._prepare(tfs, False)
-        return arguments[:-1]
+        _, arguments, kept = prepared or self._prepare(tfs, False)
+        return arguments[:-1], kept
 
     def channel(self, number: int) -> tuple[native.Struct, Tensor]:
         """Return a channel for the library, and the extremes of its bricks [bricks, 2]."""
@@ -242,7 +243,7 @@ def lit_by(cells: LightCells, light: Light) -> dict[str, Any]:
     """Return what a view needs of the light that reaches its samples, by the names of the library."""
     shadows = light.shadows if light.kind == "directional" else 0.0
     strengths = {"shadows": shadows, "occlusion": light.occlusion, "outset": cells.outset}
-    return {"light": cells.light, "light_size": cells.size, **strengths}
+    return {"light": cells.light, "light_size": cells.size, "light_half": cells.half, **strengths}
 
 
 def bytes_of(values: NDArray[Any]) -> Tensor:

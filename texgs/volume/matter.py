@@ -10,15 +10,18 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Tensor
-from torch.nn.functional import grid_sample
+from torch.nn.functional import grid_sample, pad
 
+from texgs.core.camera import orbit_direction
 from texgs.core.cuts import NO_CUTS, Cuts
+from texgs.core.light import Light
 from texgs.raster import native
 from texgs.volume.caster import Caster, NativeTransfer, NativeVolume
 from texgs.volume.light_cells import LightCells, NativeCells
 from texgs.volume.transfer import TransferFunction
 
 LONGEST_SIDE = 128  # cells
+RIM = 1  # empty cells around a volume: matter that its sides cut off is in the light there
 SKY_DIRECTIONS = 64
 native.declare("texgs_extinction", NativeVolume, NativeTransfer, "ip f pi", NativeCells, "p")
 native.declare("texgs_transmittance", NativeCells, "ppp")
@@ -33,7 +36,7 @@ class Matter:
         tfs: functions that are shown together.
         opacity_unit: length over which their opacities apply, world units.
         cuts: what is cut away hides nothing.
-        longest: cells along the longest side.
+        longest: cells along the longest side of the volume; there are empty ones around it.
     """
 
     def __init__(
@@ -44,32 +47,42 @@ class Matter:
         cuts: Cuts = NO_CUTS,
         longest: int = LONGEST_SIDE,
     ) -> None:
-        (x, y, z), device = caster.half, caster.device
-        self.half = (x, y, z)  # half the sides of the box, world units
-        size = tuple(max(2, round(longest * half / max(self.half))) for half in self.half)
-        self.extinction = torch.empty(size[::-1], device=device)  # [Z, Y, X] of the shortest edge of a cell
-        self._cells = NativeCells(size, self.half)
-        self._open: tuple[float, Tensor] | None = None
+        device = caster.device
+        inner = [max(2, round(longest * half / max(caster.half))) for half in caster.half]
+        found = torch.empty(inner[::-1], device=device)
         half_spaces = [[*plane.normal, plane.offset] for plane in cuts.half_spaces]
         planes = torch.tensor(half_spaces).reshape(-1, 4)
+        arguments, kept = caster.functions(tfs)
+        cells = NativeCells(tuple(inner), tuple(caster.half))
         native.call(
             "texgs_extinction",
-            *caster.functions(tfs),
-            *(opacity_unit, planes, len(planes), self._cells, self.extinction),
+            *(*arguments, opacity_unit, planes, len(planes), cells, found),
             device=device,
         )
+        del kept  # the functions have to be there until now
+        self.extinction = pad(found, (RIM,) * 6)  # [Z, Y, X] of the shortest edge of a cell
+        x, y, z = (half * (n + 2 * RIM) / n for half, n in zip(caster.half, inner, strict=True))
+        self.half = (x, y, z)  # half the sides of the box of all cells, world units
+        self._cells = NativeCells(tuple(n + 2 * RIM for n in inner), self.half)
+        self._open: tuple[float, Tensor] | None = None
 
     def lit(self, to_light: Tensor | None, reach: float | None) -> LightCells:
         """Return which shares of light reach each cell.
 
         Args:
-            to_light: [3] direction to a distant lamp; None: all of its light is there.
-            reach: of matter that hides light from all around, world units; None: all of that is there.
+            to_light: [3] direction to a distant lamp; None: no lamp, its share is 1 everywhere.
+            reach: of matter that hides light from all around, world units; None: that share is 1 everywhere.
         """
         light = self._everywhere() if reach is None else self._opened(reach).clone()
         if to_light is not None:
             self._call("texgs_transmittance", to_light.float().cpu().contiguous(), light)
         return LightCells(light, self.half)
+
+    def under(self, light: Light) -> LightCells:
+        """Return which shares of a light reach each cell, as far as it casts shadows."""
+        has_lamp = light.kind == "directional" and light.shadows > 0
+        direction = orbit_direction(light.azimuth, light.polar) if has_lamp else None
+        return self.lit(direction, light.reach if light.occlusion else None)
 
     @property
     def edge(self) -> float:
@@ -77,7 +90,7 @@ class Matter:
         return min(2 * half / n for half, n in zip(self.half, self._cells.size, strict=True))
 
     def at(self, points: Tensor) -> Tensor:
-        """Return the extinction [N] at points [N, 3] of the world, those of the box beyond it."""
+        """Return the extinction [N] at points [N, 3] of the world, 0 beyond the volume."""
         places = (points / points.new_tensor(self.half)).reshape(1, 1, 1, -1, 3)
         values = self.extinction[None, None]
         return grid_sample(values, places, padding_mode="border", align_corners=False).reshape(-1)
@@ -89,11 +102,12 @@ class Matter:
 
     def _opened(self, reach: float) -> Tensor:
         """Return the same with the openness; kept, as it does not depend on a lamp."""
-        if self._open is None or self._open[0] != reach:
+        latest = self._open  # another thread may replace it
+        if latest is None or latest[0] != reach:
             light, directions = self._everywhere(), even_directions(SKY_DIRECTIONS)
             self._call("texgs_openness", len(directions), directions, reach, light)
-            self._open = reach, light
-        return self._open[1]
+            self._open = latest = reach, light
+        return latest[1]
 
     def _call(self, name: str, *arguments: Any) -> None:
         device = self.extinction.device

@@ -78,11 +78,12 @@ typedef struct {
     const int32_t* face; /* [H, W] the plane through which a ray enters, or none of these; or NULL */
     const float* planes; /* [n_planes, 3] unit normals */
     int32_t n_planes, unlit_faces;
-    /* Shares of light that reach the places `outset` world units before samples, on the viewer's side, or NULL: see
-     * texgs_light.h. Of diffuse and highlights 1 - shadows (1 - first share) is left, of ambient light
-     * 1 - occlusion (1 - second share). */
-    const uint8_t* light; /* [z, y, x, 2] in 255ths, at the centres of light_size cells */
-    int32_t light_size[3];
+    /* Shares of light that reach places `outset` world units along the normals of samples, on their side towards the
+     * viewer, or NULL: see texgs_light.h. Of diffuse and highlights 1 - shadows (1 - first share) is left, of ambient
+     * light 1 - occlusion (1 - second share). */
+    const uint8_t* light;  /* [z, y, x, 2] in 255ths, at the centres of cells */
+    int32_t light_size[3]; /* these cells, see texgs_cells */
+    float light_half[3];
     float shadows, occlusion, outset;
 } texgs_cast_view;
 

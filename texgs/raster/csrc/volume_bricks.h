@@ -44,6 +44,8 @@ inline void check_cast(const texgs_cast_view& view) {
     for (int a = 0; view.light && a < 3; ++a)
         require(view.light_size[a] >= 2 && view.light_size[a] <= TEXGS_LIGHT_SIDE,
                 "light: expected 2 to 256 cells along an axis");
+    for (int a = 0; view.light && a < 3; ++a)
+        require(view.light_half[a] > 0.0f && view.light_half[a] < 1e30f, "light: expected sides above 0");
 }
 
 inline int64_t count_bricks(const texgs_volume& volume, int32_t size[3]) {

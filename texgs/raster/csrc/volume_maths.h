@@ -251,16 +251,17 @@ TEXGS_MATHS Vec3<F> lit(const CastRay& ray, F k, Vec3<F> color, Vec3<F>& normal,
     return {mix(inner.x, outer.x, part), mix(inner.y, outer.y, part), mix(inner.z, outer.z, part)};
 }
 
-// From places in a volume to those of the light that reaches them: centre = place * scale - 0.5 + outset * direction.
+// From places in a volume to those of the light that reaches them: centre = place * scale + shift + outset * direction.
 struct LightCells {
-    float scale[3], outset[3];
+    float scale[3], shift[3], outset[3];
 };
-TEXGS_MATHS LightCells light_cells_of(const Lattice& lattice, const texgs_volume& volume, const texgs_cast_view& view) {
+TEXGS_MATHS LightCells light_cells_of(const Lattice& lattice, const texgs_cast_view& view) {
     LightCells c{};
     for (int a = 0; view.light && a < 3; ++a) {
-        const float size = static_cast<float>(view.light_size[a]);
-        c.scale[a] = size / lattice.last[a];
-        c.outset[a] = view.outset * size / (2.0f * volume.half[a]);
+        const double per_unit = view.light_size[a] / (2.0 * view.light_half[a]), scale = per_unit / lattice.per_unit[a];
+        c.scale[a] = static_cast<float>(scale);
+        c.shift[a] = static_cast<float>(0.5 * (view.light_size[a] - 1) - lattice.middle[a] * scale);
+        c.outset[a] = static_cast<float>(view.outset * per_unit);
     }
     return c;
 }

@@ -4,6 +4,7 @@
 import { integralsOf } from "./function_table.js";
 
 const CODES = 256;
+const RIM = 1; // empty cells around a volume, as in texgs/volume/matter.py
 const OUTSET = 2.5; // cells along its normal from which light comes to a place, as in texgs/volume/light_cells.py
 const MOST = 16; // extinction of an edge of a cell: cells that opaque matter only touches stay bright
 const FINENESS = 256; // steps of a logarithm to base 2 of light
@@ -19,22 +20,24 @@ const mix = (a, b, t) => a + t * (b - a);
 export class Matter {
   /** Cells: `values` [Z, Y, X] are logarithms to base 2, negated, of the light that a world unit lets through. */
   extinctions;
-  #samples; #half; #size; #extinction;
+  #samples; #box; #half; #size; #extinction;
 
   /**
    * What functions show of a volume, where no cut is.
    *
    * @param {object} samples `codes` and their `sizes` x, y, z, see samples.js.
    * @param {object} facts half the sides of the box, and appearance: `volume` of the description of a scene.
-   * @param {number} longest side, in cells; no cell is smaller than those between samples.
+   * @param {number} longest side, in cells without the rim; no cell is smaller than those between samples.
    * @param {Float32Array} table see function_table.js.
    * @param {object[]} planes that cut: `normal` and `offset`.
    */
   constructor(samples, { half, appearance: { opacity_unit: unit } }, longest, table, planes) {
     this.#samples = samples;
-    this.#half = half;
-    this.#size = samples.sizes.map((count, axis) =>
+    this.#box = half;
+    const inner = samples.sizes.map((count, axis) =>
       Math.max(1, Math.min(count - 1, Math.round((longest * half[axis]) / Math.max(...half)))));
+    this.#size = inner.map((count) => count + 2 * RIM);
+    this.#half = half.map((each, axis) => (each * this.#size[axis]) / inner[axis]);
     this.#extinction = new Float32Array(this.#size[0] * this.#size[1] * this.#size[2]);
     this.extinctions = this.#cells(this.#extinction);
     this.#fill(meansBetween(table, (MOST * unit) / this.extinctions.edge), unit, planes);
@@ -92,11 +95,11 @@ export class Matter {
 
   /** Of the middles between samples along an axis: the cell of each, its share of that, and where it is. */
   #places(axis) {
-    const count = this.#samples.sizes[axis] - 1, cells = this.#size[axis], side = 2 * this.#half[axis] / count;
-    const cell = Int32Array.from({ length: count }, (_, i) => Math.floor((i + 0.5) * cells / count));
-    const counts = new Int32Array(cells);
+    const count = this.#samples.sizes[axis] - 1, cells = this.#size[axis] - 2 * RIM, side = 2 * this.#box[axis] / count;
+    const cell = Int32Array.from({ length: count }, (_, i) => RIM + Math.floor((i + 0.5) * cells / count));
+    const counts = new Int32Array(cells + 2 * RIM);
     for (const each of cell) counts[each] += 1;
-    const at = Float32Array.from(cell, (_, i) => (i + 0.5) * side - this.#half[axis]);
+    const at = Float32Array.from(cell, (_, i) => (i + 0.5) * side - this.#box[axis]);
     return { cell, share: Float32Array.from(cell, (each) => 1 / counts[each]), at, side };
   }
 

@@ -58,7 +58,7 @@ public:
         : job_(job),
           lattice_(lattice_of(job.volume)),
           lamp_(lamp_of(job.view)),
-          light_cells_(light_cells_of(lattice_, job.volume, job.view)) {
+          light_cells_(light_cells_of(lattice_, job.view)) {
         for (int a = 0; a < 3; ++a) box_.lower[a] = job.lower[a], box_.upper[a] = job.upper[a];
         for (int c = 0; c < job.n; ++c) {
             const CastTable& t = job.channels[c].table;
@@ -217,7 +217,7 @@ private:
         vf place[3];
         for (int a = 0; a < 3; ++a) {
             const vf at = fma(k + vf(0.5f), ray.step[a], ray.entry[a]);
-            place[a] = fma(at, light_cells_.scale[a], fma(outs[a], light_cells_.outset[a], vf(-0.5f)));
+            place[a] = fma(at, light_cells_.scale[a], fma(outs[a], light_cells_.outset[a], light_cells_.shift[a]));
         }
         const Shares shares = shares_at(view.light, view.light_size, place);
         return exposure_of(view, shares.lamp, shares.sky);

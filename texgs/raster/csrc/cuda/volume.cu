@@ -99,7 +99,8 @@ __device__ inline Exposure<float> exposed(const texgs_cast_view& view, const Lig
     const float outs[3] = {out.x, out.y, out.z};
     float place[3];
     for (int a = 0; a < 3; ++a)
-        place[a] = fma(fma(k + 0.5f, ray.step[a], ray.entry[a]), cells.scale[a], fma(outs[a], cells.outset[a], -0.5f));
+        place[a] = fma(fma(k + 0.5f, ray.step[a], ray.entry[a]), cells.scale[a],
+                       fma(outs[a], cells.outset[a], cells.shift[a]));
     const Shares shares = shares_at(view.light, view.light_size, place);
     return exposure_of(view, shares.lamp, shares.sky);
 }
@@ -267,7 +268,7 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, i
         check_channels(volume, transfer, n);
         check_cast(*view);
         const Channels channels(volume, transfer, n);
-        const LightCells light_cells = light_cells_of(lattice_of(*volume), *volume, *view);
+        const LightCells light_cells = light_cells_of(lattice_of(*volume), *view);
         const int tiles = (view->width + kTileX - 1) / kTileX, rows = (view->height + kTileY - 1) / kTileY;
         with_type(*volume, [&](auto sample) {
             const auto kernel =
