@@ -76,7 +76,7 @@ def test_shadows_are_in_the_colors_as_frames_have_them(tmp_path):
         alike = np.asarray((lamp > 0.99) & (ambient > 0.99))
         assert np.abs(one.sh - other.sh)[alike].max() < 0.02
         assert (other.sh[:, 0] <= one.sh[:, 0] + 1e-5).all()
-    expected = scene.open().render(CAMERA, dark, exposure=shares).color
+    expected = scene.open().under(shares).render(CAMERA, dark).color
     bright = drawn(lit, CAMERA, WHITE)
     assert psnr(drawn(dim, CAMERA, WHITE), expected) > psnr(bright, expected) + 1
     baked = Scene({"C": SceneModel(write_gaussians(tmp_path / "c.safetensors", gaussians(30)))}, dark)

@@ -18,7 +18,7 @@ from texgs.core.cuts import Cuts, Plane
 from texgs.core.light import HEADLIGHT, Light, random_lights
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.export_keys import Export
-from texgs.scene.exposure import exposure_of
+from texgs.scene.exposure import exposed, exposure_of
 from texgs.scene.frame import frame, quantize
 from texgs.scene.twin import Twin, range_of
 from texgs.viewer.export import export
@@ -126,10 +126,8 @@ def test_the_poster_has_shadows_and_hollow_cuts(scene):
     view, fov_y = described(page)["views"][0], described(page)["fov_y"]
     place = (view["azimuth"], view["polar"], view["distance"], fov_y, POSTER_SIDE, POSTER_SIDE)
     camera = orbit(*place, target=view["target"])
-    hollow = composed.render(
-        *(camera, cut.light, cut.edits),
-        depth_range=range_of(cut.cuts, camera).depth_range,
-        exposure=exposure_of(composed, cut, Twin(cut)),
+    hollow = exposed(composed, cut, Twin(cut)).render(
+        *(camera, cut.light, cut.edits), depth_range=range_of(cut.cuts, camera).depth_range
     )
     poster = np.asarray(Image.open(io.BytesIO(page.poster)))
     assert closeness(poster, quantize(hollow.color)) > 35

@@ -74,7 +74,6 @@ class Asked(NamedTuple):
     background: Tensor | None
     outputs: Collection[str]
     depth_range: Tensor | None
-    exposure: Tensor | None
 
 
 class Composed(ABC):
@@ -102,7 +101,6 @@ class Composed(ABC):
         background: Tensor | None = None,
         outputs: Collection[str] = (),
         depth_range: Tensor | None = None,
-        exposure: Tensor | None = None,
     ) -> Render:
         """Render one view of all visible fields.
 
@@ -115,12 +113,11 @@ class Composed(ABC):
             background: [3]; white by default, for a factor black.
             outputs: besides colour and alpha.
             depth_range: [2, H, W] camera z from which on, and before which, a pixel shows something.
-            exposure: [N, 2] factors on the light of the lamp, and on ambient light, of each primitive.
 
         Raises:
             ArgumentError: if there are not as many edits as parts, or fields of this kind cannot show one.
         """
-        return self._draw(camera, light, edits, look, Asked(background, outputs, depth_range, exposure))
+        return self._draw(camera, light, edits, look, Asked(background, outputs, depth_range))
 
     @abstractmethod
     def _draw(
@@ -193,22 +190,12 @@ class UnlitScene(Composed, Generic[F]):
             raise ArgumentError(
                 f"look: expected shaded, got {look}; {self.kind} have light in their colours, fit surfels"
             )
-        if asked.exposure is not None:
-            raise baked_light(self.kind)
         factors = opacity_factors(edits, len(self.counts), self.kind)
         return self._blend(factors, camera, asked)
 
     @abstractmethod
     def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
         """Render all fields, each with a factor on its opacity."""
-
-
-def baked_light(kind: str) -> ArgumentError:
-    """Return the error for shadows on fields that cannot be relit."""
-    return ArgumentError(
-        f"light: expected surfels for shadows and occlusion, got {kind}, which have light in their colours; "
-        "fit surfels, or take both back by shadows=0 occlusion=0"
-    )
 
 
 def require_depth(outputs: Collection[str], kind: str) -> None:

@@ -92,8 +92,7 @@ class JoinedGaussians(UnlitScene[Gaussians]):
         self.whole = join_models(models)
 
     def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
-        of_view = {key: value for key, value in asked._asdict().items() if key != "exposure"}
-        return self.whole.render(camera, opacity=self._per_gaussian(factors), **of_view)
+        return self.whole.render(camera, opacity=self._per_gaussian(factors), **asked._asdict())
 
     def with_edits(self, edits: Sequence[PartEdit]) -> Gaussians:
         """Return the visible Gaussians as one model, with edited opacities."""

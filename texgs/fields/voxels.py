@@ -105,7 +105,7 @@ class VoxelScene(UnlitScene[Voxels]):
         key = tuple(factors)
         if self._merged is None or self._merged[0] != key:
             self._merged = (key, self._merge(key))
-        return self._merged[1].draw(camera, *asked[:3])
+        return self._merged[1].draw(camera, *asked)
 
     def _merge(self, factors: tuple[float, ...]) -> Voxels:
         first, grids = self.fields[0], []

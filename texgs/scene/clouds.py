@@ -103,7 +103,7 @@ def cloud_of(
 ) -> Cloud:
     """Return the visible cloud of a model from `SceneModel.open`.
 
-    Edits are as in `EditableModel`, the exposure as in `Composed.render`.
+    Edits are as in `EditableModel`, the exposure as in `Composition.under`.
     """
     model, masks = cast("Surfels | Gaussians", opened[0]), opened[1]
     means, quats, scales, opacities = geometry(model.parameters)

@@ -13,7 +13,7 @@ from texgs.core.camera import Camera
 from texgs.fields.field import Composed, Look
 from texgs.raster import Render
 from texgs.raster.api import CutRange
-from texgs.scene.exposure import exposure_of
+from texgs.scene.exposure import exposed
 from texgs.scene.scene import Scene
 from texgs.scene.twin import LIT, Twin, range_of
 from texgs.volume.images import smaller
@@ -55,14 +55,13 @@ def cut_view(
     """
     cut = range_of(scene.cuts, camera) if scene.cuts else None
     if cut is None or twin is None or look != "shaded" or outputs:
-        exposure = exposure_of(composed, scene, twin) if look in LIT else None
-        return composed.render(
+        shown = exposed(composed, scene, twin) if look in LIT else composed
+        return shown.render(
             *(camera, scene.light, scene.edits),
             look=look,
             background=background,
             outputs=outputs,
             depth_range=None if cut is None else cut.depth_range,
-            exposure=exposure,
         )
     if scene.is_as_volume:
         return twin.render(camera, scene, composed.palettes, cut)
@@ -80,11 +79,10 @@ def slab_view(composed: Composed, camera: Camera, scene: Scene, twin: Twin, cut:
     near, far = beyond[:, rows, columns]
     near.copy_(slab.depth_range[1])
     far.copy_(torch.where(seen[..., 3] < HIDDEN_ALPHA, far, near))
-    models = composed.render(
+    models = exposed(composed, scene, twin).render(
         *(camera, scene.light, scene.edits),
         background=camera.viewmat.new_tensor(scene.background),
         depth_range=beyond,
-        exposure=exposure_of(composed, scene, twin),
     )
     return blend_over(seen, models, part)
 

@@ -11,7 +11,7 @@ from torch import Tensor
 from texgs.core.camera import orbit_direction
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.fields.field import Composed, baked_light
+from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.scene import Scene
@@ -30,6 +30,14 @@ NO_VOLUME = (
 )
 
 
+def exposed(composed: Composed, scene: Scene, twin: Twin | None) -> Composed:
+    """Return the models of a scene where its light reaches them; see `exposure_of`."""
+    exposure = exposure_of(composed, scene, twin)
+    return (
+        composed.under(exposure) if isinstance(composed, Composition) and exposure is not None else composed
+    )
+
+
 def exposure_of(composed: Composed, scene: Scene, twin: Twin | None) -> Tensor | None:
     """Return factors [N, 2] on the lamp's and on ambient light of each primitive, or None without shadows.
 
@@ -44,7 +52,7 @@ def exposure_of(composed: Composed, scene: Scene, twin: Twin | None) -> Tensor |
     if twin is None:
         raise ArgumentError(NO_VOLUME)
     if not isinstance(composed, Composition):
-        return torch.ones(len(composed), 2, device=composed.device)  # is refused
+        raise baked_light(kind_of(next(iter(scene.models.values())).file).name)
     cells, matter = twin.light_cells(scene, composed.palettes), twin.matter(scene, composed.palettes)
     places = last_of(twin.places, (composed, matter), lambda: places_of(composed, matter))
 
@@ -59,6 +67,14 @@ def exposure_of(composed: Composed, scene: Scene, twin: Twin | None) -> Tensor |
         return exposure
 
     return last_of(twin.exposures, (composed, cells, light), make)
+
+
+def baked_light(kind: str) -> ArgumentError:
+    """Return the error for shadows on fields that cannot be relit."""
+    return ArgumentError(
+        f"light: expected surfels for shadows and occlusion, got {kind}, which have light in their colours; "
+        "fit surfels, or take both back by shadows=0 occlusion=0"
+    )
 
 
 def require_shadows(scene: Scene) -> None:

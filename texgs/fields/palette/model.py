@@ -113,7 +113,7 @@ class PaletteScene(UnlitScene[PaletteField]):
     """Several fields in one scene, see `UnlitScene`; densities add up, opacity is a factor on them."""
 
     def _blend(self, factors: Sequence[float], camera: Camera, asked: Asked) -> Render:
-        background, outputs, depth_range, _ = asked
+        background, outputs, depth_range = asked
         require_depth(outputs, "palette fields")
         rays = camera_rays(camera).flatten(0, 1)
         near, far = (

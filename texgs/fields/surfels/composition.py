@@ -1,6 +1,7 @@
 """Basic models as one scene: geometry and texels are joined once, and edits copy neither."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import accumulate
@@ -39,7 +40,7 @@ class Edited:
     tint: Tensor | None  # [N, 3] or [3] colour of highlights; None: white
 
     def exposed(self, exposure: Tensor) -> Self:
-        """Return the same where matter hides a part of the light; see `Composed.render`."""
+        """Return the same with factors [N, 2] on the light of the lamp, and on ambient light."""
         lamp, ambient = exposure.unbind(dim=1)
         a, d, s, b = self.material
         return replace(self, material=(a * ambient, d * lamp, s * lamp, b))
@@ -131,7 +132,9 @@ class Composition(Composed):
         self.device = self.means.device
         self.texels, self.sizes, self.offsets = join_textures(models)
         self.has_normals = any("normals" in model.parameters for model in models)
-        self._latest: tuple[list[PartEdit] | None, Tensor | None, list[Edited], Tensor] | None = None
+        self.exposure: Tensor | None = None  # see `under`
+        self._exposed: Self | None = None
+        self._latest: tuple[list[PartEdit] | None, list[Edited], Tensor] | None = None
 
     def __len__(self) -> int:
         return len(self.means)
@@ -147,7 +150,7 @@ class Composition(Composed):
     ) -> Render:
         if look not in get_args(Look):
             raise ArgumentError(f"look: expected one of {', '.join(get_args(Look))}, got {look}")
-        edited, opacities = self._edited(edits, asked.exposure)
+        edited, opacities = self._edited(edits)
         looks = [part.shade(own, camera, light, look) for part, own in zip(self.parts, edited, strict=True)]
         base, gain = (torch.cat(x) for x in zip(*looks, strict=True))
         background = asked.background
@@ -176,21 +179,28 @@ class Composition(Composed):
         turns = [part.model.parameters.get("normals", part.model.parameters["quats"]) for part in self.parts]
         return quats_to_matrices(torch.cat(turns))[..., 2].contiguous()
 
-    def _edited(
-        self, edits: Sequence[PartEdit] | None, exposure: Tensor | None
-    ) -> tuple[list[Edited], Tensor]:
+    def under(self, exposure: Tensor) -> Self:
+        """Return the models with factors [N, 2] on the lamp's and on ambient light; the latest are kept."""
+        latest = self._exposed
+        if latest is None or latest.exposure is not exposure:
+            latest = copy(self)
+            latest.exposure, latest._latest = exposure, None
+            self._exposed = latest
+        return latest
+
+    def _edited(self, edits: Sequence[PartEdit] | None) -> tuple[list[Edited], Tensor]:
         """Return all models with their edits, and opacities [N]; kept while only the camera moves."""
         own = None if edits is None else list(edits)
         latest = self._latest  # another thread may replace it
-        if latest is None or latest[0] != own or latest[1] is not exposure:
+        if latest is None or latest[0] != own:
             pairs = zip(self.parts, by_part(self.parts, own), strict=True)
             edited = [part.apply(each) for part, each in pairs]
             opacities = torch.cat([each.opacities for each in edited])
-            if exposure is not None:
-                counts = [len(part.model) for part in self.parts]
-                edited = [each.exposed(own) for each, own in zip(edited, exposure.split(counts), strict=True)]
-            self._latest = latest = (own, exposure, edited, opacities)
-        return latest[2:]
+            if self.exposure is not None:
+                shares = self.exposure.split([len(part.model) for part in self.parts])
+                edited = [each.exposed(share) for each, share in zip(edited, shares, strict=True)]
+            self._latest = latest = (own, edited, opacities)
+        return latest[1:]
 
 
 def by_part(parts: Sequence[EditableModel], edits: Sequence[PartEdit] | None) -> list[Sequence[PartEdit]]:
