@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.core.keys import REQUIRED, key
-from texgs.volume.basic_tfs import BasicTF
+from texgs.volume.basic_tfs import BasicTF, mask_name
 from texgs.volume.settings import VolumeKeys
 from texgs.volume.view_settings import LARGEST
 
@@ -73,9 +73,21 @@ class Dataset:
         named = dict.fromkeys(tf.channel for tf in self.basic_tfs.values())
         return [channel for channel in named if channel is not None]
 
+    @property
+    def labels(self) -> list[str]:
+        """Return the labels that basic TFs name, in order."""
+        named = dict.fromkeys(label for tf in self.basic_tfs.values() for label in (tf.label, tf.within))
+        return [label for label in named if label is not None]
+
+    @property
+    def prepared(self) -> list[str]:
+        """Return the names of all channels of the prepared volume: those of the image, then masks."""
+        own = [] if self.volume.kind == "labels" else self.channels or [""]
+        return [*own, *map(mask_name, self.labels)]
+
     def number_of(self, tf: BasicTF) -> int:
         """Return the index of a basic TF's channel among the prepared ones."""
-        return 0 if tf.channel is None else self.channels.index(tf.channel)
+        return self.prepared.index(tf.values_of or "")
 
 
 def dataset_of(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,22 @@ class BasicTF:
     channel: str | None = key(
         None, "label or number of the channel of these values, from 0, where the data set shows several"
     )
+    label: str | None = key(
+        None, "name or number of the label that is shown: values are 0 to 255 of its mask"
+    )
+    within: str | None = key(
+        None, "name or number of the label that values are shown in; elsewhere nothing is"
+    )
+
+    @property
+    def values_of(self) -> str | None:
+        """Return what of a prepared volume its values are of, by the names of `read_summaries`."""
+        return self.channel if self.label is None else mask_name(self.label)
+
+
+def mask_name(label: str) -> str:
+    """Return the name that the mask of a label has among the channels of a prepared volume."""
+    return f"label {label}"
 
 
 def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) -> dict[str, TransferFunction]:
@@ -32,14 +48,17 @@ def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) ->
 
     known, functions = read_summaries(volume), {}
     for name, each in points.items():
-        if len(known) > 1 and each.channel not in known:
-            raise ArgumentError(
-                f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got {each.channel}"
-            )
-        channel = [*known].index(each.channel) if each.channel in known else 0
-        summary = [*known.values()][channel]
-        bounds = summary["minimum"], summary["maximum"]
-        functions[name] = in_data_values(name, each, tf_values, *bounds, channel)
+        wanted = each.values_of or ""
+        mask = None if each.within is None else mask_name(each.within)
+        for channel in filter(None, (wanted if len(known) > 1 else None, mask)):
+            if channel not in known:
+                raise ArgumentError(
+                    f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got {channel}"
+                )
+        number = [*known].index(wanted) if wanted in known else 0
+        summary = [*known.values()][number]
+        tf = in_data_values(name, each, tf_values, summary["minimum"], summary["maximum"], number)
+        functions[name] = tf if mask is None else replace(tf, within=[*known].index(mask))
     return functions
 
 

@@ -10,6 +10,7 @@ from texgs.core.memory import require_memory
 from texgs.volume.space import UNKNOWN_SPACE, Space, Triple
 
 Dims = tuple[int, int, int]
+MAX_CHANNELS = 16  # that the caster shows together
 ONES, ZEROS = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 
 # Where the new axes x, y, z come from: (axis before, sign).
@@ -36,7 +37,7 @@ class Grid:
     values: np.ndarray  # [Z, Y, X], real numbers, every axis at least 2; x is the fastest axis, as in VTK
     spacing: Triple = ONES  # x, y, z; physical units, above 0
     origin: Triple = ZEROS  # centre of the first sample in the file's space; physical units
-    others: tuple[np.ndarray, ...] = ()  # samples of further channels, of the same shape and type
+    others: tuple[np.ndarray, ...] = ()  # samples of further channels, of the same shape; masks are uint8
     space: Space = UNKNOWN_SPACE
 
     def __post_init__(self) -> None:

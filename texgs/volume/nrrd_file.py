@@ -22,6 +22,7 @@ NRRD_TYPES = {
     "uint16": "ushort",
     "float32": "float",
 }
+MASKS = "masksoflabels"  # our own key: how many masks follow the samples that the header tells of
 REMEDY = "texgs volume dataset=NAME makes it"
 NUMBER = re.compile(r"[-+.\deE]+")
 
@@ -38,7 +39,7 @@ def open_grid(path: str | Path) -> Grid:
 
 
 def open_prepared(path: Path) -> list[RawSource]:
-    """Return the channels of a prepared volume as sources; most have one."""
+    """Return the channels of a prepared volume, then masks of labels, as sources; most have one channel."""
     with reading_as("an NRRD file", f"{REMEDY} again"):
         fields, offset = read_fields(path)
         encoding = fields["encoding"]
@@ -55,18 +56,28 @@ def open_prepared(path: Path) -> list[RawSource]:
         (count,) = n or [1]
         if count < 1:
             raise ArgumentError(f"expected at least one channel, got {count}; {REMEDY}")
-        return [
-            RawSource(path, (nx, ny, nz), stored, offset + channel * size, *lattice)
-            for channel in range(count)
+        offsets = [offset + channel * size for channel in range(count)]
+        channels = [RawSource(path, (nx, ny, nz), stored, each, *lattice) for each in offsets]
+        masks = [offset + count * size + k * nx * ny * nz for k in range(int(fields.get(f"{MASKS}=", "0")))]
+        return channels + [
+            RawSource(path, (nx, ny, nz), np.dtype(np.uint8), each, *lattice) for each in masks
         ]
 
 
 def write_header(
-    file: BinaryIO, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple, space: Space, channels: int
+    file: BinaryIO,
+    dims: Dims,
+    dtype: np.dtype,
+    spacing: Triple,
+    origin: Triple,
+    space: Space,
+    channels: int,
+    masks: int = 0,
 ) -> int:
     """Write the header of a canonical file, and return its length, a multiple of `ALIGNMENT` bytes.
 
-    Raw samples follow, little endian, of one of the types in `NRRD_TYPES`; of one channel after the other.
+    Raw samples follow, little endian, of one of the types in `NRRD_TYPES`; of one channel after the other;
+    and then masks, uint8, which other programs leave unread.
     """
     vectors = (space.axes * np.array(spacing)[:, None]).tolist()
     directions = " ".join(map(_vector, vectors))
@@ -87,6 +98,7 @@ def write_header(
         "encoding: raw",
         f"space origin: {_vector(origin)}",
         *(pair if space.matrix != UNKNOWN_SPACE.matrix else []),
+        *([f"{MASKS}:={masks}"] if masks else []),
     ]
     text = ("\n".join(lines) + "\n#").encode()
     # The comment fills up; two line breaks end it and the header.

@@ -30,11 +30,10 @@ def overlay(functions: Mapping[str, TransferFunction]) -> TransferFunction:
 
 
 def overlays(functions: Mapping[str, TransferFunction]) -> list[TransferFunction]:
-    """Combine the functions of each channel into one."""
-    channels = dict.fromkeys(tf.channel for tf in functions.values())
+    """Combine the functions of each channel, and those of each within the same mask, into one."""
+    sources = dict.fromkeys(tf.source for tf in functions.values())
     return [
-        _overlay(tuple(each for each in functions.items() if each[1].channel == channel))
-        for channel in channels
+        _overlay(tuple(each for each in functions.items() if each[1].source == source)) for source in sources
     ]
 
 

@@ -13,6 +13,7 @@ from texgs.core.io import write_atomic
 from texgs.core.memory import GIB
 from texgs.core.names import check_count, is_number
 from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
+from texgs.volume.label_masks import MaskSource
 from texgs.volume.nrrd_file import NRRD_TYPES, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.space import Space
@@ -44,10 +45,11 @@ def prepare_channels(
     """Write the canonical file of a volume: a .nrrd with raw, little-endian samples that can be mapped.
 
     Samples stay uint8, int8, uint16, int16 or float32; bool becomes uint8, everything else float32. The
-    volume is read slab by slab and never held as a whole.
+    volume is read slab by slab and never held as a whole. Masks of labels beside an image follow its samples,
+    where other programs do not look for them, a byte a sample.
 
     Args:
-        sources: the channels of the volume, most often one.
+        sources: the channels of the volume, most often one, and masks behind those of an image.
         target: file to write, .nrrd.
         crop: (x0, x1, y0, y1, z0, z1) in samples of the source, half open; default all.
         reduce: one sample for every block of reduce^3; incomplete blocks at the end count as they are.
@@ -65,15 +67,17 @@ def prepare_channels(
     """
     _check_keys(nan_value, reduce, method, up)
     source, tallies = _first_of(sources), [_Tally(each.name) for each in sources]
+    count = sum(isinstance(each, MaskSource) for each in sources) if not isinstance(source, MaskSource) else 0
     bounds, axes = bounds_of(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin, space = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
-    kept = "uint8" if source.dtype.kind == "b" else source.dtype.name
-    dtype = np.dtype(kept if kept in NRRD_TYPES else "float32")
-    ((x0, x1), (y0, y1), (z0, z1)), size = bounds, prod(dims) * dtype.itemsize
+    dtypes = [_kept(each.dtype) for each in sources]
+    ((x0, x1), (y0, y1), (z0, z1)), sizes = bounds, [prod(dims) * dtype.itemsize for dtype in dtypes]
 
     def write(file: BinaryIO) -> None:
-        _require_disk(source.name, target, len(sources) * size)
-        offset = write_header(file, dims, dtype, spacing, origin, space, len(sources))
+        _require_disk(source.name, target, sum(sizes))
+        channels = len(sources) - count
+        offset = write_header(file, dims, dtypes[0], spacing, origin, space, channels, count)
+        offsets = [offset, *(offset + np.cumsum(sizes)).tolist()]
         slabs = slab_bounds(source, z0, z1, multiple=reduce)
         steps = [(number, *slab) for number in range(len(sources)) for slab in slabs]
         for number, start, stop in steps if progress is None else progress(steps, len(steps)):
@@ -81,8 +85,8 @@ def prepare_channels(
             block = tallies[number].finite(slab, (x0, y0, start), nan_value)
             if reduce > 1:
                 block = REDUCERS[method](block, reduce)
-            block = tallies[number].extend(_convert(block, dtype, source.name))
-            _write_permuted(file, offset + number * size, dims, axes, block, (start - z0) // reduce)
+            block = tallies[number].extend(_convert(block, dtypes[number], source.name))
+            _write_permuted(file, offsets[number], dims, axes, block, (start - z0) // reduce)
         for tally in tallies:
             tally.check()
 
@@ -104,11 +108,21 @@ def _summaries(source: Source, target: Path, tallies: Sequence["_Tally"]) -> lis
 
 
 def _first_of(sources: Sequence[Source]) -> Source:
-    """Return the first of some channels, and require of the others that they are like it."""
+    """Return the first of some channels, and require of the others that they are like it; masks are uint8."""
     first, *others = sources
-    if any((x.dims, x.dtype, x.spacing) != (first.dims, first.dtype, first.spacing) for x in others):
-        raise ArgumentError(f"{first.name}: expected channels of one lattice and type; choose some of them")
+    for each in others:
+        is_alike = isinstance(each, MaskSource) or each.dtype == first.dtype
+        if not is_alike or (each.dims, each.spacing) != (first.dims, first.spacing):
+            raise ArgumentError(
+                f"{first.name}: expected channels of one lattice and type; choose some of them"
+            )
     return first
+
+
+def _kept(dtype: np.dtype) -> np.dtype:
+    """Return the type that samples of a type have in the file."""
+    kept = "uint8" if dtype.kind == "b" else dtype.name
+    return np.dtype(kept if kept in NRRD_TYPES else "float32")
 
 
 def _require_disk(name: str, target: Path, needed: int) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from texgs.core.keys import key
 from texgs.core.names import file_name
 
 if TYPE_CHECKING:
+    from texgs.volume.label_masks import MaskSource
     from texgs.volume.slabs import Source
     from texgs.volume.summaries import Summary
 
@@ -58,7 +59,12 @@ class VolumeKeys:
     origin: list[float] | None = key(None, "position of the first sample; default the file's", "length")
     crop: list[int] | None = key(None, "part to keep: x0, x1, y0, y1, z0, z1, half open", "samples")
     reduce: int = key(1, "factor by which every side is made smaller on reading", least=1)
-    method: str = key("mean", "how samples are reduced; labels must be sampled", choices=("mean", "sample"))
+    method: str = key("mean", "how samples are reduced", choices=("mean", "sample"))
+    kind: str = key("image", "what samples are; labels have a mask each", choices=("image", "labels"))
+    labels: str | None = key(None, "file of labels on the lattice of the image; relative to data_folder")
+    label_numbers: dict[str, int] = field(
+        default_factory=dict, metadata={"help": "numbers of labels by name, where the file has no names"}
+    )
     up: str = key("+y", "axis of the volume that points up in the world", choices=AXES)
     nan_value: float | None = key(None, "replaces NaN; without it NaN is an error")
 
@@ -115,6 +121,34 @@ def open_field(volume: VolumeKeys, path: Path | None) -> Source:
     said |= {"series": volume.series, "variable": volume.variable, "column": volume.column}
     said |= {"image": volume.image, "channel": volume.channel, "time": volume.time}
     return open_source(path, **said)
+
+
+def open_masks(
+    volume: VolumeKeys, path: Path, names: Sequence[str], image: Source | None = None
+) -> list[MaskSource]:
+    """Return the masks of labels in a file, by names or numbers; on the lattice of an image, if any.
+
+    Raises:
+        ArgumentError: if the file has no such label, or another lattice than the image.
+    """
+    from texgs.volume.label_masks import MaskSource, on_lattice_of
+    from texgs.volume.label_names import place_of_label
+
+    layers: dict[str | None, Source] = {}
+    masks = []
+    for name in names:
+        layer, number = place_of_label(path, name, volume.label_numbers)
+        if layer not in layers:
+            own = replace(volume, channel=layer) if image is None else beside(volume, layer)
+            opened = open_field(own, path)
+            layers[layer] = opened if image is None else on_lattice_of(opened, image)
+        masks.append(MaskSource(layers[layer], number, name))
+    return masks
+
+
+def beside(volume: VolumeKeys, layer: str | None) -> VolumeKeys:
+    """Return how a file of labels beside an image is read: at the place that settings give the image."""
+    return VolumeKeys(spacing=volume.spacing, origin=volume.origin, channel=layer)
 
 
 def cached_volume(volume: VolumeKeys) -> Path:

@@ -34,6 +34,7 @@ class TransferFunction:
     opacity: tuple[tuple[float, float], ...]  # at least two (value, opacity in [0, 1] per opacity unit)
     color: tuple[tuple[float, float, float, float], ...]  # at least one (value, r, g, b), linear, in [0, 1]
     channel: int = 0  # of the volume, whose values these are
+    within: int | None = None  # channel with the mask of a label, outside which nothing shows
 
     def __post_init__(self) -> None:
         # Lists, as they come from files, become tuples of floats.
@@ -44,8 +45,14 @@ class TransferFunction:
         low, high = self.support
         if not low < high:
             raise ArgumentError("opacity: expected some values with opacity above 0, got none; raise a point")
-        if type(self.channel) is not int or self.channel < 0:
-            raise ArgumentError(f"channel: expected a number from 0 on, got {self.channel!r:.100}")
+        for name, number in (("channel", self.channel), ("within", self.within or 0)):
+            if type(number) is not int or number < 0:
+                raise ArgumentError(f"{name}: expected a number from 0 on, got {number!r:.100}")
+
+    @property
+    def source(self) -> tuple[int, int | None]:
+        """Return what it is a function of: a channel, as a whole or within a mask."""
+        return self.channel, self.within
 
     @property
     def support(self) -> tuple[float, float]:
@@ -130,17 +137,18 @@ class TransferFunction:
         return self.with_points(ramps(opacity), ramps(self.color))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the points as lists, ready for JSON or YAML, and a channel that is not the first."""
+        """Return the points as lists, ready for JSON or YAML, a channel that is not the first, and a mask."""
         points = {"opacity": [list(p) for p in self.opacity], "color": [list(p) for p in self.color]}
-        return points | ({"channel": self.channel} if self.channel else {})
+        mask = {} if self.within is None else {"within": self.within}
+        return points | ({"channel": self.channel} if self.channel else {}) | mask
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> "TransferFunction":
         """Return the function of such lists."""
-        if not isinstance(data, Mapping) or set(data) - {"channel"} != {"opacity", "color"}:
+        if not isinstance(data, Mapping) or set(data) - {"channel", "within"} != {"opacity", "color"}:
             keys = ", ".join(map(str, data)) if isinstance(data, Mapping) else type(data).__name__
             raise ArgumentError(f"transfer function: expected the keys opacity, color, got {keys or 'none'}")
-        return TransferFunction(data["opacity"], data["color"], data.get("channel", 0))
+        return TransferFunction(data["opacity"], data["color"], data.get("channel", 0), data.get("within"))
 
 
 def right_limit(points: Sequence[tuple[float, ...]], values: Array) -> Array:
@@ -227,7 +235,7 @@ def overlapping(functions: Mapping[str, TransferFunction]) -> tuple[str, str] | 
     """Return the names of the first two functions that both show some values, if there are such."""
     for (name, tf), (other_name, other) in combinations(functions.items(), 2):
         one, two = tf.support, other.support
-        if tf.channel == other.channel and max(one[0], two[0]) < min(one[1], two[1]):
+        if tf.source == other.source and max(one[0], two[0]) < min(one[1], two[1]):
             return name, other_name
     return None
 

@@ -12,6 +12,8 @@ from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import Kind, kinds, require
 from texgs.fields.surfels.material import require_material
 from texgs.fitting.kinds import fit_specs
+from texgs.volume.basic_tfs import mask_name
+from texgs.volume.grid import MAX_CHANNELS
 from texgs.workflow.edits import OF_ONE, chain_of, looks_of, require_parts
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.stage import Stage
@@ -58,15 +60,18 @@ def check_basic_tfs(dataset: Dataset) -> None:
     for name, points in dataset.basic_tfs.items():
         with errors_at(f"{dataset.name}: basic TF {name}"):
             opacity, color = tuple(points.opacity), tuple(points.color)
-            basic[name] = TransferFunction(opacity, color, dataset.number_of(points))
+            mask = None if points.within is None else dataset.prepared.index(mask_name(points.within))
+            basic[name] = TransferFunction(opacity, color, dataset.number_of(points), mask)
     with errors_at(f"{dataset.name}: basic TFs", " "):
         check_disjoint(basic)
 
 
 def check_channels(dataset: Dataset) -> None:
     """Require that all basic TFs of a data set name channels of its file, or none; a series has one."""
+    check_labels(dataset)
     channels = dataset.channels
-    unnamed = [name for name, points in dataset.basic_tfs.items() if points.channel is None]
+    images = {name: points for name, points in dataset.basic_tfs.items() if points.label is None}
+    unnamed = [name for name, points in images.items() if points.channel is None]
     if channels and unnamed:
         raise ConfigError(
             f"{dataset.name}: basic TF {unnamed[0]}: expected a channel, as others name theirs "
@@ -86,6 +91,32 @@ def check_channels(dataset: Dataset) -> None:
         raise ConfigError(
             f"{dataset.name}: basic TFs: expected none that name channels, as the volume is generated, got "
             f"{', '.join(channels)}; leave these out"
+        )
+
+
+def check_labels(dataset: Dataset) -> None:
+    """Require that basic TFs name labels where the data set has some, and of labels alone all of them."""
+    volume, where = dataset.volume, f"{dataset.name}: basic TF"
+    if volume.kind == "labels" and volume.labels:
+        raise ConfigError(
+            f"dataset.volume.labels of {dataset.name}: expected none, as its file holds labels itself "
+            "(kind=labels); leave one of them out"
+        )
+    for name, points in dataset.basic_tfs.items():
+        if points.label is not None and points.channel is not None:
+            raise ConfigError(f"{where} {name}: expected a channel or a label, got both; leave one out")
+        if volume.kind == "labels" and points.label is None:
+            raise ConfigError(f"{where} {name}: expected a label, as the volume holds labels, got none")
+        if volume.kind == "image" and not volume.labels and (points.label or points.within) is not None:
+            raise ConfigError(
+                f"{where} {name}: expected no label, as dataset.volume.labels names no file of labels"
+            )
+    if dataset.labels and dataset.series:
+        raise ConfigError(f"dataset.series of {dataset.name}: expected no labels in a series; leave them out")
+    if len(dataset.prepared) > MAX_CHANNELS:
+        raise ConfigError(
+            f"{dataset.name}: basic TFs: expected at most {MAX_CHANNELS} channels and labels together, got "
+            f"{len(dataset.prepared)}; leave some out"
         )
 
 

@@ -45,6 +45,20 @@ def source_file(config: Config) -> Path | None:
     )
 
 
+def labels_file(config: Config) -> Path | None:
+    """Return the file of labels beside the image of a data set; None where it has none."""
+    dataset = config.dataset
+    if dataset.volume.labels is None:
+        return None
+    path = Path(config.data_folder, dataset.volume.labels)
+    if not path.is_file():
+        raise MissingDataError(
+            f"data set {dataset.name}: dataset.volume.labels: {path} is not there; put it there, or name its "
+            "folder with data_folder=FOLDER or TEXGS_DATA"
+        )
+    return path
+
+
 def series_files(config: Config) -> list[Path]:
     """Return files or folders of the steps of a data set's series, in order; none where it has none.
 

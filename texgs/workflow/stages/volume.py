@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 from texgs.core.memory import GIB, MIB, free_memory
 from texgs.core.progress import progress
 from texgs.report.results import VolumeResult
-from texgs.volume.settings import VolumeKeys, open_field, prepare_fields
+from texgs.volume.settings import VolumeKeys, open_field, open_masks, prepare_fields
 from texgs.workflow.inputs import has_volume, without
-from texgs.workflow.locate import source_file
+from texgs.workflow.locate import labels_file, source_file
 from texgs.workflow.stage import Config, Outcome, Rule, Stage, plain_values, read
 from texgs.workflow.stages.settings import OfDataset
 
 if TYPE_CHECKING:
-    pass
+    from texgs.volume.slabs import Source
 
 TOLD = ("dims", "dtype", "spacing", "origin", "minimum", "maximum", "voxels")  # in metrics.json, too
 
@@ -29,23 +29,30 @@ class Settings(OfDataset):
 
     volume: VolumeKeys = read(lambda config: without(config.dataset.volume, "obtain"))
     channels: list[str] = read("dataset.channels")
+    labels: list[str] = read("dataset.labels")
+    prepared: list[str] = read("dataset.prepared")
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write volume.nrrd, which ParaView opens too, and volume.json: lattice, ranges and histograms.
 
-    It reads `source`, the volume's file, where it is not generated.
+    It reads `source`, the volume's file, where it is not generated, and `labels`, a file of labels beside it.
     """
     from texgs.volume.summaries import write_summaries
 
     volume, target = settings.volume, output / "volume.nrrd"
     channels = [replace(volume, channel=channel) for channel in settings.channels] or [volume]
-    fields = [open_field(channel, inputs.get("source")) for channel in channels]
+    fields: list[Source] = []
+    if volume.kind == "image":
+        fields = [open_field(channel, inputs.get("source")) for channel in channels]
+    if settings.labels:
+        file = inputs["source" if volume.kind == "labels" else "labels"]
+        fields += open_masks(volume, file, settings.labels, fields[0] if fields else None)
     shown = partial(progress, title=f"{settings.dataset}: volume", unit="slab")
     summaries = prepare_fields(volume, fields, target, shown)
     if fields[0].note:
         sys.stderr.write(f"{settings.dataset}: {fields[0].note}\n")
-    write_summaries(target, summaries, settings.channels)
+    write_summaries(target, summaries, settings.prepared)
     ends = min(each.minimum for each in summaries), max(each.maximum for each in summaries)
     whole = replace(summaries[0], minimum=ends[0], maximum=ends[1])
     told, size = {name: plain_values(getattr(whole, name)) for name in TOLD}, target.stat().st_size
@@ -59,9 +66,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 
 def inputs(config: Config) -> dict[str, Path]:
-    """Return the volume's file, where there is one."""
-    path = source_file(config)
-    return {} if path is None else {"source": path}
+    """Return the volume's file, where there is one, and that of its labels."""
+    files = {"source": source_file(config), "labels": labels_file(config)}
+    return {name: path for name, path in files.items() if path is not None}
 
 
 STAGE = Stage(

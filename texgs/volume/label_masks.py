@@ -1,0 +1,125 @@
+"""Labels of a volume as masks: a channel each, softened so that surfaces are smooth, and never false.
+
+Between the numbers of two labels lie those of others, so that labels are not interpolated; their masks are.
+"""
+
+from collections import Counter
+
+import numpy as np
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.grid import Triple, permuted_lattice
+from texgs.volume.slabs import Source, slab_bounds
+from texgs.volume.space import LPS, RAS, Space
+
+INSIDE = 255  # of a mask: every sample around has the label
+HALF = 127.5  # from here on a place counts as of the label
+KERNEL = np.array([1, 4, 6, 4, 1], np.float32) / 16  # close to a Gaussian of one voxel
+REACH = len(KERNEL) // 2  # samples
+MARGIN = 8  # of a sample to the half: its own label decides on which side it is
+
+
+class MaskSource(Source):
+    """The softened mask of a label [Z, Y, X], uint8: 255 inside, 0 outside, and between them at its surface.
+
+    Softening moves the surface by less than half a voxel: the samples of a label stay inside, all others
+    outside, so that nothing thin is lost and nothing grows together.
+
+    Args:
+        labels: the volume that the label is in.
+        number: of the label.
+        name: of the label, for messages.
+    """
+
+    def __init__(self, labels: Source, number: int, name: str = "") -> None:
+        told = f"{labels.name}: label {name or number}"
+        super().__init__(told, labels.dims, np.dtype(np.uint8), labels.spacing, labels.origin)
+        self._labels, self._number, self.space, self.note = labels, number, labels.space, labels.note
+
+    def slices(self, start: int, stop: int) -> np.ndarray:
+        """Return samples [stop - start, Y, X]; slices around them are read as well."""
+        low, high = max(start - REACH, 0), min(stop + REACH, self.dims[2])
+        is_inside = self._labels.slices(low, high) == self._number
+        soft = INSIDE * softened(is_inside)[start - low : stop - low]
+        own = is_inside[start - low : stop - low]
+        sided = np.where(own, np.maximum(soft, HALF + MARGIN), np.minimum(soft, HALF - MARGIN))
+        return np.rint(sided).astype(np.uint8)
+
+
+def softened(mask: np.ndarray) -> np.ndarray:
+    """Return a mask [Z, Y, X] after `KERNEL` along each axis, float32; the last samples go on."""
+    from scipy.ndimage import correlate1d
+
+    soft = mask.astype(np.float32)
+    for axis in range(3):
+        soft = correlate1d(soft, KERNEL, axis, mode="nearest")
+    return soft
+
+
+def label_counts(labels: Source) -> dict[int, int]:
+    """Count the samples of each label but 0, the largest first; reads the volume once, slab by slab.
+
+    Raises:
+        ArgumentError: if a sample is no whole number, or there is no label.
+    """
+    counts: Counter[int] = Counter()
+    for bounds in slab_bounds(labels, 0, labels.dims[2]):
+        numbers, each = np.unique(labels.slices(*bounds), return_counts=True)
+        if (bad := numbers != np.rint(numbers)).any():
+            raise ArgumentError(
+                f"{labels.name}: expected labels, which are whole numbers, got {numbers[bad][0]:g}; is it "
+                "an image?"
+            )
+        counts.update(dict(zip(map(int, numbers.tolist()), each.tolist(), strict=True)))
+    del counts[0]
+    if not counts:
+        raise ArgumentError(f"{labels.name}: expected labels, got 0 everywhere")
+    return dict(counts.most_common())
+
+
+class Flipped(Source):
+    """A source in LPS as one in RAS, or the other way: x and y run the other way, and no sample moves."""
+
+    def __init__(self, source: Source, name: str) -> None:
+        lattice = source.dims, source.spacing, source.origin, source.space
+        dims, spacing, (x, y, z), space = permuted_lattice(*lattice, ((0, -1), (1, -1), (2, 1)))
+        super().__init__(source.name, dims, source.dtype, spacing, (-x, -y, z))
+        self._source, self.note = source, source.note
+        self.space = Space.along(space.axes * (-1, -1, 1), name, space.unit)
+
+    def slices(self, start: int, stop: int) -> np.ndarray:
+        """Return samples [stop - start, Y, X]."""
+        return self._source.slices(start, stop)[:, ::-1, ::-1]
+
+
+def on_lattice_of(labels: Source, image: Source) -> Source:
+    """Return labels with their axes along those of an image, and require that they lie on its samples."""
+    if {labels.space.name, image.space.name} == {LPS, RAS}:
+        labels = Flipped(labels, image.space.name)
+    near = 0.01 * min(image.spacing)
+    is_near = [
+        np.allclose(a, b, rtol=0, atol=near)
+        for a, b in zip(corners_of(labels), corners_of(image), strict=True)
+    ]
+    if labels.dims != image.dims or labels.space.name != image.space.name or not all(is_near):
+        raise ArgumentError(
+            f"{labels.name}: expected labels on the lattice of {image.name}, {words_of(image)}, got "
+            f"{words_of(labels)}; resample them to the image first"
+        )
+    return labels
+
+
+def corners_of(source: Source) -> list[Triple]:
+    """Return the places of the first sample, and of the last ones along x, y and z, in the file's space."""
+    sides = [(size - 1) * step for size, step in zip(source.dims, source.spacing, strict=True)]
+    ends = [[side * (axis == k) for k, side in enumerate(sides)] for axis in range(-1, 3)]
+    return [source.space.place(source.origin, lengths) for lengths in ends]
+
+
+def words_of(source: Source) -> str:
+    """Describe a lattice."""
+    dims, spacing, origin = (
+        words.join(f"{x:g}" for x in each)
+        for words, each in ((" x ", source.dims), (", ", source.spacing), (", ", source.origin))
+    )
+    return f"{dims} samples, spacing {spacing}, from {origin} in {source.space.name}"

@@ -1,0 +1,115 @@
+"""Slices of a volume along the axes of its file, and what its samples are at places.
+
+Nothing is interpolated: a slice has the samples of the file, and a place is that of the nearest one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.grid import Grid, closest
+from texgs.volume.space import LETTERS, Triple
+
+PATIENT_PLANES = ("sagittal", "coronal", "axial")  # by the axis of the patient that they lie across
+# Which axis of the file's space is to the right in slices across x, y and z, ahead or behind, and which is up: as radiologists see a patient, from the left, the front and the feet.
+LAYOUT = {
+    "LPS": ((1, 1, 2, 1), (0, 1, 2, 1), (0, 1, 1, -1)),
+    "RAS": ((1, -1, 2, 1), (0, -1, 2, 1), (0, -1, 1, 1)),
+    "xyz": ((1, 1, 2, 1), (0, 1, 2, 1), (0, 1, 1, 1)),
+}
+
+
+@dataclass(frozen=True)
+class SlicePlane:
+    """Slices across one axis of the file's space, and how they are shown."""
+
+    name: str  # sagittal, coronal or axial; x, y or z where the space is no patient's
+    count: int  # of slices
+    axis: tuple[
+        int, int
+    ]  # of the grid, 0 to 2 for x, y, z: across the slices, and whether they count along it
+    right: tuple[int, int]  # the same of columns
+    up: tuple[int, int]  # the same of rows, from the lowest one
+    ends: tuple[str, str, str, str]  # what is at the left, right, bottom and top, such as R, L, P, A
+    size: tuple[int, int]  # samples to the right and up
+    spacing: tuple[float, float]  # of these, in units of the file
+
+
+@dataclass(frozen=True)
+class Place:
+    """A sample of a volume."""
+
+    index: tuple[int, int, int]  # along the axes of the file's space, from 0, within the prepared volume
+    position: Triple  # in the file's space and unit
+    value: float  # of the sample
+
+
+def planes_of(grid: Grid) -> list[SlicePlane]:
+    """Return the planes of slices across x, y and z of the file's space, or the axes closest to these."""
+    letters, behind = LETTERS.get(grid.space.name, ("xyz", ""))
+    ends = list(zip(behind, letters, strict=True)) if behind else [("", "")] * 3
+    names = PATIENT_PLANES if behind else ("x", "y", "z")
+    along = closest(grid.space.axes)  # of each axis of the space, the axis of the grid
+    planes = []
+    for name, across, (right, turn, up, rise) in zip(names, along, LAYOUT[letters], strict=True):
+        (column, one), (row, other) = along[right], along[up]
+        left_right, bottom_top = ends[right][::turn], ends[up][::rise]
+        planes.append(
+            SlicePlane(
+                name,
+                grid.dims[across[0]],
+                across,
+                (column, turn * one),
+                (row, rise * other),
+                (left_right[0], left_right[1], bottom_top[0], bottom_top[1]),
+                (grid.dims[column], grid.dims[row]),
+                (grid.spacing[column], grid.spacing[row]),
+            )
+        )
+    return planes
+
+
+def slice_of(grid: Grid, plane: SlicePlane, number: int, channel: int = 0) -> np.ndarray:
+    """Return a slice [H, W], row 0 at the top: the file's samples, of its type, as a view.
+
+    Raises:
+        ArgumentError: if there is no slice of that number.
+    """
+    if not 0 <= number < plane.count:
+        raise ArgumentError(f"slice: expected {plane.name} from 0 to {plane.count - 1}, got {number}")
+    (axis, sign), (right, turn), (up, rise) = plane.axis, plane.right, plane.up
+    values = np.moveaxis(grid.channel(channel).values, (2 - up, 2 - right, 2 - axis), (0, 1, 2))
+    return values[::-rise, ::turn, number if sign > 0 else plane.count - 1 - number]
+
+
+def place_at(grid: Grid, point: Triple, channel: int = 0) -> Place | None:
+    """Return the sample that is closest to a point of the world, or None beyond the outermost ones."""
+    places = np.array(point) / grid.scale / grid.spacing + 0.5 * (np.array(grid.dims) - 1)
+    stored = np.rint(places).astype(int)
+    if (np.abs(places - 0.5 * (np.array(grid.dims) - 1)) > 0.5 * np.array(grid.dims)).any():
+        return None
+    stored = stored.clip(0, np.array(grid.dims) - 1)
+    x, y, z = stored.tolist()
+    lengths = (stored * grid.spacing).tolist()
+    i, j, k = (
+        int(stored[axis] if sign > 0 else grid.dims[axis] - 1 - stored[axis])
+        for axis, sign in closest(grid.space.axes)
+    )
+    value = grid.channel(channel).values[z, y, x]
+    return Place((i, j, k), grid.space.place(grid.origin, lengths), value.item())
+
+
+def point_of(grid: Grid, index: tuple[int, int, int]) -> list[float]:
+    """Return the point [3] of the world of a sample, by its index along the axes of the file's space."""
+    point = [0.0, 0.0, 0.0]
+    for number, (axis, sign) in zip(index, closest(grid.space.axes), strict=True):
+        point[axis] = sign * (number - 0.5 * (grid.dims[axis] - 1)) * grid.spacing[axis] * grid.scale
+    return point
+
+
+def windowed(values: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Return values as grey levels [H, W], uint8: black up to low, white from high on; NaN is black."""
+    scale = 255.0 / max(high - low, float(np.finfo(np.float32).tiny))
+    levels = (values.astype(np.float32) - np.float32(low)) * np.float32(scale)
+    return np.nan_to_num(levels, nan=0.0).clip(0, 255).astype(np.uint8)
