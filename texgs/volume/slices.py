@@ -12,7 +12,8 @@ from texgs.volume.grid import Grid, closest
 from texgs.volume.space import LETTERS, Triple
 
 PATIENT_PLANES = ("sagittal", "coronal", "axial")  # by the axis of the patient that they lie across
-# Which axis of the file's space is to the right in slices across x, y and z, ahead or behind, and which is up: as radiologists see a patient, from the left, the front and the feet.
+# Which axis of the file's space is to the right in slices across x, y and z, ahead or behind, and which is up:
+# as radiologists see a patient, from the left, the front and the feet.
 LAYOUT = {
     "LPS": ((1, 1, 2, 1), (0, 1, 2, 1), (0, 1, 1, -1)),
     "RAS": ((1, -1, 2, 1), (0, -1, 2, 1), (0, -1, 1, 1)),
