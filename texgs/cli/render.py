@@ -1,7 +1,6 @@
 """Render a scene to PNG, GIF or MP4: one view, the test path, an orbit, a light or a cut that moves."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 
 from texgs.cli.options import add_device, add_keys, keys_of, option, require_own_place
@@ -48,8 +47,9 @@ def run(arguments: argparse.Namespace) -> int:
         composition = session.composition
     shots, beside = film.shots(scene, composition), None
     if arguments.compare:
-        if film.mode != "shaded":
-            raise ArgumentError(f"--compare: expected --mode shaded, got {film.mode}; leave one of them out")
+        if film.mode != "shaded" or film.legend:
+            got = "--legend" if film.legend else film.mode
+            raise ArgumentError(f"--compare: expected --mode shaded alone, got {got}; leave one of them out")
         with errors_at(arguments.scene):
             beside = SideBySide(session, arguments.compare, arguments.gain)
         frames = beside.frames(shots)
@@ -57,8 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
         with errors_at(arguments.scene):
             if needs_twin(scene, film.mode):
                 session.twin_of(scene)
-        shows = partial(session.frame, mode=film.mode, transparent=film.transparent)
-        frames = (shows(camera, scene=shown) for camera, shown in shots)
+        frames = (session.picture(camera, film, shown) for camera, shown in shots)
     words = found_sentence(arguments.scene, scene)
     if arguments.caption:
         require_checked(arguments.scene, words)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import dist
 
-from texgs.core.cuts import MAX_COORDINATE
+from texgs.core.cuts import MAX_COORDINATE as MOST
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import REQUIRED, key
 
@@ -14,23 +14,18 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Marker:
-    """A point of the world, or a distance between two of them, with a text."""
+    """A point of the world, or both ends of a distance, with a text."""
 
     points: tuple[Point, ...] = key(
-        REQUIRED,
-        "one, or both ends of a distance",
-        "world units",
-        items=(1, 2),
-        least=-MAX_COORDINATE,
-        most=MAX_COORDINATE,
+        REQUIRED, "one or two", "world units", items=(1, 2), least=-MOST, most=MOST
     )
     text: str = key("", "beside it")
 
     def __post_init__(self) -> None:
         if len(self.text) > MAX_LETTERS or not self.text.isprintable():
+            got = repr(self.text[: MAX_LETTERS + 1])
             raise ArgumentError(
-                f"text of a marker: expected at most {MAX_LETTERS} printable letters, "
-                f"got {self.text[: MAX_LETTERS + 1]!r}"
+                f"text of a marker: expected at most {MAX_LETTERS} printable letters, got {got}"
             )
 
     @property
@@ -41,6 +36,6 @@ class Marker:
 
 @dataclass(frozen=True)
 class Markers:
-    """The markers of a scene as a value of its file, for checks."""
+    """The markers of a scene, to check those of files and messages."""
 
-    markers: tuple[Marker, ...] = key((), "in the order that they were made", items=(0, MAX_MARKERS))
+    markers: tuple[Marker, ...] = key((), "in the order in which they were made", items=(0, MAX_MARKERS))

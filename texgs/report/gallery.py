@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from texgs.report.fit_figure import ERROR, signed_error
 from texgs.scene.changes import apply_all
 from texgs.scene.scene_file import read_scene
 from texgs.scene.session import Session
+from texgs.scene.shot import Shot
 from texgs.scene.twin import Twin
 
 
@@ -52,7 +54,8 @@ class GalleryRenderer:
             if cell.light:
                 session.set_of_scene("light", cell.light)
             camera = self._camera(cell)
-            scene = None if cell.show == "volume" else session.frame(camera).astype("float32") / 255
+            draw = partial(session.picture, shot=Shot()) if cell.show == "scene" else session.frame
+            scene = None if cell.show == "volume" else draw(camera).astype("float32") / 255
             volume = None if cell.show == "scene" else self._volume_frame(session, camera)
         finally:
             while session.undo():

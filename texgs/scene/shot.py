@@ -36,6 +36,8 @@ class Shot(LensKeys):
     mode: Mode = key("shaded", "what a picture shows; the last four are factors of the material")
     transparent: bool = key(False, "leave the background out: pictures have an alpha channel")
 
+    legend: bool = key(False, "show names, colours and ranges of values in a corner")
+
     def camera(self, framed: Frame) -> Camera:
         """Return the camera; by default it shows the whole frame."""
         from texgs.core.camera import orbit

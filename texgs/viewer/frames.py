@@ -13,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from math import sqrt
+from typing import get_args
 
 import cv2
 import numpy as np
@@ -28,6 +29,7 @@ from texgs.report.fit_figure import signed_error
 from texgs.scene.frame import quantize
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
+from texgs.scene.shot import Mode
 from texgs.viewer.messages import View
 from texgs.viewer.origins import Origins, fitted, over
 
@@ -97,8 +99,11 @@ class Frames:
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def pixels(self, view: View, scene: Scene) -> np.ndarray:
-        """Return what a view shows [H, W, 3 or 4], uint8."""
-        return self._draw(view, scene, 1.0)[0]
+        """Return what a view shows [H, W, 3 or 4], uint8, and the scene's markers on it: for files."""
+        picture = self._draw(view, scene, 1.0)[0]
+        if view.mode not in get_args(Mode):  # a comparison
+            return picture
+        return self._session.marked(picture, view.camera.camera(), scene, has_legend=view.legend)
 
     def close(self) -> None:
         """End the thread after the frame that it renders."""
