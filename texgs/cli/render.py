@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.compare:
         if film.mode != "shaded" or film.legend:
             got = "--legend" if film.legend else film.mode
-            raise ArgumentError(f"--compare: expected --mode shaded alone, got {got}; leave one of them out")
+            raise ArgumentError(f"--compare: expected --mode shaded, got {got}; leave one of them out")
         with errors_at(arguments.scene):
             beside = SideBySide(session, arguments.compare, arguments.gain)
         frames = beside.frames(shots)

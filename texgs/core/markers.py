@@ -1,7 +1,6 @@
 """Markers of a scene: points with a text, and distances between two points, in world units."""
 
 from dataclasses import dataclass
-from math import dist
 
 from texgs.core.cuts import MAX_COORDINATE as MOST
 from texgs.core.errors import ArgumentError
@@ -27,11 +26,6 @@ class Marker:
             raise ArgumentError(
                 f"text of a marker: expected at most {MAX_LETTERS} printable letters, got {got}"
             )
-
-    @property
-    def length(self) -> float:
-        """Return the distance between its points in world units; 0 of one."""
-        return dist(self.points[0], self.points[-1])
 
 
 @dataclass(frozen=True)

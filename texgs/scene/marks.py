@@ -1,6 +1,7 @@
 """What is drawn on top of pictures: markers, distances with their lengths, and a legend."""
 
 from collections.abc import Sequence
+from math import dist
 from pathlib import Path
 
 import cv2
@@ -25,7 +26,7 @@ def length_of(marker: Marker, space: Space | None) -> str:
     """Return the length of a distance in words, in the unit of the volume's file where it is known."""
     if len(marker.points) < 2:
         return ""
-    length = marker.length * (space.scale if space else 1.0)
+    length = dist(*marker.points) * (space.scale if space else 1.0)
     unit = (space.unit or "volume units") if space else "world units"
     return f"{f'{length:.3g}' if length < 1000 else f'{length:.0f}'} {unit}"
 

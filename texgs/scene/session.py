@@ -332,15 +332,11 @@ class Session:
         return frame(composition, camera, scene, mode, twin, transparent=transparent)
 
     def picture(self, camera: Camera, shot: Shot, scene: Scene | None = None) -> np.ndarray:
-        """Return a frame as a shot has it, with markers and a legend on top; of a scene of the history."""
+        """Return a frame as a shot wants it, with a scene's markers and its legend on top; see `with_marks`."""
         scene = self.scene if scene is None else scene
         pixels = self.frame(camera, shot.mode, scene, transparent=shot.transparent)
-        return self.marked(pixels, camera, scene, has_legend=shot.legend)
-
-    def marked(self, picture: np.ndarray, camera: Camera, scene: Scene, *, has_legend: bool) -> np.ndarray:
-        """Return a picture with markers and a legend of a scene of the history; see `with_marks`."""
-        legend = legend_of(scene, self.composition_of(scene).palettes) if has_legend else []
-        return with_marks(picture, camera, scene, legend)
+        legend = legend_of(scene, self.composition_of(scene).palettes) if shot.legend else []
+        return with_marks(pixels, camera, scene, legend)
 
     def point_at(self, camera: Camera, mode: str, scene: Scene, pixel: tuple[int, int]) -> list[float] | None:
         """Return the point of a scene of the history that a pixel shows; see `texgs.scene.frame.point_at`."""

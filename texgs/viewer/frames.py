@@ -13,7 +13,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from math import sqrt
-from typing import get_args
 
 import cv2
 import numpy as np
@@ -29,7 +28,7 @@ from texgs.report.fit_figure import signed_error
 from texgs.scene.frame import quantize
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
-from texgs.scene.shot import Mode
+from texgs.scene.shot import Shot
 from texgs.viewer.messages import View
 from texgs.viewer.origins import Origins, fitted, over
 
@@ -100,10 +99,10 @@ class Frames:
 
     def pixels(self, view: View, scene: Scene) -> np.ndarray:
         """Return what a view shows [H, W, 3 or 4], uint8, and the scene's markers on it: for files."""
-        picture = self._draw(view, scene, 1.0)[0]
-        if view.mode not in get_args(Mode):  # a comparison
-            return picture
-        return self._session.marked(picture, view.camera.camera(), scene, has_legend=view.legend)
+        if view.mode == "truth" or view.mode == "difference" or view.mode == "wipe":
+            return self._draw(view, scene, 1.0)[0]
+        shot = Shot(mode=view.mode, transparent=view.transparent, legend=view.legend)
+        return self._session.picture(view.camera.camera(), shot, scene)
 
     def close(self) -> None:
         """End the thread after the frame that it renders."""
