@@ -12,7 +12,7 @@ from texgs.volume.grid import Grid, closest
 from texgs.volume.space import LETTERS, Triple
 
 PATIENT_PLANES = ("sagittal", "coronal", "axial")  # by the axis of the patient that they lie across
-# Which axis of the file's space is to the right in slices across x, y and z, ahead or behind, and which is up:
+# Of slices across x, y and z: which axis of the file's space is to the right, ahead or behind, and which is up,
 # as radiologists see a patient, from the left, the front and the feet.
 LAYOUT = {
     "LPS": ((1, 1, 2, 1), (0, 1, 2, 1), (0, 1, 1, -1)),
@@ -29,7 +29,7 @@ class SlicePlane:
     count: int  # of slices
     axis: tuple[
         int, int
-    ]  # of the grid, 0 to 2 for x, y, z: across the slices, and whether they count along it
+    ]  # across, of the grid, 0 to 2 for x, y, z; and whether slices count along it or back
     right: tuple[int, int]  # the same of columns
     up: tuple[int, int]  # the same of rows, from the lowest one
     ends: tuple[str, str, str, str]  # what is at the left, right, bottom and top, such as R, L, P, A
