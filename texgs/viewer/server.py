@@ -30,7 +30,10 @@ from texgs.viewer.work import Work
 WEB = Path(__file__).parent / "web"
 SUFFIXES = (".js", ".css", ".svg")
 # What changes of a scene that a page knows.
-CHANGING_KEYS = ("name", "background", "light", *HIDING, "cuts", "functions", "time", "tfs", "models")
+CHANGING_KEYS = (
+    *("name", "background", "light", *HIDING, "cuts", "functions"),
+    *("markers", "legend", "time", "tfs", "models"),
+)
 MOST_PAGES = 16
 PATIENCE = 2.0  # seconds for a page to close its connection
 HEARTBEAT = 20.0  # seconds; a page that is gone is noticed after this time
