@@ -20,6 +20,7 @@ from texgs.viewer.messages import Place, Slice, parse
 from texgs.viewer.server import Server
 from texgs.viewer.shared_edits import open_scene
 from texgs.volume.grid import Grid
+from texgs.volume.nrrd_file import open_grid
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
 from texgs.volume.space import RAS, Space
@@ -27,6 +28,7 @@ from texgs.volume.space import RAS, Space
 SHAPE = (5, 9, 7)  # z, y, x
 SPACING, ORIGIN = (2.0, 1.0, 3.0), (-10.0, 4.0, 20.0)
 SAMPLES = np.random.default_rng(3).integers(0, 256, SHAPE, dtype=np.uint8)
+NEAR = 0.03  # world units: less than half of any step between samples
 EVERYTHING = [0, 255]  # grey levels are the samples themselves
 # Radiologists see a patient from the left, the front and the feet.
 EXPECTED = {
@@ -43,12 +45,23 @@ def with_patient(folder, functions):
     return SceneVolume(folder / "patient.nrrd", functions)
 
 
+def point_of(index):
+    """The point of the world of a sample: the longest side has length 1, and its middle is the origin."""
+    counts = np.array(SHAPE[::-1])
+    return (np.array(index) - (counts - 1) / 2) * SPACING / max((counts - 1) * SPACING)
+
+
+def write_patient_scene(folder):
+    """Balls that claim to be a volume of a patient."""
+    scene = balls_in_a_volume(folder)
+    volume = with_patient(folder, scene.volume.tfs)
+    space = open_grid(volume.file).world
+    return write_scene(folder / "scene.yaml", replace(scene, volume=volume, space=space))
+
+
 @pytest.fixture
 def scene_file(tmp_path):
-    scene = balls_in_a_volume(tmp_path)
-    return write_scene(
-        tmp_path / "scene.yaml", replace(scene, volume=with_patient(tmp_path, scene.volume.tfs))
-    )
+    return write_patient_scene(tmp_path)
 
 
 async def get(client, path, name, query):
@@ -86,11 +99,9 @@ async def test_a_window_goes_from_black_to_white(client):
 
 @on_page
 async def test_a_place_has_the_nearest_sample_of_the_file(client):
-    unit = 1 / max(step * (n - 1) for step, n in zip(SPACING, SHAPE[::-1], strict=True))
     for index in np.random.default_rng(4).integers(0, SHAPE[::-1], (20, 3)):
         x, y, z = index.tolist()
-        point = (index - (np.array(SHAPE[::-1]) - 1) / 2) * SPACING * unit
-        found = await place_at(client, (point + 0.4 * unit).tolist())
+        found = await place_at(client, (point_of(index) + NEAR).tolist())
         assert found["index"] == [x, y, z]
         assert found["position"] == pytest.approx(
             [o + n * s for o, n, s in zip(ORIGIN, index, SPACING, strict=True)]
