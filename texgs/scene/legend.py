@@ -49,5 +49,5 @@ def legend_of(scene: Scene, palettes: Sequence[Color]) -> list[Entry]:
             samples = edit_function(tf, edit, palette)(np.linspace(low, high, SAMPLES))
             colors = [tuple(rgb) for rgb in samples[:, :3].round(4).tolist()]
             words = "" if is_label else f"{low:.4g} to {high:.4g}"
-            entries.append(Entry(part, colors if len({*colors}) > 1 else colors[:1], words))
+            entries.append(Entry(part, colors if len({*colors}) > 1 else [edit.palette or colors[0]], words))
     return entries

@@ -332,7 +332,7 @@ class Session:
         return frame(composition, camera, scene, mode, twin, transparent=transparent)
 
     def picture(self, camera: Camera, shot: Shot, scene: Scene | None = None) -> np.ndarray:
-        """Return a frame as a shot wants it, with a scene's markers and its legend on top; see `with_marks`."""
+        """Return a frame as a shot has it, with markers and legend on top; see `with_marks`."""
         scene = self.scene if scene is None else scene
         pixels = self.frame(camera, shot.mode, scene, transparent=shot.transparent)
         legend = legend_of(scene, self.composition_of(scene).palettes) if shot.legend else []

@@ -11,7 +11,7 @@ const UNEDITED = {
 const MOST_STEPS = 200; // of the history: of more, the oldest cannot be undone
 const OF_SCENE = {
   light: null, shadows: 0, occlusion: 0, reach: 0.25, background: [1, 1, 1],
-  cuts: { planes: [], box: null, faces: "shaded" }, functions: {}, time: null,
+  cuts: { planes: [], box: null, faces: "shaded" }, functions: {}, markers: [], time: null,
 };
 
 /** Numbers of the steps in time that can be shown: all, or those that a page holds. */
@@ -53,7 +53,7 @@ function partsOf(scene) {
 
 /** What the list of steps calls an edit. */
 export function titleOf({ part, key, value }) {
-  const ofScene = { cuts: titleOfCuts, functions: (functions) => Object.keys(functions).join(", ") };
+  const ofScene = { cuts: titleOfCuts, functions: (functions) => Object.keys(functions).join(", "), markers: titleOfMarkers };
   const title = value && ofScene[key] ? ofScene[key](value) : titleOfValue(value);
   return `${part} ${key} ${title}`.trim();
 }
@@ -63,6 +63,10 @@ function titleOfCuts({ planes, box, faces }) {
   if (box) words.push("box");
   if (words.length && faces === "unlit") words.push("unlit");
   return words.join(", ") || "none";
+}
+
+function titleOfMarkers(markers) {
+  return markers.map(({ text, points }) => text || (points.length > 1 ? "distance" : "point")).join(", ") || "none";
 }
 
 function titleOfValue(value) {
