@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -53,9 +52,10 @@ class GalleryRenderer:
             apply_all(session, cell.changes)
             if cell.light:
                 session.set_of_scene("light", cell.light)
+            if cell.show == "error":
+                session.set_of_scene("markers", ())
             camera = self._camera(cell)
-            draw = partial(session.picture, shot=Shot()) if cell.show == "scene" else session.frame
-            scene = None if cell.show == "volume" else draw(camera).astype("float32") / 255
+            scene = None if cell.show == "volume" else session.picture(camera, Shot()).astype("float32") / 255
             volume = None if cell.show == "scene" else self._volume_frame(session, camera)
         finally:
             while session.undo():

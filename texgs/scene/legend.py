@@ -21,11 +21,6 @@ class Entry:
     colors: list[Color]  # over the range, else one; in [0, 1]
     range: str = ""  # of values, such as "15 to 75"; "" if unknown, and of a label
 
-    @property
-    def words(self) -> str:
-        """Return the name and the range."""
-        return f"{self.name}  {self.range}".strip()
-
 
 def legend_of(scene: Scene, palettes: Sequence[Color]) -> list[Entry]:
     """Return a line for each visible model, and each visible segment that has a palette of its own.

@@ -16,7 +16,7 @@ from texgs.scene.scene import Scene
 from texgs.volume.space import Space
 
 INK, HALO, CLEAR, PAPER = (20, 20, 20, 255), (255, 255, 255, 255), (255, 255, 255, 0), (255, 255, 255, 225)
-LEAST_SIZE = 9  # of letters, pixels
+LEAST = 9  # of letters, pixels
 LETTERS_HIGH = 34  # in the shorter side of a picture
 SHIFT = 4  # bits of a pixel's fraction, as OpenCV takes places
 FARTHEST = 1e6  # pixels from the picture, which OpenCV can still draw to
@@ -40,21 +40,18 @@ def with_marks(picture: np.ndarray, camera: Camera, scene: Scene, legend: Sequen
     if not scene.markers and not legend:
         return picture
     height, width = picture.shape[:2]
-    over, size = (
-        np.full((height, width, 4), CLEAR, np.uint8),
-        max(LEAST_SIZE, min(height, width) // LETTERS_HIGH),
-    )
-    drawn = {each: ends for each in scene.markers if (ends := _draw_shape(over, camera, each, size))}
+    over, size = np.full((height, width, 4), CLEAR, np.uint8), max(LEAST, min(height, width) // LETTERS_HIGH)
+    drawn = [(each, ends) for each in scene.markers if (ends := _draw_shape(over, camera, each, size))]
     layer, font = Image.fromarray(over), font_of(size)
-    draw = ImageDraw.Draw(layer)
-    for marker, ends in drawn.items():
+    for marker, ends in drawn:
         words = " ".join(filter(None, (marker.text, length_of(marker, scene.space))))
         (left, low), (right, high) = min(ends), max(ends)
         fits = right + size + font.getlength(words) < width or right + left < width
-        place = (right + size, high) if fits else (left - size, low)
-        draw.text(place, words, INK, font, "lm" if fits else "rm", stroke_width=size // 7, stroke_fill=HALO)
+        place, anchor = ((right + size, high), "lm") if fits else ((left - size, low), "rm")
+        rim = {"stroke_width": size // 7, "stroke_fill": HALO}
+        ImageDraw.Draw(layer).text(place, words, INK, font, anchor, **rim)
     if legend:
-        _draw_legend(draw, legend, size, width, height)
+        _draw_legend(layer, legend, size)
     whole = Image.fromarray(picture).convert("RGBA")
     whole.alpha_composite(layer)
     return np.array(whole)[..., : picture.shape[2]]
@@ -67,39 +64,29 @@ def _draw_shape(over: np.ndarray, camera: Camera, marker: Marker, size: int) -> 
     if not (depth > 0).all() or not inside.all(dim=1).any() or pixels.abs().max() > FARTHEST:
         return []
     ends = [tuple(round((x - 0.5) * 2**SHIFT) for x in pixel) for pixel in pixels.tolist()]
-    rim, radius, thick = max(1, size // 9), size / 4, max(1, size // 9)
-    for color, more in ((HALO, rim), (INK, 0)):
-        cv2.line(over, ends[0], ends[-1], color, thick + 2 * more, cv2.LINE_AA, SHIFT)
+    thick = max(1, size // 9)
+    for color, rim in ((HALO, thick), (INK, 0)):
+        cv2.line(over, ends[0], ends[-1], color, thick + 2 * rim, cv2.LINE_AA, SHIFT)
         for end in ends:
-            cv2.circle(over, end, round((radius + more) * 2**SHIFT), color, cv2.FILLED, cv2.LINE_AA, SHIFT)
+            cv2.circle(over, end, round((size / 4 + rim) * 2**SHIFT), color, cv2.FILLED, cv2.LINE_AA, SHIFT)
     return [(x, y) for x, y in pixels.tolist()]
 
 
-def _draw_legend(
-    draw: ImageDraw.ImageDraw, legend: Sequence[Entry], size: int, width: int, height: int
-) -> None:
+def _draw_legend(layer: Image.Image, legend: Sequence[Entry], most: int) -> None:
     """Draw a box in the lower left corner, as large as there is room: swatches, names and ranges."""
-    letters = max(font_of(size).getlength(each.words) for each in legend) / size
-    size = int(min(size, 0.9 * width / (letters + 5), 0.9 * height / (1.5 * len(legend) + 1)))
-    font, step = font_of(size), 1.5 * size
-    left, top = 0.5 * size, height - (len(legend) * step + 1.5 * size)
-    draw.rounded_rectangle(
-        (left, top, left + (letters + 4.5) * size, height - 0.5 * size), size / 3, PAPER, HALO
-    )
+    words = [f"{each.name}  {each.range}".strip() for each in legend]
+    letters = max(map(font_of(most).getlength, words)) / most
+    room = 0.9 * layer.width / (letters + 5), 0.9 * layer.height / (1.5 * len(legend) + 1.5)
+    size = max(1, int(min(most, *room)))
+    left, low, draw, font = 0.5 * size, layer.height - 0.5 * size, ImageDraw.Draw(layer), font_of(size)
+    top = low - (1.5 * len(legend) + 1) * size
+    draw.rounded_rectangle((left, top, left + (letters + 4.5) * size, low), size / 3, PAPER)
     for row, entry in enumerate(legend):
-        middle, edges = (
-            top + 0.5 * size + (row + 0.5) * step,
-            np.linspace(1, 3.5, len(entry.colors) + 1) * size,
-        )
-        for color, start, stop in zip(entry.colors, edges[:-1], edges[1:], strict=True):
-            box = (
-                left + start - 0.5 * size,
-                middle - 0.4 * size,
-                left + stop - 0.5 * size,
-                middle + 0.4 * size,
-            )
-            draw.rectangle(box, tuple(round(255 * x) for x in color))
-        draw.text((left + 3.7 * size, middle), entry.words, INK, font, "lm")
+        middle = top + (1.25 + 1.5 * row) * size
+        swatch = Image.fromarray(np.rint(255 * np.array([entry.colors])).astype(np.uint8))
+        sides = round(2.5 * size), max(1, round(0.8 * size))
+        layer.paste(swatch.resize(sides, Image.Resampling.BILINEAR), (size, round(middle - 0.4 * size)))
+        draw.text((left + 3.7 * size, middle), words[row], INK, font, "lm")
 
 
 def font_of(size: int) -> ImageFont.FreeTypeFont:
