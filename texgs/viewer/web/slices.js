@@ -6,7 +6,7 @@ import { SliceLattice } from "./slice_lattice.js";
 import { SliceView } from "./slice_view.js";
 
 const FULL_DRAG = 300; // CSS pixels that move a window by its width, or make it e times as wide
-const NARROWEST = 1e-6; // of the whole range of values
+const NARROWEST = 1e-6; // of the first window
 const DIGITS = 6; // of values, of which most are stored in 32 bits
 const get = (id) => document.getElementById(id);
 
@@ -21,7 +21,8 @@ export class Slices extends EventTarget {
    *
    * @param {{planes: object[], window: number[], slice: Function, place: Function}} source - of samples:
    *   `slice(plane, number, window)` is a promise of an ImageBitmap or ImageData, a pixel a sample, row 0 at the top;
-   *   `place(point)` of {index, position, value, labels}, or null beyond the volume; `window` has all values
+   *   `place(point)` of {index, position, value, labels}, or null beyond the volume, and the value null where
+   *   there are labels alone; `window` has the values from black to white to begin with
    * @param {{axes: string, unit: string}} space - of positions
    * @param {(text: string) => void} tell - what went wrong
    */
@@ -39,7 +40,8 @@ export class Slices extends EventTarget {
     this.#ends = ["Black", "White"].map((name, end) => element("input", { type: "number", step: "any",
       "aria-label": `Value that is ${name.toLowerCase()}`, onchange: ({ target }) => this.#typed(end, target) }));
     const rows = ["Black", "White"].map((name, end) => element("label", {}, `${name} `, this.#ends[end]));
-    const reset = element("button", { type: "button", onclick: () => this.resetWindow() }, "Whole range");
+    const reset = element("button", { type: "button", onclick: () => this.resetWindow(),
+      "aria-label": "Reset black and white" }, "Reset");
     this.controls = element("div", { className: "tools" }, ...rows, reset);
     get("slices").append(element("div", { className: "planes" }, ...this.#views.map(({ root }) => root)),
       this.#place, this.controls);
@@ -82,14 +84,16 @@ export class Slices extends EventTarget {
     this.setWindow(level - width / 2, level + width / 2);
   }
 
-  /** Show all values. */
+  /** Show the values that slices show at first. */
   resetWindow() {
     this.setWindow(...this.source.window);
   }
 
-  /** Draw slices again on which something else lies, such as labels in other colours. */
+  /** Ask for all again: the volume is another, or labels have other colours. */
   refresh() {
-    if (this.isOpen) for (const view of this.#views) view.refresh();
+    if (!this.isOpen) return;
+    for (const view of this.#views) view.refresh();
+    this.#tell();
   }
 
   #turn(isOn) {
@@ -133,7 +137,8 @@ export class Slices extends EventTarget {
     const least = Math.min(...this.lattice.planes.flatMap(({ spacing }) => spacing));
     const digits = Math.min(20, Math.max(0, 1 - Math.floor(Math.log10(least)))); // a tenth of a sample at most
     const words = position.map((x, i) => `${this.#space.axes[i]} ${x.toFixed(digits)}`).join(" ");
-    const parts = [index.join(", "), `${words} ${this.#space.unit}`.trim(), `value ${Number(value.toPrecision(DIGITS + 1))}`];
+    const parts = [index.join(", "), `${words} ${this.#space.unit}`.trim()];
+    if (value !== null) parts.push(`value ${Number(value.toPrecision(DIGITS + 1))}`);
     return [...parts, ...labels].join(" · ");
   }
 }
