@@ -56,9 +56,7 @@ class Editing:
     background = Value["tuple[float, float, float]"](
         'Colour behind the scene: set red, green, blue from 0 to 1, or "#rrggbb".'
     )
-    markers = Value[tuple[Marker, ...]](
-        "Marked points and distances, in world units; None: none; see `mark`."
-    )
+    markers = Value[tuple[Marker, ...]]("Points and distances in world units, see `mark`; None: none.")
     time = Value["int | None"]("Number of the step that is shown, of a scene of a series; None of others.")
 
     def __init__(self, session: Session, *kept: Any) -> None:

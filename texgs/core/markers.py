@@ -15,17 +15,13 @@ Point = tuple[float, float, float]
 class Marker:
     """A point of the world, or both ends of a distance, with a text."""
 
-    points: tuple[Point, ...] = key(
-        REQUIRED, "one or two", "world units", items=(1, 2), least=-MOST, most=MOST
-    )
+    points: tuple[Point, ...] = key(REQUIRED, "1 or 2", "world units", items=(1, 2), least=-MOST, most=MOST)
     text: str = key("", "beside it")
 
     def __post_init__(self) -> None:
         if len(self.text) > MAX_LETTERS or not self.text.isprintable():
-            got = repr(self.text[: MAX_LETTERS + 1])
-            raise ArgumentError(
-                f"text of a marker: expected at most {MAX_LETTERS} printable letters, got {got}"
-            )
+            expected = f"expected at most {MAX_LETTERS} printable letters"
+            raise ArgumentError(f"text of a marker: {expected}, got {self.text[: MAX_LETTERS + 1]!r}")
 
 
 @dataclass(frozen=True)

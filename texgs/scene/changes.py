@@ -38,10 +38,7 @@ PLANE = (
 DIRECTIONS = "RASLPIXYZ"  # axes of the space of a volume's file
 BOX = "X0,Y0,Z0,X1,Y1,Z1, in world units"
 LOOKS = ("style", "picture", "instruction")  # keys of looks, which are not changes of numbers
-PLACES = {
-    "marker": "TEXT@X,Y,Z",
-    "distance": "X,Y,Z:X,Y,Z or TEXT@X,Y,Z:X,Y,Z",
-}  # what stands for new markers
+PLACES = {"marker": "TEXT@X,Y,Z", "distance": "X,Y,Z:X,Y,Z or TEXT@X,Y,Z:X,Y,Z"}  # words of new markers
 VOXEL_SUFFIX = "v"  # after a position in samples, counted from 0
 
 

@@ -9,6 +9,7 @@ const UNEDITED = {
   tint: [1, 1, 1],
 };
 const MOST_STEPS = 200; // of the history: of more, the oldest cannot be undone
+const MOST_NAMED = 3; // markers in the title of a step
 const OF_SCENE = {
   light: null, shadows: 0, occlusion: 0, reach: 0.25, background: [1, 1, 1],
   cuts: { planes: [], box: null, faces: "shaded", window: null }, functions: {}, markers: [], time: null,
@@ -66,6 +67,7 @@ function titleOfCuts({ planes, box, faces }) {
 }
 
 function titleOfMarkers(markers) {
+  if (markers.length > MOST_NAMED) return `${markers.length}`;
   return markers.map(({ text, points }) => text || (points.length > 1 ? "distance" : "point")).join(", ") || "none";
 }
 
