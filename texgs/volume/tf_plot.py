@@ -84,8 +84,11 @@ def _fill_sizes(
         counts = np.asarray(summary["histogram"])
         edges = np.linspace(summary["minimum"], summary["maximum"], len(counts) + 1)
         inside = counts[edges[1:] > HALF].sum()
-        axes.barh(words(name), inside * (np.prod(summary["spacing"]) if unit else 1), color=tf.color[0][1:])
-    axes.set(xscale="log", xlabel=f"{unit}³" if unit else "samples")
+        size = inside * (np.prod(summary["spacing"]) if unit else 1)
+        bar = axes.barh(words(name), size, color=tf.color[0][1:])
+        axes.bar_label(bar, [f"{size:,.0f}" if size >= 1000 else f"{size:.3g}"], padding=4)
+    axes.margins(x=0.12)
+    axes.set_xlabel(f"{unit}³" if unit else "samples")
 
 
 def _fill(
