@@ -166,7 +166,10 @@ def test_labels_beside_a_scan_join_its_functions(conf, labels, capsys):
         (["kind=labels", "--count", "2"], "--count: expected none, as each label has a function"),
         (["kind=labels", "--tf", "a.json"], "a.json"),
         (["kind=labels", "labels=seg.nii.gz"], "as its file holds labels itself"),
-        (["kind=labels", "crop=[0,9,0,9,0,2]", "labels=[3]"], "seg.nii.gz: expected labels, got 0 everywhere"),
+        (
+            ["kind=labels", "crop=[0,9,0,9,0,2]", "labels=[3]"],
+            "seg.nii.gz: expected labels, got 0 everywhere",
+        ),
         (["kind=image", "labels=[3]"], "labels=[...]: expected a file of labels, got an image; name one by"),
     ],
 )
