@@ -56,7 +56,7 @@ def test_labels_beside_an_image_join_its_functions(labels, tmp_path):
     assert list(volume.suggest(1)) == ["TF01", "label_2", "label_5", "label_900"]
     refused(
         lambda: texgs.Volume(scan, labels=labels[1:]),
-        "labels of data: expected labels on the lattice of data",
+        "labels: expected labels on the lattice of data",
     )
     assert list(texgs.Volume(scan).channels) == [""]
 

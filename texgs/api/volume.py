@@ -17,16 +17,16 @@ from typing import TYPE_CHECKING, Any
 from texgs.api.arrays import keys_of_format, several, source_of
 from texgs.api.display import as_python, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
-from texgs.api.labels import masks_of
+from texgs.api.labels import sources_of
 from texgs.config.project import is_name, name_of
 from texgs.core.errors import ArgumentError
-from texgs.core.names import close
+from texgs.core.names import check_count, close, mask_name
 from texgs.fields.part_edit import color
 from texgs.scene.frame import quantize
 from texgs.scene.scene import WHITE
 from texgs.scene.scene_file import light_of
 from texgs.scene.shot import Shot
-from texgs.volume.basic_tfs import function_of, mask_name
+from texgs.volume.basic_tfs import function_of
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.label_choice import label_tf
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
     from texgs.core.light import Light
-    from texgs.volume.label_names import Label
 
 CELL_WIDTH = 320  # pixels, of the picture at the end of a cell
 
@@ -104,18 +103,10 @@ class Volume:
         self.name = name = default_name(data) if name is None else name
         self._scratch = TemporaryDirectory(prefix="texgs-") if folder is None else None
         self.folder = Path(folder if folder is not None else self._scratch.name)  # type: ignore[union-attr]
-        if kind not in ("image", "labels"):
-            raise ArgumentError(f"kind: expected image or labels, got {kind!r:.100}")
+        check_count("reduce", reduce)
         crop, nan_value = several("crop", crop, 6, index), as_python(nan_value)
-        sources: list[Source] = [opened(data, name, spacing, origin, keys)] if kind == "image" else []
-        shown: dict[str, Label] = {}
-        if kind == "labels":
-            open_layer = partial(opened, data, name, spacing, origin, keys)
-            shown, sources = masks_of(data, open_layer, None, labels, names, crop)
-        elif labels is not None:
-            open_layer = partial(opened, labels, f"labels of {name}", spacing, origin, {})
-            shown, masks = masks_of(labels, open_layer, sources[0], None, names, crop)
-            sources += masks
+        open_file = partial(opened, name=name, spacing=spacing, origin=origin, keys=keys)
+        shown, sources = sources_of(data, open_file, kind, labels, names, crop, reduce**3)
         source = sources[0]
         self._channel = source.channel
         if up is None:
@@ -234,11 +225,11 @@ class Volume:
 
 def opened(
     data: Any,
+    layer: str | None,
     name: str,
     spacing: Sequence[float] | None,
     origin: Sequence[float] | None,
     keys: dict[str, Any],
-    layer: str | None = None,
 ) -> Source:
     """Return a file, a layer of it or an array as a source; arguments as for `Volume`."""
     if isinstance(data, str | Path):
