@@ -86,7 +86,7 @@ def marked(pixels: np.ndarray, plane: SlicePlane, size: tuple[int, int], at: Seq
     font = ImageFont.load_default(max(10, width // 24))
     ends = ((GAP, height / 2), (width - GAP, height / 2), (width / 2, height - GAP), (width / 2, GAP))
     for letter, end, anchor in zip(plane.ends, ends, ("lm", "rm", "md", "ma"), strict=True):
-        draw.text(end, letter, LETTER, font, anchor)
+        draw.text(end, letter, LETTER, font, anchor, stroke_width=1, stroke_fill="black")
     return picture
 
 

@@ -40,6 +40,7 @@ export class Cuts {
     this.#add = element("button", { type: "button", onclick: () => this.#addPlane() }, "Add a plane");
     this.#faces = element("select", { onchange: () => this.#send(0) });
     this.#faces.append(new Option("Shaded", "shaded"), new Option("Without light", "unlit"));
+    if (page.state.scene.volume === true) this.#faces.append(new Option("Slice", "slice")); // by a server
     const shown = tick("Arrows in the picture", (isOn) => this.#handles.turn(isOn));
     const name = element("span", { className: "name" }, "Faces");
     const faces = element("label", { className: "row" }, name, this.#faces);
@@ -127,7 +128,9 @@ export class Cuts {
   }
 
   #send(step, box = this.#page.state.scene.cuts.box) {
-    const cuts = { planes: this.planes.filter((each) => each.isOn).map(plain), box, faces: this.#faces.value };
+    const { window, faces } = this.#page.state.scene.cuts, kept = window ? { window } : {}; // values of slices
+    const planes = this.planes.filter((each) => each.isOn).map(plain);
+    const cuts = { planes, box, faces: this.#faces.value || faces, ...kept };
     if (same(cuts, this.#page.state.scene.cuts)) this.show();
     else this.#page.state.edit("", "cuts", cuts, step);
   }

@@ -11,6 +11,7 @@ const areThree = (x, low, high) => Array.isArray(x) && x.length === 3 && x.every
 const isColor = (x) => areThree(x, 0, 1);
 const isFactor = (x) => isNumber(x, 0, MOST_FACTOR);
 const isPlane = (x) => areThree(x?.normal) && Math.hypot(...x.normal) >= 1 / MOST && isNumber(x.offset);
+const isWindow = (x) => Array.isArray(x) && x.length === 2 && x.every(Number.isFinite);
 const isBox = (x) => areThree(x?.low) && areThree(x?.high) && x.low.every((low, i) => low < x.high[i]);
 const arePoints = (x, columns, least) => Array.isArray(x) && x.length >= least && x.every((row, i) =>
   Array.isArray(row) && row.length === columns && Number.isFinite(row[0]) && !(row[0] < x[i - 1]?.[0])
@@ -26,7 +27,8 @@ const OF_SCENE = {
   shadows: isShare, occlusion: isShare, reach: (x, scene) => scene.can_shadow && isNumber(x, 1 / MOST, MOST_REACH),
   background: isColor,
   cuts: (x) => Array.isArray(x?.planes) && x.planes.length <= MOST_PLANES && x.planes.every(isPlane)
-    && (x.box === null || isBox(x.box)) && ["shaded", "unlit"].includes(x.faces),
+    && (x.box === null || isBox(x.box)) && ["shaded", "unlit", "slice"].includes(x.faces)
+    && (x.window === undefined || isWindow(x.window)),
   functions: (x, scene) => Boolean(scene.transfer) && typeof x === "object" && !Array.isArray(x)
     && Object.values(x).every(isFunction),
   time: (x, scene) => timesOf(scene).includes(x),

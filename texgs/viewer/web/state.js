@@ -61,7 +61,7 @@ export function titleOf({ part, key, value }) {
 function titleOfCuts({ planes, box, faces }) {
   const count = planes.length, words = count ? [count > 1 ? `${count} planes` : "1 plane"] : [];
   if (box) words.push("box");
-  if (words.length && faces === "unlit") words.push("unlit");
+  if (words.length && faces !== "shaded") words.push(faces);
   return words.join(", ") || "none";
 }
 
