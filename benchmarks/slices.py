@@ -1,8 +1,8 @@
 """Slices of a volume, and clicks on scenes: milliseconds, equal samples, and distances to what is seen.
 
-`python -m benchmarks.slices OUTPUT.json VOLUME.nii.gz RUN...` draws slices of a volume at 512x512, of random
-numbers in all planes, and compares all samples with those that nibabel reads. In scenes, below the folders of
-data sets, it compares points of clicks with where half of the light is gone in the volume, on opaque matter.
+`python -m benchmarks.slices OUTPUT.json VOLUME.nii.gz SCENE...` draws slices of a volume at 512x512, of
+random numbers in all planes, and compares all samples with those that nibabel reads. In scenes of `texgs run`
+it compares points of clicks with where half of the light is gone in the volume, on opaque matter.
 """
 
 import json
@@ -24,7 +24,6 @@ from benchmarks.settings import ROUNDS
 from benchmarks.timing import Case, measure
 from texgs.core.camera import orbit
 from texgs.core.image import FAST_PNG
-from texgs.scene.scene_file import scene_path
 from texgs.scene.session import Session
 from texgs.volume.grid import Grid
 from texgs.volume.nrrd_file import open_grid
@@ -39,13 +38,15 @@ OPAQUE = 0.99  # alpha of the volume from which on matter is opaque
 SEED = 0
 
 
-def main(output: str, volume: str, *runs: str) -> None:
+def main(output: str, volume: str, *scenes: str) -> None:
     """Measure, print and write."""
     with machine.Load() as load, TemporaryDirectory() as folder:
         prepare(open_source(Path(volume)), Path(folder, "volume.nrrd"), up="+z")
         section = drawn(open_grid(Path(folder, "volume.nrrd")), Path(volume), ROUNDS)
-        for run in map(Path, runs):
-            section.measurements += clicked(scene_path(run / "scene"), run.name)
+        for scene in map(Path, scenes):
+            section.measurements += clicked(
+                scene, scene.resolve().parents[3].name
+            )  # DATASET/scene/FIT/compose
     report.show(volume, section)
     print(load)
     facts = {"machine": machine.describe(torch.device("cpu")), "load": asdict(load)}

@@ -43,7 +43,7 @@ class SliceKeys:
     window: tuple[float, float] | None = key(
         None, "values of slices in black and in white; default what 99 % of the samples are between"
     )
-    width: int = key(800, "of the picture", "pixels", least=64, most=LARGEST)
+    width: int = key(800, "of the picture", "pixels", least=16, most=LARGEST)
 
 
 def slice_picture(grid: Grid, keys: SliceKeys, labels: Mapping[str, Label]) -> np.ndarray:
@@ -83,7 +83,7 @@ def marked(pixels: np.ndarray, plane: SlicePlane, size: tuple[int, int], at: Seq
     y = (0.5 - rise * at[up] / (plane.size[1] * plane.spacing[1])) * height
     draw.line((0, y, width, y), CROSS)
     draw.line((x, 0, x, height), CROSS)
-    font = ImageFont.load_default(max(10, width // 24))
+    font = ImageFont.load_default(max(10, min(size) // 20))
     ends = ((GAP, height / 2), (width - GAP, height / 2), (width / 2, height - GAP), (width / 2, GAP))
     for letter, end, anchor in zip(plane.ends, ends, ("lm", "rm", "md", "ma"), strict=True):
         draw.text(end, letter, LETTER, font, anchor, stroke_width=1, stroke_fill="black")
