@@ -34,7 +34,7 @@ BLUE = (0.3, 0.1, 0.1)  # where the blue ball is seen
 
 
 def test_faces_of_cuts_show_slices_where_there_is_a_volume(chromium, scene_file, tmp_path):
-    cuts = Cuts([Plane([1.0, 0.0, 0.0], 0.05)], faces="slice", window=[-1.0, 1.0])
+    cuts = Cuts([Plane([1.0, 0.0, 0.0], 0.05)], faces="slice", window=(-1.0, 1.0))
     volume = write_scene(tmp_path / "sliced.yaml", balls_in_a_volume(tmp_path, cuts=cuts))
     with served(volume) as (_, address), opened(chromium, address) as page:
         faces = page.get_by_label("Faces")
