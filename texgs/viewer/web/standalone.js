@@ -92,7 +92,7 @@ function wordsOf({ part, key, value }, space) {
   if (key === "cuts") {
     const planes = value.planes.map(({ normal, offset }) => `cut=${[...normal, offset]}`);
     const box = value.box ? [...value.box.low, ...value.box.high] : "";
-    return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`];
+    return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`, ...(value.window ? [`cut.window=${value.window}`] : [])];
   }
   if (key === "markers") {
     const words = ({ points, text }) => `${points.length > 1 ? "distance" : "marker"}=${text ? `${text}@` : ""}`
