@@ -16,14 +16,18 @@ from tests.viewer.test_messages import VALUES
 from texgs.core.errors import ArgumentError
 from texgs.scene.scene import SceneVolume
 from texgs.scene.scene_file import write_scene
+from texgs.scene.session import Session
 from texgs.viewer.messages import Place, Slice, parse
 from texgs.viewer.server import Server
 from texgs.viewer.shared_edits import open_scene
+from texgs.viewer.slices import Slices
 from texgs.volume.grid import Grid
+from texgs.volume.label_masks import HALF, INSIDE, MaskSource
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.prepare import prepare
+from texgs.volume.prepare import prepare, prepare_channels
 from texgs.volume.slabs import ArraySource
 from texgs.volume.space import RAS, Space
+from texgs.volume.transfer import TransferFunction
 
 SHAPE = (5, 9, 7)  # z, y, x
 SPACING, ORIGIN = (2.0, 1.0, 3.0), (-10.0, 4.0, 20.0)
@@ -152,6 +156,33 @@ async def test_what_the_scene_has_not_is_told(client, scene_file):
     status, text = await get(client, "place.json", "place", {"point": [0, 0, 0]})
     assert status == 400
     assert "patient.nrrd: no such file" in text.decode()
+
+
+def test_labels_lie_over_slices_in_the_colours_that_they_have_now(tmp_path):
+    scene, numbers = balls_in_a_volume(tmp_path), (SAMPLES > 200).astype(np.uint8)
+    image, labels = (ArraySource(Grid(each, SPACING)) for each in (SAMPLES, numbers))
+    prepare_channels([image, MaskSource(labels, 1, "bright")], tmp_path / "labels.nrrd")
+    palette = tuple(map(float, Session(scene).composition.palettes[1]))
+    label = TransferFunction(((HALF, 0.9), (INSIDE, 0.9)), ((HALF, *palette),), channel=1)
+    volume = SceneVolume(tmp_path / "labels.nrrd", {**scene.volume.tfs, "high": label})
+    session = Session(replace(scene, volume=volume))
+    slices, inside = Slices(session), numbers[2, ::-1].astype(bool)
+    grey = np.repeat(SAMPLES[2, ::-1, :, None], 3, axis=-1)
+
+    def shown():
+        png = slices.png(Slice("z", 2, (0, 255)))
+        return np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
+
+    session.change("high", "palette", "#ff0000")
+    seen, mixed = shown(), 0.4 * grey[inside] + 0.6 * np.array([255, 0, 0])
+    assert np.abs(seen[inside] - mixed).max() <= 1
+    assert np.array_equal(seen[~inside], grey[~inside])
+    session.change("high", "visible", False)
+    assert np.array_equal(shown(), grey)
+    for index in np.ndindex(SHAPE):
+        found = slices.found(Place(tuple(point_of(index[::-1]))))
+        assert found["labels"] == (["high"] if numbers[index] else [])
+        assert found["value"] == SAMPLES[index]
 
 
 def test_a_scene_that_names_no_volume_has_no_slices(tmp_path):

@@ -38,14 +38,14 @@ class Slices:
     async def picture(self, request: web.Request) -> web.StreamResponse:
         """Return the slice in the query as a PNG file."""
         asked = parse(request.query.get("slice", ""), Slice)
-        return web.Response(body=await asyncio.to_thread(self._png, asked), content_type="image/png")
+        return web.Response(body=await asyncio.to_thread(self.png, asked), content_type="image/png")
 
     async def place(self, request: web.Request) -> web.StreamResponse:
         """Return the sample at the place in the query, JSON; null beyond the outermost ones."""
         asked = parse(request.query.get("place", ""), Place)
-        return web.json_response(await asyncio.to_thread(self._found, asked))
+        return web.json_response(await asyncio.to_thread(self.found, asked))
 
-    def _png(self, asked: Slice) -> bytes:
+    def png(self, asked: Slice) -> bytes:
         """Return a picture of a slice, a pixel a sample: the values in a window, and labels over them."""
         grid, labels = self._open()
         planes = {plane.name: plane for plane in planes_of(grid)}
@@ -56,7 +56,7 @@ class Slices:
         pixels = colors[..., ::-1] if labels else colors[..., 0]  # three channels take three times as long
         return cv2.imencode(".png", pixels, QUICK_PNG)[1].tobytes()
 
-    def _found(self, asked: Place) -> dict[str, Any] | None:
+    def found(self, asked: Place) -> dict[str, Any] | None:
         """Return index, position and value of the sample at a place, and the labels there."""
         grid, labels = self._open()
         masks = {name: place_at(grid, asked.point, channel) for name, (channel, _) in labels.items()}
