@@ -3,7 +3,7 @@
 import asyncio
 import io
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from shutil import copy
 
 import numpy as np
@@ -220,7 +220,7 @@ async def test_pages_cut_the_scene(browser, client):
     assert cuts == {"planes": planes, "box": None, "faces": "unlit", "window": None}
     assert isolated(client.server_side.edits.scene, "TF01").cuts == NO_CUTS, "clicks select what is whole"
     await browser.send(type="undo")
-    assert (await browser.past())["scene"]["cuts"] == {"planes": [], "box": None, "faces": "shaded"}
+    assert (await browser.past())["scene"]["cuts"] == asdict(NO_CUTS)
 
 
 @on_page

@@ -61,8 +61,9 @@ class Slices:
         grid, labels = self._open()
         masks = {name: place_at(grid, asked.point, channel) for name, (channel, _) in labels.items()}
         inside = [name for name, mask in masks.items() if mask and mask.value >= HALF]
-        place = place_at(grid, asked.point)
-        return {**asdict(place), "labels": inside} if place else None
+        place, is_mask = place_at(grid, asked.point), any(channel == 0 for channel, _ in labels.values())
+        none = {"value": None} if is_mask else {}  # of an image
+        return {**asdict(place), **none, "labels": inside} if place else None
 
     def _open(self) -> tuple[Grid, dict[str, Label]]:
         """Map the volume of the scene as it is now, and return its labels in their colours."""
