@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from tests.scene.balls import balls_in_a_volume, write_balls
+from tests.scene.test_twin import HIGH, LOW
 from tests.viewer.pages import TOKEN, on_page
 from tests.viewer.test_messages import VALUES
 from texgs.core.errors import ArgumentError
@@ -43,10 +44,11 @@ EXPECTED = {
 }
 
 
-def with_patient(folder, functions):
-    """A volume of samples in the space of a patient, with some functions."""
+def with_patient(folder):
+    """A volume of samples in the space of a patient, with functions."""
     space = Space.along(np.eye(3), RAS, "mm")
     prepare(ArraySource(Grid(SAMPLES, SPACING, ORIGIN, space=space)), folder / "patient.nrrd")
+    functions = {"low": LOW.scaled(0, 255), "high": HIGH.scaled(0, 255)}
     return SceneVolume(folder / "patient.nrrd", functions)
 
 
@@ -58,10 +60,9 @@ def point_of(index):
 
 def write_patient_scene(folder):
     """Balls that claim to be a volume of a patient."""
-    scene = balls_in_a_volume(folder)
-    volume = with_patient(folder, scene.volume.tfs)
-    space = open_grid(volume.file).world
-    return write_scene(folder / "scene.yaml", replace(scene, volume=volume, space=space))
+    volume = with_patient(folder)
+    scene = replace(balls_in_a_volume(folder), volume=volume, space=open_grid(volume.file).world)
+    return write_scene(folder / "scene.yaml", scene)
 
 
 @pytest.fixture

@@ -333,7 +333,8 @@ class Session:
     def point_at(self, camera: Camera, mode: str, scene: Scene, pixel: tuple[int, int]) -> list[float] | None:
         """Return the point of a scene of the history that a pixel shows; see `texgs.scene.frame.point_at`."""
         scene = replace(scene, light=scene.light.unhidden)  # shadows hide no point
-        twin = self.twin_of(scene) if needs_twin(scene, mode) else None
+        is_known = scene.volume is not None and scene.volume.file.is_file() and scene.is_as_volume
+        twin = self.twin_of(scene) if is_known or needs_twin(scene, mode) else None
         return point_at(self.composition_of(scene), camera, scene, mode, twin, pixel)
 
     def slices(self, keys: SliceKeys) -> np.ndarray:

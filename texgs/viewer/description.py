@@ -92,7 +92,7 @@ def describe(
         "light": {"azimuth": light.azimuth, "polar": light.polar} if light.kind == "directional" else None,
         **{key: getattr(light, key) for key in HIDING},
         "can_shadow": "relight" in kind.can and scene.volume is not None,
-        "cuts": asdict(scene.cuts),
+        "cuts": {key: x for key, x in asdict(scene.cuts).items() if key != "window" or x},
         "models": models,
         "functions": plain_functions(scene.functions),
         "markers": [asdict(each) for each in scene.markers],

@@ -16,7 +16,7 @@ from texgs.viewer.messages import Place, Slice, parse
 from texgs.volume.grid import Grid
 from texgs.volume.label_masks import HALF, shows_label
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.slices import Label, place_at, planes_of, slice_colors, slice_of, window_of
+from texgs.volume.slices import Labels, place_at, planes_of, slice_colors, slice_of, window_of
 
 QUICK_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1)
 
@@ -65,7 +65,7 @@ class Slices:
         none = {"value": None} if is_mask else {}  # of an image
         return {**asdict(place), **none, "labels": inside} if place else None
 
-    def _open(self) -> tuple[Grid, dict[str, Label]]:
+    def _open(self) -> tuple[Grid, Labels]:
         """Map the volume of the scene as it is now, and return its labels in their colours."""
         scene, palettes = self._session.scene, self._session.composition.palettes
         has_labels = any(map(shows_label, volume_of(scene).tfs.values()))

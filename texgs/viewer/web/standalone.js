@@ -88,7 +88,7 @@ function wordsOf({ part, key, value }) {
   if (key === "cuts") {
     const planes = value.planes.map(({ normal, offset }) => `cut=${[...normal, offset]}`);
     const box = value.box ? [...value.box.low, ...value.box.high] : "";
-    return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`];
+    return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`, ...(value.window ? [`cut.window=${value.window}`] : [])];
   }
   return `${place}=${Array.isArray(value) ? toHex(value) : value ?? ""}`;
 }
