@@ -116,8 +116,8 @@ class Caster:
     ) -> Cast:
         """Cast a view, with what else is wanted of OUTPUTS, in one pass; without gradients and skew.
 
-        Of several functions each has a channel of its own: extinctions add up, and colours are means that
-        these weigh.
+        Of several functions each has a channel of its own, or a mask: extinctions add up, and colours are
+        means that these weigh.
 
         Samples stay where they are without a depth range, and count for what of their step lies in it: two
         parts of a ray join. Over an opacity unit behind the faces of a cut, normals are those of its planes,
