@@ -20,8 +20,10 @@ from texgs.scene.segment_file import write_segment
 from texgs.scene.series_file import Series, write_series
 from texgs.volume.generate import sphere
 from texgs.volume.grid import Grid
-from texgs.volume.prepare import prepare
+from texgs.volume.label_masks import HALF, INSIDE, MaskSource
+from texgs.volume.prepare import prepare, prepare_channels
 from texgs.volume.slabs import ArraySource
+from texgs.volume.transfer import TransferFunction
 
 COUNT, BEGIN = 5, 2  # steps of the series, and the one that its scene shows
 
@@ -65,6 +67,31 @@ def waves(shape=(30, 26, 34), spacing=(1.0, 1.5, 0.7)):
 def scene_of_volume(folder, grid):
     """Two balls of surfels beside a volume that they have little to do with."""
     return Scene(ball_models(folder, "low", "high"), volume=volume_of(folder, grid))
+
+
+def nested(shape=(44, 40, 48)):
+    """Labels of three balls, 1 the outermost, one in the other, on a lattice with different spacings."""
+    z, y, x = np.meshgrid(*(np.linspace(-1, 1, size) for size in shape), indexing="ij")
+    radius, labels = np.sqrt(x**2 + y**2 + z**2), np.zeros(shape, np.uint8)
+    for number, most in enumerate((0.9, 0.6, 0.3), 1):
+        labels[radius < most] = number
+    return Grid(labels, (1.0, 1.2, 0.9), (3.0, -2.0, 10.0))
+
+
+def scene_of_labels(folder, opacities=(0.03, 0.95, 0.95), image=None, within=None):
+    """Balls of surfels with a mask each; an image beside them has a function, maybe within a mask."""
+    source = ArraySource(nested(), "balls")
+    masks = [MaskSource(source, number) for number in (1, 2, 3)]
+    sources = [*([ArraySource(image, "image")] if image else []), *masks]
+    prepare_channels(sources, folder / "volume.nrrd")
+    colors = ((0.9, 0.6, 0.2), (0.2, 0.6, 0.9), (0.8, 0.2, 0.3))
+    tfs = {}
+    for number, (color, opacity) in enumerate(zip(colors, opacities, strict=True)):
+        points = ((HALF, opacity), (INSIDE, opacity))
+        tfs[f"ball {number + 1}"] = TransferFunction(points, ((HALF, *color),), number + bool(image))
+    if image:
+        tfs["image"] = replace(LOW.scaled(*ends_of(image)), within=within)
+    return Scene(ball_models(folder, *tfs), volume=SceneVolume(folder / "volume.nrrd", tfs, LOOK))
 
 
 def at(model, time):

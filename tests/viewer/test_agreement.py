@@ -17,6 +17,8 @@ from tests.viewer.drawn_scenes import (
     BEGIN,
     COUNT,
     ends_of,
+    nested,
+    scene_of_labels,
     scene_of_parts,
     scene_of_series,
     scene_of_volume,
@@ -61,6 +63,10 @@ CUTS = Cuts([Plane([1.0, 0.2, 0.0], 0.1), Plane([0.0, 1.0, 0.3], 0.2)])
 BOX = Cuts(box=Box([-0.3, -0.4, -0.2], [0.2, 0.3, 0.4]))
 FACE_LIGHTS = ("shaded", "unlit")
 VOLUMES = {"sphere": lambda: sphere(40), "waves": waves, "flat": lambda: waves((24, 2, 20), (1, 3, 1))}
+CHANNELS = {  # of a volume: masks of labels, and an image as well
+    "labels": scene_of_labels,
+    "image and labels": lambda folder: scene_of_labels(folder, image=bytes_of(waves(nested().values.shape))),
+}
 PARTS = [PartEdit(), PartEdit(palette=(0.1, 0.6, 0.2)), PartEdit(opacity=0.4, specular=3.0)]
 GLOSSY = {"specular": 4.0, "shininess": 0.2}
 EDITS = [  # of the model with two segments, and of the next one
@@ -108,6 +114,8 @@ def drawing(chromium, tmp_path_factory):
         folder = tmp_path_factory.mktemp(name)
         if name in VOLUMES:
             return Drawing(chromium, scene_of_volume(folder, VOLUMES[name]()), has_volume=True)
+        if name in CHANNELS:
+            return Drawing(chromium, CHANNELS[name](folder), has_volume=True)
         if name == "series":
             return Drawing(chromium, scene_of_series(folder))
         if name == "bright":  # texels beyond eight bits
@@ -121,6 +129,12 @@ def drawing(chromium, tmp_path_factory):
     every = []
     yield lambda name: every.append(opened(name)) or every[-1]
     assert [each.errors for each in every if each.errors] == []
+
+
+def bytes_of(grid):
+    """The same on the lattice of the labels, uint8."""
+    low, high = ends_of(grid)
+    return replace(nested(), values=((grid.values - low) / (high - low) * 255).round().astype(np.uint8))
 
 
 def changed(scene, edits=(), time=None, functions=(), **fields):
@@ -171,7 +185,10 @@ CASES = [  # the limit is the least PSNR in dB, or how many levels, or both wher
     *cases(VOLUMES, [CAMERA], ["volume", "shaded"], FACES, LEAST - 3),
     # Cells of light in a page are not smaller than those between its samples.
     *cases(["sphere", "waves"], [CAMERA], ["volume", "shaded"], SHADOWS, LEAST - 3),
-    *cases(["flat"], [CAMERA], ["volume", "shaded"], SHADOWS, LEAST - 7),
+    *cases(["flat", *CHANNELS], [CAMERA], ["volume", "shaded"], SHADOWS, LEAST - 7),
+    *cases(CHANNELS, [CAMERA, FROM_BELOW], ["volume"], LIGHTS[:2], LEAST),
+    *cases(CHANNELS, [CAMERA], ["volume"], [{"edits": [edit]} for edit in OF_VOLUMES], LEAST),
+    *cases(CHANNELS, [CAMERA], ["volume", "shaded"], FACES, LEAST - 3),
     # A volume has one material: models with others are seen below faces.
     *cases(
         *(VOLUMES, [CAMERA], ["shaded"]),

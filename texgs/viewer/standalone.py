@@ -146,6 +146,7 @@ def page_of(
             surfels=Markup(surfels),
             volume=Markup(b64encode(volume.packed).decode()) if volume else "",
             volume_words=f"The page has the volume in {volume}." if volume else "",
+            has_editor=bool(description.get("transfer")),
             steps=steps,
             light=light,
             time=description["time"],

@@ -1,21 +1,52 @@
-// What a scene shows of its volume, as a table over the values: colours, and extinctions of its functions together.
+// What a scene shows of its volume, as tables over the values: colours, and extinctions of its functions together.
 
 import { at } from "./functions.js";
 
 export const SIZE = 4096; // entries, sixteen for each code of a sample
 const MOST = 20; // extinction of what is opaque; of more, sums in single precision would lose what is faint
+const MASK_HALF = 127.5; // value of a mask from which on a place is of its label, as in texgs/volume/label_masks.py
 const clamp = (x) => Math.min(1, Math.max(0, x));
+
+/**
+ * What functions of a scene are functions of, visible or not: a channel, as a whole or within a mask.
+ *
+ * @param {object} scene description with its edits.
+ * @param {object[]} channels of the page, see texgs/viewer/page_volume.py; functions of others are left out.
+ * @returns {{key: string, channel: number, mask: number, half: number}[]} places among the channels, a mask of -1 where
+ *   there is none, and the share of its codes from which on a place counts.
+ */
+export function sourcesOf({ tfs, functions }, channels) {
+  const all = Object.values({ ...tfs, ...functions }).map((tf) => sourceOf(tf, channels)).filter(Boolean);
+  const sources = new Map(all.map((each) => [each.key, each]));
+  return sources.size ? [...sources.values()] : [sourceOf({}, channels)];
+}
+
+/** The same with the `table` of each of them. */
+export function functionTables(scene, channels) {
+  return sourcesOf(scene, channels).map((source) => {
+    const counts = (tf) => sourceOf(tf, channels)?.key === source.key;
+    return { ...source, table: functionTable(scene, counts, channels[source.channel]) };
+  });
+}
+
+function sourceOf({ channel: number = 0, within }, channels) {
+  const [channel, mask] = [number, within].map((each) => channels.findIndex((own) => own.number === each));
+  if (channel < 0 || (within !== undefined && mask < 0)) return undefined;
+  const { low, high } = channels[mask] ?? channels[0];
+  return { key: `${channel} ${mask}`, channel, mask, half: (MASK_HALF - low) / (high - low) };
+}
 
 /**
  * The table [SIZE, 4] of red, green, blue and extinction, log2 of the light that passes through a unit of length.
  * Where functions overlap, extinctions add up, and colours are means that these weigh.
  *
  * @param {object} scene description with its edits.
+ * @param {(tf: object) => boolean} counts which of its functions.
  * @param {{low: number, high: number}} range of the values.
  * @returns {Float32Array}
  */
-export function functionTable(scene, { low, high }) {
-  const shown = shownOf(scene), table = new Float32Array(4 * SIZE);
+function functionTable(scene, counts, { low, high }) {
+  const shown = shownOf(scene).filter(({ tf }) => counts(tf)), table = new Float32Array(4 * SIZE);
   for (let i = 0, k = 0; i < SIZE; i++, k += 4) {
     const value = low + (high - low) * i / (SIZE - 1);
     for (const { tf, factor, moved } of shown) {

@@ -25,7 +25,7 @@ class StandalonePage extends ScenePage {
     if (scene.held) this.time = new TimeSlider(this.state, get("time"), () => renderer.isBusy);
     if (scene.volume) {
       this.compare = new Compare(this);
-      if (Object.keys(scene.tfs).length) new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
+      if (scene.transfer && Object.keys(scene.tfs).length) new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
     }
     this.state.addEventListener("change", () => {
       this.#tellWords();
@@ -59,7 +59,7 @@ class StandalonePage extends ScenePage {
     const { original, scene } = this.state, edits = difference(original, scene);
     const isFunctions = ({ key }) => key === "functions", words = edits.filter((edit) => !isFunctions(edit)).flatMap(wordsOf);
     tell("words", words.map(quoted).join(" "));
-    if (scene.volume) tell("functions", edits.filter(isFunctions).map(({ value }) => `functions: ${JSON.stringify(value)}`).join());
+    if (scene.transfer) tell("functions", edits.filter(isFunctions).map(({ value }) => `functions: ${JSON.stringify(value)}`).join());
   }
 
   /** Save a picture of the view, by default in the pixels of the screen. */

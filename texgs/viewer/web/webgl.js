@@ -68,7 +68,7 @@ export class WebglRenderer {
     const { models, exposure } = this._optics;
     this._harmonics = exposure ? new Harmonics(tensors, models.length, exposure) : null;
     this._order = new DepthOrder(this._surfels.lookups.length / 4);
-    this._samples = volume ? samplesOf((await unpack(volume)).tensors) : null;
+    this._samples = volume ? samplesOf((await unpack(volume)).tensors, scene.volume.channels.length) : null;
     if (volume) this.modes = MODES.toSpliced(1, 0, ...OF_TWIN);
     this._upload();
   }
