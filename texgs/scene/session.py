@@ -33,6 +33,7 @@ from texgs.scene.scene_file import (
     cuts_of,
     functions_of,
     light_of,
+    markers_of,
     read_scene,
     require_keys,
     write_scene,
@@ -49,6 +50,7 @@ SCENE_KEYS: dict[str, Any] = {
     "background": WHITE,
     "cuts": {},
     "functions": {},
+    "markers": [],
     "time": 0,
 }  # edits of a whole scene, with their defaults
 HISTORY_STEPS = 200  # in the history; older ones cannot be undone
@@ -187,6 +189,8 @@ class Session:
                 self.set_cuts(cuts_of(value))
             case "functions":
                 self._push(replace(self.scene, functions=functions_of(value, key)))
+            case "markers":
+                self._push(replace(self.scene, markers=markers_of(value)))
             case "time":
                 self.set_scene(self.scene.at(value))
             case _:

@@ -12,7 +12,7 @@ from texgs.volume.grid import Grid, closest
 from texgs.volume.space import LETTERS, Triple
 
 PATIENT_PLANES = ("sagittal", "coronal", "axial")  # by the axis of the patient that they lie across
-# Which axis of the file's space is to the right in slices across x, y and z, ahead or behind, and which is up:
+# Of slices across x, y and z: which axis of the file's space is to the right, ahead or behind, and which up,
 # as radiologists see a patient, from the left, the front and the feet.
 LAYOUT = {
     "LPS": ((1, 1, 2, 1), (0, 1, 2, 1), (0, 1, 1, -1)),
@@ -27,9 +27,7 @@ class SlicePlane:
 
     name: str  # sagittal, coronal or axial; x, y or z where the space is no patient's
     count: int  # of slices
-    axis: tuple[
-        int, int
-    ]  # of the grid, 0 to 2 for x, y, z: across the slices, and whether they count along it
+    axis: tuple[int, int]  # across, of the grid, 0 to 2 for x, y, z; 1 where slices count along it, else -1
     right: tuple[int, int]  # the same of columns
     up: tuple[int, int]  # the same of rows, from the lowest one
     ends: tuple[str, str, str, str]  # what is at the left, right, bottom and top, such as R, L, P, A
@@ -111,6 +109,5 @@ def point_of(grid: Grid, index: tuple[int, int, int]) -> list[float]:
 
 def windowed(values: np.ndarray, low: float, high: float) -> np.ndarray:
     """Return values as grey levels [H, W], uint8: black up to low, white from high on; NaN is black."""
-    scale = 255.0 / max(high - low, float(np.finfo(np.float32).tiny))
-    levels = (values.astype(np.float32) - np.float32(low)) * np.float32(scale)
-    return np.nan_to_num(levels, nan=0.0).clip(0, 255).astype(np.uint8)
+    shares = (values.astype(np.float64) - low) / max(high - low, float(np.finfo(np.float32).tiny))
+    return np.rint(255 * np.nan_to_num(shares).clip(0, 1)).astype(np.uint8)

@@ -80,6 +80,11 @@ export class ScenePage {
     window.addEventListener("hashchange", () => this.follow());
   }
 
+  /** Draw something else that lies over the picture. */
+  addMark(mark) {
+    this.#marks.push(mark);
+  }
+
   /** What of the scene is shown: `mode`, whether as it was `before`, `only` which model, or all; `gain` and
    * `wipe` of what is beside its volume. */
   get shown() {
