@@ -15,6 +15,7 @@ from texgs.core.errors import ArgumentError, errors_at
 from texgs.scene.scene import Scene, volume_of
 from texgs.volume.grid import Grid, Triple
 from texgs.volume.nrrd_file import REMEDY, open_grid
+from texgs.volume.slices import planes_of
 
 MEGABYTE = 10**6
 LEVELS = 255  # the largest code of 8 bits
@@ -56,6 +57,16 @@ class PageVolume:
         facts = {"channels": channels, "half": self.half, "looks": scene.has_looks}
         return {**facts, "appearance": asdict(volume_of(scene).appearance)}
 
+    def slices(self, scene: Scene) -> dict[str, Any]:
+        """Return planes of slices of the file, and what a page needs beside the samples to draw them."""
+        grid, (low, high) = open_grid(volume_of(scene).file), self.ends[0]
+        facts = {
+            "window": (low, high),
+            "step": self.step * (high - low) / LEVELS,
+            "matrix": grid.world.matrix,
+        }
+        return {"planes": [asdict(plane) for plane in planes_of(grid)], **facts}
+
 
 def page_volume(scene: Scene, budget: float) -> PageVolume:
     """Return the channels that a scene shows of its volume, with as many samples as a budget in MB holds.
@@ -65,7 +76,7 @@ def page_volume(scene: Scene, budget: float) -> PageVolume:
     """
     source = volume_of(scene)
     shown = [number for tf in (*source.tfs.values(), *scene.functions.values()) for number in tf.source]
-    numbers = sorted({number for number in shown if number is not None} or {0})
+    numbers = sorted({0, *(number for number in shown if number is not None)})  # slices show the first
     with errors_at("volume"):
         grid = open_grid(source.file)
         first, *others = [grid.channel(number) for number in numbers]

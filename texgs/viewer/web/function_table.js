@@ -4,7 +4,7 @@ import { at } from "./functions.js";
 
 export const SIZE = 4096; // entries, sixteen for each code of a sample
 const MOST = 20; // extinction of what is opaque; of more, sums in single precision would lose what is faint
-const MASK_HALF = 127.5; // value of a mask from which on a place is of its label, as in texgs/volume/label_masks.py
+export const HALF = 127.5; // value of a mask from which on a place is of its label, as in texgs/volume/label_masks.py
 const clamp = (x) => Math.min(1, Math.max(0, x));
 
 /**
@@ -30,10 +30,19 @@ export function functionTables(scene, channels) {
 }
 
 function sourceOf({ channel: number = 0, within }, channels) {
-  const [channel, mask] = [number, within].map((each) => channels.findIndex((own) => own.number === each));
+  const channel = placeOf(number, channels), mask = within === undefined ? -1 : placeOf(within, channels);
   if (channel < 0 || (within !== undefined && mask < 0)) return undefined;
-  const { low, high } = channels[mask] ?? channels[0];
-  return { key: `${channel} ${mask}`, channel, mask, half: (MASK_HALF - low) / (high - low) };
+  return { key: `${channel} ${mask}`, channel, mask, half: mask < 0 ? 0 : halfOf(channels[mask]) };
+}
+
+/** The place of a channel of the volume among those of the page, by its number; -1 where the page has not that. */
+export function placeOf(number = 0, channels) {
+  return channels.findIndex((each) => each.number === number);
+}
+
+/** The share of the codes of a mask from which on a place is of its label. */
+export function halfOf({ low, high }) {
+  return (HALF - low) / (high - low);
 }
 
 /**
@@ -49,10 +58,10 @@ function functionTable(scene, counts, { low, high }) {
   const shown = shownOf(scene).filter(({ tf }) => counts(tf)), table = new Float32Array(4 * SIZE);
   for (let i = 0, k = 0; i < SIZE; i++, k += 4) {
     const value = low + (high - low) * i / (SIZE - 1);
-    for (const { tf, factor, moved } of shown) {
+    for (const { tf, factor, colorAt } of shown) {
       const extinction = Math.min(MOST, -Math.log2(1 - clamp(factor * opacityAt(tf, value))));
       if (!(extinction > 0)) continue;
-      at(tf.color, value).forEach((x, c) => { table[k + c] += extinction * clamp(x + moved[c]); });
+      colorAt(value).forEach((x, c) => { table[k + c] += extinction * x; });
       table[k + 3] += extinction;
     }
     for (let c = 0; c < 3 && table[k + 3] > 0; c++) table[k + c] /= table[k + 3];
@@ -73,16 +82,16 @@ export function integralsOf(table) {
   return sums;
 }
 
-/** Functions that are visible, each with the factor of its opacity and by how much its colours are moved. */
-function shownOf({ models, functions, tfs }) {
+/** Functions that are visible, each with the factor of its opacity and the colours at its values, as edits move them. */
+export function shownOf({ models, functions, tfs }) {
+  const made = (name, tf, factor, moved) =>
+    ({ name, tf, factor, colorAt: (value) => at(tf.color, value).map((x, c) => clamp(x + moved[c])) });
   const ofModels = models.filter(({ edit }) => edit.visible && edit.opacity > 0)
-    .map(({ name, edit: { opacity, palette }, fitted_palette: fitted }) => ({
-      tf: functions[name] ?? tfs[name], factor: opacity,
-      moved: palette ? palette.map((x, c) => x - fitted[c]) : [0, 0, 0],
-    }));
+    .map(({ name, edit: { opacity, palette }, fitted_palette: fitted }) =>
+      made(name, functions[name] ?? tfs[name], opacity, palette ? palette.map((x, c) => x - fitted[c]) : [0, 0, 0]));
   const names = models.map(({ name }) => name);
   const others = Object.entries(functions).filter(([name]) => !names.includes(name));
-  return [...ofModels, ...others.map(([, tf]) => ({ tf, factor: 1, moved: [0, 0, 0] }))];
+  return [...ofModels, ...others.map(([name, tf]) => made(name, tf, 1, [0, 0, 0]))];
 }
 
 /** Outside its points a function shows nothing. */

@@ -2,11 +2,14 @@
 
 import { Compare } from "./compare.js";
 import { EditHistory } from "./history.js";
-import { download, toHex } from "./inputs.js";
+import { download, element, toHex } from "./inputs.js";
 import { Notices } from "./notices.js";
+import { PageSlices } from "./page_slices.js";
 import { Panel } from "./panel.js";
 import { ScenePage } from "./scene_page.js";
 import { PictureDialog } from "./size_inputs.js";
+import { Slices } from "./slices.js";
+import { SlicesInScene } from "./slices_in_scene.js";
 import { State, difference } from "./state.js";
 import { TimeSlider } from "./time.js";
 import { TransferEditor } from "./transfer.js";
@@ -25,6 +28,7 @@ class StandalonePage extends ScenePage {
     if (scene.held) this.time = new TimeSlider(this.state, get("time"), () => renderer.isBusy);
     if (scene.volume) {
       this.compare = new Compare(this);
+      this.#addSlices(scene);
       if (scene.transfer && Object.keys(scene.tfs).length) new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
     }
     this.state.addEventListener("change", () => {
@@ -32,6 +36,13 @@ class StandalonePage extends ScenePage {
       if (scene.volume) this.#limitModes();
     });
     this.follow();
+  }
+
+  #addSlices({ space }) {
+    const source = new PageSlices(this.renderer.samples, this.state);
+    const slices = new Slices(source, space ?? { axes: "xyz", unit: "" }, (text) => this.notices.tell(text, "error"));
+    get("slices").append(element("p", { className: "hint" }, source.words));
+    this.addMark(new SlicesInScene(this, slices, () => false));
   }
 
   draw(moving) {
@@ -88,7 +99,8 @@ function wordsOf({ part, key, value }) {
   if (key === "cuts") {
     const planes = value.planes.map(({ normal, offset }) => `cut=${[...normal, offset]}`);
     const box = value.box ? [...value.box.low, ...value.box.high] : "";
-    return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`];
+    const window = value.window ? [`cut.window=${value.window}`] : [];
+    return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`, ...window];
   }
   return `${place}=${Array.isArray(value) ? toHex(value) : value ?? ""}`;
 }

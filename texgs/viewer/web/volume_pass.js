@@ -3,10 +3,13 @@
 import { Bricks } from "./bricks.js";
 import { VolumeLight, strengthsOf } from "./exposure.js";
 import { SIZE, functionTables, integralsOf, materialOf, sourcesOf } from "./function_table.js";
+import { labelsOf } from "./labels.js";
 import { makeProgram, makeTexture } from "./program.js";
 import { PRESENT_VERTEX } from "./shaders.js";
 import { bind, setView } from "./surfel_pass.js";
 import { PER_TEXTURE, volumeFragment } from "./volume_shaders.js";
+
+const BLACK = [2, 3]; // a window in which no code is above black
 
 export class VolumePass {
   #gl; #facts; #bricks; #samples; #textures; #light;
@@ -76,6 +79,7 @@ export class VolumePass {
     gl.uniform4fv(uniforms.material, factors);
     gl.uniform3fv(uniforms.tint, tint);
     gl.uniform1i(uniforms.are_faces_lit, scene.cuts.faces === "shaded" ? 1 : 0);
+    this.#showSlice(uniforms, scene);
     gl.uniform1i(uniforms.n_planes, planes.length);
     if (planes.length) gl.uniform4fv(uniforms["planes[0]"], planes.flatMap(unitPlane));
     if (isOver) gl.enable(gl.BLEND);
@@ -84,10 +88,21 @@ export class VolumePass {
     target.end();
   }
 
+  #showSlice(uniforms, scene) {
+    const gl = this.#gl, { channels } = this.#facts, { low, high } = channels[0], isSlice = scene.cuts.faces === "slice";
+    gl.uniform1i(uniforms.is_slice, isSlice ? 1 : 0);
+    if (!isSlice) return;
+    const window = scene.cuts.window ?? scene.slices.window, covers = new Float32Array(4 * channels.length);
+    const labels = labelsOf(scene, channels), hasImage = !labels.some(({ channel }) => channel === 0);
+    gl.uniform2fv(uniforms.window, hasImage ? window.map((value) => (value - low) / (high - low)) : BLACK);
+    for (const { channel, color, cover } of labels) if (color) covers.set([...color, cover], 4 * channel);
+    gl.uniform4fv(uniforms["labels[0]"], covers);
+  }
+
   #shadersOf(scene) {
     const sources = sourcesOf(scene, this.#facts.channels), key = sources.map((each) => each.key).join();
     if (!this.#shaders.has(key)) {
-      this.#shaders.set(key, makeProgram(this.#gl, PRESENT_VERTEX, volumeFragment(sources, this.#samples.length)));
+      this.#shaders.set(key, makeProgram(this.#gl, PRESENT_VERTEX, volumeFragment(sources, this.#facts.channels)));
     }
     return this.#shaders.get(key);
   }
@@ -127,7 +142,9 @@ export class VolumePass {
 function together(channels, width) {
   if (width === 1) return channels[0];
   const codes = new Uint8Array(width * channels[0].length);
-  channels.forEach((own, c) => own.forEach((code, i) => { codes[width * i + c] = code; }));
+  channels.forEach((own, c) => {
+    for (let i = 0; i < own.length; i++) codes[width * i + c] = own[i];
+  });
   return codes;
 }
 

@@ -1,7 +1,7 @@
 // Rays through channels of a volume as texgs/volume/caster.py defines them, and the soft rims of faces.
 
 import { BRICK } from "./bricks.js";
-import { SIZE } from "./function_table.js";
+import { SIZE, halfOf } from "./function_table.js";
 import { MOST_PLANES } from "./shaders.js";
 
 export const PER_TEXTURE = 4; // channels
@@ -11,14 +11,16 @@ export const PER_TEXTURE = 4; // channels
  * written out one by one, as arrays are slow on some cards.
  *
  * @param {object[]} sources
- * @param {number} textures of the samples.
+ * @param {object[]} channels of the page, some in each texture of samples.
  */
-export function volumeFragment(sources, textures) {
+export function volumeFragment(sources, channels) {
+  const textures = Math.ceil(channels.length / PER_TEXTURE);
   const each = (line) => Array.from({ length: textures }, (_, t) => line(t)).join(" ");
   const ofEach = (line) => sources.map(line).filter(Boolean).join("\n    ");
   const texture = (channel) => Math.floor(channel / PER_TEXTURE), place = (channel) => "rgba"[channel % PER_TEXTURE];
-  const codes = (channel) => ["before", "behind"].map((side) => `${side}${texture(channel)}.${place(channel)}`).join(", ");
-  const channels = [...new Set(sources.map(({ channel }) => channel))];
+  const code = (name, channel) => `${name}${texture(channel)}.${place(channel)}`;
+  const codes = (channel) => ["before", "behind"].map((side) => code(side, channel)).join(", ");
+  const used = [...new Set(sources.map(({ channel }) => channel))];
   return `#version 300 es
 precision highp float;
 precision highp int;
@@ -45,6 +47,9 @@ uniform vec3 viewer, light;      // directions to them
 uniform vec4 material;
 uniform vec3 tint;               // of highlights
 uniform bool are_faces_lit, is_depth;
+uniform bool is_slice;           // whether faces show it
+uniform vec2 window;             // codes that it shows in black and in white
+uniform vec4 labels[${channels.length}];       // of channels: colours, and how much they cover
 uniform int n_planes;
 uniform vec4 planes[${MOST_PLANES}]; // normals and offsets in the world
 
@@ -70,7 +75,7 @@ vec3 lit(vec3 color, vec3 normal, vec3 point) {
 }
 
 // The normals of channels at a place of their texture, 0 where nothing changes.
-${channels.map((channel) => `vec3 normal${channel}(vec3 place, vec3 texel) {
+${used.map((channel) => `vec3 normal${channel}(vec3 place, vec3 texel) {
   vec3 slope, per_length = (1.0 / texel - 1.0) / box;
   for (int a = 0; a < 3; a++) {
     vec3 step = vec3(0.0);
@@ -94,6 +99,15 @@ vec4 mean_between(int row, float one, float two) {
   vec4 sum = texelFetch(table, ivec2(ends.y, row + 1), 0) - texelFetch(table, ivec2(ends.x, row + 1), 0);
   sum /= float(ends.y - ends.x);
   return vec4(sum.rgb / max(sum.a, 1e-9), sum.a);
+}
+
+// The colour of a slice at a place of the textures: the first channel in grey, and labels over it.
+vec3 slice_at(vec3 at) {
+  ${each((t) => `vec4 here${t} = texture(samples${t}, at);`)}
+  vec3 color = vec3(clamp((here0.r - window.x) / (window.y - window.x), 0.0, 1.0));
+  ${channels.map((own, c) =>
+    `if (${code("here", c)} >= ${halfOf(own).toFixed(6)}) color = mix(color, labels[${c}].rgb, labels[${c}].a);`).join("\n  ")}
+  return color;
 }
 
 // A colour in the light, as far as it does not belong to a face.
@@ -120,6 +134,12 @@ void main() {
   if (reach > 0.0) end = face < 0 ? begin : min(end, begin + reach * texture(weights, gl_FragCoord.xy / size).r);
 
   vec3 last = vec3(textureSize(samples0, 0) - 1), texel = 1.0 / (last + 1.0);
+  vec3 at_face = from + begin * along;
+  if (is_slice && face >= 0 && begin < end && most(abs(at_face) - box) <= 0.0) {
+    vec3 at = (0.5 * last + 0.5 * last / box * at_face + 0.5) * texel;
+    fragment = vec4(is_depth ? vec3(begin / length(camera)) : slice_at(at), 1.0);
+    return;
+  }
   vec3 entry = 0.5 * last + 0.5 * last / box * (from + near * along), stride = 0.5 * last / box * interval * along;
   ivec3 n_bricks = textureSize(bricks, 0) - 2;
   float begins = (begin - near) / interval, ends = (end - near) / interval;

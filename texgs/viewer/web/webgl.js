@@ -73,6 +73,11 @@ export class WebglRenderer {
     this._upload();
   }
 
+  /** Those of the volume in the page, see samples.js; null where it has none. */
+  get samples() {
+    return this._samples;
+  }
+
   /** Size of the picture in pixels of the screen. */
   size() {
     return sizeOf(this._canvas);
