@@ -20,6 +20,7 @@ from texgs.scene.export_keys import Export
 from texgs.scene.film import Film
 from texgs.scene.session import Session
 from texgs.scene.shot import Shot
+from texgs.volume.slice_picture import SliceKeys
 
 if TYPE_CHECKING:
     import pyvista
@@ -45,6 +46,11 @@ class Scene(Editing):
         """Return a picture, which notebooks show; `numpy.asarray` of it is [H, W, 3 or 4], uint8."""
         camera = shot.camera(self.session.scene.framed(self.session.composition))
         return picture_of(self.session.frame(camera, shot.mode, transparent=shot.transparent))
+
+    @takes(SliceKeys, "plane", "number")
+    def slice(self, keys: SliceKeys) -> Image:
+        """Return a picture of a slice of the volume, or of all three, with labels and a crosshair."""
+        return picture_of(self.session.slices(keys))
 
     @interrupts_between_items()
     @takes(Film, "what", what="orbit")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.api.arrays import keys_of_format, several, source_of
 from texgs.api.display import as_python, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
+from texgs.api.keywords import takes
 from texgs.config.project import check_name, name_of
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.names import close
@@ -32,6 +33,8 @@ from texgs.volume.overlay import overlays
 from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import Source
+from texgs.volume.slice_picture import SliceKeys, sample_at, slice_picture
+from texgs.volume.slices import Place
 from texgs.volume.sources import open_source, tells_superior
 from texgs.volume.suggest import suggest
 from texgs.volume.summaries import Summary, write_summaries
@@ -179,6 +182,15 @@ class Volume:
         rgba = caster.cast(shown, view, lit, cells=cells).rgba
         behind = rgba.new_tensor(color("background", as_python(background)))
         return picture_of(quantize(rgba[..., :3] + (1 - rgba[..., 3:]) * behind))
+
+    @takes(SliceKeys, "plane", "number")
+    def slice(self, keys: SliceKeys) -> Image:
+        """Return a picture of a slice, or of all three, with a crosshair."""
+        return picture_of(slice_picture(self.grid, keys, {}))
+
+    def place(self, x: float, y: float, z: float) -> Place:
+        """Return the sample closest to a place in the space of the file: its index, position and value."""
+        return sample_at(self.grid, (x, y, z))
 
     def to_pyvista(self) -> pyvista.ImageData:
         """Return image data of PyVista in the space of the volume's file; the samples are not copied."""

@@ -25,7 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "cut=AXIS,POSITION (x, -x, y, ...; world units, or samples as in 64v; or R, A, S, L, P, "
         "I, X, Y, Z, of the volume's file, in its unit, as in S,-12mm) or "
         "cut=NX,NY,NZ,OFFSET adds a plane, cut.1=... replaces it, cut= takes all back; "
-        "cut.box=X0,Y0,Z0,X1,Y1,Z1; cut.faces=shaded or unlit; MODEL.KEY= takes an edit back; "
+        "cut.box=X0,Y0,Z0,X1,Y1,Z1; cut.faces=shaded, unlit or slice; cut.window=LOW,HIGH, "
+        "values of slices in black and in white; MODEL.KEY= takes an edit back; "
         "MODEL/SEGMENT.KEY=VALUE edits a segment, MODEL/SEGMENT=FILE adds one from a file and MODEL/SEGMENT= "
         "removes it",
     )

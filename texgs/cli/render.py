@@ -7,6 +7,7 @@ from pathlib import Path
 from texgs.cli.options import add_device, add_keys, keys_of, option, require_own_place
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.scene.film import Film
+from texgs.volume.slice_picture import SliceKeys
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,6 +19,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=".png, .gif, .mp4 or a folder; default SCENE.png here, or .mp4 for several frames",
     )
     add_keys(parser, Film)
+    parser.add_argument("--slice", metavar="PLANE=NUMBER", help="show a slice, or all three, of the volume")
+    add_keys(parser, SliceKeys, without=("plane", "number", "width"))
     compare = "show the scene, its volume or what it was as fitted, and their difference, with PSNR and SSIM"
     parser.add_argument("--compare", nargs="?", const="volume", choices=("volume", "fitted"), help=compare)
     option(parser, "--gain", 4.0, "factor on differences, 1 to 16")
@@ -38,8 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     film = keys_of(arguments, Film)
     arguments.scene = scene_path(arguments.scene)
     scene = read_scene(arguments.scene)
-    if film.transparent and (arguments.compare or arguments.caption):
-        raise ArgumentError("--transparent: expected neither --compare nor --caption; leave them out")
+    require_compatible(arguments, film)
     ending = ".png" if film.count == 1 else ".mp4"
     output = arguments.output or Path(f"{arguments.scene.stem}{ending}")
     require_own_place(output)
@@ -47,9 +49,10 @@ def run(arguments: argparse.Namespace) -> int:
     with errors_at(arguments.scene):
         composition = session.composition
     shots, beside = film.shots(scene, composition), None
-    if arguments.compare:
-        if film.mode != "shaded":
-            raise ArgumentError(f"--compare: expected --mode shaded, got {film.mode}; leave one of them out")
+    if arguments.slice:
+        plane, _, number = arguments.slice.partition("=")
+        frames = iter([session.slices(keys_of(arguments, SliceKeys, plane=plane, number=number or None))])
+    elif arguments.compare:
         with errors_at(arguments.scene):
             beside = SideBySide(session, arguments.compare, arguments.gain)
         frames = beside.frames(shots)
@@ -66,6 +69,17 @@ def run(arguments: argparse.Namespace) -> int:
     path = film.write(output, frames, words, title=str(output))
     print(*(beside.sentences if beside else ()), path, sep="\n")
     return 0
+
+
+def require_compatible(arguments: argparse.Namespace, film: Film) -> None:
+    """Refuse options that do not go together."""
+    if film.transparent and (arguments.compare or arguments.caption):
+        raise ArgumentError("--transparent: expected neither --compare nor --caption; leave them out")
+    if arguments.compare and film.mode != "shaded":
+        raise ArgumentError(f"--compare: expected --mode shaded, got {film.mode}; leave one of them out")
+    others = film.mode != "shaded" or film.count > 1 or film.transparent or arguments.compare
+    if arguments.slice and others:
+        raise ArgumentError("--slice: expected no --mode, --path, --transparent or --compare; leave them out")
 
 
 def require_checked(scene: Path, words: str) -> None:

@@ -8,7 +8,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.keys import REQUIRED, key
 
 AXES = "xyz"
-FACES = ("shaded", "unlit")
+FACES = ("shaded", "unlit", "slice")
 MAX_PLANES = 6
 LENGTH_TOLERANCE = 1e-9  # deviation from length 1 that is not normalised, so that planes survive a round trip
 MAX_COORDINATE = 1e6  # world units; float32 holds such coordinates
@@ -66,7 +66,8 @@ class Cuts:
 
     planes: list[Plane] = field(default_factory=list)
     box: Box | None = None
-    faces: str = key("shaded", "by the normal of the plane, or unlit", choices=FACES)
+    faces: str = key("shaded", "by the normal of the plane, unlit, or a slice in grey", choices=FACES)
+    window: list[float] | None = key(None, "values in black and white, of slices", items=(2, 2))
 
     def __post_init__(self) -> None:
         if len(self.planes) > MAX_PLANES:

@@ -135,8 +135,8 @@ def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:
 
     Args:
         scene: of whose volume samples are counted.
-        key: number of a plane from 1 on, `box` or `faces`; "" adds a plane, or takes all of them back.
-        text: the new plane, box or kind of faces.
+        key: number of a plane from 1 on, `box`, `faces` or `window`; "" adds a plane, or takes all back.
+        text: the new plane, box, kind of faces or values that slices on them show.
     """
     cuts = scene.cuts
     planes, numbers = list(cuts.planes), [str(number + 1) for number in range(len(cuts.planes))]
@@ -145,8 +145,11 @@ def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:
         return replace(cuts, box=Box(corners[:3], corners[3:]) if text else None)
     if key == "faces":
         return cuts_of(plain_cuts(cuts) | {"faces": text or NO_CUTS.faces})
+    if key == "window":
+        window = _places(scene, text.split(","), [None] * 2, "LOW,HIGH") if text else None
+        return replace(cuts, window=window)
     if key and key not in numbers:
-        known = ", ".join(f"cut.{each}" for each in ("box", "faces", *numbers))
+        known = ", ".join(f"cut.{each}" for each in ("box", "faces", "window", *numbers))
         raise ArgumentError(f"expected cut, which adds a plane, or one of {known}, got cut.{key}")
     if key:
         planes[int(key) - 1 : int(key)] = [_plane(scene, text)] if text else []

@@ -41,6 +41,7 @@ from texgs.scene.scene_file import (
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.shot import Mode
 from texgs.scene.twin import Twin, last_of, needs_twin
+from texgs.volume.slice_picture import SliceKeys, slice_picture
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -334,6 +335,11 @@ class Session:
         scene = replace(scene, light=scene.light.unhidden)  # shadows hide no point
         twin = self.twin_of(scene) if needs_twin(scene, mode) else None
         return point_at(self.composition_of(scene), camera, scene, mode, twin, pixel)
+
+    def slices(self, keys: SliceKeys) -> np.ndarray:
+        """Return a picture of slices of the scene's volume; see `slice_picture`."""
+        twin = self.twin_of(self.scene)
+        return slice_picture(twin.grid, keys, twin.labels(self.scene, self.composition.palettes))
 
     def twin_of(self, scene: Scene) -> Twin:
         """Return the twin of a scene of the history; the latest twins are cached."""

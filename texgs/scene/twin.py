@@ -21,12 +21,15 @@ from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
 from texgs.raster.api import CutRange, cut_range
 from texgs.raster.shading import MATERIAL
+from texgs.scene.cut_slices import with_slices
 from texgs.scene.scene import Scene, volume_of
 from texgs.volume.caster import Cast, Caster
+from texgs.volume.label_masks import INSIDE, shows_label
 from texgs.volume.light_cells import LightCells
 from texgs.volume.matter import Matter
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
+from texgs.volume.slices import Label, window_of
 from texgs.volume.transfer import TransferFunction
 
 T = TypeVar("T")
@@ -48,7 +51,8 @@ class Twin:
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
         self._volume, self._device, self._by_cell = volume_of(scene), torch.device(device), True
         with errors_at("volume"):
-            self._caster = Caster(open_grid(self._volume.file), self._volume.appearance, device)
+            self.grid = open_grid(self._volume.file)
+            self._caster = Caster(self.grid, self._volume.appearance, device)
         self._matter = deque[tuple[object, Matter]](maxlen=1)  # the latest, of all copies
         self._cells = deque[tuple[object, LightCells]](maxlen=1)
         self.places = deque[tuple[object, Tensor]](maxlen=1)  # see `texgs.scene.exposure`
@@ -88,7 +92,7 @@ class Twin:
             palettes: of its models, as fitted: `Composed.palettes`.
             cut: what of the rays counts; by default what the scene's cuts leave, with their faces.
             functions: that take the place of the basic TFs of their names, or join them; they may overlap.
-            outputs: `depth` and `median`, besides colour and alpha; none where no model is visible.
+            outputs: `depth` and `median`, besides colour and alpha.
         """
         seen = self.cast(camera, scene, palettes, cut, functions, outputs)
         color, alpha = seen.rgba.split([3, 1], dim=-1)
@@ -111,14 +115,14 @@ class Twin:
         each different channel.
         """
         shown = self._shown(scene, palettes, functions or {})
-        if not shown:
-            return Cast(torch.zeros(camera.height, camera.width, 4, device=self._device))
+        clear = torch.zeros(camera.height, camera.width, 4, device=self._device)
+        seen = Cast(clear, **{name: clear[..., 0].clone() for name in outputs})
         edit = next((model.edit for model in scene.models.values() if is_seen(model.edit)), PartEdit())
         look = self._volume.appearance
         look = replace(look, **{key: getattr(look, key) * getattr(edit, key) for key in MATERIAL})
         cut = range_of(scene.cuts, camera) if cut is None and scene.cuts else cut
         casts = {}
-        for share in dict.fromkeys(edit.tint):  # the only difference between channels
+        for share in dict.fromkeys(edit.tint) if shown else ():  # the only difference between channels
             caster = self._caster.with_appearance(replace(look, specular=share * look.specular))
             casts[share] = caster.cast(
                 *(overlays(shown), camera, scene.light, outputs),
@@ -128,11 +132,20 @@ class Twin:
                 by_cell=self._by_cell,
                 cells=self._lit(scene, shown) if scene.light.casts_shadows else None,
             )
-        first = casts[edit.tint[0]]
+        seen = casts.get(edit.tint[0], seen)
         for channel, share in enumerate(edit.tint[1:], start=1):
             if share != edit.tint[0]:
-                first.rgba[..., channel] = casts[share].rgba[..., channel]
-        return first
+                seen.rgba[..., channel] = casts[share].rgba[..., channel]
+        if cut is None or scene.cuts.faces != "slice":
+            return seen
+        window = scene.cuts.window or window_of(self.grid)
+        return with_slices(seen, camera, cut, self._caster, window, self.labels(scene, palettes))
+
+    def labels(self, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> dict[str, Label]:
+        """Return the labels of the volume by the names of their models, in the colours that they have now."""
+        shown, labels = self._shown(scene, palettes, {}), self._volume.tfs.items()
+        colors = {name: tf(INSIDE)[:3] for name, tf in shown.items()}
+        return {name: (tf.channel, colors.get(name)) for name, tf in labels if shows_label(tf)}
 
     def light_cells(self, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> LightCells:
         """Return which shares of a scene's light reach places in its volume; kept while both are the same."""

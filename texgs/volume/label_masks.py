@@ -11,6 +11,7 @@ from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Triple, permuted_lattice
 from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.space import LPS, RAS, Space
+from texgs.volume.transfer import TransferFunction
 
 INSIDE = 255  # of a mask: every sample around has the label
 HALF = 127.5  # from here on a place counts as of the label
@@ -123,3 +124,8 @@ def words_of(source: Source) -> str:
         for words, each in ((" x ", source.dims), (", ", source.spacing), (", ", source.origin))
     )
     return f"{dims} samples, spacing {spacing}, from {origin} in {source.space.name}"
+
+
+def shows_label(tf: TransferFunction) -> bool:
+    """Return whether a function shows the mask of a label: all values from one half on."""
+    return (tf.opacity[0][0], tf.opacity[-1][0]) == (HALF, INSIDE)

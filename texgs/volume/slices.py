@@ -3,12 +3,16 @@
 Nothing is interpolated: a slice has the samples of the file, and a place is that of the nearest one.
 """
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from math import prod
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Grid, closest
+from texgs.volume.label_masks import HALF
 from texgs.volume.space import LETTERS, Triple
 
 PATIENT_PLANES = ("sagittal", "coronal", "axial")  # by the axis of the patient that they lie across
@@ -19,6 +23,10 @@ LAYOUT = {
     "RAS": ((1, -1, 2, 1), (0, -1, 2, 1), (0, -1, 1, 1)),
     "xyz": ((1, 1, 2, 1), (0, 1, 2, 1), (0, 1, 1, 1)),
 }
+Label = tuple[int, np.ndarray | None]  # channel of its mask, and its colour [3]; hidden without one
+COVER = 0.6  # of a label over an image
+SHARES = 0.005, 0.995  # of the samples, below a window and up to its end
+MOST = 1_000_000  # samples that tell a window
 
 
 @dataclass(frozen=True)
@@ -82,7 +90,7 @@ def slice_of(grid: Grid, plane: SlicePlane, number: int, channel: int = 0) -> np
     return values[::-rise, ::turn, number if sign > 0 else plane.count - 1 - number]
 
 
-def place_at(grid: Grid, point: Triple, channel: int = 0) -> Place | None:
+def place_at(grid: Grid, point: Sequence[float], channel: int = 0) -> Place | None:
     """Return the sample that is closest to a point of the world, or None beyond the outermost ones."""
     places = np.array(point) / grid.scale / grid.spacing + 0.5 * (np.array(grid.dims) - 1)
     stored = np.rint(places).astype(int)
@@ -99,7 +107,7 @@ def place_at(grid: Grid, point: Triple, channel: int = 0) -> Place | None:
     return Place((i, j, k), grid.space.place(grid.origin, lengths), value.item())
 
 
-def point_of(grid: Grid, index: tuple[int, int, int]) -> list[float]:
+def point_of(grid: Grid, index: Iterable[int]) -> list[float]:
     """Return the point [3] of the world of a sample, by its index along the axes of the file's space."""
     point = [0.0, 0.0, 0.0]
     for number, (axis, sign) in zip(index, closest(grid.space.axes), strict=True):
@@ -111,3 +119,30 @@ def windowed(values: np.ndarray, low: float, high: float) -> np.ndarray:
     """Return values as grey levels [H, W], uint8: black up to low, white from high on; NaN is black."""
     shares = (values.astype(np.float64) - low) / max(high - low, float(np.finfo(np.float32).tiny))
     return np.rint(255 * np.nan_to_num(shares).clip(0, 1)).astype(np.uint8)
+
+
+@lru_cache(maxsize=2)  # all frames of a moving cut have the same
+def window_of(grid: Grid) -> tuple[float, float]:
+    """Return the values that 99 % of the first channel are between; of every n-th sample along each axis."""
+    step = round((prod(grid.dims) / MOST) ** (1 / 3)) or 1
+    samples = grid.values[::step, ::step, ::step]
+    low, high = np.quantile(samples, SHARES).tolist()
+    return (low, high) if low < high else (float(samples.min()), float(samples.max()))
+
+
+def slice_colors(
+    values: Callable[[int], np.ndarray], window: Sequence[float], labels: Mapping[str, Label]
+) -> np.ndarray:
+    """Return colours [..., 3], uint8: grey levels of the first channel, and labels over them.
+
+    Values [...] are those that a function tells of a channel. Where the first is a label, there is no grey.
+    """
+    levels, cover = windowed(values(0), *window), COVER
+    if any(channel == 0 for channel, _ in labels.values()):
+        levels, cover = np.zeros_like(levels), 1.0
+    colors = np.repeat(levels[..., None], 3, axis=-1)
+    for channel, color in labels.values():
+        if color is not None:
+            inside = values(channel) >= HALF
+            colors[inside] = np.rint((1 - cover) * colors[inside] + cover * 255 * color)
+    return colors

@@ -21,7 +21,8 @@ export class Slices extends EventTarget {
    *
    * @param {{planes: object[], window: number[], slice: Function, place: Function}} source - of samples:
    *   `slice(plane, number, window)` is a promise of an ImageBitmap or ImageData, a pixel a sample, row 0 at the top;
-   *   `place(point)` of {index, position, value, labels}, or null beyond the volume; `window` has all values
+   *   `place(point)` of {index, position, value, labels}, or null beyond the volume, and the value null where
+   *   there are labels alone; `window` has the values from black to white to begin with
    * @param {{axes: string, unit: string}} space - of positions
    * @param {(text: string) => void} tell - what went wrong
    */
@@ -87,9 +88,11 @@ export class Slices extends EventTarget {
     this.setWindow(...this.source.window);
   }
 
-  /** Draw slices again on which something else lies, such as labels in other colours. */
+  /** Ask for all again: the volume is another, or labels have other colours. */
   refresh() {
-    if (this.isOpen) for (const view of this.#views) view.refresh();
+    if (!this.isOpen) return;
+    for (const view of this.#views) view.refresh();
+    this.#tell();
   }
 
   #turn(isOn) {
@@ -133,7 +136,8 @@ export class Slices extends EventTarget {
     const least = Math.min(...this.lattice.planes.flatMap(({ spacing }) => spacing));
     const digits = Math.min(20, Math.max(0, 1 - Math.floor(Math.log10(least)))); // a tenth of a sample at most
     const words = position.map((x, i) => `${this.#space.axes[i]} ${x.toFixed(digits)}`).join(" ");
-    const parts = [index.join(", "), `${words} ${this.#space.unit}`.trim(), `value ${Number(value.toPrecision(DIGITS + 1))}`];
+    const parts = [index.join(", "), `${words} ${this.#space.unit}`.trim()];
+    if (value !== null) parts.push(`value ${Number(value.toPrecision(DIGITS + 1))}`);
     return [...parts, ...labels].join(" · ");
   }
 }

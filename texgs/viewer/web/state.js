@@ -11,7 +11,7 @@ const UNEDITED = {
 const MOST_STEPS = 200; // of the history: of more, the oldest cannot be undone
 const OF_SCENE = {
   light: null, shadows: 0, occlusion: 0, reach: 0.25, background: [1, 1, 1],
-  cuts: { planes: [], box: null, faces: "shaded" }, functions: {}, time: null,
+  cuts: { planes: [], box: null, faces: "shaded", window: null }, functions: {}, time: null,
 };
 
 /** Numbers of the steps in time that can be shown: all, or those that a page holds. */
@@ -61,7 +61,7 @@ export function titleOf({ part, key, value }) {
 function titleOfCuts({ planes, box, faces }) {
   const count = planes.length, words = count ? [count > 1 ? `${count} planes` : "1 plane"] : [];
   if (box) words.push("box");
-  if (words.length && faces === "unlit") words.push("unlit");
+  if (words.length && faces !== "shaded") words.push(faces);
   return words.join(", ") || "none";
 }
 
