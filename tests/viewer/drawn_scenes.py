@@ -23,6 +23,7 @@ from texgs.volume.grid import Grid
 from texgs.volume.label_masks import HALF, INSIDE, MaskSource
 from texgs.volume.prepare import prepare, prepare_channels
 from texgs.volume.slabs import ArraySource
+from texgs.volume.space import UNKNOWN_SPACE
 from texgs.volume.transfer import TransferFunction
 
 COUNT, BEGIN = 5, 2  # steps of the series, and the one that its scene shows
@@ -78,15 +79,20 @@ def nested(shape=(44, 40, 48)):
     return Grid(labels, (1.0, 1.2, 0.9), (3.0, -2.0, 10.0))
 
 
-def scene_of_labels(folder, opacities=(0.03, 0.95, 0.95), image=None, within=None):
+def image_on(grid, values):
+    """An image of the bytes from 0 to 255 of values, on the lattice of a grid."""
+    shares = (values - values.min()) / np.ptp(values)
+    return replace(grid, values=(255 * shares).round().astype(np.uint8))
+
+
+def scene_of_labels(folder, image=None, within=None, space=UNKNOWN_SPACE):
     """Balls of surfels with a mask each; an image beside them has a function, maybe within a mask."""
-    source = ArraySource(nested(), "balls")
+    source = ArraySource(replace(nested(), space=space), "balls")
     masks = [MaskSource(source, number) for number in (1, 2, 3)]
-    sources = [*([ArraySource(image, "image")] if image else []), *masks]
+    sources = [*([ArraySource(replace(image, space=space), "image")] if image else []), *masks]
     prepare_channels(sources, folder / "volume.nrrd")
-    colors = ((0.9, 0.6, 0.2), (0.2, 0.6, 0.9), (0.8, 0.2, 0.3))
-    tfs = {}
-    for number, (color, opacity) in enumerate(zip(colors, opacities, strict=True)):
+    looks, tfs = (((0.9, 0.6, 0.2), 0.03), ((0.2, 0.6, 0.9), 0.95), ((0.8, 0.2, 0.3), 0.95)), {}
+    for number, (color, opacity) in enumerate(looks):
         points = ((HALF, opacity), (INSIDE, opacity))
         tfs[f"ball {number + 1}"] = TransferFunction(points, ((HALF, *color),), number + bool(image))
     if image:

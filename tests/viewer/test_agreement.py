@@ -17,6 +17,7 @@ from tests.viewer.drawn_scenes import (
     BEGIN,
     COUNT,
     ends_of,
+    image_on,
     nested,
     scene_of_labels,
     scene_of_parts,
@@ -63,9 +64,10 @@ CUTS = Cuts([Plane([1.0, 0.2, 0.0], 0.1), Plane([0.0, 1.0, 0.3], 0.2)])
 BOX = Cuts(box=Box([-0.3, -0.4, -0.2], [0.2, 0.3, 0.4]))
 FACE_LIGHTS = ("shaded", "unlit")
 VOLUMES = {"sphere": lambda: sphere(40), "waves": waves, "flat": lambda: waves((24, 2, 20), (1, 3, 1))}
+LUMPS = image_on(nested(), waves(nested().values.shape).values)
 CHANNELS = {  # of a volume: masks of labels, and an image as well
     "labels": scene_of_labels,
-    "image and labels": lambda folder: scene_of_labels(folder, image=bytes_of(waves(nested().values.shape))),
+    "image and labels": lambda folder: scene_of_labels(folder, LUMPS),
 }
 PARTS = [PartEdit(), PartEdit(palette=(0.1, 0.6, 0.2)), PartEdit(opacity=0.4, specular=3.0)]
 GLOSSY = {"specular": 4.0, "shininess": 0.2}
@@ -131,12 +133,6 @@ def drawing(chromium, tmp_path_factory):
     assert [each.errors for each in every if each.errors] == []
 
 
-def bytes_of(grid):
-    """The same on the lattice of the labels, uint8."""
-    low, high = ends_of(grid)
-    return replace(nested(), values=((grid.values - low) / (high - low) * 255).round().astype(np.uint8))
-
-
 def changed(scene, edits=(), time=None, functions=(), **fields):
     """A scene with other edits, of its parts in their order, at a step, with functions to try."""
     scene = scene if time is None else scene.at(time)
@@ -159,6 +155,7 @@ def cases(names, cameras, modes, changes, limit):
 TRIED = {"functions": (("high", WIDE), ("new", HIGH))}
 LIGHTS = [{"light": light} for light in (HEADLIGHT, SIDE, BELOW)]
 FACES = [{"cuts": replace(cuts, faces=faces), "light": SIDE} for cuts in (CUTS, BOX) for faces in FACE_LIGHTS]
+SLICES = [{"cuts": replace(cuts, faces="slice")} for cuts in (CUTS, BOX)]
 SHADOWS = [
     {"light": replace(light, shadows=0.9, occlusion=occlusion), "cuts": cuts}
     for light, occlusion in ((SIDE, 0.0), (SIDE, 0.7), (HEADLIGHT, 0.7))
@@ -183,6 +180,7 @@ CASES = [  # the limit is the least PSNR in dB, or how many levels, or both wher
     *cases(VOLUMES, [CAMERA], ["volume"], [{"edits": [edit]} for edit in OF_VOLUMES], LEAST),
     *cases(VOLUMES, [CAMERA], ["volume", "shaded"], [TRIED], LEAST),
     *cases(VOLUMES, [CAMERA], ["volume", "shaded"], FACES, LEAST - 3),
+    *cases([*VOLUMES, *CHANNELS], [CAMERA], ["volume", "shaded"], SLICES, CLOSE),
     # Cells of light in a page are not smaller than those between its samples.
     *cases(["sphere", "waves"], [CAMERA], ["volume", "shaded"], SHADOWS, LEAST - 3),
     *cases(["flat", *CHANNELS], [CAMERA], ["volume", "shaded"], SHADOWS, LEAST - 7),

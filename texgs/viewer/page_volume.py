@@ -15,7 +15,7 @@ from texgs.core.errors import ArgumentError, errors_at
 from texgs.scene.scene import Scene, volume_of
 from texgs.volume.grid import Grid, Triple
 from texgs.volume.nrrd_file import REMEDY, open_grid
-from texgs.volume.slices import planes_of
+from texgs.volume.slices import planes_of, window_of
 
 MEGABYTE = 10**6
 LEVELS = 255  # the largest code of 8 bits
@@ -60,11 +60,8 @@ class PageVolume:
     def slices(self, scene: Scene) -> dict[str, Any]:
         """Return planes of slices of the file, and what a page needs beside the samples to draw them."""
         grid, (low, high) = open_grid(volume_of(scene).file), self.ends[0]
-        facts = {
-            "window": (low, high),
-            "step": self.step * (high - low) / LEVELS,
-            "matrix": grid.world.matrix,
-        }
+        step = self.step * (high - low) / LEVELS
+        facts = {"window": window_of(grid), "step": step, "matrix": grid.world.matrix}
         return {"planes": [asdict(plane) for plane in planes_of(grid)], **facts}
 
 
