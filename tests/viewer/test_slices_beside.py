@@ -7,9 +7,18 @@ import numpy as np
 import pytest
 import torch
 
-from tests.viewer.in_browser import PLACE, WAIT, drag, expect, opened, served
-from tests.viewer.test_slices import EXPECTED, ORIGIN, SAMPLES, SPACING, point_of, write_patient_scene
+from tests.viewer.in_browser import PLACE, WAIT, drag, expect, opened, save_as, served
+from tests.viewer.test_slices import (
+    EVERYTHING,
+    EXPECTED,
+    ORIGIN,
+    SAMPLES,
+    SPACING,
+    point_of,
+    write_patient_scene,
+)
 from texgs.core.camera import orbit
+from texgs.core.cuts import NO_CUTS
 from texgs.scene.scene_file import read_scene
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.slices import place_at, windowed
@@ -145,6 +154,34 @@ def test_a_click_in_the_scene_moves_the_crosshair_to_what_is_seen(chromium, scen
         assert np.abs(mark - shown.numpy()).max() < 0.2
         drag(page, page.locator("#picture"), (0.3, 0.3), (0.4, 0.3))
         says(page, *place.index)
+
+
+def test_a_tick_cuts_the_scene_at_the_crosshair_and_shows_the_slice_there(chromium, scene_file):
+    with beside(chromium, scene_file) as page:
+        page.get_by_label("Coronal slice", exact=True).fill("6")
+        says(page, 3, 6, 2)
+        page.get_by_label("In the scene").check()
+        canvas(page, "Coronal").hover()
+        page.mouse.wheel(0, -100)
+        says(page, 3, 7, 2)
+        expect(page.get_by_label("Faces")).to_have_value("slice")
+        expect(page.locator("#steps li")).to_have_text(["cuts 1 plane, slice"])
+        save_as(page, "cut.yaml")
+        cuts = read_scene(scene_file.with_name("cut.yaml")).cuts
+        assert (cuts.faces, list(cuts.window)) == ("slice", EVERYTHING)
+        (plane,) = cuts.planes
+        normal = np.array(plane.normal)
+        camera = orbit(*PLACE.values(), 9, 9)
+        assert np.abs(normal).tolist() == [0, 1, 0], "the volume lies in the world as in its file"
+        assert normal @ camera.position.numpy() > plane.offset, "what is nearer is taken away"
+        assert plane.offset == pytest.approx(normal @ point_of((3, 7, 2)))
+        page.get_by_role("button", name="Undo").click()
+        expect(page.get_by_label("In the scene")).not_to_be_checked()
+        page.get_by_label("In the scene").check()
+        page.get_by_label("In the scene").uncheck()
+        expect(page.get_by_label("Faces")).to_have_value("shaded")
+        save_as(page, "whole.yaml")
+        assert read_scene(scene_file.with_name("whole.yaml")).cuts == NO_CUTS
 
 
 def test_only_a_scene_with_its_volume_has_slices(chromium, balls_file):

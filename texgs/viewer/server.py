@@ -55,7 +55,7 @@ class Server:
         self._bounds, self._device = bounds(opened.scene, composed), device
         self._opened = self._latest = (files_of_models(opened.scene), composed)  # models as they were fitted
         self.edits = SharedEdits(session, opened)
-        self._origins, self._slices = Origins(opened.scene), Slices(self.edits)
+        self._origins, self._slices = Origins(opened.scene), Slices(session)
         self._beside = Beside(session, self._origins)
         self.frames = Frames(session, self._beside)
         self._changing = asyncio.Lock()  # changes run in other threads, in turn

@@ -3,6 +3,7 @@
 import { timesOf } from "./state.js";
 
 const MOST = 1e6; // of a coordinate
+const MOST_VALUE = 3e38; // of a sample: they have 32 bits
 const MOST_FACTOR = 1000, MOST_PLANES = 6, MOST_REACH = 2;
 
 /** A number between two others; nothing else. */
@@ -12,7 +13,8 @@ const isColor = (x) => areThree(x, 0, 1);
 const isFactor = (x) => isNumber(x, 0, MOST_FACTOR);
 const isPlane = (x) => areThree(x?.normal) && Math.hypot(...x.normal) >= 1 / MOST && isNumber(x.offset);
 const isBox = (x) => areThree(x?.low) && areThree(x?.high) && x.low.every((low, i) => low < x.high[i]);
-const isWindow = (x) => x === null || (x.length === 2 && x.every((each) => Number.isFinite(each)) && x[0] < x[1]);
+const isWindow = (x) => Array.isArray(x) && x.length === 2
+  && x.every((end) => isNumber(end, -MOST_VALUE, MOST_VALUE));
 const arePoints = (x, columns, least) => Array.isArray(x) && x.length >= least && x.every((row, i) =>
   Array.isArray(row) && row.length === columns && Number.isFinite(row[0]) && !(row[0] < x[i - 1]?.[0])
   && row.slice(1).every((each) => isNumber(each, 0, 1)));
@@ -26,9 +28,9 @@ const OF_SCENE = {
   light: (x) => isNumber(x?.azimuth) && isNumber(x?.polar),
   shadows: isShare, occlusion: isShare, reach: (x, scene) => scene.can_shadow && isNumber(x, 1 / MOST, MOST_REACH),
   background: isColor,
-  cuts: (x, scene) => Array.isArray(x?.planes) && x.planes.length <= MOST_PLANES && x.planes.every(isPlane)
-    && (x.box === null || isBox(x.box)) && isWindow(x.window ?? null)
-    && ["shaded", "unlit", ...(scene.slices ? ["slice"] : [])].includes(x.faces),
+  cuts: (x) => Array.isArray(x?.planes) && x.planes.length <= MOST_PLANES && x.planes.every(isPlane)
+    && (x.box === null || isBox(x.box)) && ["shaded", "unlit", "slice"].includes(x.faces)
+    && ((x.window ?? null) === null || isWindow(x.window)),
   functions: (x, scene) => Boolean(scene.transfer) && typeof x === "object" && !Array.isArray(x)
     && Object.values(x).every(isFunction),
   time: (x, scene) => timesOf(scene).includes(x),

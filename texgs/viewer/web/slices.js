@@ -6,7 +6,7 @@ import { SliceLattice } from "./slice_lattice.js";
 import { SliceView } from "./slice_view.js";
 
 const FULL_DRAG = 300; // CSS pixels that move a window by its width, or make it e times as wide
-const NARROWEST = 1e-6; // of the whole range of values
+const NARROWEST = 1e-6; // of the first window
 const DIGITS = 6; // of values, of which most are stored in 32 bits
 const get = (id) => document.getElementById(id);
 
@@ -40,7 +40,8 @@ export class Slices extends EventTarget {
     this.#ends = ["Black", "White"].map((name, end) => element("input", { type: "number", step: "any",
       "aria-label": `Value that is ${name.toLowerCase()}`, onchange: ({ target }) => this.#typed(end, target) }));
     const rows = ["Black", "White"].map((name, end) => element("label", {}, `${name} `, this.#ends[end]));
-    const reset = element("button", { type: "button", onclick: () => this.resetWindow() }, "Whole range");
+    const reset = element("button", { type: "button", onclick: () => this.resetWindow(),
+      "aria-label": "Reset black and white" }, "Reset");
     this.controls = element("div", { className: "tools" }, ...rows, reset);
     get("slices").append(element("div", { className: "planes" }, ...this.#views.map(({ root }) => root)),
       this.#place, this.controls);
@@ -83,7 +84,7 @@ export class Slices extends EventTarget {
     this.setWindow(level - width / 2, level + width / 2);
   }
 
-  /** Show all values. */
+  /** Show the values that slices show at first. */
   resetWindow() {
     this.setWindow(...this.source.window);
   }
