@@ -32,7 +32,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.cut_view import scene_and_volume
-from texgs.scene.frame import frame
+from texgs.scene.frame import frame, point_at
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.shot import Mode
 from texgs.scene.twin import Twin, range_of
@@ -41,7 +41,7 @@ from texgs.viewer.messages import Orbit, View
 from texgs.viewer.standalone import pack
 from texgs.volume.generate import sphere
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.transfer import TransferFunction, combine
+from texgs.volume.transfer import TransferFunction
 
 CAMERAS = [
     orbit(30, 20, 3, 40, 96, 64),
@@ -258,24 +258,27 @@ def depth_at(opened, scene, mode, column, row):
     return opened.page.evaluate(DEPTH, words)
 
 
-@pytest.mark.parametrize("name", VOLUMES)
-def test_a_double_click_turns_around_what_the_mode_shows(drawing, name):
-    """The volume or the models at the depth of the caster or the rasterizer, or else a face of a cut."""
+@pytest.mark.parametrize("name", [*VOLUMES, *CHANNELS])
+def test_a_click_finds_the_place_that_texgs_finds(drawing, name):
+    """In the volume, on a face of a cut, or where a mode shows models alone."""
     opened, scene = drawing(name), drawing(name).scene
-    volume = Twin(scene)._caster.cast(combine(scene.volume.tfs), CAMERA, HEADLIGHT, ("depth",))
-    models = scene.open().render(CAMERA, HEADLIGHT, scene.edits, outputs=("depth",))
-    row, column = divmod(int(volume.rgba[..., 3].argmax()), CAMERA.width)
-    for mode, expected in (("volume", volume), ("shaded", models)):
-        assert depth_at(opened, scene, mode, column, row) == pytest.approx(
-            float(expected.depth[row, column]), abs=5e-3
-        )
-        assert depth_at(opened, scene, mode, 0, 0) is None, "the background"
-    cut = replace(scene, cuts=CUTS)
-    seen = Twin(cut).render(CAMERA, cut, scene.open().palettes, range_of(CUTS, CAMERA), outputs=("depth",))
-    face = torch.where(range_of(CUTS, CAMERA).face >= 0, seen.alpha, 0.0)
-    row, column = divmod(int(face.argmax()), CAMERA.width)
-    found = depth_at(opened, cut, "shaded", column, row)
-    assert found == pytest.approx(float(seen.depth[row, column]), abs=5e-3)
+    composed = scene.open()
+    for cuts in (NO_CUTS, CUTS, replace(CUTS, faces="slice")):
+        seen = replace(scene, cuts=cuts)
+        twin = Twin(seen)
+        alpha = twin.render(CAMERA, seen, composed.palettes).alpha
+        if cuts:
+            alpha = torch.where(range_of(cuts, CAMERA).face >= 0, alpha, 0.0)
+        row, column = divmod(int(alpha.argmax()), CAMERA.width)
+        for mode in ("volume", "shaded"):
+            point = point_at(composed, CAMERA, seen, mode, twin, (column, row))
+            depth = float(
+                CAMERA.viewmat[2, :3].double() @ torch.tensor(point).double() + CAMERA.viewmat[2, 3]
+            )
+            assert depth_at(opened, seen, mode, column, row) == pytest.approx(depth, abs=5e-3)
+            assert depth_at(opened, seen, mode, 0, 0) is None, "the background"
+    depth = composed.render(CAMERA, HEADLIGHT, scene.edits, outputs=("depth",)).depth[40, 48]
+    assert depth_at(opened, scene, "normal", 48, 40) == pytest.approx(float(depth), abs=5e-3)
 
 
 @pytest.mark.parametrize("name", VOLUMES)

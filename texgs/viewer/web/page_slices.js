@@ -92,7 +92,7 @@ export class PageSlices {
   #greys([from, to]) {
     const { low, high } = this.#facts[0];
     return Uint32Array.from({ length: LEVELS + 1 }, (_, code) => {
-      const share = (low + code / LEVELS * (high - low) - from) / (to - from);
+      const share = (low + code / LEVELS * (high - low) - from) / Math.max(to - from, Number.MIN_VALUE);
       return this.#hasImage ? Math.round(LEVELS * Math.min(1, Math.max(0, share))) : 0;
     });
   }

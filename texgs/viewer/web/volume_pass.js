@@ -9,6 +9,7 @@ import { PRESENT_VERTEX } from "./shaders.js";
 import { bind, setView } from "./surfel_pass.js";
 import { PER_TEXTURE, volumeFragment } from "./volume_shaders.js";
 
+const NARROWEST = 1e-6; // window, of all codes
 const BLACK = [2, 3]; // a window in which no code is above black
 
 export class VolumePass {
@@ -94,7 +95,8 @@ export class VolumePass {
     if (!isSlice) return;
     const window = scene.cuts.window ?? scene.slices.window, covers = new Float32Array(4 * channels.length);
     const labels = labelsOf(scene, channels), hasImage = !labels.some(({ channel }) => channel === 0);
-    gl.uniform2fv(uniforms.window, hasImage ? window.map((value) => (value - low) / (high - low)) : BLACK);
+    const [black, white] = window.map((value) => (value - low) / (high - low));
+    gl.uniform2fv(uniforms.window, hasImage ? [black, Math.max(white, black + NARROWEST)] : BLACK);
     for (const { channel, color, cover } of labels) if (color) covers.set([...color, cover], 4 * channel);
     gl.uniform4fv(uniforms["labels[0]"], covers);
   }

@@ -147,6 +147,7 @@ void main() {
   float clear = 1.0, before_at = -1.0; // light that is left; where values before a step are from
   vec4 ${each((t) => `before${t},`)} ${each((t) => `behind${t}${t < textures - 1 ? "," : ";"}`)}
   vec3 sum = vec3(0.0);
+  float halfway = 0.0; // depth at which half of the light is gone
   while (k < stop && clear >= LEAST_LIGHT) {
     vec3 place = clamp(entry + (k + 0.5) * stride, vec3(0.0), last);
     ivec3 brick = min(ivec3(place) / ${BRICK}, n_bricks - 1);
@@ -174,7 +175,10 @@ void main() {
         vec3 normal = of_face < 1.0 ? normal${channel}(middle, texel) : vec3(0.0);
         color += look${s}.a / all * shown(look${s}.rgb, normal, of_face, face, point);
       }`)}
-      if (is_depth) color = vec3((near + (k + 0.5) * interval) / length(camera));
+      if (is_depth) {
+        color = vec3((near + (k + 0.5) * interval) / length(camera));
+        if (clear > 0.5 && clear * (1.0 - alpha) <= 0.5) halfway = color.x;
+      }
       sum += clear * alpha * color;
       clear *= 1.0 - alpha;
     }
@@ -182,7 +186,7 @@ void main() {
     k += 1.0;
     before_at = k;
   }
-  fragment = vec4(sum, 1.0 - clear);
+  fragment = vec4(halfway > 0.0 ? vec3(halfway * (1.0 - clear)) : sum, 1.0 - clear);
 }
 `;
 }

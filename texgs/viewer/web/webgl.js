@@ -125,8 +125,7 @@ export class WebglRenderer {
   /** The point [3] that a pixel shows; null for the background. */
   pointAt(camera, scene, { before, mode }, [x, y]) {
     const view = this._view(camera), pixel = [x, y].map((side) => side + 0.5), shown = before ? this._before(scene) : scene;
-    const look = lookOf(shown), isCut = look.planes.length > 0 && (mode === "shaded" || OF_TWIN.includes(mode));
-    const isVolume = this._hasTwin(shown) && (mode === "volume" || isCut);
+    const look = lookOf(shown), isVolume = this._hasTwin(shown) && (mode === "shaded" || OF_TWIN.includes(mode));
     if (isVolume) this._twin.drawDepths(viewOf(view), mode === "volume" ? shown : { ...shown, functions: {} }, look);
     else this._blend(viewOf(view), shown, look, { mode: "depth" });
     const depth = (isVolume ? this._twin : this._pass).target.depthAt(x, y);
