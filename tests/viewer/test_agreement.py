@@ -64,10 +64,12 @@ CUTS = Cuts([Plane([1.0, 0.2, 0.0], 0.1), Plane([0.0, 1.0, 0.3], 0.2)])
 BOX = Cuts(box=Box([-0.3, -0.4, -0.2], [0.2, 0.3, 0.4]))
 FACE_LIGHTS = ("shaded", "unlit")
 VOLUMES = {"sphere": lambda: sphere(40), "waves": waves, "flat": lambda: waves((24, 2, 20), (1, 3, 1))}
-LUMPS = image_on(nested(), waves(nested().values.shape).values)
+FLOATS = waves(nested().values.shape).values
+LUMPS = image_on(nested(), FLOATS)
 CHANNELS = {  # of a volume: masks of labels, and an image as well
     "labels": scene_of_labels,
     "image and labels": lambda folder: scene_of_labels(folder, LUMPS),
+    "in a label": lambda folder: scene_of_labels(folder, replace(nested(), values=FLOATS), within=1),
 }
 PARTS = [PartEdit(), PartEdit(palette=(0.1, 0.6, 0.2)), PartEdit(opacity=0.4, specular=3.0)]
 GLOSSY = {"specular": 4.0, "shininess": 0.2}

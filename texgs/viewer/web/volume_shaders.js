@@ -18,7 +18,9 @@ export function volumeFragment(sources, channels) {
   const each = (line) => Array.from({ length: textures }, (_, t) => line(t)).join(" ");
   const ofEach = (line) => sources.map(line).filter(Boolean).join("\n    ");
   const texture = (channel) => Math.floor(channel / PER_TEXTURE), place = (channel) => "rgba"[channel % PER_TEXTURE];
-  const code = (name, channel) => `${name}${texture(channel)}.${place(channel)}`;
+  const isAlone = channels.length === 1, read = (t) => `texture(samples${t}, at)${isAlone ? ".r" : ""}`;
+  const code = (name, channel) => `${name}${texture(channel)}${isAlone ? "" : `.${place(channel)}`}`;
+  const codesOf = (name) => `${isAlone ? "float" : "vec4"} ${Array.from({ length: textures }, (_, t) => `${name}${t}`)}`;
   const codes = (channel) => ["before", "behind"].map((side) => code(side, channel)).join(", ");
   const used = [...new Set(sources.map(({ channel }) => channel))];
   return `#version 300 es
@@ -103,8 +105,9 @@ vec4 mean_between(int row, float one, float two) {
 
 // The colour of a slice at a place of the textures: the first channel in grey, and labels over it.
 vec3 slice_at(vec3 at) {
-  ${each((t) => `vec4 here${t} = texture(samples${t}, at);`)}
-  vec3 color = vec3(clamp((here0.r - window.x) / (window.y - window.x), 0.0, 1.0));
+  ${codesOf("here")};
+  ${each((t) => `here${t} = ${read(t)};`)}
+  vec3 color = vec3(clamp((${code("here", 0)} - window.x) / (window.y - window.x), 0.0, 1.0));
   ${channels.map((own, c) =>
     `if (${code("here", c)} >= ${halfOf(own).toFixed(6)}) color = mix(color, labels[${c}].rgb, labels[${c}].a);`).join("\n  ")}
   return color;
@@ -145,7 +148,8 @@ void main() {
   float begins = (begin - near) / interval, ends = (end - near) / interval;
   float k = floor(max(begins, 0.0)), stop = min(ceil((far - near) / interval - 0.5), ceil(ends));
   float clear = 1.0, before_at = -1.0; // light that is left; where values before a step are from
-  vec4 ${each((t) => `before${t},`)} ${each((t) => `behind${t}${t < textures - 1 ? "," : ";"}`)}
+  ${codesOf("before")};
+  ${codesOf("behind")};
   vec3 sum = vec3(0.0);
   float halfway = 0.0; // depth at which half of the light is gone
   while (k < stop && clear >= LEAST_LIGHT) {
@@ -160,10 +164,10 @@ void main() {
     }
     if (before_at != k) {
       vec3 at = (clamp(entry + k * stride, vec3(0.0), last) + 0.5) / (last + 1.0);
-      ${each((t) => `before${t} = texture(samples${t}, at);`)}
+      ${each((t) => `before${t} = ${read(t)};`)}
     }
     vec3 at = (clamp(entry + (k + 1.0) * stride, vec3(0.0), last) + 0.5) / (last + 1.0);
-    ${each((t) => `behind${t} = texture(samples${t}, at);`)}
+    ${each((t) => `behind${t} = ${read(t)};`)}
     ${ofEach(({ channel }, s) => `vec4 look${s} = mean_between(${2 * s}, ${codes(channel)});`)}
     ${ofEach(({ mask, half }, s) => mask < 0 ? "" : `look${s}.a *= part_in(${codes(mask)}, ${half.toFixed(6)});`)}
     float all = ${sources.map((_, s) => `look${s}.a`).join(" + ")};
