@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 from texgs.api.arrays import keys_of_format, several, source_of
 from texgs.api.display import as_python, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
-from texgs.config.project import check_name, name_of
-from texgs.core.errors import ArgumentError, ConfigError
+from texgs.config.project import is_name, name_of
+from texgs.core.errors import ArgumentError
 from texgs.core.names import close
 from texgs.fields.part_edit import color
 from texgs.scene.frame import quantize
@@ -214,8 +214,4 @@ class Volume:
 def default_name(data: Any) -> str:
     """Return the name of a file or folder, as a data set can have it; "data" where it has none."""
     name = name_of(Path(data)) if isinstance(data, str | Path) else ""
-    try:
-        check_name("name", name)
-    except ConfigError:
-        return "data"
-    return name
+    return name if is_name(name) else "data"

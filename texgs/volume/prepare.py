@@ -13,7 +13,7 @@ from texgs.core.io import write_atomic
 from texgs.core.memory import GIB
 from texgs.core.names import check_count, is_number
 from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
-from texgs.volume.label_masks import MaskSource
+from texgs.volume.label_masks import HALF, MaskSource
 from texgs.volume.nrrd_file import NRRD_TYPES, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.space import Space
@@ -66,7 +66,8 @@ def prepare_channels(
             an axis, or there is too little space on the disk. Nothing is written then.
     """
     _check_keys(nan_value, reduce, method, up)
-    source, tallies = _first_of(sources), [_Tally(each.name) for each in sources]
+    source = _first_of(sources)
+    tallies = [_Tally(each.name, isinstance(each, MaskSource)) for each in sources]
     count = sum(isinstance(each, MaskSource) for each in sources) if not isinstance(source, MaskSource) else 0
     bounds, axes = bounds_of(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin, space = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
@@ -135,8 +136,8 @@ def _require_disk(name: str, target: Path, needed: int) -> None:
 class _Tally:
     """Range and bad samples of a stream."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    def __init__(self, name: str, is_mask: bool) -> None:
+        self.name, self.is_mask = name, is_mask
         self.minimum, self.maximum = inf, -inf
         self.low, self.high = inf, -inf  # of values that a sample shares with one beside it, along x or y
         self.varies, self.sample = False, None  # before samples become those of the file
@@ -166,11 +167,15 @@ class _Tally:
         return block
 
     def check(self) -> None:
-        """Refuse a volume with bad samples, or with one value only."""
+        """Refuse a volume with bad samples, or with one value only, and a mask without any inside."""
         if self.first:
             raise ArgumentError(
                 f"{self.name}: expected finite samples, got {self.n_bad} that are NaN or infinite, the first "
                 f"at (x, y, z) = {self.first}; set nan_value to replace them"
+            )
+        if self.is_mask and self.maximum < HALF:
+            raise ArgumentError(
+                f"{self.name}: expected some samples, got none in the crop, or too few for reduce"
             )
         if self.minimum == self.maximum and self.varies:
             raise ArgumentError(

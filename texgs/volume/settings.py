@@ -131,7 +131,7 @@ def open_masks(
     Raises:
         ArgumentError: if the file has no such label, or another lattice than the image.
     """
-    from texgs.volume.label_masks import MaskSource, on_lattice_of
+    from texgs.volume.label_masks import MaskSource
     from texgs.volume.label_names import place_of_label
 
     layers: dict[str | None, Source] = {}
@@ -139,16 +139,19 @@ def open_masks(
     for name in names:
         layer, number = place_of_label(path, name, volume.label_numbers)
         if layer not in layers:
-            own = replace(volume, channel=layer) if image is None else beside(volume, layer)
-            opened = open_field(own, path)
-            layers[layer] = opened if image is None else on_lattice_of(opened, image)
+            layers[layer] = open_labels(volume, path, layer, image)
         masks.append(MaskSource(layers[layer], number, name))
     return masks
 
 
-def beside(volume: VolumeKeys, layer: str | None) -> VolumeKeys:
-    """Return how a file of labels beside an image is read: at the place that settings give the image."""
-    return VolumeKeys(spacing=volume.spacing, origin=volume.origin, channel=layer)
+def open_labels(volume: VolumeKeys, path: Path, layer: str | None, image: Source | None = None) -> Source:
+    """Return a layer of the labels in a file; beside an image, at the place that settings give this."""
+    from texgs.volume.label_masks import on_lattice_of
+
+    if image is None:
+        return open_field(replace(volume, channel=layer or volume.channel), path)
+    beside = VolumeKeys(spacing=volume.spacing, origin=volume.origin, channel=layer)
+    return on_lattice_of(open_field(beside, path), image)
 
 
 def cached_volume(volume: VolumeKeys) -> Path:
