@@ -114,6 +114,9 @@ def data_set(config: Config, files: list[Path], keys: list[str], arguments: argp
     volume = config.dataset.volume
     field = array_of(volume)
     channels = channels_of(volume, field)
+    if not channels and (arguments.tf or arguments.count):
+        word = "--tf" if arguments.tf else "--count"
+        raise ArgumentError(f"{word}: expected none, as each label has a function; labels=[...] chooses some")
     if len(files) == 1 and len(channels) < 2:
         moments_of(files, volume)  # of a file or folder that has several
     found = found_in(config.dataset, arguments.names, next(iter(channels), None) or volume.channel)

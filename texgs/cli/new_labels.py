@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,8 +70,7 @@ def found_in(dataset: Dataset, table: Path | None, channel: str | None) -> list[
     known, beside = named_in(file, table)
     if beside:
         sys.stderr.write(f"{dataset.name}: names and colours of labels are those of {beside}\n")
-    layers = dict.fromkeys(each.layer for each in known) or {None: None}
-    return labels_in({layer: open_labels(volume, file, layer, image) for layer in layers}, known, volume.crop)
+    return labels_in(partial(open_labels, volume, file, image=image), known, volume.crop)
 
 
 def with_chosen(dataset: Dataset, found: list[Label], wanted: list[str] | None, channels: int) -> Dataset:

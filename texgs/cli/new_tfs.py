@@ -55,9 +55,6 @@ def with_tfs(
     from texgs.workflow.stage_table import STAGES
 
     dataset, listed = config.dataset, {}
-    if not channels and (arguments.tf or arguments.count):
-        word = "--tf" if arguments.tf else "--count"
-        raise ArgumentError(f"{word}: expected none, as each label has a function; labels=[...] chooses some")
     if len(channels) > 1:
         listed = of_each(known, channels, arguments)
     elif channels:

@@ -85,10 +85,6 @@ class Dataset:
         own = [] if self.volume.kind == "labels" else self.channels or [""]
         return [*own, *map(mask_name, self.labels)]
 
-    def number_of(self, tf: BasicTF) -> int:
-        """Return the index of a basic TF's channel among the prepared ones."""
-        return self.prepared.index(tf.values_of or "")
-
 
 def dataset_of(
     name: str, file: str | Path, basic_tfs: Mapping[str, BasicTF] | None = None, **volume: Any

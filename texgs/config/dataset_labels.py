@@ -23,7 +23,7 @@ def named(labels: Sequence[Label], taken: Container[str] = ()) -> dict[str, Labe
     for label in labels:
         numbered = f"label_{label.number}"
         more = (f"{numbered}_{k}" for k in count(2))
-        for name in chain((FORBIDDEN_LETTERS.sub("_", label.name), numbered), more):
+        for name in chain((FORBIDDEN_LETTERS.sub("_", label.name).strip("_"), numbered), more):
             if is_name(name) and name not in found and name not in taken:
                 found[name] = label
                 break

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,6 +40,26 @@ class BasicTF:
 def mask_name(label: str) -> str:
     """Return the name that the mask of a label has among the channels of a prepared volume."""
     return f"label {label}"
+
+
+def basic_tf_of(tf: TransferFunction, prepared: Sequence[str]) -> BasicTF:
+    """Return the basic TF of a function of prepared channels, by the names of these."""
+    labels = [
+        name.partition(mask_name(""))[2] if name.startswith(mask_name("")) else None for name in prepared
+    ]
+    channel = None if labels[tf.channel] else prepared[tf.channel] or None
+    within = None if tf.within is None else labels[tf.within]
+    points = tf.to_dict()
+    return BasicTF(points["opacity"], points["color"], channel, labels[tf.channel], within)
+
+
+def function_of(tf: BasicTF, prepared: Sequence[str]) -> TransferFunction:
+    """Return the function of prepared channels, by their names, that a basic TF is; of values as given."""
+    from texgs.volume.transfer import TransferFunction
+
+    mask = None if tf.within is None else prepared.index(mask_name(tf.within))
+    of = prepared.index(tf.values_of or "")
+    return TransferFunction(tuple(tf.opacity), tuple(tf.color), of, mask)
 
 
 def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) -> dict[str, TransferFunction]:

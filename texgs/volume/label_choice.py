@@ -1,6 +1,6 @@
 """Which labels a volume has, which of them are shown, and the functions that show them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.basic_tfs import BasicTF
@@ -13,12 +13,12 @@ OPACITY = 0.95  # of a label
 
 
 def labels_in(
-    layers: Mapping[str | None, Source], known: Sequence[Label], crop: Sequence[int] | None = None
+    open_layer: Callable[[str | None], Source], known: Sequence[Label], crop: Sequence[int] | None = None
 ) -> list[Label]:
     """Return the labels that samples in a crop have, the largest first, with what is known of them.
 
     Args:
-        layers: of the volume, by the names that labels give them; most often one, None.
+        open_layer: returns a layer of the volume, by the name that labels give it; most often None.
         known: names and colours.
         crop: as for `prepare_channels`.
 
@@ -26,14 +26,14 @@ def labels_in(
         ArgumentError: if a sample is no whole number, or all are 0.
     """
     found = []
-    for layer, source in layers.items():
+    for layer in dict.fromkeys(each.layer for each in known) or [None]:
+        source = open_layer(layer)
         named = {each.number: each for each in known if each.layer == layer}
         for number, samples in label_counts(source, bounds_of(source.dims, crop)).items():
             each = named.get(number, Label(number, str(number), layer=layer))
             found.append(each._replace(samples=samples))
     if not found:
-        where = ", ".join(source.name for source in layers.values())
-        raise ArgumentError(f"{where}: expected labels, got 0 everywhere")
+        raise ArgumentError(f"{source.name}: expected labels, got 0 everywhere")
     return sorted(found, key=lambda each: -each.samples)
 
 

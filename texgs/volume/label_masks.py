@@ -33,8 +33,14 @@ class MaskSource(Source):
     """
 
     def __init__(self, labels: Source, number: int, name: str = "") -> None:
-        told = f"label {name or number} of {labels.name}"
-        super().__init__(told, labels.dims, np.dtype(np.uint8), labels.spacing, labels.origin)
+        super().__init__(
+            f"label {name or number} of {labels.name}",
+            labels.dims,
+            np.dtype(np.uint8),
+            labels.spacing,
+            labels.origin,
+        )
+        self.label = name or str(number)
         self._labels, self._number, self.space, self.note = labels, number, labels.space, labels.note
 
     def slices(self, start: int, stop: int) -> np.ndarray:

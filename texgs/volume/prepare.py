@@ -13,7 +13,7 @@ from texgs.core.io import write_atomic
 from texgs.core.memory import GIB
 from texgs.core.names import check_count, is_number
 from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
-from texgs.volume.label_masks import HALF, MaskSource
+from texgs.volume.label_masks import HALF
 from texgs.volume.nrrd_file import NRRD_TYPES, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.space import Space
@@ -67,8 +67,9 @@ def prepare_channels(
     """
     _check_keys(nan_value, reduce, method, up)
     source = _first_of(sources)
-    tallies = [_Tally(each.name, isinstance(each, MaskSource)) for each in sources]
-    count = sum(isinstance(each, MaskSource) for each in sources) if not isinstance(source, MaskSource) else 0
+    tallies = [_Tally(each.name, each.label is not None) for each in sources]
+    labels = [each.label for each in sources if each.label is not None]
+    count = len(labels) % len(sources)  # of masks behind an image
     bounds, axes = bounds_of(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin, space = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
     dtypes = [_kept(each.dtype) for each in sources]
@@ -77,7 +78,7 @@ def prepare_channels(
     def write(file: BinaryIO) -> None:
         _require_disk(source.name, target, sum(sizes))
         channels = len(sources) - count
-        offset = write_header(file, dims, dtypes[0], spacing, origin, space, channels, count)
+        offset = write_header(file, dims, dtypes[0], spacing, origin, space, channels, count, labels)
         offsets = [offset, *(offset + np.cumsum(sizes)).tolist()]
         slabs = slab_bounds(source, z0, z1, multiple=reduce)
         steps = [(number, *slab) for number in range(len(sources)) for slab in slabs]
@@ -112,7 +113,7 @@ def _first_of(sources: Sequence[Source]) -> Source:
     """Return the first of some channels, and require of the others that they are like it; masks are uint8."""
     first, *others = sources
     for each in others:
-        is_alike = isinstance(each, MaskSource) or each.dtype == first.dtype
+        is_alike = each.label is not None or each.dtype == first.dtype
         if not is_alike or (each.dims, each.spacing) != (first.dims, first.spacing):
             raise ArgumentError(
                 f"{first.name}: expected channels of one lattice and type; choose some of them"

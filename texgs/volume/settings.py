@@ -13,7 +13,6 @@ from texgs.core.keys import key
 from texgs.core.names import file_name
 
 if TYPE_CHECKING:
-    from texgs.volume.label_masks import MaskSource
     from texgs.volume.slabs import Source
     from texgs.volume.summaries import Summary
 
@@ -125,17 +124,22 @@ def open_field(volume: VolumeKeys, path: Path | None) -> Source:
 
 def open_masks(
     volume: VolumeKeys, path: Path, names: Sequence[str], image: Source | None = None
-) -> list[MaskSource]:
+) -> Sequence[Source]:
     """Return the masks of labels in a file, by names or numbers; on the lattice of an image, if any.
+
+    A volume that texgs has prepared has masks instead of labels.
 
     Raises:
         ArgumentError: if the file has no such label, or another lattice than the image.
     """
     from texgs.volume.label_masks import MaskSource
     from texgs.volume.label_names import place_of_label
+    from texgs.volume.nrrd_file import masks_in
 
+    if made := masks_in(path):
+        return [made[name] for name in names]
     layers: dict[str | None, Source] = {}
-    masks = []
+    masks: list[Source] = []
     for name in names:
         layer, number = place_of_label(path, name, volume.label_numbers)
         if layer not in layers:
