@@ -73,7 +73,7 @@ def label_counts(labels: Source, bounds: Sequence[tuple[int, int]] = ()) -> dict
     (x0, x1), (y0, y1), (z0, z1) = bounds or [(0, size) for size in labels.dims]
     for slab in slab_bounds(labels, z0, z1):
         numbers, each = np.unique(labels.slices(*slab)[:, y0:y1, x0:x1], return_counts=True)
-        if (bad := numbers != np.rint(numbers)).any():
+        if (bad := ~np.isfinite(numbers) | (numbers != np.rint(numbers))).any():
             raise ArgumentError(
                 f"{labels.name}: expected labels, which are whole numbers, got {numbers[bad][0]:g}; is it "
                 "an image?"
