@@ -78,6 +78,8 @@ def with_chosen(dataset: Dataset, found: list[Label], wanted: list[str] | None, 
     from texgs.config.dataset_labels import with_labels
     from texgs.volume.label_choice import choose
 
+    if not found and wanted:
+        raise ArgumentError("labels=[...]: expected a file of labels, got an image; name one by labels=FILE")
     if not found:
         return dataset
     chosen = choose(found, wanted, MAX_CHANNELS - channels, dataset.volume.reduce**3)

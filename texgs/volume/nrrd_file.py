@@ -65,9 +65,8 @@ def open_prepared(path: Path) -> list[RawSource]:
         behind, byte = offset + count * size, np.dtype(np.uint8)
         offsets = (behind + k * nx * ny * nz for k in range(int(fields.get(f"{MASKS}=", "0"))))
         channels += [RawSource(path, (nx, ny, nz), byte, each, *lattice) for each in offsets]
-        for channel, label in zip(
-            channels[::-1], json.loads(fields.get(f"{LABELS}=", "[]"))[::-1], strict=False
-        ):
+        labels = json.loads(fields.get(f"{LABELS}=", "[]"))
+        for channel, label in zip(channels[::-1], labels[::-1], strict=False):
             channel.label = str(label)
         return channels
 
