@@ -117,9 +117,12 @@ def test_a_label_is_found_by_its_name_or_its_number(tmp_path):
     assert place_of_label(path, "-12", {}) == (None, -12)
     refused(
         lambda: place_of_label(path, "heart", {"lung": 3}),
-        "no such label 'heart'; expected one of lung, Liver",
+        "no such label 'heart'; expected its number, or one of lung, Liver",
     )
-    refused(lambda: place_of_label(tmp_path / "a.nii", "heart", {}), "expected one of its number")
+    refused(
+        lambda: place_of_label(tmp_path / "a.nii", "heart", {}),
+        "expected its number, or one of those in dataset.volume.label_numbers",
+    )
 
 
 def test_names_are_text_that_settings_hold_and_never_numbers():

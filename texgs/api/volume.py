@@ -17,16 +17,16 @@ from typing import TYPE_CHECKING, Any
 from texgs.api.arrays import keys_of_format, several, source_of
 from texgs.api.display import as_python, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
-from texgs.api.labels import masks_of
+from texgs.api.labels import sources_of
 from texgs.config.project import is_name, name_of
 from texgs.core.errors import ArgumentError
-from texgs.core.names import close
+from texgs.core.names import close, mask_name
 from texgs.fields.part_edit import color
 from texgs.scene.frame import quantize
 from texgs.scene.scene import WHITE
 from texgs.scene.scene_file import light_of
 from texgs.scene.shot import Shot
-from texgs.volume.basic_tfs import function_of, mask_name
+from texgs.volume.basic_tfs import function_of
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.label_choice import label_tf
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
     from texgs.core.light import Light
-    from texgs.volume.label_names import Label
 
 CELL_WIDTH = 320  # pixels, of the picture at the end of a cell
 
@@ -104,31 +103,22 @@ class Volume:
         self.name = name = default_name(data) if name is None else name
         self._scratch = TemporaryDirectory(prefix="texgs-") if folder is None else None
         self.folder = Path(folder if folder is not None else self._scratch.name)  # type: ignore[union-attr]
-        if kind not in ("image", "labels"):
-            raise ArgumentError(f"kind: expected image or labels, got {kind!r:.100}")
         crop, nan_value = several("crop", crop, 6, index), as_python(nan_value)
-        sources: list[Source] = [opened(data, name, spacing, origin, keys)] if kind == "image" else []
-        shown: dict[str, Label] = {}
-        if kind == "labels":
-            open_layer = partial(opened, data, name, spacing, origin, keys)
-            shown, sources = masks_of(data, open_layer, None, labels, names, crop)
-        elif labels is not None:
-            open_layer = partial(opened, labels, f"labels of {name}", spacing, origin, {})
-            shown, masks = masks_of(labels, open_layer, sources[0], None, names, crop)
-            sources += masks
-        source = sources[0]
-        self._channel = source.channel
+        open_file = partial(opened, name=name, spacing=spacing, origin=origin, keys=keys)
+        shown, sources = sources_of(data, open_file, kind, labels, names, crop, reduce)
+        self._channel = sources[0].channel
         if up is None:
             up = "+z" if isinstance(data, str | Path) and tells_superior(Path(data)) else "+y"
         how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": nan_value}
-        summaries = self._prepared(sources, how)
-        self.summary = summaries[0]
-        if source.note:
-            warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
+        self.summary, *others = self._prepared(sources, how)
+        if note := sources[0].note:
+            warnings.warn(f"{name}: {note.replace('dataset.volume.', '')}", stacklevel=2)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         prepared = ["" if each.label is None else mask_name(each.label) for each in sources]
-        self.channels = dict(zip(prepared, summaries, strict=True))  # of the image by "", and of masks
-        write_summaries(self.file, summaries, prepared)
+        self.channels = dict(
+            zip(prepared, (self.summary, *others), strict=True)
+        )  # "" is the image, then masks
+        write_summaries(self.file, [*self.channels.values()], prepared)
         self._labels = {name: function_of(label_tf(each), prepared) for name, each in shown.items()}
 
     @classmethod
@@ -234,11 +224,11 @@ class Volume:
 
 def opened(
     data: Any,
+    layer: str | None,
     name: str,
     spacing: Sequence[float] | None,
     origin: Sequence[float] | None,
     keys: dict[str, Any],
-    layer: str | None = None,
 ) -> Source:
     """Return a file, a layer of it or an array as a source; arguments as for `Volume`."""
     if isinstance(data, str | Path):

@@ -121,7 +121,7 @@ def data_set(config: Config, files: list[Path], keys: list[str], arguments: argp
         moments_of(files, volume)  # of a file or folder that has several
     found = found_in(config.dataset, arguments.names, next(iter(channels), None) or volume.channel)
     if field and "reduce" not in keys:
-        config = with_room(config, field, len(channels), len(found))
+        config = with_room(config, field, len(channels), len(arguments.labels or found))
     config = replace(config, dataset=with_chosen(config.dataset, found, arguments.labels, len(channels)))
     known = read_volume(config, channels)
     is_said = not KIND_KEYS.isdisjoint(keys) or files or arguments.tf or arguments.count

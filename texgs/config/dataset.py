@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from texgs.core.keys import REQUIRED, key
-from texgs.volume.basic_tfs import BasicTF, mask_name
+from texgs.core.names import mask_name
+from texgs.volume.basic_tfs import BasicTF
 from texgs.volume.settings import VolumeKeys
 from texgs.volume.view_settings import LARGEST
 

@@ -1,6 +1,6 @@
 """A data set with a basic transfer function for each of some labels."""
 
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain, count
 
@@ -17,14 +17,14 @@ def with_labels(dataset: Dataset, labels: Sequence[Label]) -> Dataset:
     return replace(dataset, volume=replace(dataset.volume, label_numbers=numbers), basic_tfs=basic_tfs)
 
 
-def named(labels: Sequence[Label], taken: Container[str] = ()) -> dict[str, Label]:
-    """Return labels by names that TFs can have, none of them taken: like their own, or by their numbers."""
+def named(labels: Sequence[Label]) -> dict[str, Label]:
+    """Return labels by names that TFs can have: like their own, or by their numbers."""
     found: dict[str, Label] = {}
     for label in labels:
         numbered = f"label_{label.number}"
         more = (f"{numbered}_{k}" for k in count(2))
         for name in chain((FORBIDDEN_LETTERS.sub("_", label.name).strip("_"), numbered), more):
-            if is_name(name) and name not in found and name not in taken:
+            if is_name(name) and name not in found:
                 found[name] = label
                 break
     return found

@@ -8,8 +8,7 @@ import numpy as np
 from PIL import Image, ImageOps
 
 from texgs.core.figures import Cell, Row, as_picture
-from texgs.core.names import style_file
-from texgs.volume.basic_tfs import mask_name
+from texgs.core.names import mask_name, style_file
 from texgs.volume.transfer import TransferFunction
 
 SIDE, INCHES = 512, 3.2  # side of a picture, pixels and inches; the inches determine the font size

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
+from texgs.core.names import mask_name
 
 if TYPE_CHECKING:
     from texgs.volume.transfer import TransferFunction
@@ -35,11 +36,6 @@ class BasicTF:
     def values_of(self) -> str | None:
         """Return what of a prepared volume its values are of, by the names of `read_summaries`."""
         return self.channel if self.label is None else mask_name(self.label)
-
-
-def mask_name(label: str) -> str:
-    """Return the name that the mask of a label has among the channels of a prepared volume."""
-    return f"label {label}"
 
 
 def basic_tf_of(tf: TransferFunction, prepared: Sequence[str]) -> BasicTF:

@@ -129,8 +129,10 @@ def place_of_label(path: Path, name: str, numbers: Mapping[str, int]) -> tuple[s
         return found.layer, found.number
     if name.lstrip("-").isdigit():
         return None, int(name)
-    known = ", ".join([*numbers, *(each.name for each in segments)]) or "its number"
-    raise ArgumentError(f"{path.name}: no such label {name!r}; expected one of {known}")
+    known = (
+        ", ".join([*numbers, *(each.name for each in segments)]) or "those in dataset.volume.label_numbers"
+    )
+    raise ArgumentError(f"{path.name}: no such label {name!r}; expected its number, or one of {known}")
 
 
 def label_of(word: str, labels: Iterable[Label]) -> Label | None:

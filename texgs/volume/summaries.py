@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from texgs.core.io import read_json, write_json
-from texgs.volume.basic_tfs import mask_name
+from texgs.core.names import mask_name
 from texgs.volume.grid import Dims, Triple
 from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.space import UNKNOWN_SPACE, Space

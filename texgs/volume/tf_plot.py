@@ -10,7 +10,7 @@ import numpy as np
 from texgs.core.camera import orbit
 from texgs.core.figures import new_figure, words
 from texgs.core.light import Light
-from texgs.volume.basic_tfs import mask_name
+from texgs.core.names import mask_name
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid

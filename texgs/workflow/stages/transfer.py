@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from texgs.core.memory import free_memory
+from texgs.core.names import mask_name
 from texgs.report.results import Result
-from texgs.volume.basic_tfs import BasicTF, basic_tfs_of, mask_name
+from texgs.volume.basic_tfs import BasicTF, basic_tfs_of
 from texgs.workflow.inputs import has_volume, prepared_volume
 from texgs.workflow.stage import Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import OfDataset
