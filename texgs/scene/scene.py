@@ -12,6 +12,7 @@ from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.lens import Frame
 from texgs.core.light import HEADLIGHT, Light
+from texgs.core.markers import Marker
 from texgs.core.names import is_number
 from texgs.fields.field import Composed, Field
 from texgs.fields.files import open_field
@@ -42,8 +43,8 @@ class SceneVolume:
 
     @property
     def has_channels(self) -> bool:
-        """Return whether functions use more than the first channel."""
-        return any(tf.channel for tf in self.tfs.values())
+        """Return whether functions use more than the first channel: others, or masks."""
+        return any(tf.source != (0, None) for tf in self.tfs.values())
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,7 @@ class Scene:
     series: Series | None = None  # in time; the scene shows one step of it
     time: int | None = None  # number of the shown step
     space: Space | None = None  # of the volume's file, if known
+    markers: tuple[Marker, ...] = ()  # drawn on top of pictures
 
     def __post_init__(self) -> None:
         if not self.models:

@@ -14,6 +14,7 @@ from texgs.core.io import reading, write_bytes
 from texgs.core.keys import typed_argument
 from texgs.core.lens import Frame
 from texgs.core.light import HEADLIGHT, HIDING, Light
+from texgs.core.markers import Marker, Markers
 from texgs.core.names import SCENE, SCENES, close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
 from texgs.fields.files import formats
@@ -28,7 +29,7 @@ VERSION = 1
 MAX_BYTES = 1 << 20  # a scene of a hundred models has a few thousand
 SCENE_KEYS = ("light", "background", "cuts", "frame")
 MAX_LISTED = 5  # scene files of a folder, in an error
-KEYS = ("texgs-scene", *SCENE_KEYS, "models", "volume", "space", "functions", "series", "time")
+KEYS = ("texgs-scene", *SCENE_KEYS, "models", "volume", "space", "functions", "markers", "series", "time")
 EDIT_KEYS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDIT_KEYS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
@@ -92,7 +93,8 @@ def _scene(values: Any, folder: Path) -> Scene:
     frame = typed_argument(Frame, values["frame"], "frame") if "frame" in values else None
     functions = functions_of(values.get("functions", {}), "functions")
     space = typed_argument(Space, values["space"], "space") if "space" in values else None
-    scene = Scene(models, light, background, cuts, volume, frame, functions, space=space)
+    markers = markers_of(values.get("markers", []))
+    scene = Scene(models, light, background, cuts, volume, frame, functions, space=space, markers=markers)
     if "series" not in values:
         return scene
     file = named_file("series", folder, values["series"], "a series")
@@ -125,6 +127,8 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
         values |= {"series": relative(scene.series.file), "time": scene.time}
     if scene.functions:
         values["functions"] = plain_functions(scene.functions)
+    if scene.markers:
+        values["markers"] = [asdict(each) for each in scene.markers]
     text = yaml.safe_dump(values, sort_keys=False, allow_unicode=True, default_flow_style=None)
     return write_bytes(path, text.encode())
 
@@ -234,6 +238,11 @@ def plain_cuts(cuts: Cuts) -> dict[str, Any]:
     """Return cuts as plain values."""
     unedited = asdict(NO_CUTS)
     return {key: value for key, value in asdict(cuts).items() if value != unedited[key]}
+
+
+def markers_of(value: Any) -> tuple[Marker, ...]:
+    """Return the markers that a value of a scene file stands for, a list of tables."""
+    return typed_argument(Markers, {"markers": value}).markers
 
 
 def require_keys(values: Any, keys: Collection[str] | None, where: str) -> None:

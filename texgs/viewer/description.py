@@ -15,6 +15,7 @@ from texgs.fields.part_edit import NEEDS, PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.raster.shading import MATERIAL
 from texgs.scene.bounds import STRAY_SHARE, models_of, span_of
+from texgs.scene.legend import legend_of
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import plain_functions
 from texgs.scene.shot import Mode
@@ -94,6 +95,8 @@ def describe(
         "cuts": {key: x for key, x in asdict(scene.cuts).items() if key != "window" or x},
         "models": models,
         "functions": plain_functions(scene.functions),
+        "markers": [asdict(each) for each in scene.markers],
+        "legend": [asdict(each) for each in legend_of(scene.as_fitted, composed.palettes)],
         "time": scene.time,
         "steps": list(scene.series.steps) if scene.series else [],
         "tfs": plain_functions(scene.volume.tfs) if scene.volume else {},

@@ -44,6 +44,7 @@ class View:
     wipe: float | None = key(None, "share of the width; default: beside it", least=0, most=1)
     moving: bool = False  # more views follow: speed counts more than quality
     before: bool = False  # the scene as it was opened
+    legend: bool = False  # of the scene, in a picture that is saved
     transparent: bool = False  # without background; of the scene or its volume alone
     only: str = ""  # a model to show alone and unedited, for clicks
 
@@ -54,6 +55,23 @@ class Pick:
 
     view: View
     pixel: tuple[int, int] = key(REQUIRED, "to the right and down", "pixels", least=0, most=LARGEST_SIDE - 1)
+    id: int = key(0, "comes back with the point", least=0, most=LARGEST_ID)
+
+
+@dataclass(frozen=True)
+class Slice:
+    """Ask for a slice of the volume."""
+
+    plane: str  # its name, see `planes_of`
+    number: int
+    window: tuple[float, float] = key(REQUIRED, "values in black and in white")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Ask what is at a place of the volume."""
+
+    point: tuple[float, float, float] = key(REQUIRED, "of the world", "world units", least=-1e6, most=1e6)
 
 
 @dataclass(frozen=True)
@@ -188,11 +206,11 @@ def parse(text: str | bytes, kind: type[Any] | None = None) -> Any:
         values = json.loads(text)
         if not isinstance(values, dict):
             raise mismatch("message", "keys with values in JSON", values)
+        kinds = MESSAGES if kind is None else {kind.__name__.lower(): kind}
         name = values.pop("type", kind and kind.__name__.lower())
-        wanted = MESSAGES.get(name) if isinstance(name, str) else None
-        if wanted is None or kind not in (None, wanted):
-            raise mismatch("type", f"one of {', '.join(MESSAGES)}", name)
-        return typed(wanted, values)
+        if not isinstance(name, str) or name not in kinds:
+            raise mismatch("type", f"one of {', '.join(kinds)}", name)
+        return typed(kinds[name], values)
     except ValueMismatch as error:
         raise ArgumentError(str(error)) from error
     except (ValueError, RecursionError) as error:

@@ -54,7 +54,7 @@ class Page:
     async def pick(self, asked: Pick) -> None:
         """Send the point that a pixel shows."""
         point = await self._frames.point_at(asked.view, self.scene_of(asked.view), asked.pixel)
-        self._tell_newest({"type": "point", "point": point})
+        self._tell_newest({"type": "point", "id": asked.id, "point": point})
 
     def find(self, asked: Mask | Look) -> None:
         """Send what clicks select, or show a preview of a look, in place of what was asked for before."""

@@ -23,13 +23,17 @@ from texgs.viewer.messages import MESSAGE_BYTES, Cancel, Job, Look, Mask, Messag
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
+from texgs.viewer.slices import Slices
 from texgs.viewer.styles import LARGEST_PICTURE
 from texgs.viewer.work import Work
 
 WEB = Path(__file__).parent / "web"
 SUFFIXES = (".js", ".css", ".svg")
 # What changes of a scene that a page knows.
-CHANGING_KEYS = ("name", "background", "light", *HIDING, "cuts", "functions", "time", "tfs", "models")
+CHANGING_KEYS = (
+    *("name", "background", "light", *HIDING, "cuts", "functions"),
+    *("markers", "legend", "time", "tfs", "models"),
+)
 MOST_PAGES = 16
 PATIENCE = 2.0  # seconds for a page to close its connection
 HEARTBEAT = 20.0  # seconds; a page that is gone is noticed after this time
@@ -51,7 +55,7 @@ class Server:
         self._bounds, self._device = bounds(opened.scene, composed), device
         self._opened = self._latest = (files_of_models(opened.scene), composed)  # models as they were fitted
         self.edits = SharedEdits(session, opened)
-        self._origins = Origins(opened.scene)
+        self._origins, self._slices = Origins(opened.scene), Slices(session)
         self._beside = Beside(session, self._origins)
         self.frames = Frames(session, self._beside)
         self._changing = asyncio.Lock()  # changes run in other threads, in turn
@@ -77,6 +81,8 @@ class Server:
             "socket": self.socket,
             "still.png": self.still,
             "thumbnail.jpg": self.thumbnail,
+            "slice.png": self._slices.picture,
+            "place.json": self._slices.place,
             "files/{name}": self.file,
             "{name}": self.module,
         }
@@ -219,7 +225,7 @@ class Server:
         whole["views"] += self._origins.places
         whole["modes"][1:1] = self._beside.modes
         whole["volume"] = self.edits.scene.volume is not None
-        whole["transfer"] = self._origins.transfer
+        whole["transfer"], whole["slices"] = self._origins.transfer, self._slices.facts
         facts = {"run": self._run, "choices": self._choices, "original": self._describe(self.edits.original)}
         return {**self.scene_message(), "scene": whole, **facts}
 

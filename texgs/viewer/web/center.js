@@ -13,12 +13,17 @@ export function centerByDoubleClick(page, isLocked) {
       page.notices.tell("This is a training view. Double click on the scene in another mode to turn around a point.");
       return;
     }
-    const { camera, canvas, renderer, shown, state } = page, [width, height] = renderer.size();
-    const place = [offsetX * width / canvas.clientWidth, offsetY * height / canvas.clientHeight];
-    const point = await renderer.pointAt(camera, state.scene, shown, place.map(Math.floor));
+    const point = await pointBelow(page, { offsetX, offsetY });
     if (!point) page.notices.tell("There is only background. Double click on the scene to turn around that point.");
     else if (!isLocked()) glide(page, point);
   });
+}
+
+/** The point of the scene [3] that is seen below a pointer; null for the background. */
+export function pointBelow({ camera, canvas, renderer, shown, state }, { offsetX, offsetY }) {
+  const [width, height] = renderer.size();
+  const place = [offsetX * width / canvas.clientWidth, offsetY * height / canvas.clientHeight];
+  return renderer.pointAt(camera, state.scene, shown, place.map(Math.floor));
 }
 
 /** Move the target to a point, the picture with it; unless something else moves it meanwhile. */

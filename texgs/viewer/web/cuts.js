@@ -40,7 +40,7 @@ export class Cuts {
     this.#add = element("button", { type: "button", onclick: () => this.#addPlane() }, "Add a plane");
     this.#faces = element("select", { onchange: () => this.#send(0) });
     this.#faces.append(new Option("Shaded", "shaded"), new Option("Without light", "unlit"));
-    if (page.state.scene.volume === true) this.#faces.append(new Option("Slice", "slice")); // by a server
+    if (page.state.scene.slices) this.#faces.append(new Option("Slices", "slice"));
     const shown = tick("Arrows in the picture", (isOn) => this.#handles.turn(isOn));
     const name = element("span", { className: "name" }, "Faces");
     const faces = element("label", { className: "row" }, name, this.#faces);
@@ -49,6 +49,11 @@ export class Cuts {
     shown.show(true);
     page.state.addEventListener("change", () => this.show());
     this.show();
+  }
+
+  /** Whether there is room for another plane. */
+  get hasRoom() {
+    return this.planes.length < MOST;
   }
 
   /** Show the cuts as they are. */
@@ -61,7 +66,7 @@ export class Cuts {
       this.#list.replaceChildren(...this.planes.map((_, index) => this.#planeInputs(index)));
     }
     for (const show of this.#inputs) show();
-    this.#add.disabled = this.planes.length >= MOST;
+    this.#add.disabled = !this.hasRoom;
     this.#faces.value = faces;
     this.draw();
   }
@@ -69,6 +74,20 @@ export class Cuts {
   /** Draw what stands over the picture. */
   draw() {
     this.#handles.draw();
+  }
+
+  /** Put a plane with a slice in the place of another one, or beside the others; null: take that away.
+   *
+   * @param {?{normal: number[], offset: number}} before - undefined planes of the scene stay
+   * @param {?object} plane
+   * @param {number[]} window - values that are black and white
+   */
+  showSlice(before, plane, window, step) {
+    const index = before ? this.planes.findIndex((each) => same(plain(each), before)) : -1;
+    if (index >= 0) this.planes.splice(index, 1, ...(plane ? [{ ...plane, isOn: true }] : []));
+    else if (plane) this.planes.push({ ...plane, isOn: true });
+    this.#faces.value = plane ? "slice" : "shaded";
+    this.#send(step, undefined, plane ? window : null);
   }
 
   /** The point of a plane that it is held at: the nearest to the one around which it was tilted, or the middle. */
@@ -127,10 +146,9 @@ export class Cuts {
     return Number((round(x / this.unit) * this.unit).toFixed(9));
   }
 
-  #send(step, box = this.#page.state.scene.cuts.box) {
-    const { window, faces } = this.#page.state.scene.cuts, kept = window ? { window } : {}; // values of slices
+  #send(step, box = this.#page.state.scene.cuts.box, window = this.#page.state.scene.cuts.window) {
     const planes = this.planes.filter((each) => each.isOn).map(plain);
-    const cuts = { planes, box, faces: this.#faces.value || faces, ...kept };
+    const cuts = { planes, box, faces: this.#faces.value, window };
     if (same(cuts, this.#page.state.scene.cuts)) this.show();
     else this.#page.state.edit("", "cuts", cuts, step);
   }

@@ -1,6 +1,6 @@
 // Native inputs that edit one value: they show what the state has, except while they are being used.
 
-const BURST = 1000; // milliseconds between keys that are one step of the history
+export const BURST = 1000; // milliseconds between keys that are one step of the history
 let gestures = 0; // from the first input of a control to its change, or to the last of a burst of keys
 
 /** A step of its own, for edits that are one. */

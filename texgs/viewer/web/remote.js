@@ -12,7 +12,7 @@ export class Remote {
   #picture = null; // that frame: where two are compared, the other one is to its right
   #wipe = 0.5; // part of the width that shows the first of two
   #isPair = false;
-  #picked = () => {}; // takes the point that was asked for last
+  #picks = new Map(); // what takes points that were asked for, by their ids
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -33,7 +33,7 @@ export class Remote {
     this.modes = scene.modes;
     connection.addEventListener("frame", ({ detail }) => this.#receive(detail));
     connection.addEventListener("message", ({ detail }) => {
-      if (detail.type === "point") this.#picked(detail.point);
+      if (detail.type === "point") this.#take(detail);
       if (detail.frame === this.#asked) this.#refuse(detail.text);
       if (detail.frame === this.#asked || detail.refused) this.#next();
     });
@@ -57,14 +57,21 @@ export class Remote {
 
   /** The point of the scene [3] that a pixel shows; null for the background. */
   pointAt(camera, scene, shown, pixel) {
-    this.#connection.send({ type: "pick", view: this.#view(camera, shown), pixel });
-    return new Promise((resolve) => { this.#picked = resolve; });
+    const id = ++this.#count;
+    this.#connection.send({ type: "pick", view: this.#view(camera, shown), pixel, id });
+    return new Promise((resolve) => { this.#picks.set(id, resolve); });
   }
 
   /** Move the line between two pictures. */
   wipe(part) {
     this.#wipe = part;
     if (this.#picture) this.#paint();
+  }
+
+  /** Hand on a point; those that were asked for before it come no more. */
+  #take({ id, point }) {
+    this.#picks.get(id)?.(point);
+    for (const each of this.#picks.keys()) if (each <= id) this.#picks.delete(each);
   }
 
   #view(camera, { mode, before, only, gain }) {
