@@ -42,14 +42,15 @@ def test_labels_of_a_file_are_chosen_and_named_by_a_table(labels, tmp_path):
     table = written(tmp_path / "mine.label", SNAP.replace("say ", "bone "))
     volume = texgs.Volume(tmp_path / "seg.nrrd", kind="labels", labels=[2], names=table)
     (name,) = volume.suggest()
-    assert (name, volume.suggest()[name].color[0][1:]) == ("bone__aah", (0, 1, 0))
+    assert (name, volume.suggest()[name].color[0][1:]) == ("bone_aah", (0, 1, 0))
     assert list(volume.channels) == ['label bone "aah"']
     layers, _ = layered(tmp_path / "a.seg.nrrd")
     assert list(texgs.Volume(layers, kind="labels").suggest()) == ["Liver", "Tumour_left"]
 
 
 def test_labels_beside_an_image_join_its_functions(labels, tmp_path):
-    scan = np.random.default_rng(0).normal(20, 5, labels.shape).astype(np.float32) + 30 * (labels == 5)
+    scan = np.random.default_rng(0).normal(20, 5, labels.shape) + 30 * (labels == 5)
+    scan = scan.astype(np.float32)
     volume = texgs.Volume(scan, labels=labels, folder=tmp_path / "mine")
     np.testing.assert_array_equal(volume.grid.values, scan)
     assert [*volume.channels] == ["", "label 2", "label 5", "label 900"]

@@ -9,6 +9,7 @@ from typing import Any
 
 from texgs.config.dataset_labels import named
 from texgs.core.errors import ArgumentError
+from texgs.core.names import check_count
 from texgs.volume.grid import MAX_CHANNELS
 from texgs.volume.label_choice import choose, labels_in
 from texgs.volume.label_masks import MaskSource, on_lattice_of
@@ -23,7 +24,7 @@ def sources_of(
     labels: Any,
     table: str | Path | None,
     crop: Sequence[int] | None,
-    least: int,
+    reduce: int,
 ) -> tuple[dict[str, Label], list[Source]]:
     """Return labels by the names of their functions, and an image, if there is one, before their masks.
 
@@ -34,10 +35,11 @@ def sources_of(
         labels: of an image a file or an array; of labels the names or numbers of those that are shown.
         table: names and colours, see `texgs.volume.label_names.read_table`.
         crop: as for `texgs.Volume`.
-        least: samples of a label that nobody asks for.
+        reduce: the same; a label of fewer samples than a block is only shown where it is wanted.
     """
     if kind not in ("image", "labels"):
         raise ArgumentError(f"kind: expected image or labels, got {kind!r:.100}")
+    check_count("reduce", reduce)
     images = [open_file(data, None)] if kind == "image" else []
     if images and labels is None:
         return {}, images
@@ -47,11 +49,9 @@ def sources_of(
 
     @cache
     def layer_of(layer: str | None) -> Source:
-        return (
-            on_lattice_of(open_file(of, layer, name="labels", keys={}), images[0])
-            if images
-            else open_file(of, layer)
-        )
+        if not images:
+            return open_file(of, layer)
+        return on_lattice_of(open_file(of, layer, name="labels", keys={}), images[0])
 
     path = None if table is None else Path(table)
     if isinstance(of, str | Path):
@@ -59,6 +59,6 @@ def sources_of(
     else:
         known = [] if path is None else read_table(path)
     words = None if wanted is None else [*map(str, wanted)]
-    chosen = choose(labels_in(layer_of, known, crop), words, MAX_CHANNELS - len(images), least)
+    chosen = choose(labels_in(layer_of, known, crop), words, MAX_CHANNELS - len(images), reduce**3)
     masks = [MaskSource(layer_of(each.layer), each.number, each.name) for each in chosen]
     return named(chosen), [*images, *masks]

@@ -21,7 +21,7 @@ from texgs.api.keywords import takes
 from texgs.api.labels import sources_of
 from texgs.config.project import is_name, name_of
 from texgs.core.errors import ArgumentError
-from texgs.core.names import check_count, close, mask_name
+from texgs.core.names import close, mask_name
 from texgs.fields.part_edit import color
 from texgs.scene.frame import quantize
 from texgs.scene.scene import WHITE
@@ -106,23 +106,22 @@ class Volume:
         self.name = name = default_name(data) if name is None else name
         self._scratch = TemporaryDirectory(prefix="texgs-") if folder is None else None
         self.folder = Path(folder if folder is not None else self._scratch.name)  # type: ignore[union-attr]
-        check_count("reduce", reduce)
         crop, nan_value = several("crop", crop, 6, index), as_python(nan_value)
         open_file = partial(opened, name=name, spacing=spacing, origin=origin, keys=keys)
-        shown, sources = sources_of(data, open_file, kind, labels, names, crop, reduce**3)
-        source = sources[0]
-        self._channel = source.channel
+        shown, sources = sources_of(data, open_file, kind, labels, names, crop, reduce)
+        self._channel = sources[0].channel
         if up is None:
             up = "+z" if isinstance(data, str | Path) and tells_superior(Path(data)) else "+y"
         how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": nan_value}
-        summaries = self._prepared(sources, how)
-        self.summary = summaries[0]
-        if source.note:
-            warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
+        self.summary, *others = self._prepared(sources, how)
+        if note := sources[0].note:
+            warnings.warn(f"{name}: {note.replace('dataset.volume.', '')}", stacklevel=2)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         prepared = ["" if each.label is None else mask_name(each.label) for each in sources]
-        self.channels = dict(zip(prepared, summaries, strict=True))  # of the image by "", and of masks
-        write_summaries(self.file, summaries, prepared)
+        self.channels = dict(
+            zip(prepared, (self.summary, *others), strict=True)
+        )  # "" is the image, then masks
+        write_summaries(self.file, [*self.channels.values()], prepared)
         self._labels = {name: function_of(label_tf(each), prepared) for name, each in shown.items()}
 
     @classmethod

@@ -62,8 +62,8 @@ class Pick:
 class Slice:
     """Ask for a slice of the volume."""
 
-    plane: str  # its name, see `planes_of`
-    number: int
+    plane: int = key(REQUIRED, "across x, y or z of the file's space", least=0, most=2)
+    number: int = key(REQUIRED, "of the slice")
     window: tuple[float, float] = key(REQUIRED, "values in black and in white")
 
 

@@ -64,14 +64,14 @@ def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) ->
 
     known, functions = read_summaries(volume), {}
     for name, each in points.items():
-        wanted = each.values_of or ""
+        wanted = each.values_of or "" if len(known) > 1 else next(iter(known))
         mask = None if each.within is None else mask_name(each.within)
-        for channel in filter(None, (wanted if len(known) > 1 else None, mask)):
-            if channel not in known:
-                raise ArgumentError(
-                    f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got {channel}"
-                )
-        number = [*known].index(wanted) if wanted in known else 0
+        if missing := {wanted, mask or wanted} - known.keys():
+            raise ArgumentError(
+                f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got "
+                f"{missing.pop() or None}"
+            )
+        number = [*known].index(wanted)
         summary = [*known.values()][number]
         tf = in_data_values(name, each, tf_values, summary["minimum"], summary["maximum"], number)
         functions[name] = tf if mask is None else replace(tf, within=[*known].index(mask))

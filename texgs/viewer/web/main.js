@@ -68,7 +68,7 @@ class Page extends ScenePage {
     const made = new Slices(remoteSlices(slices), space ?? { axes: "xyz", unit: "" },
       (text) => this.notices.tell(text, "error"));
     made.addEventListener("click", () => this.measure.click(made.point));
-    this.addMark(new SlicesInScene(this, made, () => this.segments.isLocked));
+    this.addMark(new SlicesInScene(this, made, () => this.segments.isLocked || this.measure.isOn));
   }
 
   #segment(model) {

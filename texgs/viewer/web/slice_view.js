@@ -84,8 +84,9 @@ export class SliceView {
     const { source, index, window, tell } = this.#slices;
     try {
       const made = await source.slice(this.#plane, index[this.#number], window);
+      const picture = made instanceof ImageData ? await createImageBitmap(made) : made;
       this.#picture?.close();
-      this.#picture = made instanceof ImageData ? await createImageBitmap(made) : made;
+      this.#picture = picture;
       this.draw();
     } catch (error) {
       tell(`No slice: ${error.message}`);

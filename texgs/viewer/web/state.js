@@ -12,7 +12,7 @@ const MOST_STEPS = 200; // of the history: of more, the oldest cannot be undone
 const MOST_NAMED = 3; // markers in the title of a step
 const OF_SCENE = {
   light: null, shadows: 0, occlusion: 0, reach: 0.25, background: [1, 1, 1],
-  cuts: { planes: [], box: null, faces: "shaded", window: null }, functions: {}, markers: [], time: null,
+  cuts: { planes: [], box: null, faces: "shaded" }, functions: {}, markers: [], time: null,
 };
 
 /** Numbers of the steps in time that can be shown: all, or those that a page holds. */
