@@ -216,6 +216,7 @@ def test_a_mistake_in_an_edit_writes_nothing(scene, tmp_path, monkeypatch, capsy
         (["--device", "cuda"], "torch sees no GPU"),
         (["--mode", "normal", "--width", "300000"], "a frame of 300000 x 300000 pixels: needs 5364 GiB"),
         (["--compare", "--mode", "normal"], "--compare: expected --mode shaded, got normal"),
+        (["--compare", "--legend"], "--legend: expected neither --compare nor --slice"),
         (["--path", "cut"], "path cut: expected a scene that a plane cuts, got none"),
     ],
 )

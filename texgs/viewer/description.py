@@ -96,7 +96,7 @@ def describe(
         "models": models,
         "functions": plain_functions(scene.functions),
         "markers": [asdict(each) for each in scene.markers],
-        "legend": [asdict(each) for each in legend_of(scene, composed.palettes)],
+        "legend": [asdict(each) for each in legend_of(scene.as_fitted, composed.palettes)],
         "time": scene.time,
         "steps": list(scene.series.steps) if scene.series else [],
         "tfs": plain_functions(scene.volume.tfs) if scene.volume else {},

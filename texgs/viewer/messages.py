@@ -44,6 +44,7 @@ class View:
     wipe: float | None = key(None, "share of the width; default: beside it", least=0, most=1)
     moving: bool = False  # more views follow: speed counts more than quality
     before: bool = False  # the scene as it was opened
+    legend: bool = False  # of the scene, in a picture that is saved
     transparent: bool = False  # without background; of the scene or its volume alone
     only: str = ""  # a model to show alone and unedited, for clicks
 

@@ -67,12 +67,14 @@ class Page extends ScenePage {
   #addSlices({ slices, space }) {
     const made = new Slices(remoteSlices(slices), space ?? { axes: "xyz", unit: "" },
       (text) => this.notices.tell(text, "error"));
+    made.addEventListener("click", () => this.measure.click(made.point));
     this.addMark(new SlicesInScene(this, made, () => this.segments.isLocked));
   }
 
   #segment(model) {
     if (!this.mayBegin()) return;
     this.looks.leave();
+    this.measure.turn("");
     this.segments.start(model);
   }
 

@@ -5,8 +5,10 @@ import { EditHistory } from "./history.js";
 import { download, toHex } from "./inputs.js";
 import { Notices } from "./notices.js";
 import { Panel } from "./panel.js";
+import { drawMarks } from "./picture_marks.js";
 import { ScenePage } from "./scene_page.js";
 import { PictureDialog } from "./size_inputs.js";
+import { inFile } from "./space.js";
 import { State, difference } from "./state.js";
 import { TimeSlider } from "./time.js";
 import { TransferEditor } from "./transfer.js";
@@ -57,7 +59,7 @@ class StandalonePage extends ScenePage {
 
   #tellWords() {
     const { original, scene } = this.state, edits = difference(original, scene);
-    const isFunctions = ({ key }) => key === "functions", words = edits.filter((edit) => !isFunctions(edit)).flatMap(wordsOf);
+    const isFunctions = ({ key }) => key === "functions", words = edits.filter((edit) => !isFunctions(edit)).flatMap((edit) => wordsOf(edit, scene.space));
     tell("words", words.map(quoted).join(" "));
     if (scene.volume) tell("functions", edits.filter(isFunctions).map(({ value }) => `functions: ${JSON.stringify(value)}`).join());
   }
@@ -65,7 +67,9 @@ class StandalonePage extends ScenePage {
   /** Save a picture of the view, by default in the pixels of the screen. */
   async #save(how) {
     try {
-      const canvas = await this.renderer.still(this.camera, this.state.scene, { ...this.shown, ...how });
+      const { before, legend } = this.shown, { original, scene } = this.state;
+      const canvas = await this.renderer.still(this.camera, scene, { ...this.shown, ...how });
+      drawMarks(canvas, before ? original : scene, this.camera, legend);
       const blob = await new Promise((done) => canvas.toBlob(done));
       if (!blob) throw new Error("This browser cannot make a picture of this size.");
       download(blob, `${this.state.scene.name}.png`);
@@ -82,7 +86,7 @@ function tell(id, text) {
 }
 
 /** An edit as `texgs edit` takes it. */
-function wordsOf({ part, key, value }) {
+function wordsOf({ part, key, value }, space) {
   const place = part ? `${part}.${key}` : key;
   if (key === "light") return `light=${value ? `${value.azimuth},${value.polar}` : "headlight"}`;
   if (key === "cuts") {
@@ -90,12 +94,17 @@ function wordsOf({ part, key, value }) {
     const box = value.box ? [...value.box.low, ...value.box.high] : "";
     return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`, ...(value.window ? [`cut.window=${value.window}`] : [])];
   }
+  if (key === "markers") {
+    const words = ({ points, text }) => `${points.length > 1 ? "distance" : "marker"}=${text ? `${text}@` : ""}`
+      + points.map((point) => inFile(point, space).map((x) => Number(x.toPrecision(9))).join()).join(":");
+    return ["marker=none", ...value.map(words)];
+  }
   return `${place}=${Array.isArray(value) ? toHex(value) : value ?? ""}`;
 }
 
 /** A word as a shell takes it. */
 function quoted(word) {
-  return /^[\w./#,=+-]*$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
+  return /^[\w./#,=+:@-]*$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
 }
 
 async function start() {
