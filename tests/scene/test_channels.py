@@ -102,10 +102,15 @@ def test_a_channel_that_the_volume_lacks_is_told(scene):
     refused(lambda: shown(broken), "channel: expected one of 0 to 1, got 2")
 
 
-def test_a_page_carries_no_channels_and_has_no_editor_of_functions(scene):
-    refused(lambda: page_volume(scene, 1.0), "volume: .*several channels")
-    one = replace(scene, volume=replace(scene.volume, tfs={"C0": scene.volume.tfs["C0"]}))
-    assert ("volume" in exports_of(one), "volume" in exports_of(scene)) == (True, False)
-    assert Origins(scene).transfer is None
-    assert Origins(one).transfer is not None
-    assert page_volume(one, 1.0).codes.ndim == 3
+def test_a_page_carries_the_channels_that_functions_use_and_has_an_editor_of_the_first_alone(scene):
+    # Slices show the first.
+    for names, numbers in ((("C0",), [0]), (("C1",), [0, 1]), (("C0", "C1"), [0, 1])):
+        tfs = {name: scene.volume.tfs[name] for name in names}
+        shown = replace(scene, volume=replace(scene.volume, tfs=tfs))
+        carried = page_volume(shown, 1.0)
+        assert [each["number"] for each in carried.describe(shown)["channels"]] == numbers
+        assert len(carried.codes) == len(numbers) * len(open_grid(scene.volume.file).values)
+        assert (Origins(shown).transfer is None) is (1 in numbers)
+        assert "volume" in exports_of(shown)
+    masked = {"C0": replace(scene.volume.tfs["C0"], within=1)}
+    assert page_volume(replace(scene, volume=replace(scene.volume, tfs=masked)), 1.0).numbers == [0, 1]

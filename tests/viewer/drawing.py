@@ -124,7 +124,9 @@ class Drawing:
     def describe(self, scene):
         """The description of a scene of the same models."""
         described = describe("test", scene, scene.open()) | self._held
-        return described | ({"volume": self._volume.describe(scene)} if self._volume else {})
+        if self._volume:
+            described |= {"volume": self._volume.describe(scene), "slices": self._volume.slices(scene)}
+        return described
 
     def draw(self, scene, camera, mode="shaded", **shown):
         """What the page draws [H, W, 3], integers."""

@@ -20,8 +20,11 @@ from texgs.scene.segment_file import write_segment
 from texgs.scene.series_file import Series, write_series
 from texgs.volume.generate import sphere
 from texgs.volume.grid import Grid
-from texgs.volume.prepare import prepare
+from texgs.volume.label_masks import HALF, INSIDE, MaskSource
+from texgs.volume.prepare import prepare, prepare_channels
 from texgs.volume.slabs import ArraySource
+from texgs.volume.space import UNKNOWN_SPACE
+from texgs.volume.transfer import TransferFunction
 
 COUNT, BEGIN = 5, 2  # steps of the series, and the one that its scene shows
 
@@ -65,6 +68,36 @@ def waves(shape=(30, 26, 34), spacing=(1.0, 1.5, 0.7)):
 def scene_of_volume(folder, grid):
     """Two balls of surfels beside a volume that they have little to do with."""
     return Scene(ball_models(folder, "low", "high"), volume=volume_of(folder, grid))
+
+
+def nested(shape=(44, 40, 48)):
+    """Labels of three balls, 1 the outermost, one in the other, on a lattice with different spacings."""
+    z, y, x = np.meshgrid(*(np.linspace(-1, 1, size) for size in shape), indexing="ij")
+    radius, labels = np.sqrt(x**2 + y**2 + z**2), np.zeros(shape, np.uint8)
+    for number, most in enumerate((0.9, 0.6, 0.3), 1):
+        labels[radius < most] = number
+    return Grid(labels, (1.0, 1.2, 0.9), (3.0, -2.0, 10.0))
+
+
+def image_on(grid, values):
+    """An image of the bytes from 0 to 255 of values, on the lattice of a grid."""
+    shares = (values - values.min()) / np.ptp(values)
+    return replace(grid, values=(255 * shares).round().astype(np.uint8))
+
+
+def scene_of_labels(folder, image=None, within=None, space=UNKNOWN_SPACE):
+    """Balls of surfels with a mask each; an image beside them has a function, maybe within a mask."""
+    source = ArraySource(replace(nested(), space=space), "balls")
+    masks = [MaskSource(source, number) for number in (1, 2, 3)]
+    sources = [*([ArraySource(replace(image, space=space), "image")] if image else []), *masks]
+    prepare_channels(sources, folder / "volume.nrrd")
+    looks, tfs = (((0.9, 0.6, 0.2), 0.03), ((0.2, 0.6, 0.9), 0.95), ((0.8, 0.2, 0.3), 0.95)), {}
+    for number, (color, opacity) in enumerate(looks):
+        points = ((HALF, opacity), (INSIDE, opacity))
+        tfs[f"ball {number + 1}"] = TransferFunction(points, ((HALF, *color),), number + bool(image))
+    if image:
+        tfs["image"] = replace(LOW.scaled(*ends_of(image)), within=within)
+    return Scene(ball_models(folder, *tfs), volume=SceneVolume(folder / "volume.nrrd", tfs, LOOK))
 
 
 def at(model, time):

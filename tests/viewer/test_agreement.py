@@ -17,6 +17,9 @@ from tests.viewer.drawn_scenes import (
     BEGIN,
     COUNT,
     ends_of,
+    image_on,
+    nested,
+    scene_of_labels,
     scene_of_parts,
     scene_of_series,
     scene_of_volume,
@@ -29,7 +32,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.cut_view import scene_and_volume
-from texgs.scene.frame import frame
+from texgs.scene.frame import frame, point_at
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.shot import Mode
 from texgs.scene.twin import Twin, range_of
@@ -38,7 +41,7 @@ from texgs.viewer.messages import Orbit, View
 from texgs.viewer.standalone import pack
 from texgs.volume.generate import sphere
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.transfer import TransferFunction, combine
+from texgs.volume.transfer import TransferFunction
 
 CAMERAS = [
     orbit(30, 20, 3, 40, 96, 64),
@@ -61,6 +64,13 @@ CUTS = Cuts([Plane([1.0, 0.2, 0.0], 0.1), Plane([0.0, 1.0, 0.3], 0.2)])
 BOX = Cuts(box=Box([-0.3, -0.4, -0.2], [0.2, 0.3, 0.4]))
 FACE_LIGHTS = ("shaded", "unlit")
 VOLUMES = {"sphere": lambda: sphere(40), "waves": waves, "flat": lambda: waves((24, 2, 20), (1, 3, 1))}
+FLOATS = waves(nested().values.shape).values
+LUMPS = image_on(nested(), FLOATS)
+CHANNELS = {  # of a volume: masks of labels, and an image as well
+    "labels": scene_of_labels,
+    "image and labels": lambda folder: scene_of_labels(folder, LUMPS),
+    "in a label": lambda folder: scene_of_labels(folder, replace(nested(), values=FLOATS), within=1),
+}
 PARTS = [PartEdit(), PartEdit(palette=(0.1, 0.6, 0.2)), PartEdit(opacity=0.4, specular=3.0)]
 GLOSSY = {"specular": 4.0, "shininess": 0.2}
 EDITS = [  # of the model with two segments, and of the next one
@@ -108,6 +118,8 @@ def drawing(chromium, tmp_path_factory):
         folder = tmp_path_factory.mktemp(name)
         if name in VOLUMES:
             return Drawing(chromium, scene_of_volume(folder, VOLUMES[name]()), has_volume=True)
+        if name in CHANNELS:
+            return Drawing(chromium, CHANNELS[name](folder), has_volume=True)
         if name == "series":
             return Drawing(chromium, scene_of_series(folder))
         if name == "bright":  # texels beyond eight bits
@@ -145,6 +157,7 @@ def cases(names, cameras, modes, changes, limit):
 TRIED = {"functions": (("high", WIDE), ("new", HIGH))}
 LIGHTS = [{"light": light} for light in (HEADLIGHT, SIDE, BELOW)]
 FACES = [{"cuts": replace(cuts, faces=faces), "light": SIDE} for cuts in (CUTS, BOX) for faces in FACE_LIGHTS]
+SLICES = [{"cuts": replace(cuts, faces="slice")} for cuts in (CUTS, BOX)]
 SHADOWS = [
     {"light": replace(light, shadows=0.9, occlusion=occlusion), "cuts": cuts}
     for light, occlusion in ((SIDE, 0.0), (SIDE, 0.7), (HEADLIGHT, 0.7))
@@ -169,9 +182,13 @@ CASES = [  # the limit is the least PSNR in dB, or how many levels, or both wher
     *cases(VOLUMES, [CAMERA], ["volume"], [{"edits": [edit]} for edit in OF_VOLUMES], LEAST),
     *cases(VOLUMES, [CAMERA], ["volume", "shaded"], [TRIED], LEAST),
     *cases(VOLUMES, [CAMERA], ["volume", "shaded"], FACES, LEAST - 3),
+    *cases([*VOLUMES, *CHANNELS], [CAMERA], ["volume", "shaded"], SLICES, CLOSE),
     # Cells of light in a page are not smaller than those between its samples.
     *cases(["sphere", "waves"], [CAMERA], ["volume", "shaded"], SHADOWS, LEAST - 3),
-    *cases(["flat"], [CAMERA], ["volume", "shaded"], SHADOWS, LEAST - 7),
+    *cases(["flat", *CHANNELS], [CAMERA], ["volume", "shaded"], SHADOWS, LEAST - 7),
+    *cases(CHANNELS, [CAMERA, FROM_BELOW], ["volume"], LIGHTS[:2], LEAST),
+    *cases(CHANNELS, [CAMERA], ["volume"], [{"edits": [edit]} for edit in OF_VOLUMES], LEAST),
+    *cases(CHANNELS, [CAMERA], ["volume", "shaded"], FACES, LEAST - 3),
     # A volume has one material: models with others are seen below faces.
     *cases(
         *(VOLUMES, [CAMERA], ["shaded"]),
@@ -243,24 +260,27 @@ def depth_at(opened, scene, mode, column, row):
     return opened.page.evaluate(DEPTH, words)
 
 
-@pytest.mark.parametrize("name", VOLUMES)
-def test_a_double_click_turns_around_what_the_mode_shows(drawing, name):
-    """The volume or the models at the depth of the caster or the rasterizer, or else a face of a cut."""
+@pytest.mark.parametrize("name", [*VOLUMES, *CHANNELS])
+def test_a_click_finds_the_place_that_texgs_finds(drawing, name):
+    """In the volume, on a face of a cut, or where a mode shows models alone."""
     opened, scene = drawing(name), drawing(name).scene
-    volume = Twin(scene)._caster.cast(combine(scene.volume.tfs), CAMERA, HEADLIGHT, ("depth",))
-    models = scene.open().render(CAMERA, HEADLIGHT, scene.edits, outputs=("depth",))
-    row, column = divmod(int(volume.rgba[..., 3].argmax()), CAMERA.width)
-    for mode, expected in (("volume", volume), ("shaded", models)):
-        assert depth_at(opened, scene, mode, column, row) == pytest.approx(
-            float(expected.depth[row, column]), abs=5e-3
-        )
-        assert depth_at(opened, scene, mode, 0, 0) is None, "the background"
-    cut = replace(scene, cuts=CUTS)
-    seen = Twin(cut).render(CAMERA, cut, scene.open().palettes, range_of(CUTS, CAMERA), outputs=("depth",))
-    face = torch.where(range_of(CUTS, CAMERA).face >= 0, seen.alpha, 0.0)
-    row, column = divmod(int(face.argmax()), CAMERA.width)
-    found = depth_at(opened, cut, "shaded", column, row)
-    assert found == pytest.approx(float(seen.depth[row, column]), abs=5e-3)
+    composed = scene.open()
+    for cuts in (NO_CUTS, CUTS, replace(CUTS, faces="slice")):
+        seen = replace(scene, cuts=cuts)
+        twin = Twin(seen)
+        alpha = twin.render(CAMERA, seen, composed.palettes).alpha
+        if cuts:
+            alpha = torch.where(range_of(cuts, CAMERA).face >= 0, alpha, 0.0)
+        row, column = divmod(int(alpha.argmax()), CAMERA.width)
+        for mode in ("volume", "shaded"):
+            point = point_at(composed, CAMERA, seen, mode, twin, (column, row))
+            depth = float(
+                CAMERA.viewmat[2, :3].double() @ torch.tensor(point).double() + CAMERA.viewmat[2, 3]
+            )
+            assert depth_at(opened, seen, mode, column, row) == pytest.approx(depth, abs=5e-3)
+            assert depth_at(opened, seen, mode, 0, 0) is None, "the background"
+    depth = composed.render(CAMERA, HEADLIGHT, scene.edits, outputs=("depth",)).depth[40, 48]
+    assert depth_at(opened, scene, "normal", 48, 40) == pytest.approx(float(depth), abs=5e-3)
 
 
 @pytest.mark.parametrize("name", VOLUMES)

@@ -20,7 +20,8 @@ Object.assign(globalThis, { evenDirections });
 globalThis.sweep = ({ codes, sizes, half, unit, longest, extinctions, planes, direction, sky, points }) => {
   const table = Float32Array.from(extinctions.flatMap((extinction) => [0, 0, 0, extinction]));
   const facts = { half, appearance: { opacity_unit: unit } };
-  const matter = new Matter({ codes: Uint8Array.from(codes), sizes }, facts, longest, table, planes);
+  const tables = [{ table, channel: 0, mask: -1 }], samples = { channels: [Uint8Array.from(codes)], sizes };
+  const matter = new Matter(samples, facts, longest, tables, planes);
   const light = () => sky ? matter.opened(sky.reach, evenDirections(sky.count)) : matter.lit(direction);
   const cells = sky || direction ? light() : matter.extinctions;
   return { ...cells, values: [...cells.values], at: points.map((point) => valueAt(cells, ...point)) };

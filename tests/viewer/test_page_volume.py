@@ -30,7 +30,8 @@ VIEW = parse(json.dumps({"type": "view", "camera": {**PLACE, "width": 96, "heigh
 
 def values_of(volume: PageVolume):
     """Values that codes stand for."""
-    return volume.low + volume.codes.astype(float) * (volume.high - volume.low) / LEVELS
+    ((low, high),) = volume.ends
+    return low + volume.codes.astype(float) * (high - low) / LEVELS
 
 
 def resampled(values, shape):
@@ -53,10 +54,27 @@ def test_codes_are_the_trilinear_values_within_the_bytes_allowed(shape, kind, mo
     grid = Grid(made.astype(kind))
     volume = within(grid, most)
     assert len(volume.packed) <= most
-    assert (volume.low, volume.high) == (grid.values.min(), grid.values.max())
-    step = volume.step * (volume.high - volume.low) / LEVELS
+    assert volume.ends == [(grid.values.min(), grid.values.max())]
+    step = volume.step * np.ptp(volume.ends) / LEVELS
     error = np.abs(values_of(volume) - resampled(grid.values, volume.codes.shape)).max()
-    assert error <= 0.5 * step + 1e-4 * (volume.high - volume.low)
+    assert error <= 0.5 * step + 1e-4 * np.ptp(volume.ends)
+
+
+def test_channels_have_one_lattice_and_a_range_each():
+    image, *masks = (np.random.default_rng(seed).normal(100, 20, (9, 10, 11)) for seed in range(3))
+    masks = [np.uint8(mask > 100) * np.uint8(255) for mask in masks]
+    grid = Grid(image.astype(np.float32), others=tuple(masks))
+    for most, is_whole in ((10_000, True), (700, False)):
+        volume = within(grid, most)
+        assert len(volume.packed) <= most
+        assert volume.ends == [(grid.values.min(), grid.values.max()), (0, 255), (0, 255)]
+        z, y, x = volume.codes.shape
+        assert ((z // 3, y, x) == image.shape) is is_whole
+        assert "of 3 channels, " in str(volume)
+        for values, codes, ends in zip((image, *masks), np.split(volume.codes, 3), volume.ends, strict=True):
+            known = ends[0] + codes * (np.ptp(ends) / LEVELS)
+            error = np.abs(known - resampled(values, codes.shape)).max()
+            assert error <= (0.5 * volume.step / LEVELS + 1e-4) * np.ptp(ends)
 
 
 def test_a_volume_that_fits_stays_as_it_is():

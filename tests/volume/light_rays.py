@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from tests.volume.march import Exposure, sample
+from tests.volume.march import Exposure, inside, sample
 from texgs.core.camera import orbit_direction
 from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.light import Light
@@ -53,6 +53,7 @@ class LightRays:
         total = torch.zeros(points.shape[:-1], dtype=torch.float64)
         for tf, values in zip(self.tfs, self._values, strict=True):
             opacity = torch.from_numpy(tf(sample(values, points / self.half))[..., 3])
+            opacity[~inside(self.grid, tf, points / self.half)] = 0
             total -= (1 - opacity).clamp_min(LEAST_LIGHT).log2() / self.opacity_unit
         for plane in self.cuts.half_spaces:
             total[points @ points.new_tensor(plane.normal) > plane.offset] = 0

@@ -47,11 +47,12 @@ def march(
 
     A sample has opacity 1 - (1 - a)^(step / opacity unit) and the colour of `shade`. Of several channels it
     has the product of what is let through, and colours and normals by their shares of the logarithm of that.
+    What is outside of a function's mask has no opacity.
     A cut leaves what of the steps of samples lies in its range. Over an opacity unit behind a face they are
     shaded by its normal, and where that is most of their step, light comes along it.
     """
     tfs = [tf] if isinstance(tf, TransferFunction) else tf
-    channels = [Tensor(grid.channel(each.channel).values) for each in tfs]
+    channels = [as_tensor(grid.channel(each.channel).values) for each in tfs]
     half, cells = torch.tensor(grid.aabb[1]), torch.tensor(grid.dims) - 1
     step = look.step * float((2 * half / cells).min())
     rays = camera.rays().reshape(-1, 3)  # [n, 3], camera z is 1
@@ -65,6 +66,8 @@ def march(
     points = origin + z[..., None] * direction[:, None]  # [n, k, 3]
     seen = [each(sample(values, points)) for each, values in zip(tfs, channels, strict=True)]
     rgba = torch.from_numpy(np.stack(seen)).float()  # [C, n, k, 4]
+    for each, of_channel in zip(tfs, rgba, strict=True):
+        of_channel[~inside(grid, each, points), 3] = 0
     left, of_face, plane = shares_of(cut, near, stretch, count, look.opacity_unit / step)
     own = 1 - (1 - rgba[..., 3]) ** (left * (step / look.opacity_unit))
     own = torch.where(z < far[:, None], own, 0)
@@ -116,6 +119,19 @@ def shares_of(
     of_face = torch.where(face >= 0, (begin + unit - k).clamp(0, 1), 0)
     left = torch.minimum(k + 1, end) - torch.maximum(k, begin)
     return left.clamp(0, 1), of_face, cut.normals[face[:, 0].clamp_min(0)]
+
+
+def as_tensor(values: np.ndarray, dtype: type = np.float32) -> Tensor:
+    """Return samples of any type as floats."""
+    return torch.from_numpy(values.astype(dtype))
+
+
+def inside(grid: Grid, tf: TransferFunction, points: Tensor) -> Tensor:
+    """Return whether points [..., 3] in [-1, 1] are inside of a function's mask, if it has one."""
+    if tf.within is None:
+        return torch.ones(points.shape[:-1], dtype=torch.bool)
+    mask = as_tensor(grid.channel(tf.within).values, np.float64).to(points)
+    return sample(mask, points) >= 127.5
 
 
 def sample(values: Tensor, points: Tensor) -> Tensor:

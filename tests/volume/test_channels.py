@@ -150,6 +150,13 @@ def test_a_header_with_another_number_of_channels_is_refused(tmp_path, count):
         open_grid(file)
 
 
+def test_a_header_with_more_masks_than_the_file_has_is_refused(tmp_path):
+    prepare_channels([ArraySource(ball(8)), ArraySource(ball(8))], file := tmp_path / "all.nrrd")
+    file.write_bytes(file.read_bytes().replace(b"\n#-", b"\nmasksoflabels:=99999999999\n#-", 1))
+    with pytest.raises(ArgumentError, match=r"all\.nrrd: "):
+        open_grid(file)
+
+
 def test_the_frame_is_around_what_all_channels_show():
     """Two balls of radius 0.2 in the world, 0.5 apart: each channel has one."""
     x, y, z = lattice(41, 41, 41)
@@ -229,7 +236,7 @@ def test_the_library_refuses_channels_that_do_not_fit_together():
     longer = NativeVolume(torch.zeros(3, 2, 2), 8, (2, 2, 3), (0.5, 0.5, 0.5))
     transfer, view = NativeTransfer(2, points), NativeView()
     distance, cells = torch.zeros(4, dtype=torch.uint8), torch.zeros(1, 2, dtype=torch.int32)
-    for volumes, message in (([volume] * 17, "1 to 16"), ([volume, longer], "one lattice and type")):
+    for volumes, message in (([volume] * 17, "1 to 16"), ([volume, longer], "one lattice")):
         n = len(volumes)
         arrays = (NativeVolume * n)(*volumes), (NativeTransfer * n)(*[transfer] * n)
         with pytest.raises(ArgumentError, match=message):

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from tests.refusals import refused
 from tests.volume.functions import GREY, functions
+from tests.volume.march import inside as inside_of_mask
 from tests.volume.march import sample
 from tests.volume.scenes import SHELLS, ball, constant, lattice
 from texgs.core.cuts import Box, Cuts, Plane
@@ -51,6 +52,7 @@ def brute_force(grid, tfs, size, cuts=None, unit=UNIT):
     for tf in tfs:
         values = torch.from_numpy(grid.channel(tf.channel).values.astype(np.float64))
         opacity = tf(sample(values, torch.from_numpy(points)))[..., 3]
+        opacity[~inside_of_mask(grid, tf, torch.from_numpy(points)).numpy()] = 0
         edge = (2 * half / size).min()
         with np.errstate(divide="ignore"):
             total -= np.log2(1 - opacity) * edge / unit

@@ -24,7 +24,7 @@ from texgs.core import memory
 from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError
 from texgs.core.native_sources import SUFFIX, built_from, library_sources
 
-ABI_VERSION = 8
+ABI_VERSION = 9
 FOLDER = Path(__file__).parent / "_native"
 CSRC = Path(__file__).parent / "csrc"
 INSTALL_ADVICE = "install texgs again (pip install .)"

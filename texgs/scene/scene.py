@@ -43,8 +43,8 @@ class SceneVolume:
 
     @property
     def has_channels(self) -> bool:
-        """Return whether functions use more than the first channel."""
-        return any(tf.channel for tf in self.tfs.values())
+        """Return whether functions use more than the first channel: others, or masks."""
+        return any(tf.source != (0, None) for tf in self.tfs.values())
 
 
 @dataclass(frozen=True)

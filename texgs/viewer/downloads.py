@@ -76,8 +76,7 @@ def exports_of(scene: Scene) -> list[str]:
     """Return what a scene can be written as."""
     kind = kind_of(next(iter(scene.models.values())).file)
     able = [*FILMS, *(each for each in kind.exports if each not in export_keys.MODEL_KINDS)]
-    has_volume = scene.volume is not None and not scene.volume.has_channels
-    return [*able, "volume"] if "html" in able and has_volume else able
+    return [*able, "volume"] if "html" in able and scene.volume is not None else able
 
 
 def require_kind(scene: Scene, kind: str) -> None:

@@ -1,7 +1,9 @@
 """The volume of a scene in a page: fewer samples, in 8 bits at most, packed."""
 
 import zlib
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import product
 from math import prod
 from typing import Any
 
@@ -13,6 +15,7 @@ from texgs.core.errors import ArgumentError, errors_at
 from texgs.scene.scene import Scene, volume_of
 from texgs.volume.grid import Grid, Triple
 from texgs.volume.nrrd_file import REMEDY, open_grid
+from texgs.volume.slices import planes_of, window_of
 
 MEGABYTE = 10**6
 LEVELS = 255  # the largest code of 8 bits
@@ -29,46 +32,58 @@ LONGEST_SIDE = 1024  # samples; all graphics cards hold that
 
 @dataclass(frozen=True, eq=False)
 class PageVolume:
-    """Samples on a coarser lattice between the same corners, as codes of values from `low` to `high`."""
+    """Samples on a coarser lattice between the same corners, as codes of values."""
 
-    codes: np.ndarray  # [Z, Y, X] uint8
+    codes: np.ndarray  # [C Z, Y, X] uint8, one channel behind the other
     step: int  # between codes
-    low: float
-    high: float
+    ends: list[tuple[float, float]]  # values of the least and the largest code of each channel
     half: Triple  # half the sides of the box between the corners, x, y, z, world units
     packed: bytes
+    numbers: Sequence[int] = (0,)  # of the channels, in the volume
 
     def __str__(self) -> str:
         """Say how much is left of a volume."""
-        z, y, x = self.codes.shape
-        step = self.step * (self.high - self.low) / LEVELS
-        return f"{x} x {y} x {z} samples in steps of {step:.3g}, {len(self.packed) / MEGABYTE:.2f} MB"
+        (z, y, x), (low, high), count = self.codes.shape, self.ends[0], len(self.ends)
+        step = f"in steps of {self.step * (high - low) / LEVELS:.3g}"
+        of = step if count == 1 else f"of {count} channels"
+        return f"{x} x {y} x {z // count} samples {of}, {len(self.packed) / MEGABYTE:.2f} MB"
 
     def describe(self, scene: Scene) -> dict[str, Any]:
         """Return what a page needs beside the samples to draw the volume of a scene."""
-        facts = {"low": self.low, "high": self.high, "half": self.half, "looks": scene.has_looks}
+        channels = [
+            {"number": number, "low": low, "high": high}
+            for number, (low, high) in zip(self.numbers, self.ends, strict=True)
+        ]
+        facts = {"channels": channels, "half": self.half, "looks": scene.has_looks}
         return {**facts, "appearance": asdict(volume_of(scene).appearance)}
+
+    def slices(self, scene: Scene) -> dict[str, Any]:
+        """Return planes of slices of the file, and what a page needs beside the samples to draw them."""
+        grid, (low, high) = open_grid(volume_of(scene).file), self.ends[0]
+        step = self.step * (high - low) / LEVELS
+        facts = {"window": window_of(grid), "step": step, "matrix": grid.world.matrix}
+        return {"planes": [asdict(plane) for plane in planes_of(grid)], **facts}
 
 
 def page_volume(scene: Scene, budget: float) -> PageVolume:
-    """Return the volume that a scene names, with as many samples as a budget in MB holds.
+    """Return the channels that a scene shows of its volume, with as many samples as a budget in MB holds.
 
     Raises:
-        ArgumentError: if the scene names no volume, or it cannot be read or has several channels.
+        ArgumentError: if the scene names no volume, or it cannot be read.
     """
     source = volume_of(scene)
-    if source.has_channels:
-        raise ArgumentError(
-            "volume: the scene shows several channels, and a page carries one; leave the volume out of the "
-            "page, or make a data set of one channel"
-        )
+    shown = [number for tf in (*source.tfs.values(), *scene.functions.values()) for number in tf.source]
+    numbers = sorted({0, *(number for number in shown if number is not None)})  # slices show the first
     with errors_at("volume"):
-        return within(open_grid(source.file), budget * MEGABYTE)
+        grid = open_grid(source.file)
+        first, *others = [grid.channel(number) for number in numbers]
+        grid = replace(first, others=tuple(each.values for each in others))
+        return replace(within(grid, budget * MEGABYTE), numbers=numbers)
 
 
 def within(grid: Grid, most: float) -> PageVolume:
     """Return a volume in `most` bytes, by the step between codes that comes closest to the grid."""
-    ends, best, least = extremes(grid.values), None, np.inf
+    ends, best, least = [extremes(values) for values in channels_of(grid)], None, np.inf
     for step in CODE_STEPS:
         volume = finest(grid, most, ends, step)
         if volume is None:
@@ -82,7 +97,7 @@ def within(grid: Grid, most: float) -> PageVolume:
     return best
 
 
-def finest(grid: Grid, most: float, ends: tuple[float, float], step: int) -> PageVolume | None:
+def finest(grid: Grid, most: float, ends: list[tuple[float, float]], step: int) -> PageVolume | None:
     """Return the finest volume in `most` bytes that a few tries find: sizes are not known before."""
     share, best = min(1.0, (SAMPLES_PER_BYTE * step**0.5 * most / prod(grid.dims)) ** (1 / 3)), None
     for _ in range(TRIES):
@@ -102,10 +117,12 @@ def loss_of(volume: PageVolume, grid: Grid) -> float:
     Few steps keep values of noise, but make terraces of what is smooth.
     """
     depth, *sides = grid.values.shape
+    places = np.linspace(0, depth - 1, COMPARED_PLANES).round().astype(int)
+    channels = zip(channels_of(grid), np.split(volume.codes, len(volume.ends)), volume.ends, strict=True)
     loss = []
-    for z in np.linspace(0, depth - 1, COMPARED_PLANES).round().astype(int):
-        made = plane_at(volume.codes, z * (len(volume.codes) - 1) / (depth - 1), sides)
-        truth = (grid.values[z].astype(np.float32) - volume.low) * (LEVELS / (volume.high - volume.low))
+    for (values, codes, (low, high)), z in product(channels, places):
+        made = plane_at(codes, z * (len(codes) - 1) / (depth - 1), sides)
+        truth = (values[z].astype(np.float32) - low) * (LEVELS / (high - low))
         slopes, truths = (np.stack(np.gradient(x)) for x in (made, truth))
         lengths = np.linalg.norm(slopes, axis=0) * np.linalg.norm(truths, axis=0)
         turned = 1 - (slopes * truths).sum(axis=0) / np.maximum(lengths, 1e-6)
@@ -117,13 +134,20 @@ def loss_of(volume: PageVolume, grid: Grid) -> float:
 
 def is_finest(volume: PageVolume, grid: Grid) -> bool:
     """Return whether no lattice with more samples may be in a page."""
-    return volume.codes.shape == sizes_of(grid, 1.0)
+    z, y, x = sizes_of(grid, 1.0)
+    return volume.codes.shape == (len(volume.ends) * z, y, x)
+
+
+def channels_of(grid: Grid) -> list[np.ndarray]:
+    """Return the samples [Z, Y, X] of all channels."""
+    return [grid.values, *grid.others]
 
 
 def sizes_of(grid: Grid, share: float) -> tuple[int, ...]:
     """Return the sizes [3] of an array whose sides have a share of a grid's cells; cards hold them."""
     cells = [size - 1 for size in grid.values.shape]
-    most = min(LONGEST_SIDE / max(grid.values.shape), (MOST_SAMPLES / grid.values.size) ** (1 / 3), 1.0)
+    size = grid.values.size * len(channels_of(grid))
+    most = min(LONGEST_SIDE / max(grid.values.shape), (MOST_SAMPLES / size) ** (1 / 3), 1.0)
     return tuple(max(round(min(share, most) * size), 1) + 1 for size in cells)
 
 
@@ -138,17 +162,19 @@ def extremes(values: np.ndarray) -> tuple[float, float]:
     return low, high
 
 
-def reduced(grid: Grid, share: float, ends: tuple[float, float], step: int) -> PageVolume:
+def reduced(grid: Grid, share: float, ends: list[tuple[float, float]], step: int) -> PageVolume:
     """Return the trilinear values of a grid at a coarser lattice as codes, multiples of a step.
 
     Means of all samples around a place would show fewer of the values that a thin wall has.
     """
-    (low, high), (depth, *sides) = ends, sizes_of(grid, share)
-    places = np.linspace(0, grid.values.shape[0] - 1, depth)
-    planes = np.stack([plane_at(grid.values, place, sides) for place in places])
-    codes = ((planes - low) * (LEVELS / step / (high - low))).round() * step
-    codes = codes.clip(0, LEVELS).astype(np.uint8)
-    return PageVolume(codes, step, low, high, grid.aabb[1], pack(codes))
+    depth, *sides = sizes_of(grid, share)
+    places, made = np.linspace(0, grid.values.shape[0] - 1, depth), []
+    for values, (low, high) in zip(channels_of(grid), ends, strict=True):
+        planes = np.stack([plane_at(values, place, sides) for place in places])
+        codes = ((planes - low) * (LEVELS / step / (high - low))).round() * step
+        made.append(codes.clip(0, LEVELS).astype(np.uint8))
+    codes = np.concatenate(made)
+    return PageVolume(codes, step, ends, grid.aabb[1], pack(codes))
 
 
 def plane_at(values: np.ndarray, place: float, sides: list[int]) -> np.ndarray:
@@ -162,7 +188,7 @@ def plane_at(values: np.ndarray, place: float, sides: list[int]) -> np.ndarray:
 
 
 def pack(codes: np.ndarray) -> bytes:
-    """Return codes [Z, Y, X] as a zlib stream of safetensors: their differences along all axes.
+    """Return codes [C Z, Y, X] as a zlib stream of safetensors: their differences along all axes.
 
     Deflate packs these a quarter to a third smaller, and sums undo them.
     """

@@ -101,7 +101,11 @@ def scene_page(
         description["held"] = list(moved.packed)
     description["can_shadow"] = volume is not None or light is not None
     if volume is not None:
-        description |= {"volume": volume.describe(scene), "presets": presets()}
+        description |= {
+            "volume": volume.describe(scene),
+            "presets": presets(),
+            "slices": volume.slices(scene),
+        }
         description["transfer"] = Origins(scene).transfer
     view = description["views"][0] | {"fov_y": description["fov_y"]}
     picture = poster(scene, composed, view, twin, has_faces=volume is not None)
@@ -147,6 +151,7 @@ def page_of(
             surfels=Markup(surfels),
             volume=Markup(b64encode(volume.packed).decode()) if volume else "",
             volume_words=f"The page has the volume in {volume}." if volume else "",
+            has_editor=bool(description.get("transfer")),
             steps=steps,
             light=light,
             time=description["time"],

@@ -32,6 +32,7 @@ from texgs.raster import native
 from texgs.raster.api import CutRange
 from texgs.raster.arguments import pinhole, require
 from texgs.volume.grid import Grid
+from texgs.volume.label_masks import HALF
 from texgs.volume.light_cells import LightCells
 from texgs.volume.render import Appearance, directions
 from texgs.volume.transfer import TransferFunction, left_limit, right_limit
@@ -45,7 +46,7 @@ MAX_SAMPLES = 2**24  # samples along a ray; float32 counts them
 Prepared = tuple[Any, Any, Any]  # functions and by_cell, the arguments of the library, what these need
 PADDING = 3  # bytes after the distances of bricks, which are loaded as words
 NativeVolume = native.struct("texgs_volume", "p values, i type, 3i size, 3f half")
-NativeTransfer = native.struct("texgs_transfer", "i n, p points")
+NativeTransfer = native.struct("texgs_transfer", "i n, p points within")
 NativeView = native.struct(
     "texgs_cast_view",
     "p viewmat K, i width height, f step opacity_unit, 3f to_viewer to_light, "
@@ -202,8 +203,16 @@ class Caster:
     ) -> tuple[native.Struct, native.Struct, Tensor, Tensor | None]:
         """Return a function's channel, the function, how far bricks are from one that it shows, and cells."""
         volume, extremes = self.channel(tf.channel)
-        points = points_of(tf).to(self.device)
-        transfer = NativeTransfer(len(points), points)
+        points, mask = points_of(tf).to(self.device), None
+        if tf.within is not None:
+            mask, of_mask = self.channel(tf.within)
+            if mask.type != TYPES.index("uint8"):
+                raise ArgumentError(
+                    f"within: expected a mask of uint8, got channel {tf.within} of {TYPES[mask.type]}"
+                )
+            # Bricks outside of the mask are as those without any number.
+            extremes = torch.where(of_mask[:, 1:] < HALF, extremes.new_tensor([inf, -inf]), extremes)
+        transfer = NativeTransfer(len(points), points, mask.values if mask else None)
         distance = torch.zeros(len(extremes) + PADDING, dtype=torch.uint8, device=self.device)
         native.call("texgs_volume_distance", volume, extremes, transfer, distance, device=self.device)
         cells = None

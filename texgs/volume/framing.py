@@ -1,6 +1,6 @@
 """The ball of a volume's visible part under transfer functions, the target of cameras."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import combinations, pairwise, product
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Frame
 from texgs.volume.grid import Grid
+from texgs.volume.label_masks import HALF, INSIDE
 from texgs.volume.slabs import ArraySource, slab_bounds
 from texgs.volume.transfer import TransferFunction
 
@@ -36,14 +37,16 @@ def out_of_frame(grid: Grid, tf: TransferFunction, frame: Frame) -> str:
 
 def shown_corners(grid: Grid, tfs: Iterable[TransferFunction]) -> np.ndarray:
     """Return the outermost corners [N, 3], world units, of rows of cells with values that functions show."""
-    seen: dict[int, list[tuple[np.float64, np.float64]]] = {}
+    seen: dict[tuple[int, int | None], list[tuple[np.float64, np.float64]]] = {}
     for tf in tfs:
-        seen.setdefault(tf.channel, []).extend(shown_values(tf))
+        seen.setdefault(tf.source, []).extend(shown_values(tf))
     corners = [np.empty((0, 3), int)]
-    for channel, ranges in seen.items():
-        values = grid.channel(channel).values
+    for (channel, mask), ranges in seen.items():
         for start, stop in slab_bounds(ArraySource(grid), 0, grid.dims[2] - 1):
-            corners.append(outermost(shown_cells(values[start : stop + 1], ranges), start))
+            cells = shown_cells(grid.channel(channel).values[start : stop + 1], ranges)
+            if mask is not None:
+                cells &= shown_cells(grid.channel(mask).values[start : stop + 1], [(HALF, INSIDE)])
+            corners.append(outermost(cells, start))
     indices = np.concatenate(corners)
     if not len(indices):
         raise ArgumentError("transfer functions: expected some of the volume to be visible, got nothing")
@@ -64,7 +67,7 @@ def shown_values(tf: TransferFunction) -> list[tuple[np.float64, np.float64]]:
     return ranges
 
 
-def shown_cells(values: np.ndarray, seen: list[tuple[np.float64, np.float64]]) -> np.ndarray:
+def shown_cells(values: np.ndarray, seen: Sequence[tuple[float, float]]) -> np.ndarray:
     """Return of cells [Z - 1, Y - 1, X - 1] between samples [Z, Y, X] whether they show one of the ranges."""
     least = most = values
     for _ in range(3):  # axis by axis: the first one goes to the end

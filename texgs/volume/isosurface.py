@@ -8,6 +8,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.memory import require_memory
 from texgs.volume.grid import Grid, Triple
+from texgs.volume.label_masks import HALF
 from texgs.volume.transfer import TransferFunction
 
 BYTES_PER_SAMPLE = 8  # of memory for a sample: what is opaque, in single precision, and the mesh
@@ -49,6 +50,7 @@ def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
     Where an opaque middle of its range has two sides, both are surfaces; and so are the faces of the volume's
     box, where what is opaque ends there.
     """
+    mask = None if tf.within is None else grid.channel(tf.within).values
     grid = grid.channel(tf.channel)
     least, most = float(np.nanmin(grid.values)), float(np.nanmax(grid.values))  # missing samples: transparent
     span = max(most - least, 1e-30)
@@ -65,6 +67,8 @@ def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
             above = values - np.float32(low) if low > least else span
             below = np.float32(high) - values if high < most else span
             np.fmax(slab, np.minimum(above, below), out=slab)
+    for inside, slab in zip([] if mask is None else mask, signed, strict=False):
+        np.minimum(slab, (inside - np.float32(HALF)) * np.float32(span / HALF), out=slab)
     if not (signed > 0).any():
         raise ArgumentError(
             f"mesh.opacity: expected a transfer function that is as opaque as {opacity:g} somewhere in the "

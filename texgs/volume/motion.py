@@ -11,6 +11,7 @@ from torch.nn.functional import grid_sample
 
 from texgs.volume.framing import shown_corners, shown_values
 from texgs.volume.grid import Grid
+from texgs.volume.label_masks import HALF
 from texgs.volume.transfer import TransferFunction
 
 MARGIN = 6  # samples around the visible part
@@ -78,6 +79,8 @@ def shown_image(grid: Grid, tf: TransferFunction, low: np.ndarray, high: np.ndar
     least, most = float(ranges[0][0]), float(ranges[-1][1])
     box = tuple(slice(*ends) for ends in zip(low[::-1], high[::-1], strict=True))
     shown = grid.channel(tf.channel).values[box].astype(np.float32)
+    if tf.within is not None:
+        shown[grid.channel(tf.within).values[box] < HALF] = np.nan
     values = np.nan_to_num(shown, nan=least, posinf=most, neginf=least)
     image = sitk.GetImageFromArray(((values - least) / (most - least)).clip(-LOW_MARGIN, 1))
     image.SetOrigin(low.astype(float).tolist())

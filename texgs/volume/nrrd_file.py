@@ -56,12 +56,12 @@ def open_prepared(path: Path) -> list[RawSource]:
         (count,) = n or [1]
         if count < 1:
             raise ArgumentError(f"expected at least one channel, got {count}; {REMEDY}")
-        offsets = [offset + channel * size for channel in range(count)]
+        # One by one: a damaged header may tell of any number, and the first that is not there is refused.
+        offsets = (offset + channel * size for channel in range(count))
         channels = [RawSource(path, (nx, ny, nz), stored, each, *lattice) for each in offsets]
-        masks = [offset + count * size + k * nx * ny * nz for k in range(int(fields.get(f"{MASKS}=", "0")))]
-        return channels + [
-            RawSource(path, (nx, ny, nz), np.dtype(np.uint8), each, *lattice) for each in masks
-        ]
+        behind, byte = offset + count * size, np.dtype(np.uint8)
+        offsets = (behind + k * nx * ny * nz for k in range(int(fields.get(f"{MASKS}=", "0"))))
+        return channels + [RawSource(path, (nx, ny, nz), byte, each, *lattice) for each in offsets]
 
 
 def write_header(

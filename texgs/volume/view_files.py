@@ -27,12 +27,16 @@ from texgs.volume.view_set import View
 TURNTABLE = 320  # pixels of its longer side
 
 
-def renderer_for(kind: str, grid: Grid, appearance: Appearance, channel: int) -> VolumeRenderer:
-    """Return the caster on the CPU or a GPU, or VTK, which knows one channel."""
+def renderer_for(kind: str, grid: Grid, appearance: Appearance, tf: TransferFunction) -> VolumeRenderer:
+    """Return the caster on the CPU or a GPU, or VTK, which knows one channel and no masks."""
     if kind == "vtk":
         from texgs.volume.vtk_renderer import VtkRenderer
 
-        return VtkRenderer(grid.channel(channel), appearance)
+        if tf.within is not None:
+            raise DeviceError(
+                "views.renderer: expected cpu or gpu for a function within a label, got vtk; choose another"
+            )
+        return VtkRenderer(grid.channel(tf.channel), appearance)
     return Caster(grid, appearance, torch_device("cuda" if kind == "gpu" else "cpu"))
 
 
@@ -41,7 +45,7 @@ def vtk_frame_ms(
 ) -> float | None:
     """Return the median milliseconds of views rendered by VTK, or None if it cannot render offscreen."""
     try:
-        vtk = renderer_for("vtk", grid, appearance, tf.channel)
+        vtk = renderer_for("vtk", grid, appearance, tf)
     except DeviceError as error:
         print(f"{title}: VTK's time is not measured: {error}", file=sys.stderr)
         return None

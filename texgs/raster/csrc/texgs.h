@@ -25,7 +25,7 @@
 extern "C" {
 #endif
 
-#define TEXGS_ABI_VERSION 8
+#define TEXGS_ABI_VERSION 9
 #ifndef TEXGS_SOURCES /* the build defines it, see texgs_sources() */
 #define TEXGS_SOURCES "unknown"
 #endif

@@ -11,6 +11,7 @@
 extern "C" {
 #endif
 
+#define TEXGS_INSIDE 127.5f   /* of a mask, from which on a place is inside */
 enum { TEXGS_BRICK = 4 };     /* cells along each side of a brick: what is known to be empty or not */
 enum { TEXGS_CHANNELS = 16 }; /* volumes that a cast shows together, at most */
 typedef enum {
@@ -36,10 +37,11 @@ typedef struct {
 
 /* The colour of values, and their opacity over a unit of length, linear between points [n, 5] of value, opacity, red,
  * green and blue, ascending by value. The second of two points at one value holds there. Beyond all points nothing
- * shows. n: 2 to 65536. */
+ * shows, nor does anything outside of a mask. n: 2 to 65536. */
 typedef struct {
     int32_t n;
     const float* points;
+    const uint8_t* within; /* [z, y, x] the mask, samples of the volume's lattice, trilinear between them; or NULL */
 } texgs_transfer;
 
 /* Bricks along x, y and z, and their number. */
@@ -48,7 +50,8 @@ TEXGS_API int64_t texgs_volume_bricks(const texgs_volume*, int32_t size[3]);
  * number the smallest is infinite. Returns in *missing how many samples are NaN. */
 TEXGS_API int32_t texgs_volume_extremes(const texgs_volume*, float* extremes, int64_t* missing, void* stream);
 /* How far it is from each brick to one in which something shows, distance [bricks + 3], the last three unused: by how
- * many bricks along the axis along which it is farthest, 0 there, at most 255. */
+ * many bricks along the axis along which it is farthest, 0 there, at most 255. A mask is not looked at: bricks outside
+ * of it need extremes of bricks without any number. */
 TEXGS_API int32_t texgs_volume_distance(const texgs_volume*, const float* extremes, const texgs_transfer*,
                                         uint8_t* distance, void* stream);
 /* In which cells of the bricks at distance 0 something may show, cells [bricks, 2]: cell (x, y, z) of a brick is bit
@@ -87,14 +90,14 @@ typedef struct {
     float shadows, occlusion, outset;
 } texgs_cast_view;
 
-/* Volumes [n] of one lattice and type, each with its transfer function, show together what all of them show: where
- * several do, extinctions add up, and colours are means that these weigh. distance: the least of theirs; cells: those
- * of any of them, or NULL where these are not known. */
+/* Volumes [n] of one lattice, each of its own type and with its transfer function, show together what all of them show:
+ * where several do, extinctions add up, and colours are means that these weigh. distance: the least of theirs; cells:
+ * those of any of them, or NULL where these are not known. */
 TEXGS_API int32_t texgs_cast(const texgs_volume*, const texgs_transfer*, int32_t n, const uint8_t* distance,
                              const uint32_t* cells, const texgs_cast_view*, void* stream);
 
-/* What a volume is at points, and a transfer function there; each of them may be NULL. Beyond the box it is as at the
- * nearest point of it. */
+/* What a volume is at points, and a transfer function there, mask or not; each of them may be NULL. Beyond the box it
+ * is as at the nearest point of it. */
 typedef struct {
     float* values;    /* [n] NaN where a sample of the cell is missing */
     float* gradients; /* [n, 3] of values, per world unit: central differences, one voxel to both sides */

@@ -5,33 +5,41 @@ const FARTHEST = 255;
 
 export class Bricks {
   size; // with one more brick on each side, so that all have neighbours
-  #lows; #highs; #strides; #before;
+  #extremes; #strides; #before;
 
   /**
-   * @param {Uint8Array} codes of samples [Z, Y, X].
+   * @param {Uint8Array[]} channels codes of samples [Z, Y, X].
    * @param {number[]} sizes x, y, z.
    */
-  constructor(codes, sizes) {
+  constructor(channels, sizes) {
     this.size = sizes.map((side) => Math.ceil((side - 1) / BRICK) + 2);
     const [x, y] = this.size;
     this.#strides = [1, x, x * y];
     this.#before = neighbours(this.#strides);
-    this.#lows = new Uint8Array(x * y * this.size[2]).fill(255);
-    this.#highs = new Uint8Array(this.#lows.length);
-    this.#find(codes, sizes);
+    const count = x * y * this.size[2];
+    this.#extremes = channels.map((codes) => {
+      const own = { lows: new Uint8Array(count).fill(255), highs: new Uint8Array(count) };
+      this.#find(codes, sizes, own);
+      return own;
+    });
   }
 
-  /** Distances [Z, Y, X] in bricks to the nearest that has a value with extinction in a table. */
-  distances(table) {
-    const seen = countsOf(table), last = table.length / 4 - 1, distances = new Uint8Array(this.#lows.length).fill(FARTHEST);
-    for (let i = 0; i < distances.length; i++) {
-      if (this.#lows[i] > this.#highs[i]) continue;
-      const low = Math.floor(this.#lows[i] / 255 * last) - 1, high = Math.ceil(this.#highs[i] / 255 * last) + 1;
-      if (seen[Math.min(high, last) + 1] > seen[Math.max(low, 0)]) distances[i] = 0;
-    }
+  /** Distances [Z, Y, X] in bricks to the nearest that has a value with extinction in a table, see function_table.js. */
+  distances(tables) {
+    const distances = new Uint8Array(this.#strides[2] * this.size[2]).fill(FARTHEST);
+    for (const each of tables) this.#mark(distances, each);
     this.#spread(distances, 1);
     this.#spread(distances, -1);
     return distances;
+  }
+
+  #mark(distances, { table, channel, mask, half }) {
+    const seen = countsOf(table), last = table.length / 4 - 1, { lows, highs } = this.#extremes[channel];
+    for (let i = 0; i < distances.length; i++) {
+      if (lows[i] > highs[i] || this.#extremes[mask]?.highs[i] < 255 * half) continue;
+      const low = Math.floor(lows[i] / 255 * last) - 1, high = Math.ceil(highs[i] / 255 * last) + 1;
+      if (seen[Math.min(high, last) + 1] > seen[Math.max(low, 0)]) distances[i] = 0;
+    }
   }
 
   /** Let bricks learn from the neighbours before them, or with sign -1 from those behind. */
@@ -43,14 +51,14 @@ export class Bricks {
     }
   }
 
-  #find(codes, sizes) {
+  #find(codes, sizes, extremes) {
     const [nx, ny, nz] = this.size, [, row, plane] = this.#strides;
     for (let z = 1; z < nz - 1; z++) for (let y = 1; y < ny - 1; y++) for (let x = 1; x < nx - 1; x++) {
-      this.#findOf(z * plane + y * row + x, [x, y, z].map((at) => BRICK * (at - 1)), codes, sizes);
+      this.#findOf(z * plane + y * row + x, [x, y, z].map((at) => BRICK * (at - 1)), codes, sizes, extremes);
     }
   }
 
-  #findOf(brick, [left, top, front], codes, [nx, ny, nz]) {
+  #findOf(brick, [left, top, front], codes, [nx, ny, nz], { lows, highs }) {
     const end = (start, size) => Math.min(start + BRICK, size - 1);
     let low = 255, high = 0;
     for (let z = front; z <= end(front, nz); z++) for (let y = top; y <= end(top, ny); y++) {
@@ -59,8 +67,8 @@ export class Bricks {
         high = Math.max(high, codes[i]);
       }
     }
-    this.#lows[brick] = low;
-    this.#highs[brick] = high;
+    lows[brick] = low;
+    highs[brick] = high;
   }
 }
 

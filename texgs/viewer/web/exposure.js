@@ -1,7 +1,7 @@
 // Which shares of a scene's light reach its surfels and its volume, found again where something of it has changed.
 
 import { dot } from "./camera.js";
-import { functionTable } from "./function_table.js";
+import { functionTables } from "./function_table.js";
 import { EVERYWHERE, Matter, evenDirections, valueAt } from "./light_cells.js";
 import { LAYERS, PLACED } from "./surfels.js";
 
@@ -55,8 +55,8 @@ export class VolumeLight {
     const [shadows, occlusion] = strengthsOf(scene, light), { models, functions, reach } = scene;
     if (!shadows && !occlusion) return { extinctions: null, lamp: EVERYWHERE, sky: EVERYWHERE };
     const opacities = models.map(({ edit: { visible, opacity } }) => visible && opacity);
-    const shown = JSON.stringify([opacities, functions, planes]), table = () => functionTable(scene, this.#facts);
-    const matter = (longest) => new Matter(this.#samples, this.#facts, longest, table(), planes);
+    const shown = JSON.stringify([opacities, functions, planes]), tables = () => functionTables(scene, this.#facts.channels);
+    const matter = (longest) => new Matter(this.#samples, this.#facts, longest, tables(), planes);
     const opened = () => matter(SKY_SIDE).opened(reach, evenDirections(SKY_DIRECTIONS));
     const fine = this.#matter.of([shown], () => matter(LAMP_SIDE));
     return {

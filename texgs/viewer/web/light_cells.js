@@ -25,13 +25,13 @@ export class Matter {
   /**
    * What functions show of a volume, where no cut is.
    *
-   * @param {object} samples `codes` and their `sizes` x, y, z, see samples.js.
+   * @param {object} samples codes of `channels` and their `sizes` x, y, z, see samples.js.
    * @param {object} facts half the sides of the box, and appearance: `volume` of the description of a scene.
    * @param {number} longest side, in cells without the rim; no cell is smaller than those between samples.
-   * @param {Float32Array} table see function_table.js.
+   * @param {object[]} tables see function_table.js.
    * @param {object[]} planes that cut: `normal` and `offset`.
    */
-  constructor(samples, { half, appearance: { opacity_unit: unit } }, longest, table, planes) {
+  constructor(samples, { half, appearance: { opacity_unit: unit } }, longest, tables, planes) {
     this.#samples = samples;
     this.#box = half;
     const inner = samples.sizes.map((count, axis) =>
@@ -40,7 +40,7 @@ export class Matter {
     this.#half = half.map((each, axis) => (each * this.#size[axis]) / inner[axis]);
     this.#extinction = new Float32Array(this.#size[0] * this.#size[1] * this.#size[2]);
     this.extinctions = this.#cells(this.#extinction);
-    this.#fill(meansBetween(table, (MOST * unit) / this.extinctions.edge), unit, planes);
+    for (const each of tables) this.#fill(each, meansBetween(each.table, (MOST * unit) / this.extinctions.edge), unit, planes);
   }
 
   /**
@@ -75,9 +75,10 @@ export class Matter {
     return 2 * this.#half[axis] / this.#size[axis];
   }
 
-  /** Mean extinctions, of the diagonals between samples, as values are linear along them. */
-  #fill(means, unit, planes) {
-    const { codes, sizes: [nx, ny, nz] } = this.#samples, [sx, sy] = this.#size, plane = nx * ny;
+  /** Adds mean extinctions, of the diagonals between samples, as values are linear along them. */
+  #fill({ channel, mask, half }, means, unit, planes) {
+    const { channels, sizes: [nx, ny, nz] } = this.#samples, [sx, sy] = this.#size, plane = nx * ny;
+    const codes = channels[channel], masks = channels[mask], least = 8 * 255 * half; // of the sum of eight corners
     const [ofX, ofY, ofZ] = [0, 1, 2].map((axis) => this.#places(axis));
     const cuts = planes.map((each) => inSides(each, ofX.side));
     for (let z = 0; z < nz - 1; z++) for (let y = 0; y < ny - 1; y++) {
@@ -87,6 +88,7 @@ export class Matter {
         const sum = means[CODES * codes[i] + codes[l + 1]] + means[CODES * codes[i + 1] + codes[l]]
           + means[CODES * codes[j] + codes[k + 1]] + means[CODES * codes[j + 1] + codes[k]];
         if (sum === 0) continue;
+        if (masks && masks[i] + masks[i + 1] + masks[j] + masks[j + 1] + masks[k] + masks[k + 1] + masks[l] + masks[l + 1] < least) continue;
         const left = cuts.length ? leftOf(cuts, ofX.at[x], ofY.at[y], ofZ.at[z]) : 1;
         this.#extinction[row + ofX.cell[x]] += left * sum * share * ofX.share[x];
       }

@@ -2,8 +2,9 @@
 
 import { Compare } from "./compare.js";
 import { EditHistory } from "./history.js";
-import { download, toHex } from "./inputs.js";
+import { download, element, toHex } from "./inputs.js";
 import { Notices } from "./notices.js";
+import { PageSlices } from "./page_slices.js";
 import { Panel } from "./panel.js";
 import { drawMarks } from "./picture_marks.js";
 import { ScenePage } from "./scene_page.js";
@@ -27,7 +28,10 @@ class StandalonePage extends ScenePage {
     if (scene.held) this.time = new TimeSlider(this.state, get("time"), () => renderer.isBusy);
     if (scene.volume) {
       this.compare = new Compare(this);
-      if (Object.keys(scene.tfs).length) new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
+      const source = new PageSlices(renderer.samples, this.state);
+      this.addSlices(source);
+      get("slices").append(element("p", { className: "hint" }, source.words));
+      if (scene.transfer && Object.keys(scene.tfs).length) new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
     }
     this.state.addEventListener("change", () => {
       this.#tellWords();
@@ -61,7 +65,7 @@ class StandalonePage extends ScenePage {
     const { original, scene } = this.state, edits = difference(original, scene);
     const isFunctions = ({ key }) => key === "functions", words = edits.filter((edit) => !isFunctions(edit)).flatMap((edit) => wordsOf(edit, scene.space));
     tell("words", words.map(quoted).join(" "));
-    if (scene.volume) tell("functions", edits.filter(isFunctions).map(({ value }) => `functions: ${JSON.stringify(value)}`).join());
+    if (scene.transfer) tell("functions", edits.filter(isFunctions).map(({ value }) => `functions: ${JSON.stringify(value)}`).join());
   }
 
   /** Save a picture of the view, by default in the pixels of the screen. */
@@ -92,7 +96,8 @@ function wordsOf({ part, key, value }, space) {
   if (key === "cuts") {
     const planes = value.planes.map(({ normal, offset }) => `cut=${[...normal, offset]}`);
     const box = value.box ? [...value.box.low, ...value.box.high] : "";
-    return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`, ...(value.window ? [`cut.window=${value.window}`] : [])];
+    const window = value.window ? [`cut.window=${value.window}`] : [];
+    return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`, ...window];
   }
   if (key === "markers") {
     const words = ({ points, text }) => `${points.length > 1 ? "distance" : "marker"}=${text ? `${text}@` : ""}`

@@ -63,7 +63,7 @@ export class Twin {
     return this.#volume.cells({ ...scene, functions: {} }, look, isMoving);
   }
 
-  /** Draw depths of the volume into the target. */
+  /** Draw depths of the volume into the target: where half of the light is gone, or if it never is, means. */
   drawDepths(view, scene, look) {
     this.#volume.cast(this.target, view, scene, look, { step: STILL, isDepth: true });
   }

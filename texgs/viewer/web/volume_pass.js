@@ -2,33 +2,43 @@
 
 import { Bricks } from "./bricks.js";
 import { VolumeLight, strengthsOf } from "./exposure.js";
-import { SIZE, functionTable, integralsOf, materialOf } from "./function_table.js";
+import { SIZE, functionTables, integralsOf, materialOf, sourcesOf } from "./function_table.js";
+import { labelsOf } from "./labels.js";
 import { makeProgram, makeTexture } from "./program.js";
 import { PRESENT_VERTEX } from "./shaders.js";
 import { bind, setView } from "./surfel_pass.js";
-import { VOLUME_FRAGMENT } from "./volume_shaders.js";
+import { PER_TEXTURE, volumeFragment } from "./volume_shaders.js";
+
+const NARROWEST = 1e-6; // window, of all codes
+const BLACK = [2, 3]; // a window in which no code is above black
 
 export class VolumePass {
-  #gl; #facts; #shaders; #bricks; #textures; #light;
+  #gl; #facts; #bricks; #samples; #textures; #light;
+  #shaders = new Map(); // by sources
   #lit = { lamp: null, sky: null }; // cells that the textures hold
   #shown = ""; // what the table and the distances show
 
   /**
    * @param {WebGL2RenderingContext} gl
-   * @param {object} samples `codes` and their `sizes` x, y, z, see samples.js.
-   * @param {object} facts range of the values, box and appearance: `volume` of the description of a scene.
+   * @param {object} samples codes of `channels` and their `sizes` x, y, z, see samples.js.
+   * @param {object} facts channels with the ranges of their values, box and appearance: `volume` of the description
+   *   of a scene.
    * @throws {Error} where the volume is too large for the card.
    */
-  constructor(gl, { codes, sizes }, facts) {
+  constructor(gl, { channels, sizes }, facts) {
     this.#gl = gl;
     this.#facts = facts;
-    this.#bricks = new Bricks(codes, sizes);
-    this.#light = new VolumeLight({ codes, sizes }, facts);
-    this.#shaders = makeProgram(gl, PRESENT_VERTEX, VOLUME_FRAGMENT);
+    this.#bricks = new Bricks(channels, sizes);
+    this.#light = new VolumeLight({ channels, sizes }, facts);
+    const format = channels.length > 1 ? [gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE] : [gl.R8, gl.RED, gl.UNSIGNED_BYTE];
+    this.#samples = Array.from({ length: Math.ceil(channels.length / PER_TEXTURE) }, (_, t) => {
+      const codes = together(channels.slice(PER_TEXTURE * t, PER_TEXTURE * (t + 1)), channels.length > 1 ? PER_TEXTURE : 1);
+      return makeTexture(gl, format, sizes, codes, { filter: gl.LINEAR, isSolid: true });
+    });
     this.#textures = {
-      samples: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], sizes, codes, { filter: gl.LINEAR, isSolid: true }),
+      ...Object.fromEntries(this.#samples.map((each, t) => [`samples${t}`, each])),
       bricks: makeTexture(gl, [gl.R8UI, gl.RED_INTEGER, gl.UNSIGNED_BYTE], this.#bricks.size, null, { isSolid: true }),
-      table: makeTexture(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT], [SIZE, 2], null),
+      table: makeTexture(gl, [gl.RGBA32F, gl.RGBA, gl.FLOAT], [1, 1], null),
       weights: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], [1, 1], new Uint8Array([255])),
       lamp: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], [1, 1, 1], null, { filter: gl.LINEAR, isSolid: true }),
       sky: makeTexture(gl, [gl.R8, gl.RED, gl.UNSIGNED_BYTE], [1, 1, 1], null, { filter: gl.LINEAR, isSolid: true }),
@@ -49,7 +59,7 @@ export class VolumePass {
    *   `isOver`: over what is in the target; `isDepth`: depths in place of colours; `isMoving`: see `VolumeLight`.
    */
   cast(target, view, scene, look, { step, reach = 0, weights = this.#textures.weights, isOver = false, isDepth = false, isMoving = false }) {
-    const gl = this.#gl, { program, uniforms } = this.#shaders, viewer = view.viewmat.slice(8, 11).map((x) => -x);
+    const gl = this.#gl, { program, uniforms } = this.#shadersOf(scene), viewer = view.viewmat.slice(8, 11).map((x) => -x);
     const { light, planes } = look;
     this.#show(scene);
     this.#shine(scene, look, isMoving);
@@ -70,12 +80,33 @@ export class VolumePass {
     gl.uniform4fv(uniforms.material, factors);
     gl.uniform3fv(uniforms.tint, tint);
     gl.uniform1i(uniforms.are_faces_lit, scene.cuts.faces === "shaded" ? 1 : 0);
+    this.#showSlice(uniforms, scene);
     gl.uniform1i(uniforms.n_planes, planes.length);
     if (planes.length) gl.uniform4fv(uniforms["planes[0]"], planes.flatMap(unitPlane));
     if (isOver) gl.enable(gl.BLEND);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.BLEND);
     target.end();
+  }
+
+  #showSlice(uniforms, scene) {
+    const gl = this.#gl, { channels } = this.#facts, { low, high } = channels[0], isSlice = scene.cuts.faces === "slice";
+    gl.uniform1i(uniforms.is_slice, isSlice ? 1 : 0);
+    if (!isSlice) return;
+    const window = scene.cuts.window ?? scene.slices.window, covers = new Float32Array(4 * channels.length);
+    const labels = labelsOf(scene, channels), hasImage = !labels.some(({ channel }) => channel === 0);
+    const [black, white] = window.map((value) => (value - low) / (high - low));
+    gl.uniform2fv(uniforms.window, hasImage ? [black, Math.max(white, black + NARROWEST)] : BLACK);
+    for (const { channel, color, cover } of labels) if (color) covers.set([...color, cover], 4 * channel);
+    gl.uniform4fv(uniforms["labels[0]"], covers);
+  }
+
+  #shadersOf(scene) {
+    const sources = sourcesOf(scene, this.#facts.channels), key = sources.map((each) => each.key).join();
+    if (!this.#shaders.has(key)) {
+      this.#shaders.set(key, makeProgram(this.#gl, PRESENT_VERTEX, volumeFragment(sources, this.#facts.channels)));
+    }
+    return this.#shaders.get(key);
   }
 
   /** What of a scene's light reaches cells, see `VolumeLight`. */
@@ -99,13 +130,24 @@ export class VolumePass {
     const gl = this.#gl, { models, functions } = scene, shown = JSON.stringify([models.map(({ edit }) => edit), functions]);
     if (shown === this.#shown) return;
     this.#shown = shown;
-    const table = functionTable(scene, this.#facts);
+    const tables = functionTables(scene, this.#facts.channels), rows = tables.flatMap(({ table }) => [table, integralsOf(table)]);
     gl.bindTexture(gl.TEXTURE_2D, this.#textures.table.texture);
-    [table, integralsOf(table)].forEach((row, y) => gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, y, SIZE, 1, gl.RGBA, gl.FLOAT, row));
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, SIZE, rows.length, 0, gl.RGBA, gl.FLOAT, null);
+    rows.forEach((row, y) => gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, y, SIZE, 1, gl.RGBA, gl.FLOAT, row));
     gl.bindTexture(gl.TEXTURE_3D, this.#textures.bricks.texture);
     gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, ...this.#bricks.size, gl.RED_INTEGER, gl.UNSIGNED_BYTE,
-      this.#bricks.distances(table));
+      this.#bricks.distances(tables));
   }
+}
+
+/** Codes of channels side by side, so many to a texel. */
+function together(channels, width) {
+  if (width === 1) return channels[0];
+  const codes = new Uint8Array(width * channels[0].length);
+  channels.forEach((own, c) => {
+    for (let i = 0; i < own.length; i++) codes[width * i + c] = own[i];
+  });
+  return codes;
 }
 
 /** A plane with a normal of length 1. */

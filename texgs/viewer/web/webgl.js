@@ -68,9 +68,14 @@ export class WebglRenderer {
     const { models, exposure } = this._optics;
     this._harmonics = exposure ? new Harmonics(tensors, models.length, exposure) : null;
     this._order = new DepthOrder(this._surfels.lookups.length / 4);
-    this._samples = volume ? samplesOf((await unpack(volume)).tensors) : null;
+    this._samples = volume ? samplesOf((await unpack(volume)).tensors, scene.volume.channels.length) : null;
     if (volume) this.modes = MODES.toSpliced(1, 0, ...OF_TWIN);
     this._upload();
+  }
+
+  /** Those of the volume in the page, see samples.js; null where it has none. */
+  get samples() {
+    return this._samples;
   }
 
   /** Size of the picture in pixels of the screen. */
@@ -120,8 +125,7 @@ export class WebglRenderer {
   /** The point [3] that a pixel shows; null for the background. */
   pointAt(camera, scene, { before, mode }, [x, y]) {
     const view = this._view(camera), pixel = [x, y].map((side) => side + 0.5), shown = before ? this._before(scene) : scene;
-    const look = lookOf(shown), isCut = look.planes.length > 0 && (mode === "shaded" || OF_TWIN.includes(mode));
-    const isVolume = this._hasTwin(shown) && (mode === "volume" || isCut);
+    const look = lookOf(shown), isVolume = this._hasTwin(shown) && (mode === "shaded" || OF_TWIN.includes(mode));
     if (isVolume) this._twin.drawDepths(viewOf(view), mode === "volume" ? shown : { ...shown, functions: {} }, look);
     else this._blend(viewOf(view), shown, look, { mode: "depth" });
     const depth = (isVolume ? this._twin : this._pass).target.depthAt(x, y);

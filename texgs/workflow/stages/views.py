@@ -71,7 +71,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     grid = open_grid(inputs["volume"])
     (tf,) = basic_tfs_of(inputs["volume"], {settings.tf: settings.points}, settings.tf_values).values()
     appearance = appearance_of(views)
-    renderer = renderer_for(views.renderer, grid, appearance, tf.channel)
+    renderer = renderer_for(views.renderer, grid, appearance, tf)
     times, coverages = Times(output / TIMES), []
     framed = basic_tfs_of(inputs["volume"], settings.framed, settings.tf_values)
     frame = frame_of(grid, framed.values()) if framed else None

@@ -178,7 +178,9 @@ int32_t texgs_volume_cells(const texgs_volume* volume, const uint8_t* distance, 
     return guarded([&] {
         check_volume(*volume);
         check_transfer(*transfer);
-        const std::vector<Range> ranges = shown_ranges(*transfer);
+        const std::vector<Range> ranges = shown_ranges(*transfer), in_mask{{TEXGS_INSIDE, 255.0f}};
+        texgs_volume mask = *volume;
+        mask.values = transfer->within;
         int32_t size[3];
         parallel_for(count_bricks(*volume, size), 64, [&](int64_t begin, int64_t end, int) {
             for (int64_t i = begin; i < end; ++i) {
@@ -186,6 +188,11 @@ int32_t texgs_volume_cells(const texgs_volume* volume, const uint8_t* distance, 
                 const int32_t row = static_cast<int32_t>(i / size[0]);
                 const int32_t brick[3] = {static_cast<int32_t>(i % size[0]), row % size[1], row / size[1]};
                 if (!distance[i]) kSetCells[volume->type](*volume, ranges, brick, words);
+                if (transfer->within && (words[0] | words[1])) {
+                    uint32_t inside[2] = {};
+                    set_cells<uint8_t>(mask, in_mask, brick, inside);
+                    words[0] &= inside[0], words[1] &= inside[1];
+                }
                 cells[2 * i] = words[0], cells[2 * i + 1] = words[1];
             }
         });

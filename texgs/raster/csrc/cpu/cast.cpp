@@ -45,13 +45,17 @@ struct Queue {
     }
 };
 
+// Where the samples of a stage are: their cells, and the places in these.
+struct Places {
+    vf cell[kVectors][3], inside[kVectors][3];
+};
+
 // What a ray gathers.
 struct Sums {
     vf color[3], normal[3], depth = 0.0f;
     float median = 0.0f, light = 1.0f;
 };
 
-template <class T>
 class Caster {
 public:
     Caster(const CastJob& job)
@@ -139,18 +143,23 @@ private:
     // Finds what the first samples weigh, and lets those that show something wait.
     void weigh(const CastRay& ray, Queue& waiting, Sums& sums) {
         const int vectors = waiting.vectors();
-        vf inside[kVectors][3], value[TEXGS_CHANNELS][kVectors], through[TEXGS_CHANNELS][kVectors], all[kVectors];
+        vf value[TEXGS_CHANNELS][kVectors], through[TEXGS_CHANNELS][kVectors], all[kVectors];
+        Places at;
+        locate(ray, waiting, vectors, at);
         for (int c = 0; c < job_.n; ++c) {
             const CastTable& t = job_.channels[c].table;
-            load_blocks(ray, waiting, vectors, Rows::of_cell, c, inside);
+            vm shown[kVectors];
+            for (int i = 0; i < vectors; ++i)
+                shown[i] = to_float(iota()) < vf(static_cast<float>(waiting.n - i * kLanes));
+            if (job_.channels[c].within) keep_inside(ray, at, vectors, job_.channels[c].within, shown);
+            fetch(ray, at, vectors, job_.channels[c].values, job_.channels[c].type, Rows::of_cell);
             for (int i = 0; i < vectors; ++i) {
-                const vf v = values_in(blocks_[i], inside[i]), opacity = Intervals(t, v).mixed(t.opacity);
+                const vf v = values_in(blocks_[i], at.inside[i]), opacity = Intervals(t, v).mixed(t.opacity);
                 const vm visible = (vf(t.value[0]) <= v) & (v <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
-                const vm is_used = to_float(iota()) < vf(static_cast<float>(waiting.n - i * kLanes));
                 const vf lengths =
                     vf(job_.view.step / job_.view.opacity_unit) * share(ray, load(waiting.k + i * kLanes));
                 value[c][i] = v;
-                through[c][i] = zero_unless(visible & is_used, log2_through(opacity, lengths));
+                through[c][i] = zero_unless(visible & shown[i], log2_through(opacity, lengths));
                 all[i] = c ? all[i] + through[c][i] : through[c][i];
             }
         }
@@ -186,11 +195,12 @@ private:
         const CastTable& t = job_.channels[c].table;
         Queue& seen = seen_[c];
         const int vectors = seen.vectors();
-        vf inside[kVectors][3];
-        load_blocks(ray, seen, vectors, Rows::around, c, inside);
+        Places at;
+        locate(ray, seen, vectors, at);
+        fetch(ray, at, vectors, job_.channels[c].values, job_.channels[c].type, Rows::around);
         for (int i = 0; i < vectors; ++i) {
             vf slope[3];
-            differences_in(blocks_[i], inside[i], slope);
+            differences_in(blocks_[i], at.inside[i], slope);
             const float* const s = slope_[c];
             Vec3<vf> n = unit(Vec3<vf>{slope[0] * vf(s[0]), slope[1] * vf(s[1]), slope[2] * vf(s[2])});
             const Intervals intervals(t, load(seen.value + i * kLanes));
@@ -223,14 +233,24 @@ private:
         return exposure_of(view, shares.lamp, shares.sky);
     }
 
-    // Loads the blocks around the first samples, and where these are in their cells.
-    TEXGS_INLINE void load_blocks(const CastRay& ray, const Queue& samples, int vectors, Rows rows, int channel,
-                                  vf (&inside)[kVectors][3]) {
-        const T* const values = static_cast<const T*>(job_.channels[channel].values);
+    // Finds where the first samples are.
+    TEXGS_INLINE void locate(const CastRay& ray, const Queue& samples, int vectors, Places& at) const {
+        for (int i = 0; i < vectors; ++i) locate(ray, load(samples.k + i * kLanes), at.cell[i], at.inside[i]);
+    }
+
+    // Loads the blocks around samples.
+    TEXGS_INLINE void fetch(const CastRay& ray, const Places& at, int vectors, const void* values, int32_t type,
+                            Rows rows) {
+        with_type(values, type, [&](auto samples) {
+            for (int i = 0; i < vectors; ++i) blocks_[i].fetch(samples, job_.volume.size, at.cell[i], ray.ahead, rows);
+        });
+    }
+
+    // Keeps those of samples that are inside of a mask.
+    void keep_inside(const CastRay& ray, const Places& at, int vectors, const uint8_t* mask, vm (&chosen)[kVectors]) {
         for (int i = 0; i < vectors; ++i) {
-            vf cell[3];
-            locate(ray, load(samples.k + i * kLanes), cell, inside[i]);
-            blocks_[i].fetch(values, job_.volume.size, cell, ray.ahead, rows);
+            blocks_[i].fetch(mask, job_.volume.size, at.cell[i], ray.ahead, Rows::of_cell);
+            chosen[i] = chosen[i] & (vf(TEXGS_INSIDE) <= values_in(blocks_[i], at.inside[i]));
         }
     }
 
@@ -255,19 +275,9 @@ private:
     float slope_[TEXGS_CHANNELS][3];
 };
 
-template <class T>
-void cast_row(const CastJob& job, int y, int begin, int end) {
-    Caster<T> caster(job);
-    for (int x = begin; x < end; ++x) caster.cast(x, y);
-}
-
 void cast(const CastJob& job, int y, int begin, int end) {
-    using Cast = void (*)(const CastJob&, int, int, int);
-    static constexpr Cast kCast[] = {
-        cast_row<uint8_t>, cast_row<int8_t>,   cast_row<uint16_t>, cast_row<int16_t>, cast_row<uint32_t>,
-        cast_row<int32_t>, cast_row<uint64_t>, cast_row<int64_t>,  cast_row<float>,   cast_row<double>,
-    };
-    kCast[job.volume.type](job, y, begin, end);
+    Caster caster(job);
+    for (int x = begin; x < end; ++x) caster.cast(x, y);
 }
 
 }  // namespace

@@ -6,8 +6,37 @@
 
 #include "simd.h"
 
+#include "../texgs_volume.h"
+
 namespace texgs::TEXGS_ISA {
 namespace {
+
+// Calls use(values) with the samples of a volume as what they are.
+template <class Use>
+TEXGS_INLINE void with_type(const void* values, int32_t type, const Use& use) {
+    switch (type) {
+        case TEXGS_U8:
+            return use(static_cast<const uint8_t*>(values));
+        case TEXGS_I8:
+            return use(static_cast<const int8_t*>(values));
+        case TEXGS_U16:
+            return use(static_cast<const uint16_t*>(values));
+        case TEXGS_I16:
+            return use(static_cast<const int16_t*>(values));
+        case TEXGS_U32:
+            return use(static_cast<const uint32_t*>(values));
+        case TEXGS_I32:
+            return use(static_cast<const int32_t*>(values));
+        case TEXGS_U64:
+            return use(static_cast<const uint64_t*>(values));
+        case TEXGS_I64:
+            return use(static_cast<const int64_t*>(values));
+        case TEXGS_F32:
+            return use(static_cast<const float*>(values));
+        default:
+            return use(static_cast<const double*>(values));
+    }
+}
 
 // Which rows of a block are loaded: those that hold the cell, or also those beside them.
 enum class Rows { of_cell, around };

@@ -13,7 +13,6 @@ namespace {
 constexpr int kMostPlaces = 8 * TEXGS_LIGHT_SIDE;
 
 // Places of a row of the finer lattice.
-template <class T>
 class Row {
 public:
     Row(const ExtinctionJob& job, int places) : job_(job), lattice_(lattice_of(job.volume)), places_(places) {
@@ -79,10 +78,15 @@ private:
         vf all = 0.0f;
         for (int c = 0; c < job_.n; ++c) {
             const CastTable& t = job_.channels[c].table;
-            blocks_.fetch(static_cast<const T*>(job_.channels[c].values), job_.volume.size, cell, kAhead,
-                          Rows::of_cell);
+            vm visible = vf(0.0f) < vf(1.0f);
+            if (const uint8_t* mask = job_.channels[c].within) {
+                blocks_.fetch(mask, job_.volume.size, cell, kAhead, Rows::of_cell);
+                visible = vf(TEXGS_INSIDE) <= values_in(blocks_, inside);
+            }
+            with_type(job_.channels[c].values, job_.channels[c].type,
+                      [&](auto values) { blocks_.fetch(values, job_.volume.size, cell, kAhead, Rows::of_cell); });
             const vf v = values_in(blocks_, inside), opacity = Intervals(t, v).mixed(t.opacity);
-            const vm visible = (vf(t.value[0]) <= v) & (v <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
+            visible = visible & (vf(t.value[0]) <= v) & (v <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
             all -= zero_unless(visible, log2_through(opacity, vf(per_edge_)));
         }
         return min(all, kMostExtinction);
@@ -95,12 +99,13 @@ private:
     Blocks blocks_;
 };
 
-template <class T>
-void extinction_of(const ExtinctionJob& job, int y, int z) {
+}  // namespace
+
+void extinction_row(const ExtinctionJob& job, int y, int z) {
     int places[3];
     for (int a = 0; a < 3; ++a) places[a] = places_per_cell(job.volume, job.cells, a);
     const int32_t* const size = job.cells.size;
-    Row<T> row(job, places[0] * size[0]);
+    Row row(job, places[0] * size[0]);
     float sums[kMostPlaces + kLanes] = {};
     for (int k = 0; k < places[2]; ++k)
         for (int j = 0; j < places[1]; ++j) row.add(y * places[1] + j, z * places[2] + k, sums);
@@ -111,18 +116,6 @@ void extinction_of(const ExtinctionJob& job, int y, int z) {
         for (int i = 0; i < places[0]; ++i) sum += sums[x * places[0] + i];
         to[x] = share * sum;
     }
-}
-
-}  // namespace
-
-void extinction_row(const ExtinctionJob& job, int y, int z) {
-    using Extinction = void (*)(const ExtinctionJob&, int, int);
-    static constexpr Extinction kExtinction[] = {
-        extinction_of<uint8_t>,  extinction_of<int8_t>,  extinction_of<uint16_t>, extinction_of<int16_t>,
-        extinction_of<uint32_t>, extinction_of<int32_t>, extinction_of<uint64_t>, extinction_of<int64_t>,
-        extinction_of<float>,    extinction_of<double>,
-    };
-    kExtinction[job.volume.type](job, y, z);
 }
 
 }  // namespace texgs::TEXGS_ISA

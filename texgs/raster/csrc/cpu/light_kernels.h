@@ -10,7 +10,7 @@ constexpr int kBand = 16;    // rows of columns that one worker follows at a tim
 constexpr int kMargin = 16;  // numbers behind a row that whole vectors may reach: the most lanes there are
 
 struct ExtinctionJob {
-    texgs_volume volume;  // the first; others have its lattice and type
+    texgs_volume volume;  // the first; others have its lattice
     int32_t n;
     const CastChannel* channels;
     const uint8_t* distance;  // [bricks]

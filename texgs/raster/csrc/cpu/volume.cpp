@@ -102,7 +102,8 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, i
         if (!shown.any()) return;
         const std::vector<PointTable> tables(transfer, transfer + n);
         CastJob job{*volume, *view, n, {}, distance, cells, {}, {}};
-        for (int c = 0; c < n; ++c) job.channels[c] = {volume[c].values, tables[c].view};
+        for (int c = 0; c < n; ++c)
+            job.channels[c] = {volume[c].values, volume[c].type, transfer[c].within, tables[c].view};
         for (int a = 0; a < 3; ++a) {
             job.lower[a] = static_cast<float>(kBrick * shown.lower[a]);
             job.upper[a] = static_cast<float>(std::min(kBrick * shown.upper[a], volume->size[a] - 1));

@@ -19,13 +19,16 @@ struct CastTable {
 // Refuses transfer functions whose values do not ascend.
 void check_transfer(const texgs_transfer&);
 
+// A volume as its transfer function shows it.
 struct CastChannel {
     const void* values;
+    int32_t type;
+    const uint8_t* within;  // mask, or NULL
     CastTable table;
 };
 
 struct CastJob {
-    texgs_volume volume;  // the first; others have its lattice and type
+    texgs_volume volume;  // the first; others have its lattice
     texgs_cast_view view;
     int32_t n;
     CastChannel channels[TEXGS_CHANNELS];

@@ -51,22 +51,22 @@ struct Places {
 
 // The extinction of all channels at a place.
 template <class T>
-__device__ float extinction_at(const texgs_volume& volume, const Lattice& lattice, const Channels& channels,
-                               const uint8_t* distance, const Places& places, const float (&at)[3]) {
+__device__ float extinction_at(const Lattice& lattice, const Channels& channels, const uint8_t* distance,
+                               const Places& places, const float (&at)[3]) {
     const Spot spot(lattice.last, at);
     const int64_t row = int64_t(spot.cell[2] / TEXGS_BRICK) * lattice.bricks[1] + spot.cell[1] / TEXGS_BRICK;
     if (distance[row * lattice.bricks[0] + spot.cell[0] / TEXGS_BRICK] || !places.is_left(at)) return 0.0f;
     float all = 0.0f;
     for (int c = 0; c < channels.n; ++c)
-        all -= log2_through_at(channels.transfer[c], spot.value(channels.samples<T>(c, volume)), places.lengths);
+        if (channels.has(c, spot))
+            all -= log2_through_at(channels.transfer[c], spot.value(channels.samples<T>(c)), places.lengths);
     return fminf(all, kMostExtinction);
 }
 
 template <class T>
-__global__ __launch_bounds__(kThreads, 1) void extinction_kernel(const texgs_volume volume, const Lattice lattice,
-                                                                 const Channels channels, const uint8_t* distance,
-                                                                 const Places places, int64_t cells,
-                                                                 float* extinction) {
+__global__ __launch_bounds__(kThreads, 1) void extinction_kernel(const Lattice lattice, const Channels channels,
+                                                                 const uint8_t* distance, const Places places,
+                                                                 int64_t cells, float* extinction) {
     const int64_t i = thread_index();
     if (i >= cells) return;
     const int* const size = places.size;
@@ -81,8 +81,7 @@ __global__ __launch_bounds__(kThreads, 1) void extinction_kernel(const texgs_vol
         float of_rows = 0.0f;
         for (int z = 0; z < places.per_cell[2]; ++z)
             for (int y = 0; y < places.per_cell[1]; ++y)
-                of_rows +=
-                    extinction_at<T>(volume, lattice, channels, distance, places, {at(x, 0), at(y, 1), at(z, 2)});
+                of_rows += extinction_at<T>(lattice, channels, distance, places, {at(x, 0), at(y, 1), at(z, 2)});
         sum += of_rows;
     }
     extinction[i] = 1.0f / static_cast<float>(places.per_cell[0] * places.per_cell[1] * places.per_cell[2]) * sum;
@@ -200,8 +199,8 @@ int32_t texgs_extinction(const texgs_volume* volume, const texgs_transfer* trans
         require(opacity_unit > 0.0f, "light: expected an opacity unit above 0");
         const Places places(*volume, *cells, opacity_unit, planes, n_planes);
         const int64_t count = count_cells(*cells);
-        with_type(*volume, [&](auto sample) {
-            launch(extinction_kernel<decltype(sample)>, blocks_for(count, kThreads), kThreads, stream, *volume,
+        with_type_of(volume, n, [&](auto sample) {
+            launch(extinction_kernel<decltype(sample)>, blocks_for(count, kThreads), kThreads, stream,
                    lattice_of(*volume), Channels(volume, transfer, n), distance, places, count, extinction);
         });
     });

@@ -53,9 +53,9 @@ __global__ __launch_bounds__(kThreads) void shown_kernel(const texgs_transfer tr
         shown[i] = shows(transfer, extremes[2 * i], extremes[2 * i + 1]) ? 0 : 255;
 }
 
-// In which cells of a word, half a brick, something may show.
-template <class T>
-__device__ uint32_t shown_cells(const texgs_volume& volume, const texgs_transfer& transfer, int64_t word) {
+// Which cells of a word, half a brick, have extremes that are wanted.
+template <class T, class IsWanted>
+__device__ uint32_t cells_with(const texgs_volume& volume, int64_t word, const IsWanted& is_wanted) {
     int first[3];
     int64_t brick = word / 2;
     for (int a = 0; a < 3; ++a) {
@@ -76,9 +76,20 @@ __device__ uint32_t shown_cells(const texgs_volume& volume, const texgs_transfer
             low = value < low ? value : low;
             high = value > high ? value : high;
         }
-        if (shows(transfer, low, high)) cells |= uint32_t(1) << cell;
+        if (is_wanted(low, high)) cells |= uint32_t(1) << cell;
     }
     return cells;
+}
+
+// In which cells of a word something may show.
+template <class T>
+__device__ uint32_t shown_cells(const texgs_volume& volume, const texgs_transfer& transfer, int64_t word) {
+    const uint32_t cells =
+        cells_with<T>(volume, word, [&](float low, float high) { return shows(transfer, low, high); });
+    if (!transfer.within || !cells) return cells;
+    texgs_volume mask = volume;
+    mask.values = transfer.within;
+    return cells & cells_with<uint8_t>(mask, word, [](float, float high) { return high >= TEXGS_INSIDE; });
 }
 
 template <class T>
@@ -142,7 +153,9 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
         const float lengths = view.step / view.opacity_unit * share(ray, at);
         float value[kMost], through[kMost], all = 0.0f;
         for (int c = 0; c < n; ++c) {
-            value[c] = spot.value(channels.samples<T>(c, volume));
+            through[c] = 0.0f;
+            if (!channels.has(c, spot)) continue;
+            value[c] = spot.value(channels.samples<T>(c));
             through[c] = log2_through_at(channels.transfer[c], value[c], lengths);
             all += through[c];
         }
@@ -155,7 +168,7 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
         for (int c = 0; c < n; ++c) {
             if (through[c] == 0.0f) continue;
             const texgs_transfer& transfer = channels.transfer[c];
-            const Samples<T> samples = channels.samples<T>(c, volume);
+            const Samples<T> samples = channels.samples<T>(c);
             const float part = weight * (through[c] / all);
             const float scale = 1.0f / (transfer.points[5 * (transfer.n - 1)] - transfer.points[0]);
             Vec3<float> slope{spot.difference(samples, 0), spot.difference(samples, 1), spot.difference(samples, 2)};
@@ -191,7 +204,7 @@ __global__ __launch_bounds__(kThreads) void lookup_kernel(const texgs_volume vol
     const int64_t i = thread_index();
     if (i >= n) return;
     const Lattice lattice = lattice_of(volume);
-    const Samples<T> samples{static_cast<const T*>(volume.values), {volume.size[0], volume.size[1], volume.size[2]}};
+    const Samples<T> samples{volume.values, volume.type, {volume.size[0], volume.size[1], volume.size[2]}};
     float at[3];
     for (int a = 0; a < 3; ++a)
         at[a] = fma(points[3 * i + a], static_cast<float>(lattice.per_unit[a]), static_cast<float>(lattice.middle[a]));
@@ -228,7 +241,7 @@ int32_t texgs_volume_extremes(const texgs_volume* volume, float* extremes, int64
         const int64_t bricks = count_bricks(*volume, size);
         check(cudaMemsetAsync(missing, 0, sizeof(*missing), stream), "clearing a count");
         auto* count = reinterpret_cast<unsigned long long*>(missing);
-        with_type(*volume, [&](auto sample) {
+        with_type(volume->type, [&](auto sample) {
             launch(extremes_kernel<decltype(sample)>, blocks_for(bricks, kThreads), kThreads, stream, *volume, bricks,
                    extremes, count);
         });
@@ -255,7 +268,7 @@ int32_t texgs_volume_cells(const texgs_volume* volume, const uint8_t* distance, 
         check_points(*transfer);
         int32_t size[3];
         const int64_t words = 2 * count_bricks(*volume, size);
-        with_type(*volume, [&](auto sample) {
+        with_type(volume->type, [&](auto sample) {
             launch(cells_kernel<decltype(sample)>, blocks_for(words, kThreads), kThreads, stream, *volume, distance,
                    *transfer, words, cells);
         });
@@ -270,7 +283,7 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, i
         const Channels channels(volume, transfer, n);
         const LightCells light_cells = light_cells_of(lattice_of(*volume), *view);
         const int tiles = (view->width + kTileX - 1) / kTileX, rows = (view->height + kTileY - 1) / kTileY;
-        with_type(*volume, [&](auto sample) {
+        with_type_of(volume, n, [&](auto sample) {
             const auto kernel =
                 n == 1 ? cast_kernel<decltype(sample), 1> : cast_kernel<decltype(sample), TEXGS_CHANNELS>;
             launch(kernel, int64_t(tiles) * rows, kThreads, stream, *volume, channels, distance, cells, *view,
@@ -284,7 +297,7 @@ int32_t texgs_volume_lookup(const texgs_volume* volume, const texgs_transfer* tr
     return on_device_of(points, on, [&](cudaStream_t stream) {
         check_volume(*volume);
         check_points(*transfer);
-        with_type(*volume, [&](auto sample) {
+        with_type(volume->type, [&](auto sample) {
             launch(lookup_kernel<decltype(sample)>, blocks_for(n, kThreads), kThreads, stream, *volume, *transfer, n,
                    points, *to);
         });

@@ -4,6 +4,7 @@
 #include <cuda_runtime.h>
 
 #include <cstdint>
+#include <type_traits>
 
 #include "maths.cuh"
 
@@ -16,14 +17,56 @@ constexpr int kThreads = 128;
 
 __device__ inline int64_t thread_index() { return int64_t(blockIdx.x) * kThreads + threadIdx.x; }
 
+// Calls body(sample) with a sample of a type. It runs where the body does, on the host or on the GPU.
+#ifdef __CUDACC__
+#pragma nv_exec_check_disable
+#endif
+template <class Body>
+TEXGS_MATHS auto with_type(int32_t type, const Body& body) {
+    switch (type) {
+        case TEXGS_U8:
+            return body(uint8_t());
+        case TEXGS_I8:
+            return body(int8_t());
+        case TEXGS_U16:
+            return body(uint16_t());
+        case TEXGS_I16:
+            return body(int16_t());
+        case TEXGS_U32:
+            return body(uint32_t());
+        case TEXGS_I32:
+            return body(int32_t());
+        case TEXGS_U64:
+            return body(uint64_t());
+        case TEXGS_I64:
+            return body(int64_t());
+        case TEXGS_F32:
+            return body(float());
+        default:
+            return body(double());
+    }
+}
+
+// Stands for the type of samples that is known only where they are read.
+struct AnyType {};
+
 template <class T>
 struct Samples {
-    const T* values;
+    const void* values;
+    int32_t type;
     int size[3];
 
     __device__ float at(int x, int y, int z) const {
         const int i[3] = {clamped(x, 0), clamped(y, 1), clamped(z, 2)};
-        return static_cast<float>(values[(int64_t(i[2]) * size[1] + i[1]) * size[0] + i[0]]);
+        const int64_t place = (int64_t(i[2]) * size[1] + i[1]) * size[0] + i[0];
+        if constexpr (std::is_same_v<T, AnyType>)
+            return with_type(type, [&](auto s) { return value_at<decltype(s)>(place); });
+        else
+            return value_at<T>(place);
+    }
+    template <class S>
+    __device__ float value_at(int64_t place) const {
+        return static_cast<float>(static_cast<const S*>(values)[place]);
     }
     __device__ int clamped(int i, int axis) const { return i < 0 ? 0 : i < size[axis] ? i : size[axis] - 1; }
 };
@@ -95,43 +138,31 @@ __device__ inline float log2_through_at(const texgs_transfer& t, float value, fl
 // Volumes of one lattice that are shown together, each with its transfer function.
 struct Channels {
     const void* values[TEXGS_CHANNELS] = {};
+    int32_t type[TEXGS_CHANNELS] = {};
     texgs_transfer transfer[TEXGS_CHANNELS] = {};
-    int n;
+    int size[3], n;
 
     Channels(const texgs_volume* volume, const texgs_transfer* functions, int32_t count) : n(count) {
-        for (int c = 0; c < n; ++c) values[c] = volume[c].values, transfer[c] = functions[c];
+        for (int a = 0; a < 3; ++a) size[a] = volume->size[a];
+        for (int c = 0; c < n; ++c) values[c] = volume[c].values, type[c] = volume[c].type, transfer[c] = functions[c];
     }
     template <class T>
-    __device__ Samples<T> samples(int c, const texgs_volume& volume) const {
-        return {static_cast<const T*>(values[c]), {volume.size[0], volume.size[1], volume.size[2]}};
+    __device__ Samples<T> samples(int c) const {
+        return {values[c], type[c], {size[0], size[1], size[2]}};
+    }
+    // Whether a place is inside of the mask of a channel.
+    __device__ bool has(int c, const Spot& spot) const {
+        const uint8_t* mask = transfer[c].within;
+        return !mask || spot.value(Samples<uint8_t>{mask, TEXGS_U8, {size[0], size[1], size[2]}}) >= TEXGS_INSIDE;
     }
 };
 
-// Calls body(sample) with a sample of the volume's type.
+// Calls body(sample) with a sample of the type that volumes have in common, or else with AnyType().
 template <class Body>
-void with_type(const texgs_volume& volume, const Body& body) {
-    switch (volume.type) {
-        case TEXGS_U8:
-            return body(uint8_t());
-        case TEXGS_I8:
-            return body(int8_t());
-        case TEXGS_U16:
-            return body(uint16_t());
-        case TEXGS_I16:
-            return body(int16_t());
-        case TEXGS_U32:
-            return body(uint32_t());
-        case TEXGS_I32:
-            return body(int32_t());
-        case TEXGS_U64:
-            return body(uint64_t());
-        case TEXGS_I64:
-            return body(int64_t());
-        case TEXGS_F32:
-            return body(float());
-        default:
-            return body(double());
-    }
+void with_type_of(const texgs_volume* volume, int32_t n, const Body& body) {
+    for (int c = 1; c < n; ++c)
+        if (volume[c].type != volume->type) return body(AnyType());
+    with_type(volume->type, body);
 }
 
 }  // namespace
