@@ -6,10 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import nibabel
+import numpy as np
 import pytest
 import torch
 
-from benchmarks import light, light_speed
+from benchmarks import light, light_speed, slices
 from benchmarks.command import call
 from benchmarks.report import Measurement, Section
 from benchmarks.settings import SECTIONS
@@ -17,8 +19,12 @@ from benchmarks.speeds import Sample, factor, scaled
 from benchmarks.timing import Case, measure
 from tests.viewer.drawn_scenes import scene_of_volume, waves
 from tests.volume.scenes import SHELLS, ball
+from texgs.scene.scene_file import write_scene
 from texgs.volume.framing import frame_of
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.prepare import prepare
 from texgs.volume.render import Appearance
+from texgs.volume.sources import open_source
 from texgs.workflow.forecast import Speed
 
 ROOT = Path(__file__).parents[1]
@@ -138,3 +144,18 @@ def test_speed_of_light_is_told_for_each_step_and_frame(tmp_path):
     }
     assert {m.name for m in section.measurements if m.unit == "ratio"} == {"volume / plain", "scene / plain"}
     assert all(m.min > 0 for m in section.measurements)
+
+
+def test_slices_are_timed_and_compared_and_clicks_measured(tmp_path, monkeypatch):
+    values = np.random.default_rng(0).integers(0, 255, (7, 8, 9)).astype(np.uint8)
+    nibabel.save(nibabel.Nifti1Image(values, np.diag([-1, 2, 3, 1])), tmp_path / "v.nii.gz")
+    prepare(open_source(tmp_path / "v.nii.gz"), tmp_path / "volume.nrrd", up="+z")
+    section = slices.drawn(open_grid(tmp_path / "volume.nrrd"), tmp_path / "v.nii.gz", 1)
+    assert [m.min for m in section.measurements if m.name == "equal samples"] == [1.0] * 3
+    assert sum(m.unit == "ms" for m in section.measurements) >= 3
+    for name, value in {"VIEWS": 1, "VIEW_SIZE": 24, "OPAQUE": 0.5, "APART": 3}.items():
+        monkeypatch.setattr(slices, name, value)
+    scene = write_scene(tmp_path / "scene.yaml", scene_of_volume(tmp_path, waves()))
+    found = {(m.name, m.parameters["place"]): m.median for m in slices.clicked(scene, "waves")}
+    assert found["share within a voxel", "clicks"] == 1
+    assert found["voxels apart", "mean depth of models"] > 0

@@ -27,6 +27,8 @@ from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
 from texgs.scene.twin import Twin, twin_of
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.slice_picture import SliceKeys, slice_picture
 from tools import workflow_picture
 
 DOCS, RUNS = ROOT / "docs", ROOT / "build" / "pictures"
@@ -46,6 +48,7 @@ RUN = {  # words of `texgs run`, by the folder of its results
     f" dataset.engine.views.height=400 fit=quick edit=style edit.image.style={','.join(STYLES)}"
     " edit.image.recipe=preview,default",
     "engine": "dataset=engine fit=quick scenes",
+    "mni152": "dataset=mni152 volumes",
 }
 LOOKS = {  # title: scene file below the scenes of the demo
     "as fitted": "compose/scene.yaml",
@@ -124,6 +127,12 @@ def styles(run: Path) -> Image.Image:
     return as_picture(lay_out(grid_rows(rows, ["picture", *(("laid onto it", "edited") * 2)]))).reduce(2)
 
 
+def slices(run: Path) -> Image.Image:
+    """Draw three slices of a head with a crosshair, as `texgs render --slice all` does."""
+    grid = open_grid(run / "mni152/volume/volume.nrrd")
+    return Image.fromarray(slice_picture(grid, SliceKeys(at=(24, -20, 8), width=1200), {}))
+
+
 def copy(pattern: str, smaller: int = 1) -> Callable[[Path], Image.Image]:
     """Take a picture that the run itself makes, so many times smaller."""
     return lambda run: Image.open(next(run.glob(pattern))).convert("RGB").reduce(smaller)
@@ -177,6 +186,7 @@ PICTURES = {
         copy(GALLERY, smaller=2), "text", f"{FIT} gaussians voxels text in2n igs2gs gallery"
     ),
     "styles": Picture(styles, "styles", f"{FIT} image"),
+    "slices": Picture(slices, "mni152", "volume texgs.volume.slice_picture"),
     "viewer": Picture(viewer, "engine", f"{FIT} compose texgs.viewer.server"),
 }
 

@@ -177,6 +177,13 @@ def test_a_picture_is_that_of_texgs_render(scene, tmp_path):
     assert np.array_equal(np.asarray(near), read_rgba(tmp_path / "b.png"))
 
 
+def test_a_slice_is_that_of_texgs_render(tmp_path):
+    scene = texgs.open(write_scene(tmp_path / "scene.yaml", balls_in_a_volume(tmp_path)))
+    words = ["--slice", "z=12", "--width", "90", "--output", str(tmp_path / "a.png")]
+    assert main(["render", str(tmp_path / "scene.yaml"), *words]) == 0
+    assert np.array_equal(np.asarray(scene.slice("z", 12, width=90)), read_rgba(tmp_path / "a.png")[..., :3])
+
+
 def test_films_have_the_frames_of_pictures(scene, tmp_path):
     folder = scene.film(tmp_path / "turn", frames=3, width=32)
     frames = [read_rgba(folder / f"{number:04}.png")[..., :3] for number in range(3)]

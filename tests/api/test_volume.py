@@ -27,6 +27,7 @@ from texgs.volume.framing import frame_of
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlay
 from texgs.volume.render import Appearance
+from texgs.volume.slice_picture import SliceKeys, slice_picture
 
 RED = texgs.TransferFunction([[0.5, 0.0], [1.0, 0.5]], [[0.5, 1.0, 0.0, 0.0]])
 BLUE = texgs.TransferFunction([[0.0, 0.0], [0.2, 0.1], [0.4, 0.0]], [[0.0, 0.0, 0.0, 1.0]])
@@ -46,6 +47,20 @@ def test_an_array_keeps_its_samples_and_places():
     assert volume.summary.minimum == values.min()
     assert volume.summary.maximum == values.max()
     assert repr(volume) == f"Volume hill: 7 x 6 x 5 float32, {values.min():g} to {values.max():g}"
+
+
+def test_slices_and_places_are_those_of_the_samples():
+    values = field(15, 16, 17)
+    volume = texgs.Volume(values, spacing=(1, 2, 3), origin=(4, 5, 6))
+    place = volume.place(4 + 3.2, 5 + 2 * 7, 6 + 3 * 9 - 1)
+    assert (place.index, place.value) == ((3, 7, 9), values[9, 7, 3])
+    assert place.position == (7.0, 19.0, 33.0)
+    keys = SliceKeys("z", 9, window=(0.0, 2.0), width=170)
+    expected = slice_picture(volume.grid, keys, {})
+    assert np.array_equal(np.asarray(volume.slice("z", 9, window=(0, 2), width=170)), expected)
+    assert np.asarray(volume.slice()).shape[1] == pytest.approx(800, abs=1)
+    refused(lambda: volume.slice("axial"), "slice: expected all, or a number of x, y, z, got axial")
+    refused(lambda: volume.place(0, 0, 0), "at: expected a place in the volume")
 
 
 def test_z_of_nifti_points_up_unless_it_is_told_otherwise(tmp_path):

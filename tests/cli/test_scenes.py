@@ -28,6 +28,8 @@ from texgs.fields.surfels.variants import write_texture
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment
+from texgs.scene.session import Session
+from texgs.volume.slice_picture import SliceKeys
 
 
 @pytest.fixture
@@ -214,6 +216,7 @@ def test_a_mistake_in_an_edit_writes_nothing(scene, tmp_path, monkeypatch, capsy
         (["--device", "cuda"], "torch sees no GPU"),
         (["--mode", "normal", "--width", "300000"], "a frame of 300000 x 300000 pixels: needs 5364 GiB"),
         (["--compare", "--mode", "normal"], "--compare: expected --mode shaded, got normal"),
+        (["--compare", "--legend"], "--legend: expected neither --compare nor --slice"),
         (["--path", "cut"], "path cut: expected a scene that a plane cuts, got none"),
     ],
 )
@@ -221,6 +224,41 @@ def test_a_mistake_in_a_rendering(scene, tmp_path, capsys, monkeypatch, words, m
     monkeypatch.setattr("torch.cuda.is_available", lambda: False)
     assert message in refused(capsys, "render", scene, "--output", tmp_path / "x.mp4", *words)
     assert not (tmp_path / "x.mp4").exists()
+
+
+@pytest.mark.parametrize("shown", ["z=20", "all", "x"])
+def test_a_slice_is_a_picture(tmp_path, shown):
+    """That of the session, which is tested on its own; as wide as it is asked for."""
+    scene = write_scene(tmp_path / "scene.yaml", balls_in_a_volume(tmp_path))
+    words = ["--slice", shown, "--at", "0.1", "-.2", "0.3", "--window", "-1", "0.8"]
+    assert render(scene, tmp_path / "a.png", *words, "--width", "200") == 0
+    plane, _, number = shown.partition("=")
+    keys = SliceKeys(plane, int(number) if number else None, (0.1, -0.2, 0.3), (-1.0, 0.8), 200)
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "a.png")), Session.open(scene).slices(keys))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["axial=3"], "slice: expected all, or a number of x, y, z, got axial"),
+        (["z=32"], "slice: expected z from 0 to 31, got 32"),
+        (["z=a"], "--slice: expected an integer, got 'a'"),
+        (["z=-1"], "--slice: expected at least 0, got -1"),
+        (["all", "--at", "0", "0", "99"], "at: expected a place in the volume, from"),
+        (["all", "--path", "orbit"], "--slice: expected no --mode, --path, --transparent or --compare"),
+        (["all", "--compare"], "--slice: expected no --mode, --path, --transparent or --compare"),
+    ],
+)
+def test_a_mistake_in_a_slice(tmp_path, capsys, words, message):
+    scene = write_scene(tmp_path / "scene.yaml", balls_in_a_volume(tmp_path))
+    assert message in refused(
+        capsys, "render", scene, "--output", tmp_path / "a.png", "--width", "80", "--slice", *words
+    )
+
+
+def test_a_slice_needs_a_volume(scene, tmp_path, capsys):
+    message = refused(capsys, "render", scene, "--output", tmp_path / "a.png", "--slice", "all")
+    assert "volume: expected the volume that the scene was made from, got none" in message
 
 
 def test_only_a_scene_is_replaced_by_an_edited_one(scene, tmp_path, capsys):

@@ -11,6 +11,7 @@ from texgs.core.cuts import NO_CUTS, Cuts, Plane
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.session import Session
+from texgs.scene.twin import Twin
 
 CAMERA = orbit(20, 10, 4, 30, 64, 48)
 MIDDLE = (32, 24)
@@ -24,11 +25,28 @@ def scene(tmp_path_factory):
 
 @pytest.mark.parametrize("mode", ["shaded", "normal", "difference"])
 def test_a_point_of_models_is_seen_at_its_pixel_at_their_mean_depth(scene, mode):
-    point = torch.tensor(Session(scene).point_at(CAMERA, mode, scene, (30, 20)))
-    place, z = CAMERA.project(point)
-    torch.testing.assert_close(place, torch.tensor([30.5, 20.5]), atol=1e-3, rtol=0)
-    depth = scene.open().render(CAMERA, scene.light, scene.edits, outputs=("depth",)).depth
-    assert float(z) == pytest.approx(float(depth[20, 30]), abs=1e-4)
+    """Without a volume, or where that is gone, or in modes that show models only."""
+    gone = replace(scene, volume=replace(scene.volume, file=scene.volume.file.with_name("gone.nrrd")))
+    for each in (scene,) if mode == "normal" else (replace(scene, volume=None), gone):
+        point = torch.tensor(Session(each).point_at(CAMERA, mode, each, (30, 20)))
+        place, z = CAMERA.project(point)
+        torch.testing.assert_close(place, torch.tensor([30.5, 20.5]), atol=1e-3, rtol=0)
+        depth = scene.open().render(CAMERA, scene.light, scene.edits, outputs=("depth",)).depth
+        assert float(z) == pytest.approx(float(depth[20, 30]), abs=1e-4)
+
+
+@pytest.mark.parametrize("mode", ["shaded", "difference"])
+def test_a_point_is_where_half_of_the_light_is_gone_in_the_volume(scene, mode):
+    solid = replace(scene.models["high"], edit=PartEdit(opacity=1.1))
+    opaque = replace(scene, models={**scene.models, "high": solid})
+    seen = Twin(opaque).render(CAMERA, opaque, opaque.open().palettes, outputs=("depth", "median"))
+    assert float(seen.median[20, 30]) > 0
+    point = torch.tensor(Session(opaque).point_at(CAMERA, mode, opaque, (30, 20)))
+    assert float(CAMERA.project(point)[1]) == pytest.approx(float(seen.median[20, 30]), abs=1e-4)
+    styled = replace(opaque, models={**opaque.models, "low": replace(solid, edit=PartEdit(ambient=0.5))})
+    depth = styled.open().render(CAMERA, styled.light, styled.edits, outputs=("depth",)).depth
+    point = torch.tensor(Session(styled).point_at(CAMERA, mode, styled, (30, 20)))
+    assert float(CAMERA.project(point)[1]) == pytest.approx(float(depth[20, 30]), abs=1e-4)
 
 
 @pytest.mark.parametrize("mode", ["shaded", "normal", "volume"])

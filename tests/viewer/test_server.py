@@ -257,6 +257,14 @@ async def test_a_movement_goes_on_from_its_own_step_only(browser, client):
             "light: expected the volume of the scene for shadows",
         ),
         ({"part": "", "key": "cuts", "value": {"planes": 3}}, "cuts.planes: expected"),
+        (
+            {"part": "", "key": "markers", "value": [{"points": 3}]},
+            "markers.0.points: expected a list, got 3",
+        ),
+        (
+            {"part": "", "key": "markers", "value": [{"points": [[0, 0, 0]]}] * 101},
+            "0 to 100 values, got 101",
+        ),
     ],
 )
 @on_page

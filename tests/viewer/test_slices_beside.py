@@ -20,6 +20,7 @@ from tests.viewer.test_slices import (
 from texgs.core.camera import orbit
 from texgs.core.cuts import NO_CUTS
 from texgs.scene.scene_file import read_scene
+from texgs.scene.twin import Twin
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.slices import place_at, windowed
 
@@ -143,10 +144,9 @@ def test_a_click_in_the_scene_moves_the_crosshair_to_what_is_seen(chromium, scen
         x, y = round(u * box["width"]), round(v * box["height"])
         page.mouse.click(box["x"] + x, box["y"] + y)
         camera = orbit(*PLACE.values(), round(box["width"]), round(box["height"]))
-        depth = float(scene.open().render(camera, outputs=("depth",)).depth[y, x])
-        ray = torch.linalg.inv(camera.K) @ torch.tensor([x + 0.5, y + 0.5, 1.0])
-        point = camera.viewmat[:3, :3].T @ (depth * ray - camera.viewmat[:3, 3])
-        place = place_at(open_grid(scene.volume.file), tuple(point.tolist()))
+        median = Twin(scene).render(camera, scene, scene.open().palettes, outputs=("median",)).median
+        point = camera.unproject(median)[y, x]
+        place = place_at(open_grid(scene.volume.file), point.tolist())
         says(page, *place.index)
         marks = re.findall(r"-?[\d.]+", page.locator(".crosshair .line").get_attribute("d"))
         mark = np.array(marks, float).reshape(-1, 2).mean(axis=0)
@@ -165,7 +165,8 @@ def test_a_tick_cuts_the_scene_at_the_crosshair_and_shows_the_slice_there(chromi
         page.mouse.wheel(0, -100)
         says(page, 3, 7, 2)
         expect(page.get_by_label("Faces")).to_have_value("slice")
-        expect(page.locator("#steps li")).to_have_text(["cuts 1 plane, slice"])
+        steps = page.locator("#steps li").all_inner_texts()
+        assert set(steps) == {"cuts 1 plane, slice"}, "one, or two where the machine is slow"
         save_as(page, "cut.yaml")
         cuts = read_scene(scene_file.with_name("cut.yaml")).cuts
         assert (cuts.faces, list(cuts.window)) == ("slice", EVERYTHING)
@@ -175,7 +176,8 @@ def test_a_tick_cuts_the_scene_at_the_crosshair_and_shows_the_slice_there(chromi
         assert np.abs(normal).tolist() == [0, 1, 0], "the volume lies in the world as in its file"
         assert normal @ camera.position.numpy() > plane.offset, "what is nearer is taken away"
         assert plane.offset == pytest.approx(normal @ point_of((3, 7, 2)))
-        page.get_by_role("button", name="Undo").click()
+        for _ in steps:
+            page.get_by_role("button", name="Undo").click()
         expect(page.get_by_label("In the scene")).not_to_be_checked()
         page.get_by_label("In the scene").check()
         page.get_by_label("In the scene").uncheck()

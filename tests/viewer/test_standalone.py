@@ -278,6 +278,7 @@ WRONG = [  # as links to pages that were edited by hand
     {"part": "", "key": "background", "value": [2, 0, 0]},
     {"part": "", "key": "cuts", "value": {"planes": 3, "box": None, "faces": "shaded"}},
     {"part": "", "key": "functions", "value": {}},
+    {"part": "", "key": "markers", "value": [{"points": [[0, 0]], "text": ""}]},
     {"part": "", "key": "constructor", "value": 1},
     {"part": "B", "key": "opacity", "value": -5},
     {"part": "B", "key": "visible", "value": "no"},
@@ -301,10 +302,10 @@ def test_of_a_wrong_link_is_done_what_can_be_and_the_rest_named(page, file):
     page.evaluate("words => { location.hash = new URLSearchParams(words); }", words)
     told = page.get_by_text("This page cannot use of the link")
     told.wait_for()
-    names = (
-        "mode, azimuth, polar, target, models, light, background, cuts, functions, constructor, B opacity, "
+    names = "mode, azimuth, polar, target, models, light, background, cuts, functions, markers, constructor, "
+    assert (
+        f"{names}B opacity, B visible, B palette, B segments, C opacity, 3, an edit." in told.text_content()
     )
-    assert f"{names}B visible, B palette, B segments, C opacity, 3, an edit." in told.text_content()
     page.evaluate("() => { document.getElementById('notices').hidden = true; }")
     assert page.get_by_role("listitem").all_text_contents() == ["B visible off"]
     settle(page)

@@ -15,9 +15,10 @@ from texgs.api.display import picture_of
 from texgs.api.part import Part, Value
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
+from texgs.core.markers import Marker
 from texgs.core.names import new_part_file
 from texgs.core.progress import interrupts_between_items
-from texgs.scene.changes import apply_all
+from texgs.scene.changes import apply_all, new_marker
 from texgs.scene.parts import part_names
 from texgs.scene.session import Session
 from texgs.scene.shot import Shot
@@ -55,6 +56,7 @@ class Editing:
     background = Value["tuple[float, float, float]"](
         'Colour behind the scene: set red, green, blue from 0 to 1, or "#rrggbb".'
     )
+    markers = Value[tuple[Marker, ...]]("Points and distances in world units, see `mark`; None: none.")
     time = Value["int | None"]("Number of the step that is shown, of a scene of a series; None of others.")
 
     def __init__(self, session: Session, *kept: Any) -> None:
@@ -91,6 +93,13 @@ class Editing:
             raise ArgumentError(f"words: expected text such as 'light=30,40', got {words!r:.100}")
         with self.session.one_step(" ".join(words)):
             apply_all(self.session, words)
+        return self
+
+    def mark(self, *places: Sequence[float], text: str = "") -> Self:
+        """Mark a place in the space and unit of the volume's file, or the distance of two; return self."""
+        with self.session.one_step(f"marker {text}"):
+            marker = new_marker(self.session.scene, places, text)
+            self.session.set_of_scene("markers", [*self.markers, marker])
         return self
 
     def undo(self) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +44,7 @@ class Scene(Editing):
     def render(self, shot: Shot) -> Image:
         """Return a picture, which notebooks show; `numpy.asarray` of it is [H, W, 3 or 4], uint8."""
         camera = shot.camera(self.session.scene.framed(self.session.composition))
-        return picture_of(self.session.frame(camera, shot.mode, transparent=shot.transparent))
+        return picture_of(self.session.picture(camera, shot))
 
     @takes(SliceKeys, "plane", "number")
     def slice(self, keys: SliceKeys) -> Image:
@@ -57,8 +56,7 @@ class Scene(Editing):
     def film(self, path: str | Path, film: Film) -> Path:
         """Write a film, .mp4 or .gif, or a folder of pictures, to a path, and return it."""
         shots = film.shots(self.session.scene, self.session.composition)
-        draw = partial(self.session.frame, mode=film.mode, transparent=film.transparent)
-        return film.write(path, (draw(camera, scene=scene) for camera, scene in shots))
+        return film.write(path, (self.session.picture(camera, film, scene) for camera, scene in shots))
 
     def psnr(self, views: int = 12, width: int = 400) -> float:
         """Return the mean PSNR in dB beside direct volume rendering, over views of the path of test views.

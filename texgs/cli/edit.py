@@ -26,7 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "I, X, Y, Z, of the volume's file, in its unit, as in S,-12mm) or "
         "cut=NX,NY,NZ,OFFSET adds a plane, cut.1=... replaces it, cut= takes all back; "
         "cut.box=X0,Y0,Z0,X1,Y1,Z1; cut.faces=shaded, unlit or slice; cut.window=LOW,HIGH, "
-        "values of slices in black and in white; MODEL.KEY= takes an edit back; "
+        "values of slices in black and in white; marker=TEXT@X,Y,Z and distance=X,Y,Z:X,Y,Z, in the space "
+        "and unit of the volume's file, marker=none takes all away; MODEL.KEY= takes an edit back; "
         "MODEL/SEGMENT.KEY=VALUE edits a segment, MODEL/SEGMENT=FILE adds one from a file and MODEL/SEGMENT= "
         "removes it",
     )

@@ -1,7 +1,6 @@
 """Render a scene to PNG, GIF or MP4: one view, the test path, an orbit, a light or a cut that moves."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 
 from texgs.cli.options import add_device, add_keys, keys_of, option, require_own_place
@@ -60,8 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
         with errors_at(arguments.scene):
             if needs_twin(scene, film.mode):
                 session.twin_of(scene)
-        shows = partial(session.frame, mode=film.mode, transparent=film.transparent)
-        frames = (shows(camera, scene=shown) for camera, shown in shots)
+        frames = (session.picture(camera, film, shown) for camera, shown in shots)
     words = found_sentence(arguments.scene, scene)
     if arguments.caption:
         require_checked(arguments.scene, words)
@@ -77,6 +75,8 @@ def require_compatible(arguments: argparse.Namespace, film: Film) -> None:
         raise ArgumentError("--transparent: expected neither --compare nor --caption; leave them out")
     if arguments.compare and film.mode != "shaded":
         raise ArgumentError(f"--compare: expected --mode shaded, got {film.mode}; leave one of them out")
+    if film.legend and (arguments.compare or arguments.slice):
+        raise ArgumentError("--legend: expected neither --compare nor --slice; leave one of them out")
     others = film.mode != "shaded" or film.count > 1 or film.transparent or arguments.compare
     if arguments.slice and others:
         raise ArgumentError("--slice: expected no --mode, --path, --transparent or --compare; leave them out")

@@ -1,9 +1,8 @@
 """Markers of a scene: points with a text, and distances between two points, in world units."""
 
 from dataclasses import dataclass
-from math import dist
 
-from texgs.core.cuts import MAX_COORDINATE
+from texgs.core.cuts import MAX_COORDINATE as MOST
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import REQUIRED, key
 
@@ -14,33 +13,19 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Marker:
-    """A point of the world, or a distance between two of them, with a text."""
+    """A point of the world, or both ends of a distance, with a text."""
 
-    points: tuple[Point, ...] = key(
-        REQUIRED,
-        "one, or both ends of a distance",
-        "world units",
-        items=(1, 2),
-        least=-MAX_COORDINATE,
-        most=MAX_COORDINATE,
-    )
+    points: tuple[Point, ...] = key(REQUIRED, "1 or 2", "world units", items=(1, 2), least=-MOST, most=MOST)
     text: str = key("", "beside it")
 
     def __post_init__(self) -> None:
         if len(self.text) > MAX_LETTERS or not self.text.isprintable():
-            raise ArgumentError(
-                f"text of a marker: expected at most {MAX_LETTERS} printable letters, "
-                f"got {self.text[: MAX_LETTERS + 1]!r}"
-            )
-
-    @property
-    def length(self) -> float:
-        """Return the distance between its points in world units; 0 of one."""
-        return dist(self.points[0], self.points[-1])
+            expected = f"expected at most {MAX_LETTERS} printable letters"
+            raise ArgumentError(f"text of a marker: {expected}, got {self.text[: MAX_LETTERS + 1]!r}")
 
 
 @dataclass(frozen=True)
 class Markers:
-    """The markers of a scene as a value of its file, for checks."""
+    """The markers of a scene, to check those of files and messages."""
 
-    markers: tuple[Marker, ...] = key((), "in the order that they were made", items=(0, MAX_MARKERS))
+    markers: tuple[Marker, ...] = key((), "in the order in which they were made", items=(0, MAX_MARKERS))

@@ -15,6 +15,7 @@ from texgs.report.fit_figure import ERROR, signed_error
 from texgs.scene.changes import apply_all
 from texgs.scene.scene_file import read_scene
 from texgs.scene.session import Session
+from texgs.scene.shot import Shot
 from texgs.scene.twin import Twin
 
 
@@ -51,8 +52,10 @@ class GalleryRenderer:
             apply_all(session, cell.changes)
             if cell.light:
                 session.set_of_scene("light", cell.light)
+            if cell.show == "error":
+                session.set_of_scene("markers", ())
             camera = self._camera(cell)
-            scene = None if cell.show == "volume" else session.frame(camera).astype("float32") / 255
+            scene = None if cell.show == "volume" else session.picture(camera, Shot()).astype("float32") / 255
             volume = None if cell.show == "scene" else self._volume_frame(session, camera)
         finally:
             while session.undo():

@@ -1,7 +1,8 @@
 """Changes of a scene as words, such as TF01.palette=#ff8800 or light=headlight.
 
 Those of cuts are cut=x,0.1, cut=-z,64v, cut=1,1,0,0.2, cut.box=-1,-1,-1,1,1,0 and cut.faces=unlit; in the
-space of the volume's file cut=S,-12mm and cut=-S,64v.
+space of the volume's file cut=S,-12mm and cut=-S,64v. Places of markers are in that space, too:
+marker=aorta@12.5,-30,44, distance=12.5,-30,44:20,-30,44 and marker=none.
 """
 
 import re
@@ -16,7 +17,9 @@ import yaml
 
 from texgs.core.cuts import AXES, NO_CUTS, Box, Cuts, Plane, along
 from texgs.core.errors import ArgumentError, errors_at
+from texgs.core.keys import typed_argument
 from texgs.core.light import HIDING
+from texgs.core.markers import Marker
 from texgs.core.names import is_number
 from texgs.core.plain_yaml import parse_yaml
 from texgs.scene.bounds import models_of, span_of
@@ -35,6 +38,7 @@ PLANE = (
 DIRECTIONS = "RASLPIXYZ"  # axes of the space of a volume's file
 BOX = "X0,Y0,Z0,X1,Y1,Z1, in world units"
 LOOKS = ("style", "picture", "instruction")  # keys of looks, which are not changes of numbers
+PLACES = {"marker": "TEXT@X,Y,Z", "distance": "X,Y,Z:X,Y,Z or TEXT@X,Y,Z:X,Y,Z"}  # words of new markers
 VOXEL_SUFFIX = "v"  # after a position in samples, counted from 0
 
 
@@ -70,14 +74,36 @@ def _apply(session: Session, word: str) -> None:
         cuts = changed_cuts(session.scene, key if dot else "", text)
         _require_through(session, cuts)
         session.set_cuts(cuts)
+    elif name in PLACES:
+        others = () if text in ("", "none") else (*session.scene.markers, _marker(session.scene, name, text))
+        session.set_of_scene("markers", others)
     elif "/" in name:
         session.add_segment(name, _file(text)) if text else session.remove_segment(name)
     elif dot:
         models = ", ".join(session.scene.models)
         raise ArgumentError(f"expected a model of the scene ({models}), got {part}")
     else:
-        require_keys({name: text}, ("light", *HIDING, "background", "cut", "time"), "the scene")
+        require_keys({name: text}, ("light", *HIDING, "background", "cut", *PLACES, "time"), "the scene")
         session.set_of_scene(name, _plain(text) if text else SCENE_KEYS[name])
+
+
+def new_marker(scene: Scene, places: Any, text: str = "") -> Marker:
+    """Return a marker at places [1 or 2, 3] in the volume's file, in its unit; without one, of the world."""
+    try:
+        points = np.array(places, float).reshape(-1, 3)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"expected three numbers a place, got {places!r:.100}") from error
+    points = scene.space.in_world(points) if scene.space else points
+    return typed_argument(Marker, {"points": points.tolist(), "text": text}, "marker")
+
+
+def _marker(scene: Scene, name: str, text: str) -> Marker:
+    """Return the marker or the distance that words stand for."""
+    words, _, places = text.rpartition("@")
+    rows = [each.split(",") for each in places.split(":")]
+    if [len(row) for row in rows] != [3] * (1 + (name == "distance")):
+        raise ArgumentError(f"expected {PLACES[name]}, got {text:.100}")
+    return new_marker(scene, rows, words)
 
 
 def _require_through(session: Session, cuts: Cuts) -> None:

@@ -1,6 +1,6 @@
 """Slices of a volume on the faces of cuts, which hide what is behind them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,19 +11,14 @@ from texgs.core.camera import Camera
 from texgs.raster.api import CutRange
 from texgs.volume.caster import Cast, Caster
 from texgs.volume.lookup import Lookup
-from texgs.volume.slices import Label, slice_colors
+from texgs.volume.slices import Labels, slice_colors
 from texgs.volume.transfer import TransferFunction
 
 ANY = TransferFunction(((0, 1), (1, 1)), ((0, 0, 0, 0),))  # only its channel is looked up
 
 
 def with_slices(
-    seen: Cast,
-    camera: Camera,
-    cut: CutRange,
-    caster: Caster,
-    window: Sequence[float],
-    labels: Mapping[str, Label],
+    seen: Cast, camera: Camera, cut: CutRange, caster: Caster, window: Sequence[float], labels: Labels
 ) -> Cast:
     """Return a view with slices on the faces of a cut, opaque where a face is in the volume."""
     near, far = cut.depth_range

@@ -132,7 +132,7 @@ def frames_of(
     from texgs.scene.session import Session
 
     session = Session(scene, device)
-    return (session.frame(camera, scene=shown) for camera, shown in shots)
+    return (session.picture(camera, Shot(), shown) for camera, shown in shots)
 
 
 def sweep_range(scene: Scene, composition: Composed) -> tuple[float, float]:

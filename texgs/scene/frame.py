@@ -111,8 +111,8 @@ def point_at(
 ) -> list[float] | None:
     """Return the point [3] of the world that a pixel (column, row) shows; None for the background.
 
-    It lies at the mean depth of the models. Where the twin is seen it lies where half of the light is gone,
-    or if it never is, at the mean depth of the volume.
+    With a twin, and in modes that can show it, it lies where half of the light is gone in the volume, or if
+    it never is, at the mean depth of the volume; otherwise at the mean depth of the models.
     """
     column, row = pixel
     alone = camera.crop(column, row, column + 1, row + 1).to(composed.device)

@@ -8,7 +8,6 @@ import numpy as np
 from texgs.scene.scene import Scene
 from texgs.scene.twin import edit_function, is_seen
 from texgs.volume.label_masks import HALF, INSIDE
-from texgs.volume.transfer import TransferFunction
 
 Color = tuple[float, ...]
 SAMPLES = 9  # colours of a function over its range
@@ -20,7 +19,7 @@ class Entry:
 
     name: str
     colors: list[Color]  # over the range, else one; in [0, 1]
-    range: str  # of values, such as "15 to 75"; "" if unknown, and of labels
+    range: str = ""  # of values, such as "15 to 75"; "" if unknown, and of a label
 
 
 def legend_of(scene: Scene, palettes: Sequence[Color]) -> list[Entry]:
@@ -30,34 +29,20 @@ def legend_of(scene: Scene, palettes: Sequence[Color]) -> list[Entry]:
         scene: with its edits.
         palettes: of its models, as fitted: `Composed.palettes`.
     """
-    tfs = scene.volume.tfs if scene.volume else {}
     entries = []
     for (name, model), palette in zip(scene.models.items(), palettes, strict=True):
-        parts = {name: model.edit} | {
-            f"{name}/{key}": segment.edit
-            for key, segment in model.segments.items()
-            if segment.edit.palette not in (None, model.edit.palette)
-        }
-        for part, edit in parts.items():
-            if not is_seen(edit):
+        tf = scene.volume.tfs.get(name) if scene.volume else None
+        own = {f"{name}/{key}": part.edit for key, part in model.segments.items()}
+        for part, edit in {name: model.edit, **own}.items():
+            if not is_seen(edit) or (part in own and edit.palette in (None, model.edit.palette)):
                 continue
-            tf = tfs.get(name)
-            if tf is not None and palette:
-                entries.append(Entry(part, colors_of(edit_function(tf, edit, palette)), range_of_values(tf)))
-            elif shown := edit.palette or palette:
-                entries.append(Entry(part, [shown], ""))
+            if tf is None or not palette:
+                entries += [Entry(part, [shown])] if (shown := edit.palette or palette) else []
+                continue
+            low, high = tf.support
+            is_label = (tf.opacity[0][0], tf.opacity[-1][0]) == (HALF, INSIDE)
+            samples = edit_function(tf, edit, palette)(np.linspace(low, high, SAMPLES))
+            colors = [tuple(rgb) for rgb in samples[:, :3].round(4).tolist()]
+            words = "" if is_label else f"{low:.4g} to {high:.4g}"
+            entries.append(Entry(part, colors if len({*colors}) > 1 else [edit.palette or colors[0]], words))
     return entries
-
-
-def colors_of(tf: TransferFunction) -> list[Color]:
-    """Return the colours of a function over its range; of a constant one, or of a label, its colour."""
-    low, high = tf.support
-    colors = [tuple(rgb) for rgb in tf(np.linspace(low, high, SAMPLES))[:, :3].round(4).tolist()]
-    return colors[:1] if len({*colors}) == 1 else colors
-
-
-def range_of_values(tf: TransferFunction) -> str:
-    """Return the range of values that a function shows, as people write it; "" where it shows a label."""
-    low, high = tf.support
-    is_label = (tf.opacity[0][0], tf.opacity[-1][0]) == (HALF, INSIDE)
-    return "" if is_label else f"{low:.4g} to {high:.4g}"

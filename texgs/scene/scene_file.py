@@ -1,7 +1,7 @@
 """scene.yaml: basic models and their edits; opening composes them and trains nothing."""
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
@@ -128,7 +128,7 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
     if scene.functions:
         values["functions"] = plain_functions(scene.functions)
     if scene.markers:
-        values["markers"] = plain_markers(scene.markers)
+        values["markers"] = [asdict(each) for each in scene.markers]
     text = yaml.safe_dump(values, sort_keys=False, allow_unicode=True, default_flow_style=None)
     return write_bytes(path, text.encode())
 
@@ -243,14 +243,6 @@ def plain_cuts(cuts: Cuts) -> dict[str, Any]:
 def markers_of(value: Any) -> tuple[Marker, ...]:
     """Return the markers that a value of a scene file stands for, a list of tables."""
     return typed_argument(Markers, {"markers": value}).markers
-
-
-def plain_markers(markers: Sequence[Marker]) -> list[dict[str, Any]]:
-    """Return markers as plain values."""
-    return [
-        {"points": [list(point) for point in each.points], **({"text": each.text} if each.text else {})}
-        for each in markers
-    ]
 
 
 def require_keys(values: Any, keys: Collection[str] | None, where: str) -> None:

@@ -26,6 +26,8 @@ from texgs.raster import Render
 from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.exposure import require_shadows
 from texgs.scene.frame import frame, point_at
+from texgs.scene.legend import legend_of
+from texgs.scene.marks import with_marks
 from texgs.scene.parts import NewLook, entry_of, key_path, replace_entry, require_new, split, with_looks
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import (
@@ -39,7 +41,7 @@ from texgs.scene.scene_file import (
     write_scene,
 )
 from texgs.scene.segment_file import read_segment, write_segment
-from texgs.scene.shot import Mode
+from texgs.scene.shot import Mode, Shot
 from texgs.scene.twin import Twin, last_of, needs_twin
 from texgs.volume.slice_picture import SliceKeys, slice_picture
 
@@ -330,10 +332,18 @@ class Session:
             twin = twin.with_step(step, by_cell=False)  # of something that moves, perhaps its function
         return frame(composition, camera, scene, mode, twin, transparent=transparent)
 
+    def picture(self, camera: Camera, shot: Shot, scene: Scene | None = None) -> np.ndarray:
+        """Return a frame as a shot has it, with markers and legend on top; see `with_marks`."""
+        scene = self.scene if scene is None else scene
+        pixels = self.frame(camera, shot.mode, scene, transparent=shot.transparent)
+        legend = legend_of(scene, self.composition_of(scene).palettes) if shot.legend else []
+        return with_marks(pixels, camera, scene, legend)
+
     def point_at(self, camera: Camera, mode: str, scene: Scene, pixel: tuple[int, int]) -> list[float] | None:
         """Return the point of a scene of the history that a pixel shows; see `texgs.scene.frame.point_at`."""
         scene = replace(scene, light=scene.light.unhidden)  # shadows hide no point
-        twin = self.twin_of(scene) if needs_twin(scene, mode) else None
+        is_known = scene.volume is not None and scene.volume.file.is_file() and scene.is_as_volume
+        twin = self.twin_of(scene) if is_known or needs_twin(scene, mode) else None
         return point_at(self.composition_of(scene), camera, scene, mode, twin, pixel)
 
     def slices(self, keys: SliceKeys) -> np.ndarray:

@@ -35,6 +35,7 @@ class Shot(LensKeys):
     polar: float = key(20.0, "of the camera above the horizon, not on path test", "degrees")
     mode: Mode = key("shaded", "what a picture shows; the last four are factors of the material")
     transparent: bool = key(False, "leave the background out: pictures have an alpha channel")
+    legend: bool = key(False, "show names, colours and ranges of values in a corner")
 
     def camera(self, framed: Frame) -> Camera:
         """Return the camera; by default it shows the whole frame."""

@@ -29,7 +29,7 @@ from texgs.volume.light_cells import LightCells
 from texgs.volume.matter import Matter
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
-from texgs.volume.slices import Label, window_of
+from texgs.volume.slices import Labels, window_of
 from texgs.volume.transfer import TransferFunction
 
 T = TypeVar("T")
@@ -115,8 +115,6 @@ class Twin:
         each different channel.
         """
         shown = self._shown(scene, palettes, functions or {})
-        clear = torch.zeros(camera.height, camera.width, 4, device=self._device)
-        seen = Cast(clear, **{name: clear[..., 0].clone() for name in outputs})
         edit = next((model.edit for model in scene.models.values() if is_seen(model.edit)), PartEdit())
         look = self._volume.appearance
         look = replace(look, **{key: getattr(look, key) * getattr(edit, key) for key in MATERIAL})
@@ -132,7 +130,10 @@ class Twin:
                 by_cell=self._by_cell,
                 cells=self._lit(scene, shown) if scene.light.casts_shadows else None,
             )
-        seen = casts.get(edit.tint[0], seen)
+        seen = casts.get(edit.tint[0]) or Cast(
+            torch.zeros(camera.height, camera.width, 4, device=self._device),
+            **{name: torch.zeros(camera.height, camera.width, device=self._device) for name in outputs},
+        )
         for channel, share in enumerate(edit.tint[1:], start=1):
             if share != edit.tint[0]:
                 seen.rgba[..., channel] = casts[share].rgba[..., channel]
@@ -141,7 +142,7 @@ class Twin:
         window = scene.cuts.window or window_of(self.grid)
         return with_slices(seen, camera, cut, self._caster, window, self.labels(scene, palettes))
 
-    def labels(self, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> dict[str, Label]:
+    def labels(self, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> Labels:
         """Return the labels of the volume by the names of their models, in the colours that they have now."""
         shown, labels = self._shown(scene, palettes, {}), self._volume.tfs.items()
         colors = {name: tf(INSIDE)[:3] for name, tf in shown.items()}

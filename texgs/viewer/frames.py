@@ -28,6 +28,7 @@ from texgs.report.fit_figure import signed_error
 from texgs.scene.frame import quantize
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
+from texgs.scene.shot import Shot
 from texgs.viewer.messages import View
 from texgs.viewer.origins import Origins, fitted, over
 
@@ -97,8 +98,11 @@ class Frames:
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def pixels(self, view: View, scene: Scene) -> np.ndarray:
-        """Return what a view shows [H, W, 3 or 4], uint8."""
-        return self._draw(view, scene, 1.0)[0]
+        """Return what a view shows [H, W, 3 or 4], uint8, and the scene's markers on it: for files."""
+        if view.mode == "truth" or view.mode == "difference" or view.mode == "wipe":
+            return self._draw(view, scene, 1.0)[0]
+        shot = Shot(mode=view.mode, transparent=view.transparent, legend=view.legend)
+        return self._session.picture(view.camera.camera(), shot, scene)
 
     def close(self) -> None:
         """End the thread after the frame that it renders."""

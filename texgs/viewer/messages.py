@@ -44,6 +44,7 @@ class View:
     wipe: float | None = key(None, "share of the width; default: beside it", least=0, most=1)
     moving: bool = False  # more views follow: speed counts more than quality
     before: bool = False  # the scene as it was opened
+    legend: bool = False  # of the scene, in a picture that is saved
     transparent: bool = False  # without background; of the scene or its volume alone
     only: str = ""  # a model to show alone and unedited, for clicks
 
@@ -61,8 +62,8 @@ class Pick:
 class Slice:
     """Ask for a slice of the volume."""
 
-    plane: str  # its name, see `planes_of`
-    number: int
+    plane: int = key(REQUIRED, "across x, y or z of the file's space", least=0, most=2)
+    number: int = key(REQUIRED, "of the slice")
     window: tuple[float, float] = key(REQUIRED, "values in black and in white")
 
 

@@ -9,16 +9,14 @@ from typing import Any
 import cv2
 from aiohttp import web
 
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import TexgsError
 from texgs.scene.scene import volume_of
 from texgs.scene.session import Session
 from texgs.viewer.messages import Place, Slice, parse
 from texgs.volume.grid import Grid
 from texgs.volume.label_masks import HALF, shows_label
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.slices import Label, place_at, planes_of, slice_colors, slice_of, window_of
-
-QUICK_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1)
+from texgs.volume.slices import Labels, place_at, planes_of, slice_colors, slice_of, window_of
 
 
 class Slices:
@@ -38,33 +36,31 @@ class Slices:
     async def picture(self, request: web.Request) -> web.StreamResponse:
         """Return the slice in the query as a PNG file."""
         asked = parse(request.query.get("slice", ""), Slice)
-        return web.Response(body=await asyncio.to_thread(self._png, asked), content_type="image/png")
+        return web.Response(body=await asyncio.to_thread(self.png, asked), content_type="image/png")
 
     async def place(self, request: web.Request) -> web.StreamResponse:
         """Return the sample at the place in the query, JSON; null beyond the outermost ones."""
         asked = parse(request.query.get("place", ""), Place)
-        return web.json_response(await asyncio.to_thread(self._found, asked))
+        return web.json_response(await asyncio.to_thread(self.found, asked))
 
-    def _png(self, asked: Slice) -> bytes:
+    def png(self, asked: Slice) -> bytes:
         """Return a picture of a slice, a pixel a sample: the values in a window, and labels over them."""
         grid, labels = self._open()
-        planes = {plane.name: plane for plane in planes_of(grid)}
-        if asked.plane not in planes:
-            raise ArgumentError(f"plane: expected one of {', '.join(planes)}, got {asked.plane!r:.100}")
-        values = partial(slice_of, grid, planes[asked.plane], asked.number)
+        values = partial(slice_of, grid, planes_of(grid)[asked.plane], asked.number)
         colors = slice_colors(values, asked.window, labels)
         pixels = colors[..., ::-1] if labels else colors[..., 0]  # three channels take three times as long
-        return cv2.imencode(".png", pixels, QUICK_PNG)[1].tobytes()
+        return cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
 
-    def _found(self, asked: Place) -> dict[str, Any] | None:
+    def found(self, asked: Place) -> dict[str, Any] | None:
         """Return index, position and value of the sample at a place, and the labels there."""
         grid, labels = self._open()
         masks = {name: place_at(grid, asked.point, channel) for name, (channel, _) in labels.items()}
         inside = [name for name, mask in masks.items() if mask and mask.value >= HALF]
-        place = place_at(grid, asked.point)
-        return {**asdict(place), "labels": inside} if place else None
+        place, is_mask = place_at(grid, asked.point), any(channel == 0 for channel, _ in labels.values())
+        none = {"value": None} if is_mask else {}  # of an image
+        return {**asdict(place), **none, "labels": inside} if place else None
 
-    def _open(self) -> tuple[Grid, dict[str, Label]]:
+    def _open(self) -> tuple[Grid, Labels]:
         """Map the volume of the scene as it is now, and return its labels in their colours."""
         scene, palettes = self._session.scene, self._session.composition.palettes
         has_labels = any(map(shows_label, volume_of(scene).tfs.values()))

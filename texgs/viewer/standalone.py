@@ -25,6 +25,7 @@ from texgs.fields.surfels.composition import Composition
 from texgs.scene.cut_view import cut_view
 from texgs.scene.exposure import require_shadows
 from texgs.scene.frame import quantize
+from texgs.scene.marks import with_marks
 from texgs.scene.scene import Scene
 from texgs.scene.twin import Twin, is_seen
 from texgs.viewer.description import describe, presets
@@ -169,7 +170,7 @@ def poster(
     more = ("depth",) if twin is not None and not has_faces else ()
     background = torch.tensor(scene.background)
     seen = cut_view(composed, camera, scene, twin, background=background, outputs=more)
-    pixels = quantize(seen.color)
+    pixels = with_marks(quantize(seen.color), camera, scene)
     file = BytesIO()
     Image.fromarray(pixels).save(file, "JPEG", quality=POSTER_QUALITY, optimize=True)
     return file.getvalue()

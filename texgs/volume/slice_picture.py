@@ -1,6 +1,6 @@
 """A picture of slices through a place of a volume, with a crosshair, and words about the place."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,7 +14,7 @@ from texgs.core.keys import key
 from texgs.volume.grid import Grid
 from texgs.volume.label_masks import HALF
 from texgs.volume.slices import (
-    Label,
+    Labels,
     Place,
     SlicePlane,
     place_at,
@@ -41,12 +41,12 @@ class SliceKeys:
         None, "place that slices go through, in space and unit of the volume's file; default the middle"
     )
     window: tuple[float, float] | None = key(
-        None, "values of slices in black and in white; default what 99 % of the samples are between"
+        None, "values in black and in white; default what 99 % are between"
     )
-    width: int = key(800, "of the picture", "pixels", least=64, most=LARGEST)
+    width: int = key(800, "of the picture", "pixels", least=16, most=LARGEST)
 
 
-def slice_picture(grid: Grid, keys: SliceKeys, labels: Mapping[str, Label]) -> np.ndarray:
+def slice_picture(grid: Grid, keys: SliceKeys, labels: Labels) -> np.ndarray:
     """Return a picture [H, W, 3], uint8, of a slice, or of all three side by side; pixels are square.
 
     Raises:
@@ -83,10 +83,10 @@ def marked(pixels: np.ndarray, plane: SlicePlane, size: tuple[int, int], at: Seq
     y = (0.5 - rise * at[up] / (plane.size[1] * plane.spacing[1])) * height
     draw.line((0, y, width, y), CROSS)
     draw.line((x, 0, x, height), CROSS)
-    font = ImageFont.load_default(max(10, width // 24))
+    font = ImageFont.load_default(max(10, min(size) // 20))
     ends = ((GAP, height / 2), (width - GAP, height / 2), (width / 2, height - GAP), (width / 2, GAP))
     for letter, end, anchor in zip(plane.ends, ends, ("lm", "rm", "md", "ma"), strict=True):
-        draw.text(end, letter, LETTER, font, anchor)
+        draw.text(end, letter, LETTER, font, anchor, stroke_width=1, stroke_fill="black")
     return picture
 
 
@@ -104,7 +104,7 @@ def sample_at(grid: Grid, at: Sequence[float] | None = None) -> Place:
     return place
 
 
-def words_at(grid: Grid, point: Sequence[float], labels: Mapping[str, Label]) -> str:
+def words_at(grid: Grid, point: Sequence[float], labels: Labels) -> str:
     """Return words about the sample at a point of the world: its place, value and labels."""
     letters, words = LETTERS.get(grid.space.name, ("XYZ", ""))[0], list[str]()
     if place := place_at(grid, point):

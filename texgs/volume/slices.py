@@ -6,7 +6,6 @@ Nothing is interpolated: a slice has the samples of the file, and a place is tha
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import prod
 
 import numpy as np
 
@@ -23,10 +22,8 @@ LAYOUT = {
     "RAS": ((1, -1, 2, 1), (0, -1, 2, 1), (0, -1, 1, 1)),
     "xyz": ((1, 1, 2, 1), (0, 1, 2, 1), (0, 1, 1, 1)),
 }
-Label = tuple[int, np.ndarray | None]  # channel of its mask, and its colour [3]; hidden without one
+Labels = Mapping[str, tuple[int, np.ndarray | None]]  # channel of a mask, and its colour [3]; None: hidden
 COVER = 0.6  # of a label over an image
-SHARES = 0.005, 0.995  # of the samples, below a window and up to its end
-MOST = 1_000_000  # samples that tell a window
 
 
 @dataclass(frozen=True)
@@ -124,15 +121,13 @@ def windowed(values: np.ndarray, low: float, high: float) -> np.ndarray:
 @lru_cache(maxsize=2)  # all frames of a moving cut have the same
 def window_of(grid: Grid) -> tuple[float, float]:
     """Return the values that 99 % of the first channel are between; of every n-th sample along each axis."""
-    step = round((prod(grid.dims) / MOST) ** (1 / 3)) or 1
+    step = max(grid.dims) // 100 or 1
     samples = grid.values[::step, ::step, ::step]
-    low, high = np.quantile(samples, SHARES).tolist()
+    low, high = np.quantile(samples, (0.005, 0.995)).tolist()
     return (low, high) if low < high else (float(samples.min()), float(samples.max()))
 
 
-def slice_colors(
-    values: Callable[[int], np.ndarray], window: Sequence[float], labels: Mapping[str, Label]
-) -> np.ndarray:
+def slice_colors(values: Callable[[int], np.ndarray], window: Sequence[float], labels: Labels) -> np.ndarray:
     """Return colours [..., 3], uint8: grey levels of the first channel, and labels over them.
 
     Values [...] are those that a function tells of a channel. Where the first is a label, there is no grey.

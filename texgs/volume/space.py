@@ -63,6 +63,10 @@ class Space:
         """Return places [N, 3] of the world in the space, float64."""
         return np.asarray(places @ self.axes + np.array(self.matrix)[:3, 3])
 
+    def in_world(self, places: np.ndarray) -> np.ndarray:
+        """Return places [N, 3] of the space in the world, float64."""
+        return np.asarray((places - np.array(self.matrix)[:3, 3]) @ np.linalg.inv(self.axes))
+
     def place(self, origin: Triple, lengths: Sequence[float]) -> Triple:
         """Return the place at lengths along the axes of the lattice from an origin."""
         x, y, z = (

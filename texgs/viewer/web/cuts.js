@@ -148,7 +148,8 @@ export class Cuts {
 
   #send(step, box = this.#page.state.scene.cuts.box, window = this.#page.state.scene.cuts.window) {
     const planes = this.planes.filter((each) => each.isOn).map(plain);
-    const cuts = { planes, box, faces: this.#faces.value, window };
+    const kept = window ? { window } : {}; // values of slices
+    const cuts = { planes, box, faces: this.#faces.value || this.#page.state.scene.cuts.faces, ...kept };
     if (same(cuts, this.#page.state.scene.cuts)) this.show();
     else this.#page.state.edit("", "cuts", cuts, step);
   }

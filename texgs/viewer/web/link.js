@@ -3,8 +3,7 @@
 import { timesOf } from "./state.js";
 
 const MOST = 1e6; // of a coordinate
-const MOST_VALUE = 3e38; // of a sample: they have 32 bits
-const MOST_FACTOR = 1000, MOST_PLANES = 6, MOST_REACH = 2;
+const MOST_FACTOR = 1000, MOST_PLANES = 6, MOST_REACH = 2, MOST_MARKERS = 100, MOST_LETTERS = 200;
 
 /** A number between two others; nothing else. */
 const isNumber = (x, low = -MOST, high = MOST) => typeof x === "number" && x >= low && x <= high;
@@ -12,12 +11,13 @@ const areThree = (x, low, high) => Array.isArray(x) && x.length === 3 && x.every
 const isColor = (x) => areThree(x, 0, 1);
 const isFactor = (x) => isNumber(x, 0, MOST_FACTOR);
 const isPlane = (x) => areThree(x?.normal) && Math.hypot(...x.normal) >= 1 / MOST && isNumber(x.offset);
+const isWindow = (x) => Array.isArray(x) && x.length === 2 && x.every(Number.isFinite);
 const isBox = (x) => areThree(x?.low) && areThree(x?.high) && x.low.every((low, i) => low < x.high[i]);
-const isWindow = (x) => Array.isArray(x) && x.length === 2
-  && x.every((end) => isNumber(end, -MOST_VALUE, MOST_VALUE));
 const arePoints = (x, columns, least) => Array.isArray(x) && x.length >= least && x.every((row, i) =>
   Array.isArray(row) && row.length === columns && Number.isFinite(row[0]) && !(row[0] < x[i - 1]?.[0])
   && row.slice(1).every((each) => isNumber(each, 0, 1)));
+const isMarker = (x) => Array.isArray(x?.points) && [1, 2].includes(x.points.length)
+  && x.points.every((point) => areThree(point)) && typeof x.text === "string" && x.text.length <= MOST_LETTERS;
 const isFunction = (x) => arePoints(x?.opacity, 2, 2) && arePoints(x?.color, 4, 1);
 const isShare = (x, scene) => scene.can_shadow && isNumber(x, 0, 1);
 const OF_PART = {
@@ -30,9 +30,10 @@ const OF_SCENE = {
   background: isColor,
   cuts: (x) => Array.isArray(x?.planes) && x.planes.length <= MOST_PLANES && x.planes.every(isPlane)
     && (x.box === null || isBox(x.box)) && ["shaded", "unlit", "slice"].includes(x.faces)
-    && ((x.window ?? null) === null || isWindow(x.window)),
+    && (x.window === undefined || isWindow(x.window)),
   functions: (x, scene) => Boolean(scene.transfer) && typeof x === "object" && !Array.isArray(x)
     && Object.values(x).every(isFunction),
+  markers: (x) => Array.isArray(x) && x.length <= MOST_MARKERS && x.every(isMarker),
   time: (x, scene) => timesOf(scene).includes(x),
 };
 

@@ -12,7 +12,7 @@ export function remoteSlices({ planes, window }) {
     planes,
     window,
     async slice(plane, number, shown) {
-      const answer = await ask(`slice.png?${query("slice", { plane: plane.name, number, window: shown })}`);
+      const answer = await ask(`slice.png?${query("slice", { plane: planes.indexOf(plane), number, window: shown })}`);
       return createImageBitmap(await answer.blob(), { colorSpaceConversion: "none" });
     },
     async place(point) {

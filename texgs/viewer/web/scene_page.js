@@ -9,9 +9,14 @@ import { copyLinkBy } from "./copy_link.js";
 import { Cuts } from "./cuts.js";
 import { Gizmo } from "./gizmo.js";
 import { capital, element } from "./inputs.js";
+import { Legend } from "./legend.js";
 import { LightControl } from "./light.js";
 import { editsOf } from "./link.js";
+import { MarkerShapes } from "./marker_shapes.js";
+import { Measure } from "./measure.js";
 import { ScaleBar } from "./scale_bar.js";
+import { Slices } from "./slices.js";
+import { SlicesInScene } from "./slices_in_scene.js";
 import { difference, edited } from "./state.js";
 
 const REST = 100; // milliseconds after the last movement until a whole frame is drawn
@@ -46,7 +51,7 @@ function isDifferent(scene, edit) {
 
 export class ScenePage {
   #resting = 0; // timer
-  #shown = { mode: "shaded", before: false, only: "", gain: 4, wipe: 0.5 };
+  #shown = { mode: "shaded", before: false, only: "", gain: 4, wipe: 0.5, legend: false };
   #isLocked;
   #marks; // what lies over the picture
 
@@ -65,12 +70,14 @@ export class ScenePage {
     this.notices = notices;
     this.#isLocked = isLocked;
     this.cuts = new Cuts(this);
-    this.#marks = [this.cuts, new BoundingBox(this), new Gizmo(this), new ScaleBar(this)];
+    this.measure = new Measure(this, isLocked);
+    this.#marks = [this.cuts, new BoundingBox(this), new Legend(this), new MarkerShapes(this), new Gizmo(this),
+      new ScaleBar(this)];
     this.bookmarks = new Bookmarks(this);
     this.#inputs();
     control(this.canvas, () => this.camera, () => this.moved(), (name) => this.goTo(name), isLocked);
     copyLinkBy(get("link"), this);
-    centerByDoubleClick(this, isLocked);
+    centerByDoubleClick(this, () => isLocked() || this.measure.isOn);
     state.addEventListener("edit", () => { // who edits wants to see it
       if (this.#shown.before) this.show({ before: false });
     });
@@ -80,13 +87,16 @@ export class ScenePage {
     window.addEventListener("hashchange", () => this.follow());
   }
 
-  /** Draw something else that lies over the picture. */
-  addMark(mark) {
-    this.#marks.push(mark);
+  /** Offer slices of the scene's volume, from a source that `Slices` describes. */
+  addSlices(source) {
+    const space = this.state.scene.space ?? { axes: "xyz", unit: "" };
+    const slices = new Slices(source, space, (text) => this.notices.tell(text, "error"));
+    slices.addEventListener("click", () => this.measure.click(slices.point));
+    this.#marks.push(new SlicesInScene(this, slices, this.#isLocked));
   }
 
   /** What of the scene is shown: `mode`, whether as it was `before`, `only` which model, or all; `gain` and
-   * `wipe` of what is beside its volume. */
+   * `wipe` of what is beside its volume; whether with a `legend`. */
   get shown() {
     return this.#shown;
   }
@@ -194,7 +204,7 @@ export class ScenePage {
 
   #rest(moving) {
     if (moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
-    const { mode } = this.#shown, asked = OPTIONS[mode] ?? ` --mode ${mode}`;
+    const { mode, legend } = this.#shown, asked = (OPTIONS[mode] ?? ` --mode ${mode}`) || (legend ? " --legend" : "");
     get("options").textContent = `texgs render ${this.camera.options(...this.renderer.size())}${asked}`;
     try {
       history.replaceState(null, "", `#${this.#fragment}`);

@@ -5,6 +5,7 @@ import { sizeOf } from "./size.js";
 
 const GAP = 7, LETTER = 13; // CSS pixels: of the crosshair around its place, and the height of letters
 const NOTCH = 50, LINE = 16; // pixels of the wheel for a slice, and of one that counts in lines
+const STILL = 4; // CSS pixels that a click may move
 const CROSS = "#ffd54f";
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 const PAGES = { PageUp: 1, PageDown: -1 };
@@ -15,6 +16,7 @@ export class SliceView {
   #asked = ""; // what the picture is of, or will be
   #isLoading = false;
   #drag = null; // what the pointer does, and where it was
+  #begun = null; // where the latest drag or click did
   #turned = 0; // pixels of the wheel
 
   /**
@@ -82,8 +84,9 @@ export class SliceView {
     const { source, index, window, tell } = this.#slices;
     try {
       const made = await source.slice(this.#plane, index[this.#number], window);
+      const picture = made instanceof ImageData ? await createImageBitmap(made) : made;
       this.#picture?.close();
-      this.#picture = made instanceof ImageData ? await createImageBitmap(made) : made;
+      this.#picture = picture;
       this.draw();
     } catch (error) {
       tell(`No slice: ${error.message}`);
@@ -153,6 +156,7 @@ export class SliceView {
     const canvas = this.#canvas, slices = this.#slices;
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
+      this.#begun = event;
       this.#drag = { isOfWindow: event.button > 0 || event.shiftKey, last: event };
       if (!this.#drag.isOfWindow) this.#pointed(event);
     });
@@ -164,6 +168,10 @@ export class SliceView {
       else this.#pointed(event);
     });
     for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => { this.#drag = null; });
+    canvas.addEventListener("click", ({ clientX, clientY, shiftKey, detail }) => { // also at the end of a drag
+      const moved = Math.hypot(clientX - this.#begun.clientX, clientY - this.#begun.clientY);
+      if (moved < STILL && !shiftKey && detail === 1) slices.dispatchEvent(new Event("click"));
+    });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("dblclick", () => slices.resetWindow());
     canvas.addEventListener("wheel", (event) => {

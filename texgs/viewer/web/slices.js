@@ -16,8 +16,8 @@ export class Slices extends EventTarget {
   #told = 0; // counts places that were asked for
 
   /**
-   * Dispatches "move" when the crosshair, the active plane or the window is another, and "open" when slices are shown
-   * or hidden.
+   * Dispatches "move" when the crosshair, the active plane or the window is another, "click" when it was put somewhere
+   * by a click, and "open" when slices are shown or hidden.
    *
    * @param {{planes: object[], window: number[], slice: Function, place: Function}} source - of samples:
    *   `slice(plane, number, window)` is a promise of an ImageBitmap or ImageData, a pixel a sample, row 0 at the top;

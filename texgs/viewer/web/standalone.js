@@ -6,10 +6,10 @@ import { download, element, toHex } from "./inputs.js";
 import { Notices } from "./notices.js";
 import { PageSlices } from "./page_slices.js";
 import { Panel } from "./panel.js";
+import { drawMarks } from "./picture_marks.js";
 import { ScenePage } from "./scene_page.js";
 import { PictureDialog } from "./size_inputs.js";
-import { Slices } from "./slices.js";
-import { SlicesInScene } from "./slices_in_scene.js";
+import { inFile } from "./space.js";
 import { State, difference } from "./state.js";
 import { TimeSlider } from "./time.js";
 import { TransferEditor } from "./transfer.js";
@@ -28,7 +28,9 @@ class StandalonePage extends ScenePage {
     if (scene.held) this.time = new TimeSlider(this.state, get("time"), () => renderer.isBusy);
     if (scene.volume) {
       this.compare = new Compare(this);
-      this.#addSlices(scene);
+      const source = new PageSlices(renderer.samples, this.state);
+      this.addSlices(source);
+      get("slices").append(element("p", { className: "hint" }, source.words));
       if (scene.transfer && Object.keys(scene.tfs).length) new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
     }
     this.state.addEventListener("change", () => {
@@ -36,13 +38,6 @@ class StandalonePage extends ScenePage {
       if (scene.volume) this.#limitModes();
     });
     this.follow();
-  }
-
-  #addSlices({ space }) {
-    const source = new PageSlices(this.renderer.samples, this.state);
-    const slices = new Slices(source, space ?? { axes: "xyz", unit: "" }, (text) => this.notices.tell(text, "error"));
-    get("slices").append(element("p", { className: "hint" }, source.words));
-    this.addMark(new SlicesInScene(this, slices, () => false));
   }
 
   draw(moving) {
@@ -68,7 +63,7 @@ class StandalonePage extends ScenePage {
 
   #tellWords() {
     const { original, scene } = this.state, edits = difference(original, scene);
-    const isFunctions = ({ key }) => key === "functions", words = edits.filter((edit) => !isFunctions(edit)).flatMap(wordsOf);
+    const isFunctions = ({ key }) => key === "functions", words = edits.filter((edit) => !isFunctions(edit)).flatMap((edit) => wordsOf(edit, scene.space));
     tell("words", words.map(quoted).join(" "));
     if (scene.transfer) tell("functions", edits.filter(isFunctions).map(({ value }) => `functions: ${JSON.stringify(value)}`).join());
   }
@@ -76,7 +71,9 @@ class StandalonePage extends ScenePage {
   /** Save a picture of the view, by default in the pixels of the screen. */
   async #save(how) {
     try {
-      const canvas = await this.renderer.still(this.camera, this.state.scene, { ...this.shown, ...how });
+      const { before, legend } = this.shown, { original, scene } = this.state;
+      const canvas = await this.renderer.still(this.camera, scene, { ...this.shown, ...how });
+      drawMarks(canvas, before ? original : scene, this.camera, legend);
       const blob = await new Promise((done) => canvas.toBlob(done));
       if (!blob) throw new Error("This browser cannot make a picture of this size.");
       download(blob, `${this.state.scene.name}.png`);
@@ -93,7 +90,7 @@ function tell(id, text) {
 }
 
 /** An edit as `texgs edit` takes it. */
-function wordsOf({ part, key, value }) {
+function wordsOf({ part, key, value }, space) {
   const place = part ? `${part}.${key}` : key;
   if (key === "light") return `light=${value ? `${value.azimuth},${value.polar}` : "headlight"}`;
   if (key === "cuts") {
@@ -102,12 +99,17 @@ function wordsOf({ part, key, value }) {
     const window = value.window ? [`cut.window=${value.window}`] : [];
     return ["cut=", ...planes, `cut.box=${box}`, `cut.faces=${value.faces}`, ...window];
   }
+  if (key === "markers") {
+    const words = ({ points, text }) => `${points.length > 1 ? "distance" : "marker"}=${text ? `${text}@` : ""}`
+      + points.map((point) => inFile(point, space).map((x) => Number(x.toPrecision(9))).join()).join(":");
+    return ["marker=none", ...value.map(words)];
+  }
   return `${place}=${Array.isArray(value) ? toHex(value) : value ?? ""}`;
 }
 
 /** A word as a shell takes it. */
 function quoted(word) {
-  return /^[\w./#,=+-]*$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
+  return /^[\w./#,=+:@-]*$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
 }
 
 async function start() {

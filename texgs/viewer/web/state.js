@@ -9,9 +9,10 @@ const UNEDITED = {
   tint: [1, 1, 1],
 };
 const MOST_STEPS = 200; // of the history: of more, the oldest cannot be undone
+const MOST_NAMED = 3; // markers in the title of a step
 const OF_SCENE = {
   light: null, shadows: 0, occlusion: 0, reach: 0.25, background: [1, 1, 1],
-  cuts: { planes: [], box: null, faces: "shaded", window: null }, functions: {}, time: null,
+  cuts: { planes: [], box: null, faces: "shaded" }, functions: {}, markers: [], time: null,
 };
 
 /** Numbers of the steps in time that can be shown: all, or those that a page holds. */
@@ -53,7 +54,7 @@ function partsOf(scene) {
 
 /** What the list of steps calls an edit. */
 export function titleOf({ part, key, value }) {
-  const ofScene = { cuts: titleOfCuts, functions: (functions) => Object.keys(functions).join(", ") };
+  const ofScene = { cuts: titleOfCuts, functions: (functions) => Object.keys(functions).join(", "), markers: titleOfMarkers };
   const title = value && ofScene[key] ? ofScene[key](value) : titleOfValue(value);
   return `${part} ${key} ${title}`.trim();
 }
@@ -63,6 +64,11 @@ function titleOfCuts({ planes, box, faces }) {
   if (box) words.push("box");
   if (words.length && faces !== "shaded") words.push(faces);
   return words.join(", ") || "none";
+}
+
+function titleOfMarkers(markers) {
+  if (markers.length > MOST_NAMED) return `${markers.length}`;
+  return markers.map(({ text, points }) => text || (points.length > 1 ? "distance" : "point")).join(", ") || "none";
 }
 
 function titleOfValue(value) {
