@@ -103,6 +103,17 @@ def test_what_is_far_from_one_channel_is_not_leapt_over_in_another(device):
     assert sums[2] == pytest.approx(sums[0] + sums[1], rel=1e-4)
 
 
+def test_channels_that_are_passed_by_where_they_show_nothing_change_no_bit(three, device):
+    caster = Caster(three, LOOK, device)
+    known = caster.cast(TFS, CAMERA, SIDE, OUTPUTS)
+    ((key, (*arguments, own), kept),) = caster._prepared
+    assert all(0 < cells.count_nonzero() < 0.9 * cells.numel() for cells in own)
+    caster._prepared[:] = [(key, (*arguments, None), kept)]
+    unknown = caster.cast(TFS, CAMERA, SIDE, OUTPUTS)
+    for one, other in zip(vars(known).values(), vars(unknown).values(), strict=True):
+        assert torch.equal(one, other)
+
+
 def test_a_prepared_file_has_each_channel_as_it_is_alone(three, tmp_path):
     sources = [ArraySource(three.channel(k), f"c{k}") for k in range(3)]
     keys = {"up": "+z", "reduce": 2, "crop": (1, 25, 0, 20, 2, 22)}
@@ -240,4 +251,4 @@ def test_the_library_refuses_channels_that_do_not_fit_together():
         n = len(volumes)
         arrays = (NativeVolume * n)(*volumes), (NativeTransfer * n)(*[transfer] * n)
         with pytest.raises(ArgumentError, match=message):
-            native.call("texgs_cast", *arrays, n, distance, cells, view, device=torch.device("cpu"))
+            native.call("texgs_cast", *arrays, n, distance, cells, None, view, device=torch.device("cpu"))

@@ -50,10 +50,11 @@ def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) ->
     for name, each in points.items():
         wanted = each.values_of or ""
         mask = None if each.within is None else mask_name(each.within)
-        for channel in filter(None, (wanted if len(known) > 1 else None, mask)):
+        for channel in [wanted] * (len(known) > 1) + [mask] * (mask is not None):
             if channel not in known:
                 raise ArgumentError(
-                    f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got {channel}"
+                    f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got "
+                    f"{channel or None}"
                 )
         number = [*known].index(wanted) if wanted in known else 0
         summary = [*known.values()][number]

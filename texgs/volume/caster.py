@@ -58,7 +58,7 @@ native.declare("texgs_volume_bricks", NativeVolume, "p", result=c_int64, stream=
 native.declare("texgs_volume_extremes", NativeVolume, "pp")
 native.declare("texgs_volume_distance", NativeVolume, "p", NativeTransfer, "p")
 native.declare("texgs_volume_cells", NativeVolume, "p", NativeTransfer, "p")
-native.declare("texgs_cast", NativeVolume, NativeTransfer, "ipp", NativeView)
+native.declare("texgs_cast", NativeVolume, NativeTransfer, "ippp", NativeView)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +116,8 @@ class Caster:
     ) -> Cast:
         """Cast a view, with what else is wanted of OUTPUTS, in one pass; without gradients and skew.
 
-        Of several functions each has a channel of its own: extinctions add up, and colours are means that
-        these weigh.
+        Of several functions each has a channel of its own, or a mask: extinctions add up, and colours are
+        means that these weigh.
 
         Samples stay where they are without a depth range, and count for what of their step lies in it: two
         parts of a ray join. Over an opacity unit behind the faces of a cut, normals are those of its planes,
@@ -189,12 +189,13 @@ class Caster:
         key, last = (tfs, by_cell), [*self._prepared]  # another thread may prepare others
         prepared = next((each for each in last if each[0] == key), None)
         if prepared is None:
-            kept = [self._shown(tf, by_cell) for tf in tfs]  # arrays of the library do not keep tensors
-            volumes, transfers, distances, cells = zip(*kept, strict=True)
+            volumes, transfers, distances, cells = zip(*(self._shown(tf, by_cell) for tf in tfs), strict=True)
             arrays = (NativeVolume * len(tfs))(*volumes), (NativeTransfer * len(tfs))(*transfers)
             nearest = torch.stack(distances).amin(dim=0)
             in_any = reduce(torch.bitwise_or, cells) if by_cell else None
-            prepared = key, (*arrays, len(tfs), nearest, in_any), kept
+            own = torch.stack(cells) if by_cell and len(tfs) > 1 else None
+            kept = volumes, transfers  # arrays of the library do not keep tensors
+            prepared = key, (*arrays, len(tfs), nearest, in_any, own), kept
             self._prepared[:] = [prepared, *last[: CACHE_SIZE - 1]]
         return prepared
 
@@ -226,7 +227,7 @@ class Caster:
         tfs = [*tfs]
         prepared = next((each for each in [*self._prepared] if each[0][0] == tfs), None)
         _, arguments, kept = prepared or self._prepare(tfs, False)
-        return arguments[:-1], kept
+        return arguments[:4], kept
 
     def channel(self, number: int) -> tuple[native.Struct, Tensor]:
         """Return a channel for the library, and the extremes of its bricks [bricks, 2]."""

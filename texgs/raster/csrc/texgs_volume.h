@@ -92,9 +92,9 @@ typedef struct {
 
 /* Volumes [n] of one lattice, each of its own type and with its transfer function, show together what all of them show:
  * where several do, extinctions add up, and colours are means that these weigh. distance: the least of theirs; cells:
- * those of any of them, or NULL where these are not known. */
+ * those of any of them; own [n, bricks, 2]: those of each. Both, or the latter, are NULL where they are not known. */
 TEXGS_API int32_t texgs_cast(const texgs_volume*, const texgs_transfer*, int32_t n, const uint8_t* distance,
-                             const uint32_t* cells, const texgs_cast_view*, void* stream);
+                             const uint32_t* cells, const uint32_t* own, const texgs_cast_view*, void* stream);
 
 /* What a volume is at points, and a transfer function there, mask or not; each of them may be NULL. Beyond the box it
  * is as at the nearest point of it. */

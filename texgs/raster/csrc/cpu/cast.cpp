@@ -50,6 +50,22 @@ struct Places {
     vf cell[kVectors][3], inside[kVectors][3];
 };
 
+// Where cells are among those that may show something.
+struct CellBits {
+    vi brick, word, bit;
+
+    TEXGS_INLINE CellBits(const Lattice& lattice, const vf (&cell)[3]) {
+        const vi x = truncate(cell[0]), y = truncate(cell[1]), z = truncate(cell[2]);
+        const vi row = (z >> 2) * splat(lattice.bricks[1]) + (y >> 2);
+        brick = row * splat(lattice.bricks[0]) + (x >> 2);
+        word = brick * splat(2) + ((z >> 1) & splat(1));
+        bit = (z & splat(1)) * splat(16) + (y & splat(3)) * splat(4) + (x & splat(3));
+    }
+    TEXGS_INLINE vm are_in(const uint32_t* cells) const {
+        return is_set(gather(reinterpret_cast<const int32_t*>(cells), word), bit);
+    }
+};
+
 // What a ray gathers.
 struct Sums {
     vf color[3], normal[3], depth = 0.0f;
@@ -122,12 +138,9 @@ private:
     vm are_visible(const CastRay& ray, vf k) const {
         vf corner[3], inside[3];
         locate(ray, k, corner, inside);
-        const vi x = truncate(corner[0]), y = truncate(corner[1]), z = truncate(corner[2]);
-        const vi row = (z >> 2) * splat(lattice_.bricks[1]) + (y >> 2), half = (z >> 1) & splat(1);
-        const vi brick = row * splat(lattice_.bricks[0]) + (x >> 2);
-        if (!job_.cells) return to_float(gather_bytes(job_.distance, brick) & splat(255)) < vf(0.5f);
-        const vi words = gather(reinterpret_cast<const int32_t*>(job_.cells), brick * splat(2) + half);
-        return is_set(words, (z & splat(1)) * splat(16) + (y & splat(3)) * splat(4) + (x & splat(3)));
+        const CellBits at(lattice_, corner);
+        if (!job_.cells) return to_float(gather_bytes(job_.distance, at.brick) & splat(255)) < vf(0.5f);
+        return at.are_in(job_.cells);
     }
 
     // Cells of samples and the places in them.
@@ -149,26 +162,28 @@ private:
         for (int c = 0; c < job_.n; ++c) {
             const CastTable& t = job_.channels[c].table;
             vm shown[kVectors];
-            for (int i = 0; i < vectors; ++i)
-                shown[i] = to_float(iota()) < vf(static_cast<float>(waiting.n - i * kLanes));
-            if (job_.channels[c].within) keep_inside(ray, at, vectors, job_.channels[c].within, shown);
-            fetch(ray, at, vectors, job_.channels[c].values, job_.channels[c].type, Rows::of_cell);
+            choose(ray, waiting, at, vectors, job_.channels[c], shown);
+            fetch(ray, at, vectors, job_.channels[c], Rows::of_cell, shown);
             for (int i = 0; i < vectors; ++i) {
+                if (c == 0) all[i] = 0.0f;
+                value[c][i] = through[c][i] = 0.0f;
+                if (!any(shown[i])) continue;
                 const vf v = values_in(blocks_[i], at.inside[i]), opacity = Intervals(t, v).mixed(t.opacity);
                 const vm visible = (vf(t.value[0]) <= v) & (v <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
                 const vf lengths =
                     vf(job_.view.step / job_.view.opacity_unit) * share(ray, load(waiting.k + i * kLanes));
                 value[c][i] = v;
                 through[c][i] = zero_unless(visible & shown[i], log2_through(opacity, lengths));
-                all[i] = c ? all[i] + through[c][i] : through[c][i];
+                all[i] += through[c][i];
             }
         }
         for (int i = 0; i < vectors && sums.light >= kOpaque; ++i) {
             const float* const k = waiting.k + i * kLanes;
             const vf weight = absorb(ray, k, opacity_of(all[i]), sums);
             for (int c = 0; c < job_.n; ++c) {
-                const vf part = weight * (through[c][i] / all[i]);
-                seen_[c].add(load(k), value[c][i], part, (vf(0.0f) < weight) & (through[c][i] < vf(0.0f)));
+                const vm is_seen = (vf(0.0f) < weight) & (through[c][i] < vf(0.0f));
+                if (!any(is_seen)) continue;
+                seen_[c].add(load(k), value[c][i], weight * (through[c][i] / all[i]), is_seen);
                 if (seen_[c].is_full()) shade(ray, c, sums);
             }
         }
@@ -197,7 +212,7 @@ private:
         const int vectors = seen.vectors();
         Places at;
         locate(ray, seen, vectors, at);
-        fetch(ray, at, vectors, job_.channels[c].values, job_.channels[c].type, Rows::around);
+        fetch(ray, at, vectors, job_.channels[c], Rows::around);
         for (int i = 0; i < vectors; ++i) {
             vf slope[3];
             differences_in(blocks_[i], at.inside[i], slope);
@@ -238,20 +253,25 @@ private:
         for (int i = 0; i < vectors; ++i) locate(ray, load(samples.k + i * kLanes), at.cell[i], at.inside[i]);
     }
 
-    // Loads the blocks around samples.
-    TEXGS_INLINE void fetch(const CastRay& ray, const Places& at, int vectors, const void* values, int32_t type,
-                            Rows rows) {
-        with_type(values, type, [&](auto samples) {
-            for (int i = 0; i < vectors; ++i) blocks_[i].fetch(samples, job_.volume.size, at.cell[i], ray.ahead, rows);
-        });
-    }
-
-    // Keeps those of samples that are inside of a mask.
-    void keep_inside(const CastRay& ray, const Places& at, int vectors, const uint8_t* mask, vm (&chosen)[kVectors]) {
+    // Chooses those of the first samples that are in cells of a channel, and in its mask.
+    TEXGS_INLINE void choose(const CastRay& ray, const Queue& waiting, const Places& at, int vectors,
+                             const CastChannel& channel, vm (&chosen)[kVectors]) {
         for (int i = 0; i < vectors; ++i) {
-            blocks_[i].fetch(mask, job_.volume.size, at.cell[i], ray.ahead, Rows::of_cell);
+            chosen[i] = to_float(iota()) < vf(static_cast<float>(waiting.n - i * kLanes));
+            if (channel.cells) chosen[i] = chosen[i] & CellBits(lattice_, at.cell[i]).are_in(channel.cells);
+            if (!channel.within || !any(chosen[i])) continue;
+            blocks_[i].fetch(channel.within, job_.volume.size, at.cell[i], ray.ahead, Rows::of_cell);
             chosen[i] = chosen[i] & (vf(TEXGS_INSIDE) <= values_in(blocks_[i], at.inside[i]));
         }
+    }
+
+    // Loads the blocks around vectors of samples: all, or those of which some are chosen.
+    TEXGS_INLINE void fetch(const CastRay& ray, const Places& at, int vectors, const CastChannel& channel, Rows rows,
+                            const vm* chosen = nullptr) {
+        with_type(channel.values, channel.type, [&](auto samples) {
+            for (int i = 0; i < vectors; ++i)
+                if (!chosen || any(chosen[i])) blocks_[i].fetch(samples, job_.volume.size, at.cell[i], ray.ahead, rows);
+        });
     }
 
     void write(int64_t pixel, const Sums& sums) const {

@@ -89,7 +89,7 @@ int32_t texgs_extinction(const texgs_volume* volume, const texgs_transfer* trans
         const std::vector<PointTable> tables(transfer, transfer + n);
         CastChannel channels[TEXGS_CHANNELS];
         for (int c = 0; c < n; ++c)
-            channels[c] = {volume[c].values, volume[c].type, transfer[c].within, tables[c].view};
+            channels[c] = {volume[c].values, volume[c].type, transfer[c].within, nullptr, tables[c].view};
         const ExtinctionJob job{*volume, n, channels, distance, opacity_unit, planes, n_planes, *cells, extinction};
         parallel_for(int64_t(cells->size[1]) * cells->size[2], 4, [&](int64_t begin, int64_t end, int) {
             for (int64_t i = begin; i < end; ++i)

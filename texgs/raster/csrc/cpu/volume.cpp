@@ -90,20 +90,21 @@ void clear(const texgs_cast_view& view) {
 using namespace texgs;
 
 int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, int32_t n, const uint8_t* distance,
-                   const uint32_t* cells, const texgs_cast_view* view, void*) {
+                   const uint32_t* cells, const uint32_t* own, const texgs_cast_view* view, void*) {
     return guarded([&] {
         check_channels(volume, transfer, n);
         for (int c = 0; c < n; ++c) check_transfer(transfer[c]);
         check_cast(*view);
         clear(*view);
         int32_t size[3];
-        count_bricks(*volume, size);
+        const int64_t words = 2 * count_bricks(*volume, size);
         const Shown shown(distance, size);
         if (!shown.any()) return;
         const std::vector<PointTable> tables(transfer, transfer + n);
         CastJob job{*volume, *view, n, {}, distance, cells, {}, {}};
         for (int c = 0; c < n; ++c)
-            job.channels[c] = {volume[c].values, volume[c].type, transfer[c].within, tables[c].view};
+            job.channels[c] = {volume[c].values, volume[c].type, transfer[c].within, own ? own + c * words : nullptr,
+                               tables[c].view};
         for (int a = 0; a < 3; ++a) {
             job.lower[a] = static_cast<float>(kBrick * shown.lower[a]);
             job.upper[a] = static_cast<float>(std::min(kBrick * shown.upper[a], volume->size[a] - 1));

@@ -24,6 +24,7 @@ struct CastChannel {
     const void* values;
     int32_t type;
     const uint8_t* within;  // mask, or NULL
+    const uint32_t* cells;  // [bricks, 2] its own, or NULL
     CastTable table;
 };
 
@@ -33,7 +34,7 @@ struct CastJob {
     int32_t n;
     CastChannel channels[TEXGS_CHANNELS];
     const uint8_t* distance;   // [bricks]
-    const uint32_t* cells;     // [bricks, 2], or NULL
+    const uint32_t* cells;     // [bricks, 2] of any channel, or NULL
     float lower[3], upper[3];  // corners of a box that holds all bricks in which something shows, in samples
 };
 

@@ -120,8 +120,8 @@ __device__ inline Exposure<float> exposed(const texgs_cast_view& view, const Lig
 template <class T, int kMost>
 __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volume, const Channels channels,
                                                         const uint8_t* distance, const uint32_t* cells,
-                                                        const texgs_cast_view view, const LightCells light_cells,
-                                                        int tiles) {
+                                                        const uint32_t* own, const texgs_cast_view view,
+                                                        const LightCells light_cells, int tiles) {
     const int x = static_cast<int>(blockIdx.x) % tiles * kTileX + static_cast<int>(threadIdx.x) % kTileX;
     const int y = static_cast<int>(blockIdx.x) / tiles * kTileY + static_cast<int>(threadIdx.x) / kTileX;
     if (x >= view.width || y >= view.height) return;
@@ -129,6 +129,7 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
     const Lamp lamp = lamp_of(view);
     const CastRay ray = cast_ray(lattice, view, x, y);
     const int n = kMost == 1 ? 1 : channels.n;
+    const int64_t bricks = int64_t(lattice.bricks[0]) * lattice.bricks[1] * lattice.bricks[2];
     float light = 1.0f, depth = 0.0f, median = 0.0f, color[3] = {}, normal[3] = {};
     for (int k = ray.first; k < ray.samples && light >= kOpaque;) {
         float place[3];
@@ -154,6 +155,7 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
         float value[kMost], through[kMost], all = 0.0f;
         for (int c = 0; c < n; ++c) {
             through[c] = 0.0f;
+            if (kMost > 1 && own && !spot.is_among(own + 2 * (c * bricks + at_brick), brick)) continue;
             if (!channels.has(c, spot)) continue;
             value[c] = spot.value(channels.samples<T>(c));
             through[c] = log2_through_at(channels.transfer[c], value[c], lengths);
@@ -276,7 +278,7 @@ int32_t texgs_volume_cells(const texgs_volume* volume, const uint8_t* distance, 
 }
 
 int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, int32_t n, const uint8_t* distance,
-                   const uint32_t* cells, const texgs_cast_view* view, void* on) {
+                   const uint32_t* cells, const uint32_t* own, const texgs_cast_view* view, void* on) {
     return on_device_of(view->rgba, on, [&](cudaStream_t stream) {
         check_channels(volume, transfer, n);
         check_cast(*view);
@@ -286,7 +288,7 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, i
         with_type_of(volume, n, [&](auto sample) {
             const auto kernel =
                 n == 1 ? cast_kernel<decltype(sample), 1> : cast_kernel<decltype(sample), TEXGS_CHANNELS>;
-            launch(kernel, int64_t(tiles) * rows, kThreads, stream, *volume, channels, distance, cells, *view,
+            launch(kernel, int64_t(tiles) * rows, kThreads, stream, *volume, channels, distance, cells, own, *view,
                    light_cells, tiles);
         });
     });
